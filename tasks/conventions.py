@@ -1,0 +1,74 @@
+"""Axes, classes and channel names: the one table from which Parquet, Zarr and the docs are labelled.
+
+ISO 8855 vehicle axes: x forward, y left, z up; pitch positive nose-down, heave positive up.
+Camera axes: x right, y down, z forward. Poses are 4x4 matrices ``T_a_b`` taking b-coordinates to a;
+quaternions are wxyz. SI units; any other unit stands in the name. NaN means "not represented".
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class SemanticClass(IntEnum):
+    """What a Gaussian, and so a pixel, belongs to. 0 is a pixel that no Gaussian covers."""
+
+    SKY = 0
+    ROAD = 1
+    MARKING = 2
+    KERB = 3
+    SIDEWALK = 4
+    BUILDING = 5
+    VEGETATION = 6
+    VEHICLE = 7
+    POLE = 8
+    TERRAIN = 9
+    OTHER = 10
+
+
+ROAD_CLASSES = (SemanticClass.ROAD, SemanticClass.MARKING)
+"""Classes that carry the water film and the snow cover, and that follow the road profile."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One telemetry column: its name, unit, the paper's symbol and, where CF has one, the standard name."""
+
+    name: str
+    unit: str
+    symbol: str
+    description: str
+    standard_name: str = ""
+
+
+TICK_CHANNELS: tuple[Channel, ...] = (
+    Channel(name="t_ns", unit="ns", symbol="t", description="time since the start of the clip", standard_name="time"),
+    Channel(name="station", unit="m", symbol="s", description="front-axle route coordinate"),
+    Channel(name="speed", unit="m s-1", symbol="v", description="longitudinal speed", standard_name="platform_speed_wrt_ground"),
+    Channel(name="longitudinal_acceleration", unit="m s-2", symbol="dv/dt", description="rate of change of speed"),
+    Channel(name="braking_slip_f", unit="1", symbol="kappa_f", description="braking slip, front axle (ISO slip is its negative)"),
+    Channel(name="braking_slip_r", unit="1", symbol="kappa_r", description="braking slip, rear axle (ISO slip is its negative)"),
+    Channel(name="wheel_speed_f", unit="rad s-1", symbol="omega_f", description="wheel angular speed, front axle"),
+    Channel(name="wheel_speed_r", unit="rad s-1", symbol="omega_r", description="wheel angular speed, rear axle"),
+    Channel(name="tyre_force_f", unit="N", symbol="F_x,f", description="longitudinal braking force, front axle, rearward positive"),
+    Channel(name="tyre_force_r", unit="N", symbol="F_x,r", description="longitudinal braking force, rear axle, rearward positive"),
+    Channel(name="axle_load_f", unit="N", symbol="F_z,f", description="half-car contact load, front axle; half of it per wheel"),
+    Channel(name="axle_load_r", unit="N", symbol="F_z,r", description="half-car contact load, rear axle; half of it per wheel"),
+    Channel(name="tyre_load_f", unit="N", symbol="F_z,f^tyre", description="the load that fed the front tyre force"),
+    Channel(name="tyre_load_r", unit="N", symbol="F_z,r^tyre", description="the load that fed the rear tyre force"),
+    Channel(name="brake_torque_f", unit="N m", symbol="T_b,f", description="brake torque after ABS, front axle"),
+    Channel(name="brake_torque_r", unit="N m", symbol="T_b,r", description="brake torque after ABS, rear axle"),
+    Channel(name="abs_scale_f", unit="1", symbol="q_f", description="share of the commanded torque that ABS lets through, front"),
+    Channel(name="abs_scale_r", unit="1", symbol="q_r", description="share of the commanded torque that ABS lets through, rear"),
+    Channel(name="brake_pressure_mpa", unit="MPa", symbol="p_b", description="commanded brake pressure"),
+    Channel(name="heave", unit="m", symbol="z_s", description="body heave about static equilibrium, up positive", standard_name="platform_heave"),
+    Channel(name="heave_rate", unit="m s-1", symbol="dz_s/dt", description="rate of heave"),
+    Channel(name="pitch", unit="rad", symbol="theta", description="body pitch about static equilibrium, nose-down positive", standard_name="platform_pitch_fore_down"),
+    Channel(name="pitch_rate", unit="rad s-1", symbol="dtheta/dt", description="rate of pitch"),
+    Channel(name="unsprung_heave_f", unit="m", symbol="z_u,f", description="front axle height about static equilibrium"),
+    Channel(name="unsprung_heave_r", unit="m", symbol="z_u,r", description="rear axle height about static equilibrium"),
+    Channel(name="road_height_f", unit="m", symbol="z_r,f", description="road elevation under the front axle"),
+    Channel(name="road_height_r", unit="m", symbol="z_r,r", description="road elevation under the rear axle"),
+    Channel(name="road_force", unit="N", symbol="F_x,road", description="longitudinal force of the road slope, forward positive"),
+    Channel(name="contact_f", unit="1", symbol="", description="front axle touches the road"),
+    Channel(name="contact_r", unit="1", symbol="", description="rear axle touches the road"),
+)  # fmt: skip

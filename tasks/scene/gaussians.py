@@ -1,0 +1,72 @@
+"""A cloud of 3D Gaussians: the scene as the rasteriser sees it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gaussians:
+    """N anisotropic Gaussians in the world frame (ISO 8855: z up) [m].
+
+    Parameters
+    ----------
+    means : float32 [N, 3] centres [m]
+    quats_wxyz : float32 [N, 4] unit quaternions, local axes to world [1]
+    scales : float32 [N, 3] standard deviations along the local axes [m]
+    opacities : float32 [N] peak opacity in (0, 1] [1]
+    sh : float32 [N, K, 3] spherical-harmonic colour, K = 1, 4, 9 or 16, band order of the INRIA layout;
+        colour = max(SH(direction) + 0.5, 0) [1]
+    normals : float32 [N, 3] unit normals, world frame [1]
+    class_id : uint8 [N] `SemanticClass`
+    display_encoded : the colours blend in sRGB display space (scenes trained on pictures) and the
+        picture is linearised after blending; False: they are linear light
+    """
+
+    means: NDArray[np.float32]
+    quats_wxyz: NDArray[np.float32]
+    scales: NDArray[np.float32]
+    opacities: NDArray[np.float32]
+    sh: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    class_id: NDArray[np.uint8]
+    display_encoded: bool = False
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+
+def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
+    """Raise `InputError` naming every array with a wrong shape, a NaN or a value out of range."""
+    n = len(gaussians.means)
+    problems = []
+    shapes = {
+        "means": (n, 3), "quats_wxyz": (n, 4), "scales": (n, 3), "opacities": (n,), "normals": (n, 3), "class_id": (n,),
+    }  # fmt: skip
+    for name, shape in shapes.items():
+        if getattr(gaussians, name).shape != shape:
+            problems.append(f"{place}: {name} must have shape {shape}; it has {getattr(gaussians, name).shape}")
+    if gaussians.sh.ndim != 3 or gaussians.sh.shape[0] != n or gaussians.sh.shape[1:] not in {(k, 3) for k in (1, 4, 9, 16)}:
+        problems.append(f"{place}: sh must have shape ({n}, 1|4|9|16, 3); it has {gaussians.sh.shape}")
+    if problems:
+        raise InputError(problems)
+    for name in ("means", "quats_wxyz", "scales", "opacities", "sh", "normals"):
+        values = getattr(gaussians, name).reshape(n, -1)
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+        if len(bad):
+            problems.append(
+                f"{place}: {name} must be finite; {len(bad)} of {n} Gaussians are not, the first is number {bad[0]}"
+            )
+    if not problems:
+        for name, ok, rule in (
+            ("scales", (gaussians.scales > 0).all(axis=1), "positive"),
+            ("opacities", (gaussians.opacities > 0) & (gaussians.opacities <= 1), "in (0, 1]"),
+        ):
+            if not ok.all():
+                bad = np.flatnonzero(~ok)
+                problems.append(f"{place}: {name} must be {rule}; {len(bad)} of {n} are not, the first is number {bad[0]}")
+    if problems:
+        raise InputError(problems)
