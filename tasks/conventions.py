@@ -72,3 +72,37 @@ TICK_CHANNELS: tuple[Channel, ...] = (
     Channel(name="contact_f", unit="1", symbol="", description="front axle touches the road"),
     Channel(name="contact_r", unit="1", symbol="", description="rear axle touches the road"),
 )  # fmt: skip
+
+FRAME_CHANNELS: tuple[Channel, ...] = (
+    Channel(name="frame", unit="1", symbol="", description="frame number in the clip"),
+    Channel(name="tick", unit="1", symbol="", description="row of the tick table that the frame shows"),
+    Channel(name="T_world_rig", unit="1", symbol="P", description="rig-to-world pose with heave and pitch, 4x4 row-major; translation in m"),
+    Channel(name="recovered_pitch", unit="rad", symbol="theta^", description="pitch recovered from the finished frames, relative to frame 0"),
+    Channel(name="recovered_progress", unit="m", symbol="p^", description="forward progress recovered from the finished frames"),
+)  # fmt: skip
+
+CLIP_CHANNELS: tuple[Channel, ...] = (
+    Channel(name="precipitation_mm_h", unit="mm h-1", symbol="r", description="rain rate, or water-equivalent snow rate"),
+    Channel(name="snow_accumulation_h", unit="h", symbol="tau_s", description="time over which the snow has fallen"),
+    Channel(name="initial_speed_km_h", unit="km h-1", symbol="v_0", description="speed at the start of the clip"),
+    Channel(name="peak_pressure_mpa", unit="MPa", symbol="p_b", description="brake pressure after the ramp"),
+    Channel(name="ramp_s", unit="s", symbol="", description="rise time of the brake pressure"),
+    Channel(name="hold_s", unit="s", symbol="", description="time at the peak pressure; null to the end"),
+    Channel(name="release_s", unit="s", symbol="", description="fall time of the brake pressure"),
+    Channel(name="brake_onset_s", unit="s", symbol="t_b", description="brake onset by time"),
+    Channel(name="brake_onset_m", unit="m", symbol="", description="brake onset by route position"),
+    Channel(name="hazard_center_m", unit="m", symbol="s_g", description="route coordinate of the road feature's centre"),
+    Channel(name="hazard_length_m", unit="m", symbol="L_g", description="length of the road feature"),
+    Channel(name="hazard_height_m", unit="m", symbol="A_g", description="height of the road feature; negative is a depression"),
+    Channel(name="film_depth_mm", unit="mm", symbol="h_t", description="total water-film depth"),
+    Channel(name="snow_depth_mm", unit="mm", symbol="h_s", description="snow depth"),
+    Channel(name="snow_coverage", unit="1", symbol="c_s", description="snow coverage of the road"),
+    Channel(name="surface_friction", unit="1", symbol="mu_c", description="reference surface coefficient"),
+    Channel(name="tyre_peak", unit="1", symbol="mu_eff", description="effective peak of the tyre curve"),
+    Channel(name="stop_time", unit="s", symbol="t_s", description="time of the stop since the start of the clip"),
+    Channel(name="stopping_distance", unit="m", symbol="d_stop", description="distance from brake onset to the stop"),
+    Channel(name="peak_pitch", unit="rad", symbol="", description="largest nose-down pitch of the clip"),
+    Channel(name="static_pitch", unit="rad", symbol="theta_0", description="pitch of the resting body, not contained in the pitch column"),
+)  # fmt: skip
+
+CHANNELS_BY_NAME: dict[str, Channel] = {c.name: c for c in (*TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS)}

@@ -1,0 +1,124 @@
+"""Scenario grids: a YAML file of named axes whose product is a list of scenarios."""
+
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from catalogs.scenario import Scenario, scenario_problems
+from tasks.errors import InputError
+
+GRID_FOLDER = Path(__file__).parent
+
+
+class PartialScenario(BaseModel):
+    """The scenario fields that one level of an axis sets; the rest keep their defaults."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    weather: Literal["dry", "rain", "snow"] | None = None
+    precipitation_mm_h: float | None = None
+    snow_accumulation_h: float | None = None
+    initial_speed_km_h: float | None = None
+    peak_pressure_mpa: float | None = None
+    ramp_s: float | None = None
+    hold_s: float | None = None
+    release_s: float | None = None
+    brake_onset_s: float | None = None
+    brake_onset_m: float | None = None
+    hazard_center_m: float | None = None
+    hazard_length_m: float | None = None
+    hazard_height_m: float | None = None
+
+
+class GridFile(BaseModel):
+    """A grid as written in YAML."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    name: str = Field(min_length=1)
+    scene: str = "street"
+    vehicle: str = "paper-reference"
+    surface: str = "dense-asphalt"
+    camera: str = "dashcam-480x320"
+    vehicle_mode: Literal["paper", "coupled"] = "paper"
+    frames: int = Field(default=81, ge=2)
+    frame_rate_hz: float = Field(default=10.0, gt=0, le=1000)
+    seed: int = Field(default=2025, ge=0, lt=2**53)
+    base: PartialScenario = PartialScenario()
+    axes: dict[str, dict[str, PartialScenario]] = Field(min_length=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grid:
+    """A validated grid: what all clips share, and the labelled scenarios in order."""
+
+    settings: GridFile
+    scenarios: tuple[tuple[str, Scenario], ...]
+
+
+def grid_names() -> list[str]:
+    """Names of the grids that ship with the project."""
+    return sorted(path.stem for path in GRID_FOLDER.glob("*.yaml"))
+
+
+def load_grid(source: str | Path) -> Grid:
+    """Read and check a grid by catalogue name or file.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file at once.
+    """
+    path = Path(source)
+    if path.suffix not in {".yaml", ".yml"}:
+        path = GRID_FOLDER / f"{source}.yaml"
+    if not path.is_file():
+        raise InputError(f"{source}: no such grid; give a YAML file or one of: {', '.join(grid_names())}")
+    try:
+        content = yaml.safe_load(path.read_text())
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: a grid must be valid YAML; {' '.join(str(error).split())}") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: a grid must be a YAML mapping; it is {type(content).__name__}")
+    try:
+        settings = GridFile.model_validate(content)
+    except ValidationError as error:
+        raise InputError([_sentence(path, problem) for problem in error.errors()]) from None
+    return expand_grid(settings, str(path))
+
+
+def expand_grid(settings: GridFile, place: str) -> Grid:
+    """The product of the axes, later axes over earlier ones over ``base``, each scenario checked."""
+    base = settings.base.model_dump(exclude_none=True)
+    problems: dict[str, list[str]] = {}
+    scenarios = []
+    for combination in product(*(levels.items() for levels in settings.axes.values())):
+        label = "/".join(level for level, _ in combination)
+        merged: dict[str, Any] = dict(base)
+        for _, partial in combination:
+            merged |= partial.model_dump(exclude_none=True)
+        scenario = Scenario(**merged)
+        scenarios.append((label, scenario))
+        for problem in scenario_problems(scenario):
+            problems.setdefault(problem, []).append(label)
+    if problems:
+        raise InputError([f"{place}: scenario {_some(labels)}: {problem}" for problem, labels in problems.items()])
+    return Grid(settings=settings, scenarios=tuple(scenarios))
+
+
+def _some(labels: list[str]) -> str:
+    return labels[0] if len(labels) == 1 else f"{labels[0]} and {len(labels) - 1} more"
+
+
+def _sentence(path: Path, problem: Any) -> str:
+    place = ".".join(str(part) for part in problem["loc"]) or "the file"
+    if problem["type"] == "extra_forbidden":
+        known = GridFile.model_fields if len(problem["loc"]) == 1 else PartialScenario.model_fields
+        return f"{path}: {place}: unknown key; known here are {', '.join(known)}"
+    if problem["type"] == "missing":
+        return f"{path}: {place}: this key is required; it is missing"
+    return f"{path}: {place}: {problem['msg'].removeprefix('Input ').lower()}; it is {problem['input']!r}"

@@ -1,0 +1,89 @@
+"""One scenario: the weather q, the controls u and the road g that everything else follows from."""
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Literal
+
+Weather = Literal["dry", "rain", "snow"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """The controls of one clip (paper, Eq. overall_pipeline: q, u, g), flat as they stand in a Parquet row.
+
+    Parameters
+    ----------
+    weather : dry, rain or snow
+    precipitation_mm_h : rain rate, or water-equivalent snow rate [mm/h]
+    snow_accumulation_h : time over which the snow has fallen [h]
+    initial_speed_km_h : speed at the start of the clip [km/h]
+    peak_pressure_mpa : brake pressure after the ramp; 0 coasts [MPa]
+    ramp_s : rise time of the pressure [s]
+    hold_s : time at the peak before the release; None holds to the end [s]
+    release_s : fall time of the pressure after the hold [s]
+    brake_onset_s, brake_onset_m : brake onset by time [s] or by route position [m]; one of them
+    hazard_center_m, hazard_length_m : where on the route the road feature lies and how long it is [m]
+    hazard_height_m : positive a hump, negative a depression, 0 a flat road [m]
+    """
+
+    weather: Weather = "dry"
+    precipitation_mm_h: float = 0.0
+    snow_accumulation_h: float = 0.0
+    initial_speed_km_h: float = 60.0
+    peak_pressure_mpa: float = 0.0
+    ramp_s: float = 0.5
+    hold_s: float | None = None
+    release_s: float = 0.5
+    brake_onset_s: float | None = None
+    brake_onset_m: float | None = None
+    hazard_center_m: float = 0.0
+    hazard_length_m: float = 0.0
+    hazard_height_m: float = 0.0
+
+    def as_row(self) -> dict[str, Any]:
+        """The fields in order, for a manifest, a table row or a content id."""
+        return asdict(self)
+
+
+SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario))
+
+
+def scenario_problems(scenario: Scenario) -> list[str]:
+    """Every rule the scenario breaks by itself, each as one sentence; empty when it is sound."""
+    s = scenario
+    problems = []
+    for name in ("precipitation_mm_h", "snow_accumulation_h", "peak_pressure_mpa", "hazard_length_m", "ramp_s", "release_s"):
+        if getattr(s, name) < 0:
+            problems.append(f"{name} must not be negative; it is {getattr(s, name):g}")
+    if s.initial_speed_km_h <= 0:
+        problems.append(f"initial_speed_km_h must be positive; it is {s.initial_speed_km_h:g}")
+    if s.weather == "dry" and s.precipitation_mm_h > 0:
+        problems.append(f"weather dry has no precipitation; precipitation_mm_h is {s.precipitation_mm_h:g}: name rain or snow")
+    if s.weather != "dry" and s.precipitation_mm_h == 0:
+        problems.append(f"weather {s.weather} needs precipitation_mm_h above 0; it is 0")
+    if s.weather == "snow" and s.snow_accumulation_h == 0:
+        problems.append("weather snow needs an accumulation time; snow_accumulation_h is 0: give the hours of snowfall")
+    if s.weather != "snow" and s.snow_accumulation_h > 0:
+        problems.append(f"snow_accumulation_h belongs to snow; the weather is {s.weather} and it is {s.snow_accumulation_h:g}")
+    if s.peak_pressure_mpa > 0 and (s.brake_onset_s is None) == (s.brake_onset_m is None):
+        problems.append("braking (peak_pressure_mpa above 0) needs exactly one of brake_onset_s and brake_onset_m")
+    for name in ("brake_onset_s", "brake_onset_m", "hold_s"):
+        value = getattr(s, name)
+        if value is not None and value < 0:
+            problems.append(f"{name} must not be negative; it is {value:g}")
+    if s.hazard_height_m != 0 and s.hazard_length_m == 0:
+        problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
+    return problems
+
+
+def route_problems(scenario: Scenario, route_length_m: float, scene: str) -> list[str]:
+    """Rules that tie the scenario to the route it drives on."""
+    if scenario.hazard_height_m == 0:
+        return []
+    start = scenario.hazard_center_m - scenario.hazard_length_m / 2
+    end = scenario.hazard_center_m + scenario.hazard_length_m / 2
+    if start < 0 or end > route_length_m:
+        return [
+            f"the hazard must lie on the route of scene {scene} (0 to {route_length_m:.1f} m);"
+            f" it reaches from {start:.2f} to {end:.2f} m: move hazard_center_m or shorten hazard_length_m"
+        ]
+    return []

@@ -1,0 +1,66 @@
+"""Frames as Zarr v3 arrays [clip, frame, y, x(, channel)]: one chunk a frame, one shard a clip.
+
+A shard has one writer. An absent shard reads as fill values, so completeness comes from the receipts and the
+manifest, never from the arrays. Every chunk ends in a CRC-32C, because Blosc alone lets flipped bits through.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from zarr.codecs import BloscCodec, Crc32cCodec
+
+from manifests.canonical import sha256_of
+
+ARRAYS: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "rgb": ("uint8", ("channel",), "sRGB-encoded colour"),
+    "depth": ("float32", (), "camera z [m], rounded to 13 mantissa bits; NaN where nothing is seen"),
+    "class": ("uint8", (), "semantic class"),
+}
+
+
+def create_arrays(path: Path, clips: int, frames: int, height: int, width: int, attributes: Mapping[str, Any]) -> None:
+    """Create the group and its arrays, once, before any clip is written."""
+    group = zarr.create_group(path, overwrite=False, attributes=dict(attributes))
+    for name, (dtype, extra, meaning) in ARRAYS.items():
+        tail = (height, width) + (3,) * len(extra)
+        group.create_array(
+            name,
+            shape=(clips, frames, *tail),
+            chunks=(1, 1, *tail),
+            shards=(1, frames, *tail),
+            dtype=dtype,
+            fill_value=float("nan") if dtype == "float32" else 0,
+            compressors=[
+                BloscCodec(cname="zstd", clevel=3, shuffle="bitshuffle", typesize=np.dtype(dtype).itemsize),
+                Crc32cCodec(),
+            ],
+            dimension_names=("clip", "frame", "y", "x", *extra),
+            attributes={"long_name": meaning},
+        )
+
+
+def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> None:
+    """Write one clip's whole shard of every array; ``buffers`` maps array name to [frame, y, x(, channel)]."""
+    group = zarr.open_group(path, mode="r+")
+    for name in ARRAYS:
+        _array(group, name)[index] = buffers[name]
+
+
+def read_clip(path: Path, index: int, name: str) -> np.ndarray:
+    """One clip's frames of one array, decoded and checksum-verified."""
+    return np.asarray(_array(zarr.open_group(path, mode="r"), name)[index])
+
+
+def buffer_hash(buffer: np.ndarray) -> str:
+    """SHA-256 of the decoded pixels with their shape and type."""
+    values = np.ascontiguousarray(buffer)
+    return sha256_of([f"{values.dtype.str} {values.shape}\n".encode(), values.data.cast("B")])
+
+
+def _array(group: zarr.Group, name: str) -> zarr.Array:
+    array = group[name]
+    assert isinstance(array, zarr.Array)
+    return array

@@ -1,0 +1,103 @@
+"""Telemetry as Arrow tables and Parquet files, labelled from the one table of conventions."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from manifests.canonical import sha256_of
+from tasks.conventions import CHANNELS_BY_NAME
+
+ROW_GROUP_ROWS = 100_000
+
+
+def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | None = None) -> pa.Table:
+    """An Arrow table whose fields carry unit, symbol, CF name and description.
+
+    Parameters
+    ----------
+    columns : name to array, one row a sample; a 2-D array becomes a fixed-size list column
+    constants : name to a value repeated in every row; text is dictionary-encoded
+    """
+    arrays: dict[str, pa.Array] = {}
+    rows = len(next(iter(columns.values())))
+    for name, value in (constants or {}).items():
+        array = pa.repeat(pa.scalar(value, type=_constant_type(value)), rows)
+        arrays[name] = array.dictionary_encode() if isinstance(value, str) else array
+    for name, values in columns.items():
+        values = np.asarray(values)
+        if values.ndim == 2:
+            arrays[name] = pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
+        else:
+            arrays[name] = pa.array(values)
+    fields = [pa.field(name, array.type, metadata=_labels(name)) for name, array in arrays.items()]
+    return pa.Table.from_arrays(list(arrays.values()), schema=pa.schema(fields))
+
+
+def write_parquet(table: pa.Table, path: Path) -> None:
+    """Write to a neighbour and rename, so that the file is whole or absent."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".partial")
+    floats = [field.name for field in table.schema if pa.types.is_floating(field.type)]
+    pq.write_table(
+        table,
+        partial,
+        compression="zstd",
+        compression_level=3,
+        row_group_size=ROW_GROUP_ROWS,
+        use_dictionary=[field.name for field in table.schema if pa.types.is_dictionary(field.type)],
+        column_encoding={name: "BYTE_STREAM_SPLIT" for name in floats},
+        write_page_checksum=True,
+    )
+    partial.replace(path)
+
+
+def read_columns(path: Path, clip_id: str | None = None) -> dict[str, np.ndarray]:
+    """The columns of a Parquet file as NumPy arrays, of one clip where it is named."""
+    filters = None if clip_id is None else [("clip_id", "==", clip_id)]
+    return table_columns(pq.read_table(path, filters=filters))
+
+
+def table_columns(table: pa.Table) -> dict[str, np.ndarray]:
+    """Column name to NumPy array; a fixed-size list column comes back as 2-D."""
+    columns = {}
+    for name in table.column_names:
+        column = table[name].combine_chunks()
+        if pa.types.is_fixed_size_list(column.type):
+            columns[name] = column.flatten().to_numpy().reshape(len(column), -1)
+        else:
+            columns[name] = column.to_numpy(zero_copy_only=False)
+    return columns
+
+
+def columns_hash(columns: Mapping[str, np.ndarray], names: Iterable[str]) -> str:
+    """SHA-256 over the named columns' decoded bytes: the same on any Arrow version."""
+    parts: list[bytes | memoryview] = []
+    for name in names:
+        values = np.ascontiguousarray(columns[name])
+        parts += [f"{name} {values.dtype.str} {values.shape}\n".encode(), values.data.cast("B")]
+    return sha256_of(parts)
+
+
+def _constant_type(value: Any) -> pa.DataType:
+    if isinstance(value, bool):
+        return pa.bool_()
+    if isinstance(value, int):
+        return pa.int64()
+    return pa.string() if isinstance(value, str) else pa.float64()
+
+
+def _labels(name: str) -> dict[str, str] | None:
+    channel = CHANNELS_BY_NAME.get(name)
+    if channel is None:
+        return None
+    labels = {
+        "units": channel.unit,
+        "symbol": channel.symbol,
+        "standard_name": channel.standard_name,
+        "description": channel.description,
+    }
+    return {key: text for key, text in labels.items() if text}

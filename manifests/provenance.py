@@ -1,0 +1,61 @@
+"""What code, on what libraries and processor, makes the data: recorded so that a difference can be named."""
+
+import importlib.metadata
+import platform
+from functools import lru_cache
+from pathlib import Path
+
+from manifests.canonical import sha256_of, sha256_of_file
+
+SOURCE_ROOT = Path(__file__).resolve().parents[1]
+SOURCE_PACKAGES = ("flows", "manifests", "catalogs", "tasks")
+RECORDED_LIBRARIES = (
+    "numpy", "scipy", "numba", "llvmlite", "torch", "pyarrow", "pandas", "zarr", "numcodecs",
+    "opencv-python-headless", "dask", "distributed", "prefect",
+)  # fmt: skip
+
+
+@lru_cache
+def source_hashes() -> dict[str, str]:
+    """SHA-256 of every Python source file and catalogue entry of the project, by relative path."""
+    return {
+        path.relative_to(SOURCE_ROOT).as_posix(): sha256_of_file(path)
+        for package in SOURCE_PACKAGES
+        for path in sorted((SOURCE_ROOT / package).rglob("*"))
+        if path.suffix in {".py", ".yaml"} and "__pycache__" not in path.parts
+    }
+
+
+@lru_cache
+def source_hash() -> str:
+    """One SHA-256 over `source_hashes` of the code; catalogue entries are hashed where they are used."""
+    code = {path: digest for path, digest in source_hashes().items() if path.endswith(".py")}
+    return sha256_of(f"{path} {digest}\n".encode() for path, digest in code.items())
+
+
+def code_version() -> dict[str, str]:
+    """The project's version and the hash of its source."""
+    return {"version": importlib.metadata.version("musync"), "source_sha256": source_hash()}
+
+
+def library_versions() -> dict[str, str]:
+    """Installed versions of the libraries whose arithmetic or encoding reaches the data."""
+    return {"python": platform.python_version()} | {
+        name: importlib.metadata.version(name) for name in RECORDED_LIBRARIES
+    }
+
+
+def processor() -> dict[str, str]:
+    """Architecture and, where the kernel tells, the model and vector extensions of the processor."""
+    facts = {"architecture": platform.machine()}
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text().splitlines():
+            key, _, value = line.partition(":")
+            if key.strip() == "model name":
+                facts["model"] = value.strip()
+            elif key.strip() == "flags":
+                known = {"avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl"}
+                facts["vector_extensions"] = " ".join(sorted(known.intersection(value.split())))
+                break
+    return facts
