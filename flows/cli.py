@@ -1,0 +1,220 @@
+"""The ``musync`` command: reads arguments, calls one function, prints what it returned."""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from tasks.errors import InputError
+
+DONE, CHECK_FAILED, INPUT_WRONG, BROKEN = 0, 1, 2, 3
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
+scene_app = typer.Typer(no_args_is_help=True, help="Build a scene from recordings or other tools.")
+app.add_typer(scene_app, name="scene")
+
+Json = Annotated[bool, typer.Option("--json", help="Print the JSON instead of text.")]
+Out = Annotated[str | None, typer.Option(help="Folder for the JSON this command writes.")]
+Runner = Annotated[str, typer.Option(help="threads, processes or dask.")]
+Workers = Annotated[int | None, typer.Option(help="How many at once; by default one a processor.", min=1)]
+Scheduler = Annotated[str | None, typer.Option(help="tcp:// or tls:// address of a running Dask scheduler.")]
+Prefect = Annotated[bool, typer.Option("--prefect", help="Run as a Prefect flow; implied by PREFECT_API_URL.")]
+
+
+@app.command()
+def generate(
+    grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")],
+    out: Annotated[str, typer.Option(help="Dataset folder: new, empty, or an unfinished run of the same grid.")],
+    runner: Runner = "dask",
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    backend: Annotated[str, typer.Option(help="Rasteriser: auto, cpu or gsplat.")] = "auto",
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Make the dataset of a scenario grid, or what is missing of it."""
+    report = _call("generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend)
+    layout = report.layout
+    _show(
+        {
+            "run_id": report.run_id,
+            "clips": report.clips,
+            "made": report.made,
+            "dataset": str(layout.root),
+            "manifest": str(layout.manifest),
+            "contact_sheet": str(layout.previews / "contact_sheet.png"),
+        },
+        as_json,
+    )
+
+
+@app.command()
+def audit(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    share: Annotated[float, typer.Option(help="Share of the clips to make again.")] = 0.1,
+    out: Out = None,
+    runner: Runner = "dask",
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Verify every hash of a dataset and make a share of it again."""
+    result = _call(
+        "audit", prefect, dataset, share=share, out=out, runner=runner, workers=workers, scheduler=scheduler
+    )
+    _show(result, as_json)
+    if not result["verified"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def describe(dataset: Annotated[str, typer.Argument()], as_json: Json = False) -> None:
+    """Say what is in a dataset."""
+    _show(_call("describe", False, dataset), as_json)
+
+
+@app.command()
+def validate(grid: Annotated[str, typer.Argument()], as_json: Json = False) -> None:
+    """Check a grid without making anything."""
+    _show(_call("validate", False, grid), as_json)
+
+
+@app.command()
+def sensitivity(out: Out = None, as_json: Json = False) -> None:
+    """Reproduce the paper's bounded surface-parameter study (Appendix E) beside its printed figures."""
+    result = _call("sensitivity", False, out=out)
+    _show(result, as_json)
+    if not all(row["agrees"] for row in result["beside_print"]):
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def agreement(
+    traces: Annotated[str, typer.Argument(help="Folder with cases.json and the traces as Parquet.")],
+    vehicle: Annotated[str, typer.Option(help="Vehicle name or file.")] = "paper-reference",
+    mode: Annotated[str, typer.Option(help="paper or coupled.")] = "paper",
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Hold the vehicle model against reference traces, as the paper's Appendix A.2 does."""
+    _show(_call("agreement", False, traces, vehicle=vehicle, mode=mode, out=out), as_json)
+
+
+@app.command()
+def render(
+    scene: Annotated[str, typer.Argument(help="Scene folder, or street.")],
+    pose: Annotated[str, typer.Option(help="JSON file: viewmat 4x4, K 3x3, width, height.")],
+    out: Annotated[str, typer.Option(help="Folder for rgb.png and the buffers.")],
+    backend: Annotated[str, typer.Option(help="auto, cpu or gsplat.")] = "auto",
+    as_json: Json = False,
+) -> None:
+    """Render one frame of a scene at a world-to-camera pose."""
+    _show(_call("render_pose", False, scene, pose, out, backend=backend), as_json)
+
+
+@app.command()
+def bench(
+    name: Annotated[str | None, typer.Argument(help="One benchmark; by default all.")] = None,
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Measure speed and memory beside a peer in the same run."""
+    _show(_call("bench", False, name, out=out), as_json)
+
+
+@scene_app.command("from-stereo")
+def scene_from_stereo(
+    folder: Annotated[str, typer.Argument(help="calib.txt, poses.txt, image_l/, image_r/.")],
+    out: Annotated[str, typer.Option(help="Scene folder to make.")],
+    as_json: Json = False,
+) -> None:
+    """Build a Gaussian scene from a posed stereo sequence."""
+    _show(_call("scene_from_stereo", False, folder, out), as_json)
+
+
+@scene_app.command("import")
+def scene_import(
+    gaussians: Annotated[str, typer.Argument(help=".ply, compressed .ply, .splat or .spz file.")],
+    route: Annotated[str, typer.Option(help="Route: CSV, KITTI poses, TUM or nerfstudio transforms.json.")],
+    out: Annotated[str, typer.Option(help="Scene folder to make.")],
+    as_json: Json = False,
+) -> None:
+    """Make a scene of Gaussians trained elsewhere and a route through them."""
+    _show(_call("scene_import", False, gaussians, route, out), as_json)
+
+
+def _call(name: str, prefect: bool, *args: Any, **kwargs: Any) -> Any:
+    """Call a pipeline function, as a Prefect flow where one is asked for."""
+    return _function(name, prefect or "PREFECT_API_URL" in os.environ)(*args, **kwargs)
+
+
+def _function(name: str, as_flow: bool) -> Callable[..., Any]:
+    # imports are late so that each command loads only the libraries it needs
+    if as_flow:
+        from flows import prefect_flows
+
+        if hasattr(prefect_flows, name):
+            function: Callable[..., Any] = getattr(prefect_flows, name)
+            return function
+    from importlib import import_module
+
+    module = {
+        "generate": "generate", "audit": "audit", "describe": "describe", "validate": "describe",
+        "sensitivity": "studies", "agreement": "studies", "bench": "studies",
+        "scene_from_stereo": "scenes", "scene_import": "scenes", "render_pose": "scenes",
+    }[name]  # fmt: skip
+    function = getattr(import_module(f"flows.{module}"), name)
+    return function
+
+
+def _show(value: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(value, indent=1))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, soft_wrap=True)
+    for key, entry in value.items():
+        if isinstance(entry, list) and entry and isinstance(entry[0], dict):
+            table = Table(title=key, title_justify="left")
+            for column in entry[0]:
+                table.add_column(column, overflow="fold")
+            for row in entry:
+                table.add_row(*(_text(row.get(column)) for column in entry[0]))
+            Console(highlight=False).print(table)
+        else:
+            console.print(f"{key}: {_text(entry)}")
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    if isinstance(value, list):
+        return ", ".join(_text(item) for item in value)
+    return "-" if value is None else str(value)
+
+
+def main() -> None:
+    """Entry point: exit codes 0 done, 1 a check failed, 2 the input is wrong, 3 something broke."""
+    from flows.failures import ClipsFailed, disk_full_sentence
+
+    try:
+        app(standalone_mode=True)
+    except InputError as error:
+        for problem in error.problems:
+            print(f"musync: {problem}", file=sys.stderr)
+        sys.exit(INPUT_WRONG)
+    except ClipsFailed as error:
+        print(f"musync: {error}", file=sys.stderr)
+        sys.exit(BROKEN)
+    except OSError as error:
+        sentence = disk_full_sentence(error)
+        if sentence is None:
+            raise
+        print(f"musync: {sentence}", file=sys.stderr)
+        sys.exit(INPUT_WRONG)

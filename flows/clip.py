@@ -1,0 +1,215 @@
+"""One clip from its scenario to its committed receipt: the work that is fanned out.
+
+A clip is made whole by one worker. Its frames and tables are written first and its receipt last, by rename:
+where the receipt exists, the clip is complete. Making a clip twice writes the same bytes.
+"""
+
+import resource
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catalogs.cameras import load_camera
+from catalogs.gates import load_gates
+from catalogs.scenario import Scenario
+from catalogs.scenes import load_scene
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from flows.plan import ClipPlan, Plan, read_plan
+from flows.store.frames import ARRAYS, buffer_hash, write_clip
+from flows.store.layout import Layout, write_json
+from flows.store.telemetry import columns_hash, labelled_table, write_parquet
+from manifests.canonical import sha256_of_file
+from tasks.conventions import TICK_CHANNELS
+from tasks.eval.motion_agreement import pose_verdict
+from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.render.backend import select_backend
+from tasks.render.camera import Camera, body_poses
+from tasks.render.clip import render_clip
+from tasks.render.road_edit import apply_road_profile
+from tasks.scene.scene import Scene
+from tasks.surface.friction import surface_friction
+from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
+from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Controls, Rollout, rollout
+
+TICK_RATE_HZ = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Catalogue:
+    """The entries that a dataset was planned with, read from the dataset's own frozen copies."""
+
+    vehicle: Vehicle
+    surface: SurfaceParameters
+    camera: Camera
+    scene: Scene
+
+
+@lru_cache(maxsize=2)
+def catalogue_of(root: Path) -> Catalogue:
+    """Load a dataset's frozen inputs and its scene."""
+    inputs = Layout(root).inputs
+    return Catalogue(
+        vehicle=load_vehicle(inputs / "vehicle.yaml"),
+        surface=load_surface(inputs / "surface.yaml"),
+        camera=load_camera(inputs / "camera.yaml"),
+        scene=load_scene(read_plan(root).settings.scene),
+    )
+
+
+def make_clip(root: str, index: int) -> dict[str, Any]:
+    """Make and commit clip ``index`` of the dataset at ``root``; returns its receipt."""
+    started = time.process_time(), time.perf_counter()
+    layout = Layout(Path(root))
+    plan = read_plan(layout.root)
+    clip = plan.clips[index]
+    catalogue = catalogue_of(layout.root)
+
+    facts, ride = drive(clip.scenario, catalogue, plan.settings.vehicle_mode, plan.duration_s)
+    frames = frame_rows(ride, plan, catalogue)
+    buffers = picture(clip.scenario, facts, frames, plan, catalogue)
+    frames |= judge(buffers, frames, catalogue)
+    verdict = frames.pop("verdict")
+
+    write_clip(layout.frames, index, buffers)
+    identity = {"clip_id": clip.clip_id, "label": clip.label, "weather": clip.scenario.weather}
+    write_parquet(labelled_table(ride.columns, identity), layout.staged(clip.clip_id, "ticks"))
+    write_parquet(labelled_table(frames, identity | facts), layout.staged(clip.clip_id, "frames"))
+    shards = {name: layout.frame_shard(name, index) for name in ARRAYS}
+    receipt = {
+        "index": clip.index,
+        "clip_id": clip.clip_id,
+        "label": clip.label,
+        "seed": clip.seed,
+        "scenario": clip.scenario.as_row(),
+        "artifacts": {layout.relative(path): sha256_of_file(path) for path in shards.values()},
+        "content": {name: buffer_hash(buffers[name]) for name in ARRAYS}
+        | {"ticks": columns_hash(ride.columns, [channel.name for channel in TICK_CHANNELS]),
+           "frames": columns_hash(frames, sorted(frames))},
+        "figures": _json_numbers(facts | {
+            "stop_time": ride.stop_time,
+            "stopping_distance": ride.stopping_distance,
+            "peak_pitch": float(ride.columns["pitch"].max()),
+            "static_pitch": ride.static_pitch,
+            "calibration_extrapolated": ride.calibration_extrapolated,
+        }),
+        "verdict": verdict,
+    }  # fmt: skip
+    write_json(layout.receipt(clip.clip_id), receipt)
+    cost = {
+        "cpu_s": time.process_time() - started[0],
+        "wall_s": time.perf_counter() - started[1],
+        "peak_memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    return receipt | {"cost": cost}
+
+
+def drive(
+    scenario: Scenario, catalogue: Catalogue, mode: str, duration_s: float
+) -> tuple[dict[str, Any], Rollout]:
+    """Weather to surface state to friction to vehicle motion."""
+    weather = Weather(
+        kind=scenario.weather,
+        precipitation_mm_h=scenario.precipitation_mm_h,
+        snow_accumulation_h=scenario.snow_accumulation_h,
+    )
+    state = surface_state(weather, catalogue.surface)
+    friction = surface_friction(weather, state, catalogue.surface)
+    controls = Controls(
+        initial_speed=scenario.initial_speed_km_h / 3.6,
+        brake=BrakeCommand(
+            peak_pressure_mpa=scenario.peak_pressure_mpa,
+            ramp_s=scenario.ramp_s,
+            hold_s=scenario.hold_s,
+            release_s=scenario.release_s,
+            onset_s=scenario.brake_onset_s,
+            onset_station_m=scenario.brake_onset_m,
+        ),
+        hold_speed_until_brake=False,
+    )
+    ride = rollout(
+        catalogue.vehicle, scenario.weather, friction, controls, hazard_of(scenario), mode=mode, duration_s=duration_s
+    )
+    facts = {
+        "film_depth_mm": state.film_depth_mm,
+        "snow_depth_mm": state.snow_depth_mm,
+        "snow_coverage": state.snow_coverage,
+        "surface_friction": friction,
+        "tyre_peak": ride.tyre_peak,
+    }
+    return facts, ride
+
+
+def hazard_of(scenario: Scenario) -> RoadHazard:
+    """The scenario's road feature."""
+    return RoadHazard(
+        center_m=scenario.hazard_center_m, length_m=scenario.hazard_length_m, height_m=scenario.hazard_height_m
+    )
+
+
+def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:
+    """The tick that each frame shows, and the rig pose at it."""
+    frame = np.arange(plan.settings.frames)
+    tick = np.rint(frame * TICK_RATE_HZ / plan.settings.frame_rate_hz).astype(np.int64)
+    rows = {"frame": frame, "tick": tick} | {name: column[tick] for name, column in ride.columns.items()}
+    vehicle = catalogue.vehicle
+    poses = body_poses(
+        catalogue.scene.route, rows["station"], rows["heave"], rows["pitch"],
+        cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
+    )  # fmt: skip
+    return rows | {"T_world_rig": poses.reshape(len(frame), 16)}
+
+
+def picture(
+    scenario: Scenario, facts: Mapping[str, Any], frames: Mapping[str, NDArray[Any]], plan: Plan, catalogue: Catalogue
+) -> dict[str, NDArray[Any]]:
+    """The clip's finished frames, depth and class."""
+    hazard = hazard_of(scenario)
+    scene = catalogue.scene
+    gaussians = scene.gaussians
+    if hazard.height_m != 0:
+        gaussians, _ = apply_road_profile(
+            gaussians, scene.route,
+            lambda station: road_elevation(station, hazard), lambda station: road_slope(station, hazard),
+            scene.carriageway_left, scene.carriageway_right,
+        )  # fmt: skip
+    return render_clip(
+        gaussians, scene.environment, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
+        film_depth_mm=facts["film_depth_mm"], snow_coverage=facts["snow_coverage"],
+        backend=select_backend(plan.backend),
+    )  # fmt: skip
+
+
+def judge(
+    buffers: Mapping[str, NDArray[Any]], frames: Mapping[str, NDArray[Any]], catalogue: Catalogue
+) -> dict[str, Any]:
+    """Motion recovered from the finished frames, held against the telemetry."""
+    recovered = recover_motion_pnp(
+        buffers["rgb"], buffers["depth"], catalogue.camera.K, catalogue.camera.T_rig_camera, class_id=buffers["class"]
+    )
+    verdict = pose_verdict(recovered, frames["pitch"], frames["station"], load_gates())
+    return {
+        "recovered_pitch": recovered.pitch,
+        "recovered_progress": recovered.progress,
+        "verdict": _json_numbers(verdict.as_row()),
+    }
+
+
+def clip_plan_of(root: Path, clip_id: str) -> ClipPlan:
+    """The planned clip of that id."""
+    return next(clip for clip in read_plan(root).clips if clip.clip_id == clip_id)
+
+
+def _json_numbers(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Plain JSON values; NaN, which means "not represented", becomes null."""
+    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in values.items()}
+    return {key: None if isinstance(value, float) and np.isnan(value) else value for key, value in plain.items()}

@@ -1,0 +1,135 @@
+"""A grid to a dataset: plan, make the missing clips, seal."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from flows.clip import make_clip
+from flows.failures import ClipsFailed, disk_full_sentence
+from flows.orchestration import stage
+from flows.plan import Plan, make_plan, plan_differences, read_plan
+from flows.progress import progress_bar
+from flows.runner import RunnerName, open_executor, run_unordered
+from flows.seal import seal
+from flows.store.frames import create_arrays
+from flows.store.layout import Layout, clear_partial_files, write_atomically, write_json
+from tasks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunReport:
+    """What a generating run did."""
+
+    layout: Layout
+    run_id: str
+    clips: int
+    made: int
+    cost: dict[str, dict[str, float]] = field(default_factory=dict)
+
+
+def generate(
+    grid: str,
+    out: str,
+    *,
+    runner: RunnerName = "dask",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    backend: str = "auto",
+) -> RunReport:
+    """Make the dataset of ``grid`` in ``out``, or what is missing of it.
+
+    Raises
+    ------
+    InputError
+        For a faulty grid, or a folder that holds something else.
+    ClipsFailed
+        If clips failed; run the same command again to make just those.
+    """
+    layout = Layout(Path(out).resolve())
+    plan = stage(prepare)(grid, layout, backend)
+    if layout.manifest.is_file():
+        return RunReport(layout=layout, run_id=plan.run_id, clips=len(plan.clips), made=0)
+    missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
+    cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
+    stage(seal)(layout, plan)
+    return RunReport(layout=layout, run_id=plan.run_id, clips=len(plan.clips), made=len(missing), cost=cost)
+
+
+def prepare(grid: str, layout: Layout, backend: str) -> Plan:
+    """Check and freeze the plan, and lay out the folder; resumes a folder that holds the same plan."""
+    from tasks.render.backend import select_backend
+
+    plan, inputs = make_plan(grid, select_backend(backend).name)
+    if layout.plan.is_file():
+        existing = read_plan(layout.root)
+        if existing.run_id != plan.run_id:
+            differences = plan_differences(plan.as_json(), existing.as_json())
+            raise InputError(
+                f"{layout.root}: holds the dataset of another run: {'; '.join(differences[:5])}; give an empty folder"
+            )
+        clear_partial_files(layout)
+        return existing
+    if layout.root.exists() and (not layout.root.is_dir() or any(layout.root.iterdir())):
+        raise InputError(f"{layout.root}: must be an empty or new folder, or a muSync dataset; it holds other files")
+    for name, content in inputs.items():
+        write_atomically(layout.inputs / name, content)
+    write_json(layout.inputs / "grid.json", plan.settings.model_dump(mode="json"))
+    create_frame_arrays(layout, plan)
+    # last: where the plan exists, the folder is ready to be filled
+    write_json(layout.plan, plan.as_json())
+    return plan
+
+
+def create_frame_arrays(layout: Layout, plan: Plan) -> None:
+    """Create the empty Zarr arrays of a plan."""
+    from catalogs.cameras import load_camera
+
+    camera = load_camera(layout.inputs / "camera.yaml")
+    attributes = {
+        "camera": camera.name,
+        "K": camera.K.tolist(),
+        "T_rig_camera": camera.T_rig_camera.tolist(),
+        "frame_rate_hz": plan.settings.frame_rate_hz,
+        "axes": "rig: x forward, y left, z up (ISO 8855); camera: x right, y down, z forward",
+    }
+    clips, frames = len(plan.clips), plan.settings.frames
+    create_arrays(layout.frames, clips, frames, camera.height, camera.width, attributes)
+
+
+def fan_out(
+    layout: Layout,
+    plan: Plan,
+    indices: list[int],
+    runner: RunnerName,
+    workers: int | None,
+    scheduler: str | None,
+    make: Callable[[str, int], dict[str, Any]] = make_clip,
+) -> dict[str, dict[str, float]]:
+    """Make the clips on the runner; returns what each cost (CPU and wall seconds, peak memory)."""
+    cost: dict[str, dict[str, float]] = {}
+    failures: dict[str, BaseException] = {}
+    labels = {clip.index: clip.label for clip in plan.clips}
+    with open_executor(runner, workers, scheduler) as executor, progress_bar("clips", len(indices)) as advance:
+        for (_, index), future in run_unordered(executor, make, ((str(layout.root), index) for index in indices)):
+            error = future.exception()
+            if error is None:
+                cost[labels[index]] = future.result()["cost"]
+                advance(labels[index])
+            elif disk_full_sentence(error) is not None:
+                raise InputError(
+                    f"{layout.root}: the disk is full; {len(cost)} of {len(indices)} clips are committed and kept:"
+                    " free space and run the same command again"
+                )
+            else:
+                failures[labels[index]] = error
+                advance(f"{labels[index]} failed")
+    if failures:
+        first = next(iter(failures.values()))
+        names = ", ".join(sorted(failures))
+        raise ClipsFailed(
+            f"{layout.root}: {len(failures)} of {len(indices)} clips failed ({names}); the first said:"
+            f" {type(first).__name__}: {first}; the others are kept: run the same command again to make just these"
+        ) from first
+    return cost
+

@@ -1,0 +1,177 @@
+"""From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from catalogs.cameras import camera_source
+from catalogs.grids import Grid, GridFile, load_grid
+from catalogs.scenario import Scenario, route_problems
+from catalogs.scenes import load_scene, scene_identity
+from catalogs.surfaces import surface_source
+from catalogs.vehicles import vehicle_source
+from flows.store.layout import Layout, read_json
+from manifests.canonical import content_id, sha256_of
+from manifests.provenance import code_version, library_versions
+from tasks.errors import InputError
+
+PLAN_FORMAT = "musync-plan/1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClipPlan:
+    """One clip to be made."""
+
+    index: int
+    clip_id: str
+    label: str
+    seed: str
+    scenario: Scenario
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """All that decides a dataset's bytes; JSON in ``plan.json``."""
+
+    run_id: str
+    settings: GridFile
+    scene: Mapping[str, str]
+    backend: str
+    inputs: Mapping[str, str]
+    made_with: Mapping[str, Mapping[str, str]]
+    clips: tuple[ClipPlan, ...]
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first frame to the last [s]."""
+        return (self.settings.frames - 1) / self.settings.frame_rate_hz
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "format": PLAN_FORMAT,
+            "run_id": self.run_id,
+            "grid": self.settings.model_dump(mode="json"),
+            "scene": dict(self.scene),
+            "backend": self.backend,
+            "inputs": dict(self.inputs),
+            "made_with": {key: dict(value) for key, value in self.made_with.items()},
+            "clips": [
+                {
+                    "index": clip.index,
+                    "clip_id": clip.clip_id,
+                    "label": clip.label,
+                    "seed": clip.seed,
+                    "scenario": clip.scenario.as_row(),
+                }
+                for clip in self.clips
+            ],
+        }
+
+
+def make_plan(source: str | Path, backend: str) -> tuple[Plan, dict[str, bytes]]:
+    """Check a grid against its catalogue entries and scene, and freeze it.
+
+    Returns
+    -------
+    The plan, and the catalogue files it stands on (file name to bytes), to be kept with the dataset.
+
+    Raises
+    ------
+    InputError
+        Listing every problem at once.
+    """
+    grid = load_grid(source)
+    settings = grid.settings
+    inputs, problems = {}, []
+    for name, lookup, entry in (
+        ("vehicle.yaml", vehicle_source, settings.vehicle),
+        ("surface.yaml", surface_source, settings.surface),
+        ("camera.yaml", camera_source, settings.camera),
+    ):
+        try:
+            inputs[name] = lookup(entry).read_bytes()
+        except InputError as error:
+            problems += error.problems
+    try:
+        scene = {"name": settings.scene, "sha256": scene_identity(settings.scene)}
+        problems += _route_problems(grid)
+    except InputError as error:
+        problems += error.problems
+    if problems:
+        raise InputError([f"{source}: {problem}" for problem in problems])
+    hashes = {name: sha256_of([content]) for name, content in inputs.items()}
+    asked = {
+        "scene": scene,
+        "inputs": hashes,
+        "backend": backend,
+        "vehicle_mode": settings.vehicle_mode,
+        "frames": settings.frames,
+        "frame_rate_hz": settings.frame_rate_hz,
+    }
+    clips = tuple(_clip_plan(index, label, scenario, asked, settings.seed)
+                  for index, (label, scenario) in enumerate(grid.scenarios))  # fmt: skip
+    repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()
+    if repeated:
+        raise InputError(f"{source}: two scenarios of a grid must differ; some of these are equal: {', '.join(sorted(repeated))}")
+    made_with = {"code": code_version(), "libraries": library_versions()}
+    run_id = content_id([asked, settings.model_dump(mode="json"), [clip.clip_id for clip in clips], made_with])
+    plan = Plan(
+        run_id=run_id, settings=settings, scene=scene, backend=backend, inputs=hashes, made_with=made_with, clips=clips
+    )
+    return plan, inputs
+
+
+@lru_cache(maxsize=4)
+def read_plan(root: Path) -> Plan:
+    """The plan of a dataset.
+
+    Raises
+    ------
+    InputError
+        If there is none, or one of another format.
+    """
+    content = read_json(Layout(root).plan)
+    if content.get("format") != PLAN_FORMAT:
+        raise InputError(f"{Layout(root).plan}: the plan must be of format {PLAN_FORMAT}; it is {content.get('format')!r}")
+    return Plan(
+        run_id=content["run_id"],
+        settings=GridFile.model_validate(content["grid"]),
+        scene=content["scene"],
+        backend=content["backend"],
+        inputs=content["inputs"],
+        made_with=content["made_with"],
+        clips=tuple(ClipPlan(**clip | {"scenario": Scenario(**clip["scenario"])}) for clip in content["clips"]),
+    )
+
+
+def plan_differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], place: str = "") -> list[str]:
+    """Where two plans' JSON differ, as ``path: a, not b``."""
+    differences = []
+    for key in sorted(ours.keys() | theirs.keys()):
+        a, b = ours.get(key), theirs.get(key)
+        path = f"{place}.{key}" if place else key
+        if isinstance(a, Mapping) and isinstance(b, Mapping):
+            differences += plan_differences(a, b, path)
+        elif a != b and key not in {"run_id", "clip_id"}:
+            short = isinstance(a, str | float | int) and isinstance(b, str | float | int)
+            differences.append(f"{path} is {b!r} there and {a!r} here" if short else f"{path} differs")
+    return differences
+
+
+def _clip_plan(index: int, label: str, scenario: Scenario, asked: Mapping[str, Any], grid_seed: int) -> ClipPlan:
+    row = scenario.as_row()
+    # the seed follows the scenario, not its place in the grid, so that a longer grid repeats its clips
+    seed = str(int(sha256_of([f"{grid_seed}/{content_id(row)}".encode()])[:16], 16))
+    clip_id = content_id([asked, row, seed])
+    return ClipPlan(index=index, clip_id=clip_id, label=label, seed=seed, scenario=scenario)
+
+
+def _route_problems(grid: Grid) -> list[str]:
+    route = load_scene(grid.settings.scene).route
+    problems: dict[str, str] = {}
+    for label, scenario in grid.scenarios:
+        for problem in route_problems(scenario, route.length, grid.settings.scene):
+            problems.setdefault(problem, f"scenario {label}: {problem}")
+    return list(problems.values())

@@ -1,0 +1,44 @@
+"""The pipeline's commands as Prefect flows, for a server, a schedule or a work pool.
+
+Each flow is the plain function of the same name; its stages (see `flows.orchestration`) become task runs, and
+the clips fan out on the chosen runner from inside one of them. Results are never persisted by Prefect:
+receipts and hashes on disk decide what is done.
+"""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+QUIET_AND_LOCAL = {
+    "DO_NOT_TRACK": "1",
+    "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+    "PREFECT_LOGGING_LEVEL": "WARNING",
+    "PREFECT_HOME": str(Path.cwd() / ".musync" / "prefect"),
+}
+for _name, _value in QUIET_AND_LOCAL.items():
+    os.environ.setdefault(_name, _value)
+
+from prefect import flow  # noqa: E402  (reads the environment when it is imported)
+
+from flows import audit as _audit  # noqa: E402
+from flows import describe as _describe  # noqa: E402
+from flows import generate as _generate  # noqa: E402
+from flows import scenes as _scenes  # noqa: E402
+from flows import studies as _studies  # noqa: E402
+
+
+def as_flow(function: Callable[..., Any]) -> Any:
+    """The Prefect flow of a pipeline function."""
+    name = f"musync-{function.__name__.replace('_', '-')}"
+    return flow(function, name=name, persist_result=False, description=(function.__doc__ or "").split("\n")[0])
+
+
+generate = as_flow(_generate.generate)
+audit = as_flow(_audit.audit)
+describe = as_flow(_describe.describe)
+validate = as_flow(_describe.validate)
+sensitivity = as_flow(_studies.sensitivity)
+agreement = as_flow(_studies.agreement)
+scene_from_stereo = as_flow(_scenes.scene_from_stereo)
+scene_import = as_flow(_scenes.scene_import)

@@ -1,0 +1,82 @@
+"""Sealing: staged clips become the dataset's tables, preview and frozen manifest."""
+
+import shutil
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from flows.plan import Plan
+from flows.store.frames import read_clip
+from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically
+from flows.store.telemetry import labelled_table, read_columns, write_parquet
+from manifests.canonical import sha256_of_file
+from manifests.manifest import freeze
+from manifests.provenance import processor
+from tasks.render.contact_sheet import contact_sheet, encode_png
+
+CLIPS_PER_FILE = 100
+PREVIEW_FRAMES = (0, 20, 40, 80)
+
+
+def seal(layout: Layout, plan: Plan) -> None:
+    """Gather the staged tables, draw the contact sheet, and freeze the manifest last."""
+    receipts = [read_json(layout.receipt(clip.clip_id)) for clip in plan.clips]
+    tables = [path for table in STAGED_TABLES for path in _gather(layout, plan, table)]
+    write_parquet(_clips_table(receipts), layout.telemetry / "clips.parquet")
+    write_atomically(layout.previews / "contact_sheet.png", _preview(layout, plan, receipts))
+    shared = [
+        *tables,
+        layout.telemetry / "clips.parquet",
+        layout.previews / "contact_sheet.png",
+        layout.plan,
+        *sorted(layout.inputs.iterdir()),
+        *sorted(layout.frames.rglob("zarr.json")),
+    ]
+    artifacts = {layout.relative(path): sha256_of_file(path) for path in shared}
+    write_atomically(layout.manifest, freeze(plan.as_json(), receipts, artifacts, processor()))
+    shutil.rmtree(layout.staging)
+
+
+def _gather(layout: Layout, plan: Plan, table: str) -> list[Any]:
+    """Staged tables of one kind into one file per weather and hundred clips, in plan order."""
+    written = []
+    by_weather: dict[str, list[str]] = {}
+    for clip in plan.clips:
+        by_weather.setdefault(clip.scenario.weather, []).append(clip.clip_id)
+    for weather, clip_ids in by_weather.items():
+        for part, start in enumerate(range(0, len(clip_ids), CLIPS_PER_FILE)):
+            staged = [pq.read_table(layout.staged(clip_id, table)) for clip_id in clip_ids[start : start + CLIPS_PER_FILE]]
+            path = layout.telemetry / table / f"family={weather}" / f"part-{part:04d}.parquet"
+            write_parquet(pa.concat_tables(staged).unify_dictionaries().combine_chunks(), path)
+            written.append(path)
+    return written
+
+
+def _clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
+    """One row a clip: controls, surface, outcome and verdict."""
+    rows = [
+        {"clip_id": r["clip_id"], "index": r["index"], "label": r["label"], "seed": r["seed"]}
+        | r["scenario"]
+        | r["figures"]
+        | {f"check_{key}": value for key, value in r["verdict"].items()}
+        for r in receipts
+    ]
+    columns: dict[str, Any] = {}
+    for name in rows[0]:
+        values = [row[name] for row in rows]
+        numeric = any(isinstance(value, float) for value in values) or all(value is None for value in values)
+        columns[name] = np.array([np.nan if v is None else v for v in values], float) if numeric else values
+    return labelled_table(columns)
+
+
+def _preview(layout: Layout, plan: Plan, receipts: list[dict[str, Any]]) -> bytes:
+    frames = [frame for frame in PREVIEW_FRAMES if frame < plan.settings.frames]
+    rows = []
+    for receipt in receipts:
+        pictures = read_clip(layout.frames, receipt["index"], "rgb")
+        columns = read_columns(layout.staged(receipt["clip_id"], "frames"))
+        rows.append((receipt["label"], [pictures[frame] for frame in frames],
+                     {"speed": columns["speed"], "pitch": columns["pitch"]}))  # fmt: skip
+    return encode_png(contact_sheet(rows, frames, plan.settings.frame_rate_hz))

@@ -1,0 +1,62 @@
+"""The frozen manifest of a dataset: what was asked, with what it was made, and the hash of everything made."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from manifests.canonical import canonical_bytes, sha256_of_file
+from tasks.errors import InputError
+
+MANIFEST_FORMAT = "musync-manifest/1"
+
+
+def freeze(
+    plan: Mapping[str, Any], clips: list[Mapping[str, Any]], artifacts: Mapping[str, str], processor: Mapping[str, str]
+) -> bytes:
+    """The manifest's one byte string (RFC 8785).
+
+    Parameters
+    ----------
+    plan : the run's plan as JSON; its clips are replaced by ``clips``
+    clips : one record a clip: id, scenario, seed, artifacts, content hashes, figures, verdict
+    artifacts : relative path to SHA-256 of the files that several clips share
+    processor : on what the bytes were made; it decides nothing, and explains a difference
+    """
+    manifest = {
+        **plan,
+        "format": MANIFEST_FORMAT,
+        "clips": list(clips),
+        "artifacts": dict(artifacts),
+        "processor": dict(processor),
+    }
+    return canonical_bytes(manifest)
+
+
+def check_format(manifest: Mapping[str, Any], place: Path) -> None:
+    """Raise `InputError` if the manifest is of another format than this version reads."""
+    found = manifest.get("format")
+    if found != MANIFEST_FORMAT:
+        raise InputError(
+            f"{place}: the manifest must be of format {MANIFEST_FORMAT}; it is {found!r}:"
+            " read it with the version of muSync that wrote it"
+        )
+
+
+def recorded_files(manifest: Mapping[str, Any]) -> dict[str, tuple[str, str | None]]:
+    """Every recorded file: relative path to (SHA-256, clip id or None where several clips share it)."""
+    files: dict[str, tuple[str, str | None]] = {path: (digest, None) for path, digest in manifest["artifacts"].items()}
+    for clip in manifest["clips"]:
+        files |= {path: (digest, clip["clip_id"]) for path, digest in clip["artifacts"].items()}
+    return files
+
+
+def damaged_files(root: Path, manifest: Mapping[str, Any]) -> list[dict[str, str | None]]:
+    """Files that are missing, or whose bytes are not those recorded; empty when all is well."""
+    damage: list[dict[str, str | None]] = []
+    for path, (digest, clip_id) in sorted(recorded_files(manifest).items()):
+        file = root / path
+        if not file.is_file():
+            damage.append({"path": path, "clip_id": clip_id, "damage": "missing"})
+        elif sha256_of_file(file) != digest:
+            damage.append({"path": path, "clip_id": clip_id, "damage": "changed"})
+    return damage
