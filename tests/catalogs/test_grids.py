@@ -1,0 +1,106 @@
+from pathlib import Path
+
+import pytest
+
+from catalogs.grids import grid_names, load_grid
+from catalogs.scenario import Scenario, route_problems, scenario_problems
+from tasks.errors import InputError
+
+
+def grid_file(tmp_path: Path, body: str) -> Path:
+    path = tmp_path / "grid.yaml"
+    path.write_text(body)
+    return path
+
+
+@pytest.mark.parametrize("name", grid_names())
+def test_every_grid_that_ships_is_sound(name):
+    assert load_grid(name).scenarios
+
+
+def test_the_demo_covers_two_rates_of_each_weather_on_three_roads():
+    scenarios = [scenario for _, scenario in load_grid("demo").scenarios]
+    assert len(scenarios) >= 12
+    assert {s.weather for s in scenarios} == {"dry", "rain", "snow"}
+    assert len({s.precipitation_mm_h for s in scenarios if s.weather == "rain"}) == 2
+    assert len({s.precipitation_mm_h for s in scenarios if s.weather == "snow"}) == 2
+    assert {(s.hazard_height_m > 0) - (s.hazard_height_m < 0) for s in scenarios} == {-1, 0, 1}
+    assert 0 < sum(s.peak_pressure_mpa > 0 for s in scenarios) < len(scenarios)
+
+
+def test_axes_multiply_and_later_axes_override_earlier_ones(tmp_path):
+    grid = load_grid(
+        grid_file(
+            tmp_path,
+            "{name: t, base: {initial_speed_km_h: 30}, axes: {a: {x: {}, y: {initial_speed_km_h: 50}},"
+            " b: {p: {}, q: {initial_speed_km_h: 70}}}}",
+        )
+    )
+    assert [(label, s.initial_speed_km_h) for label, s in grid.scenarios] == [
+        ("x/p", 30), ("x/q", 70), ("y/p", 50), ("y/q", 70),
+    ]  # fmt: skip
+
+
+def test_all_faults_of_a_file_are_listed_at_once_each_with_its_place(tmp_path):
+    path = grid_file(
+        tmp_path,
+        "{name: t, frames: 0, colour: red, axes: {w: {a: {weather: hail}, b: {precipitaton_mm_h: 3},"
+        " c: {precipitation_mm_h: .nan}}}}",
+    )
+    with pytest.raises(InputError) as caught:
+        load_grid(path)
+    text = str(caught.value)
+    assert len(caught.value.problems) == 5
+    for place in ("frames", "colour", "axes.w.a.weather", "axes.w.b.precipitaton_mm_h", "axes.w.c.precipitation_mm_h"):
+        assert f"{path}: {place}:" in text
+
+
+def test_a_rule_broken_by_many_scenarios_is_told_once(tmp_path):
+    path = grid_file(tmp_path, "{name: t, axes: {w: {s: {weather: snow, precipitation_mm_h: 1}}, r: {a: {}, b: {}, c: {}}}}")
+    with pytest.raises(InputError) as caught:
+        load_grid(path)
+    assert caught.value.problems == (
+        f"{path}: scenario s/a and 2 more: weather snow needs an accumulation time;"
+        " snow_accumulation_h is 0: give the hours of snowfall",
+    )
+
+
+@pytest.mark.parametrize("body", ["[1, 2]", "name: [", "3", ""])
+def test_a_file_that_is_no_mapping_is_refused_with_one_sentence(tmp_path, body):
+    with pytest.raises(InputError) as caught:
+        load_grid(grid_file(tmp_path, body))
+    assert len(caught.value.problems) == 1
+
+
+def test_an_unknown_grid_lists_those_that_exist():
+    with pytest.raises(InputError, match="demo"):
+        load_grid("nowhere")
+
+
+@pytest.mark.parametrize(
+    ("fields", "rule"),
+    [
+        ({"weather": "rain", "precipitation_mm_h": -3.0}, "must not be negative; it is -3"),
+        ({"weather": "dry", "precipitation_mm_h": 3.0}, "dry has no precipitation"),
+        ({"weather": "rain"}, "needs precipitation_mm_h above 0"),
+        ({"weather": "rain", "precipitation_mm_h": 1.0, "snow_accumulation_h": 1.0}, "belongs to snow"),
+        ({"initial_speed_km_h": 0.0}, "must be positive"),
+        ({"peak_pressure_mpa": 2.0}, "exactly one of brake_onset_s and brake_onset_m"),
+        ({"peak_pressure_mpa": 2.0, "brake_onset_s": 1.0, "brake_onset_m": 12.0}, "exactly one of"),
+        ({"brake_onset_s": -1.0}, "must not be negative"),
+        ({"hazard_height_m": 0.1}, "needs hazard_length_m above 0"),
+    ],
+)
+def test_each_rule_of_a_scenario_is_enforced(fields, rule):
+    problems = scenario_problems(Scenario(**fields))
+    assert any(rule in problem for problem in problems), problems
+
+
+def test_a_sound_scenario_has_no_problems():
+    assert scenario_problems(Scenario(weather="snow", precipitation_mm_h=1.0, snow_accumulation_h=1.0)) == []
+
+
+@pytest.mark.parametrize(("center", "length", "fits"), [(50, 3, True), (1, 3, False), (99, 3, False), (50, 200, False)])
+def test_a_hazard_must_lie_on_the_route(center, length, fits):
+    scenario = Scenario(hazard_center_m=center, hazard_length_m=length, hazard_height_m=0.1)
+    assert (route_problems(scenario, 100.0, "s") == []) == fits

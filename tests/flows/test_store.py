@@ -1,0 +1,133 @@
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import zarr
+
+from flows.store.frames import ARRAYS, buffer_hash, create_arrays, read_clip, write_clip
+from flows.store.layout import Layout, clear_partial_files, write_atomically, write_json
+from flows.store.telemetry import columns_hash, labelled_table, read_columns, write_parquet
+from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
+
+SHAPE = (3, 16, 24)
+
+
+@pytest.fixture
+def layout(tmp_path):
+    layout = Layout(tmp_path / "dataset")
+    create_arrays(layout.frames, 4, *SHAPE, {"camera": "test"})
+    return layout
+
+
+def buffers(seed: int) -> dict[str, np.ndarray]:
+    draw = np.random.default_rng(seed)
+    return {
+        "rgb": draw.integers(0, 256, (*SHAPE, 3), np.uint8),
+        "depth": np.where(draw.random(SHAPE) < 0.1, np.nan, draw.random(SHAPE)).astype(np.float32),
+        "class": draw.integers(0, 11, SHAPE, np.uint8),
+    }
+
+
+def test_a_clip_reads_back_bit_for_bit_from_one_file_an_array(layout):
+    written = buffers(1)
+    write_clip(layout.frames, 2, written)
+    for name in ARRAYS:
+        np.testing.assert_array_equal(read_clip(layout.frames, 2, name), written[name])
+        assert layout.frame_shard(name, 2).is_file()
+        assert sum(f.is_file() for f in (layout.frames / name / "c").rglob("*")) == 1
+
+
+def test_the_same_pixels_give_the_same_bytes(layout, tmp_path):
+    other = Layout(tmp_path / "other")
+    create_arrays(other.frames, 4, *SHAPE, {"camera": "test"})
+    for index in (0, 2):
+        write_clip(layout.frames, index, buffers(1))
+    for index in (2, 0):
+        write_clip(other.frames, index, buffers(1))
+    for name in ARRAYS:
+        shards = {d.frame_shard(name, i).read_bytes() for d in (layout, other) for i in (0, 2)}
+        assert len(shards) == 1
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_a_flipped_bit_in_a_shard_is_an_error_and_not_a_picture(layout, name):
+    write_clip(layout.frames, 0, buffers(1))
+    shard = layout.frame_shard(name, 0)
+    content = bytearray(shard.read_bytes())
+    content[len(content) // 3] ^= 4
+    shard.write_bytes(content)
+    with pytest.raises(Exception, match=r"(?i)checksum|crc"):
+        read_clip(layout.frames, 0, name)
+
+
+def test_arrays_say_their_dimensions_and_camera(layout):
+    group = zarr.open_group(layout.frames, mode="r")
+    assert group.attrs["camera"] == "test"
+    assert group["rgb"].metadata.dimension_names == ("clip", "frame", "y", "x", "channel")
+    assert group["rgb"].chunks == (1, 1, 16, 24, 3)
+
+
+def test_hash_of_a_buffer_sees_values_type_and_shape():
+    zeros = np.zeros((2, 3), np.uint8)
+    assert len({buffer_hash(zeros), buffer_hash(zeros.T), buffer_hash(zeros.view(np.int8)), buffer_hash(zeros + 1)}) == 4
+
+
+def columns() -> dict[str, np.ndarray]:
+    return {
+        "t_ns": np.arange(5) * 1_000_000,
+        "speed": np.linspace(16.7, 0.1, 5),
+        "contact_f": np.ones(5, bool),
+        "T_world_rig": np.arange(80.0).reshape(5, 16),
+    }
+
+
+def test_parquet_keeps_every_bit_and_selects_one_clip(tmp_path):
+    import pyarrow as pa
+
+    path = tmp_path / "ticks.parquet"
+    shifted = columns() | {"speed": columns()["speed"] + 1}
+    tables = [labelled_table(columns(), {"clip_id": "a"}), labelled_table(shifted, {"clip_id": "b"})]
+    write_parquet(pa.concat_tables(tables).unify_dictionaries(), path)
+    back = read_columns(path, "b")
+    for name, values in shifted.items():
+        np.testing.assert_array_equal(back[name], values)
+    assert columns_hash(back, columns()) == columns_hash(shifted, columns())
+    assert columns_hash(back, columns()) != columns_hash(columns(), columns())
+
+
+def test_parquet_fields_carry_unit_symbol_and_description(tmp_path):
+    write_parquet(labelled_table(columns()), tmp_path / "t.parquet")
+    field = pq.read_schema(tmp_path / "t.parquet").field("speed")
+    assert field.metadata[b"units"] == b"m s-1"
+    assert field.metadata[b"symbol"] == b"v"
+    assert field.metadata[b"standard_name"] == b"platform_speed_wrt_ground"
+
+
+def test_channel_names_are_unique_and_described():
+    assert len({c.name for c in TICK_CHANNELS}) == len(TICK_CHANNELS)
+    assert all(c.description and c.unit for c in CHANNELS_BY_NAME.values())
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_partial_one(tmp_path, monkeypatch):
+    target = tmp_path / "receipt.json"
+    write_json(target, {"a": 1})
+    before = target.read_bytes()
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        write_atomically(target, b"new")
+    assert target.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_left_overs_of_a_killed_writer_are_cleared_and_nothing_else(layout):
+    write_clip(layout.frames, 0, buffers(1))
+    left_over = layout.frames / "rgb" / "c" / "1.partial"
+    left_over.mkdir(parents=True)
+    (left_over / "x").touch()
+    (layout.root / "manifest.json.77.partial").touch()
+    clear_partial_files(layout)
+    assert not list(layout.root.rglob("*.partial*"))
+    assert read_clip(layout.frames, 0, "rgb").any()

@@ -1,0 +1,49 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from manifests.canonical import canonical_bytes, sha256_of
+from manifests.manifest import MANIFEST_FORMAT, check_format, damaged_files, freeze
+from tasks.errors import InputError
+
+
+@pytest.fixture
+def sealed(tmp_path: Path) -> tuple[Path, dict]:
+    for name in ("a.bin", "b.bin", "shared.bin"):
+        (tmp_path / name).write_bytes(name.encode() * 100)
+    digest = {name: sha256_of([name.encode() * 100]) for name in ("a.bin", "b.bin", "shared.bin")}
+    clips = [{"clip_id": c, "artifacts": {f"{c}.bin": digest[f"{c}.bin"]}} for c in "ab"]
+    manifest = json.loads(freeze({"run_id": "r"}, clips, {"shared.bin": digest["shared.bin"]}, {}))
+    return tmp_path, manifest
+
+
+def test_a_manifest_is_its_own_canonical_form(sealed):
+    _, manifest = sealed
+    frozen = freeze(manifest, manifest["clips"], manifest["artifacts"], manifest["processor"])
+    assert frozen == canonical_bytes(manifest)
+    assert manifest["format"] == MANIFEST_FORMAT
+
+
+def test_an_untouched_dataset_has_no_damage(sealed):
+    assert damaged_files(*sealed) == []
+
+
+@pytest.mark.parametrize("position", [0, 137, 499])
+def test_one_flipped_bit_is_found_and_named_with_its_clip(sealed, position):
+    root, manifest = sealed
+    content = bytearray((root / "b.bin").read_bytes())
+    content[position] ^= 1 << (position % 8)
+    (root / "b.bin").write_bytes(content)
+    assert damaged_files(root, manifest) == [{"path": "b.bin", "clip_id": "b", "damage": "changed"}]
+
+
+def test_a_missing_shared_file_is_named_without_a_clip(sealed):
+    root, manifest = sealed
+    (root / "shared.bin").unlink()
+    assert damaged_files(root, manifest) == [{"path": "shared.bin", "clip_id": None, "damage": "missing"}]
+
+
+def test_a_manifest_of_another_version_is_refused_with_both_formats():
+    with pytest.raises(InputError, match=r"musync-manifest/1; it is 'musync-manifest/9'"):
+        check_format({"format": "musync-manifest/9"}, Path("manifest.json"))
