@@ -1,0 +1,155 @@
+"""From a cloud of Gaussians to the packed blocks the rasteriser streams through."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.scene.gaussians import Gaussians, check_gaussians
+
+BLOCK = 64
+"""Gaussians per block: one block is culled, projected and shaded as a whole, one vector lane each."""
+
+OFFSET, AXES, LOG_OPACITY, NORMAL, SH = 0, 3, 12, 13, 16
+"""First plane of each quantity inside a block; SH coefficient k of channel c is plane ``SH + 3 k + c``."""
+
+_MORTON_BITS = 21
+_PADDING_LOG_OPACITY = -1e30
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreparedGaussians:
+    """Gaussians along a Morton curve, in blocks of 64, one contiguous plane per quantity.
+
+    Neighbours in space are neighbours in memory, so that whole blocks fall outside a view at once.
+
+    Parameters
+    ----------
+    blocks : float32 [B, 16 + 3 K, 64] centre offset from the block's origin [m], local axes times
+        standard deviation (axis-major) [m], natural logarithm of opacity [1], normal [1], SH [1]
+    origins : float64 [B, 3] middle of each block's bounding box, world frame [m]
+    radii : float64 [B] distance from the origin to the furthest centre of the block [m]
+    reach : float64 [B] largest standard deviation within the block [m]
+    class_id : uint8 [64 B] `SemanticClass`
+    order : int64 [N] index in the original cloud of each Gaussian along the curve
+    display_encoded : carried over from `Gaussians`
+    """
+
+    blocks: NDArray[np.float32]
+    origins: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    reach: NDArray[np.float64]
+    class_id: NDArray[np.uint8]
+    order: NDArray[np.int64]
+    display_encoded: bool
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+
+def rotation_matrices(quats_wxyz: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Rotation matrices of quaternions, which are normalised first.
+
+    Parameters
+    ----------
+    quats_wxyz : [N, 4] quaternions, not zero [1]
+
+    Returns
+    -------
+    float64 [N, 3, 3] local axes as columns [1]
+    """
+    q = np.asarray(quats_wxyz, dtype=np.float64)
+    w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def morton_order(means: NDArray[np.floating]) -> NDArray[np.int64]:
+    """Indices that walk the points along a Morton curve; points in one cell keep their order.
+
+    Parameters
+    ----------
+    means : [N, 3] points [m]
+
+    Returns
+    -------
+    int64 [N] indices
+    """
+    if len(means) == 0:
+        return np.zeros(0, dtype=np.int64)
+    low = means.min(axis=0).astype(np.float64)
+    extent = float((means.max(axis=0) - low).max()) or 1.0
+    cells = ((means - low) * ((2**_MORTON_BITS - 1) / extent)).astype(np.uint64)
+    code = np.zeros(len(means), dtype=np.uint64)
+    for axis in range(3):
+        code |= _spread_bits(cells[:, axis]) << np.uint64(axis)
+    return np.argsort(code, kind="stable").astype(np.int64)
+
+
+def _spread_bits(v: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Put two zero bits between the 21 low bits of v."""
+    for shift, mask in (
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
+        v = (v | (v << np.uint64(shift))) & np.uint64(mask)
+    return v
+
+
+def prepare(gaussians: Gaussians) -> PreparedGaussians:
+    """Check, order and pack a cloud once; every view of it is then rasterised from the result.
+
+    Parameters
+    ----------
+    gaussians : the cloud, world frame
+
+    Returns
+    -------
+    PreparedGaussians
+
+    Raises
+    ------
+    InputError
+        An array has a wrong shape, a NaN or a value out of range.
+    """
+    check_gaussians(gaussians)
+    order = morton_order(gaussians.means)
+    n, sh_count = len(order), gaussians.sh.shape[1]
+    block_count = -(-n // BLOCK)
+    blocks = np.zeros((block_count, SH + 3 * sh_count, BLOCK), dtype=np.float32)
+    blocks[:, LOG_OPACITY] = _PADDING_LOG_OPACITY
+    origins = np.zeros((block_count, 3))
+    radii, reach = np.zeros(block_count), np.zeros(block_count)
+    class_id = np.zeros(block_count * BLOCK, dtype=np.uint8)
+    class_id[:n] = gaussians.class_id[order]
+    for b in range(block_count):
+        members = order[b * BLOCK : (b + 1) * BLOCK]
+        block = blocks[b, :, : len(members)]
+        means = gaussians.means[members].astype(np.float64)
+        origins[b] = (means.min(axis=0) + means.max(axis=0)) / 2
+        offsets = means - origins[b]
+        scales = gaussians.scales[members].astype(np.float64)
+        axes = rotation_matrices(gaussians.quats_wxyz[members]) * scales[:, None, :]
+        radii[b] = np.sqrt((offsets**2).sum(axis=1).max())
+        reach[b] = scales.max()
+        block[OFFSET:AXES] = offsets.T
+        block[AXES:LOG_OPACITY] = axes.transpose(2, 1, 0).reshape(9, -1)
+        block[LOG_OPACITY] = np.log(gaussians.opacities[members].astype(np.float64))
+        block[NORMAL:SH] = gaussians.normals[members].T
+        block[SH:] = gaussians.sh[members].reshape(len(members), -1).T
+    return PreparedGaussians(
+        blocks=blocks,
+        origins=origins,
+        radii=radii,
+        reach=reach,
+        class_id=class_id,
+        order=order,
+        display_encoded=gaussians.display_encoded,
+    )

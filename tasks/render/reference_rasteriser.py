@@ -1,0 +1,142 @@
+"""The rasteriser's rules in plain NumPy, one Gaussian at a time in float64: the oracle of the fast kernels."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.render.gbuffer import GBuffer
+from tasks.render.preparation import morton_order, rotation_matrices
+from tasks.render.spherical_harmonics import sh_basis
+from tasks.scene.gaussians import Gaussians
+
+NEAR, LOW_PASS, RAY_MARGIN, MIN_ALPHA, MAX_ALPHA, STOP = 0.05, 0.3, 0.3, 1 / 255, 0.999, 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contribution:
+    """What one Gaussian adds to a window of the picture.
+
+    Parameters
+    ----------
+    gaussian : index in the cloud [1]
+    depth : camera z of its centre [m]
+    window : rows and columns of the picture
+    weight : float64 [h, w] opacity times the transmittance in front of it [1]
+    transmittance : float64 [h, w] share of light left in front of it [1]
+    """
+
+    gaussian: int
+    depth: float
+    window: tuple[slice, slice]
+    weight: NDArray[np.float64]
+    transmittance: NDArray[np.float64]
+
+
+def blend_steps(
+    gaussians: Gaussians, viewmat: NDArray[np.floating], K: NDArray[np.floating], width: int, height: int
+) -> Iterator[Contribution]:
+    """Blend the Gaussians front to back, one step each; equal depths follow the Morton curve.
+
+    Parameters
+    ----------
+    gaussians : the cloud
+    viewmat : [4, 4] world to camera [m]
+    K : [3, 3] intrinsics [px]
+    width, height : picture size [px]
+
+    Yields
+    ------
+    Contribution
+    """
+    R, t = np.asarray(viewmat, np.float64)[:3, :3], np.asarray(viewmat, np.float64)[:3, 3]
+    f, c = np.array((K[0, 0], K[1, 1]), np.float64), np.asarray(K, np.float64)[:2, 2]
+    size = np.array((width, height))
+    low, high = -c / f - RAY_MARGIN * 0.5 * size / f, (size - c) / f + RAY_MARGIN * 0.5 * size / f
+    means = gaussians.means.astype(np.float64) @ R.T + t
+    axes = rotation_matrices(gaussians.quats_wxyz) * gaussians.scales[:, None, :].astype(np.float64)
+
+    order = morton_order(gaussians.means)
+    order = order[np.argsort(means[order, 2].astype(np.float32), kind="stable")]
+    transmittance = np.ones((height, width))
+    still_open = np.ones((height, width), dtype=bool)
+    for i in order[means[order, 2] >= NEAR]:
+        z = means[i, 2]
+        ray = means[i, :2] / z
+        J = np.column_stack((np.diag(f / z), -f * np.clip(ray, low, high) / z))
+        M = J @ R @ axes[i]
+        covariance = M @ M.T + LOW_PASS * np.eye(2)
+        opacity = float(gaussians.opacities[i])
+        centre = f * ray + c
+        half = np.sqrt(2 * max(np.log(opacity / MIN_ALPHA), 0) * np.diag(covariance))
+        first = np.clip(np.floor(centre - half), 0, size).astype(int)
+        last = np.clip(np.ceil(centre + half), 0, size).astype(int)
+        if (first >= last).any():
+            continue
+        window = slice(first[1], last[1]), slice(first[0], last[0])
+        dy, dx = np.meshgrid(
+            np.arange(first[1], last[1]) + 0.5 - centre[1],
+            np.arange(first[0], last[0]) + 0.5 - centre[0],
+            indexing="ij",
+        )
+        (a, b), (_, d) = np.linalg.inv(covariance)
+        alpha = opacity * np.exp(-0.5 * (a * dx * dx + 2 * b * dx * dy + d * dy * dy))
+        drawn = (alpha >= MIN_ALPHA) & still_open[window]
+        alpha = np.minimum(alpha, MAX_ALPHA)
+        before = transmittance[window].copy()
+        stops = drawn & (before * (1 - alpha) <= STOP)
+        still_open[window] &= ~stops
+        weight = np.where(drawn & ~stops, before * alpha, 0.0)
+        transmittance[window] = before - weight
+        yield Contribution(
+            gaussian=int(i), depth=float(z), window=window, weight=weight, transmittance=before
+        )
+
+
+def rasterise_reference(
+    gaussians: Gaussians, viewmat: NDArray[np.floating], K: NDArray[np.floating], width: int, height: int
+) -> GBuffer:
+    """What `tasks.render.rasteriser.rasterise` returns, slowly.
+
+    Parameters
+    ----------
+    gaussians : the cloud
+    viewmat : [4, 4] world to camera [m]
+    K : [3, 3] intrinsics [px]
+    width, height : picture size [px]
+
+    Returns
+    -------
+    GBuffer
+    """
+    R, t = np.asarray(viewmat, np.float64)[:3, :3], np.asarray(viewmat, np.float64)[:3, 3]
+    direction = gaussians.means.astype(np.float64) + R.T @ t
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    basis = sh_basis(direction, gaussians.sh.shape[1])
+    colours = np.maximum(np.einsum("nk,nkc->nc", basis, gaussians.sh) + 0.5, 0)
+    away = (gaussians.normals * direction).sum(axis=1) > 0
+    normals = np.where(away[:, None], -gaussians.normals, gaussians.normals)
+
+    rgb, normal = np.zeros((height, width, 3)), np.zeros((height, width, 3))
+    depth, left = np.zeros((height, width)), np.ones((height, width))
+    class_id = np.zeros((height, width), dtype=np.uint8)
+    for step in blend_steps(gaussians, viewmat, K, width, height):
+        rgb[step.window] += step.weight[..., None] * colours[step.gaussian]
+        normal[step.window] += step.weight[..., None] * normals[step.gaussian]
+        depth[step.window] += step.weight * step.depth
+        left[step.window] -= step.weight
+        halves = (step.transmittance >= 0.5) & (step.transmittance - step.weight < 0.5)
+        class_id[step.window][halves] = gaussians.class_id[step.gaussian]
+    alpha = 1 - left
+    covered = alpha > 0
+    depth[covered] /= alpha[covered]
+    depth[~covered] = np.nan
+    normal[covered] /= np.linalg.norm(normal[covered], axis=1, keepdims=True)
+    return GBuffer(
+        rgb=rgb.astype(np.float32),
+        depth=depth.astype(np.float32),
+        alpha=alpha.astype(np.float32),
+        normal=normal.astype(np.float32),
+        class_id=class_id,
+    )
