@@ -10,6 +10,7 @@ from typing import Any, Literal
 from tasks.errors import InputError
 
 RunnerName = Literal["threads", "processes", "dask"]
+CONNECT_TIMEOUT = "10s"
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 """One frame per worker, one thread each: measured faster than threads within a frame, and repeatable."""
 
@@ -61,7 +62,7 @@ def _dask_client(workers: int, scheduler: str | None) -> Iterator[Any]:
                 yield client
         else:
             try:
-                client = Client(scheduler, timeout="10s")
+                client = Client(scheduler, timeout=CONNECT_TIMEOUT)
             except (OSError, ValueError) as error:
                 raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
             with client:

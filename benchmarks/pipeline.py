@@ -1,0 +1,41 @@
+"""What the pipeline costs beyond its work: wall time against the clips' own wall time over the workers."""
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from flows.generate import generate
+
+WORKERS = 2
+
+
+def rows(grid: str = "demo") -> list[dict[str, Any]]:
+    """Generate a grid into a temporary folder and split its wall time into work and overhead.
+
+    Returns
+    -------
+    Rows of name, value, unit, peer (what the value is held against) and ratio (value over peer).
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        started = time.perf_counter()
+        report = generate(grid, str(Path(folder) / "dataset"), workers=WORKERS)
+        wall = time.perf_counter() - started
+        resumed = time.perf_counter()
+        generate(grid, str(Path(folder) / "dataset"), workers=WORKERS)
+        resume_wall = time.perf_counter() - resumed
+    work = sum(cost["wall_s"] for cost in report.cost.values()) / WORKERS
+    cpu = sum(cost["cpu_s"] for cost in report.cost.values())
+    memory = max(cost["peak_memory_mib"] for cost in report.cost.values())
+    peer = f"sum of the clips' wall time over {WORKERS} workers"
+    return [
+        {"name": "pipeline wall", "value": wall, "unit": "s", "peer": peer, "ratio": wall / work},
+        {"name": "clip cpu", "value": cpu / report.clips, "unit": "CPU-s/clip", "peer": None, "ratio": None},
+        {"name": "worker peak memory", "value": memory, "unit": "MiB", "peer": "limit 1536", "ratio": memory / 1536},
+        {"name": "finished run called again", "value": resume_wall, "unit": "s", "peer": "limit 3", "ratio": resume_wall / 3},
+    ]
+
+
+if __name__ == "__main__":
+    for row in rows():
+        print(f"{row['name']:32} {row['value']:10.3f} {row['unit']:12} {row['ratio'] or float('nan'):6.3f} of {row['peer']}")

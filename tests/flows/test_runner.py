@@ -1,0 +1,56 @@
+import os
+
+import pytest
+
+from flows.orchestration import stage
+from flows.runner import open_executor, run_unordered
+from tasks.errors import InputError
+
+
+def square_or_fail(number: int) -> int:
+    if number == 3:
+        raise ValueError("three")
+    return number * number
+
+
+def process_id(_: int) -> int:
+    return os.getpid()
+
+
+@pytest.mark.parametrize("runner", ["threads", "processes", "dask"])
+def test_every_runner_returns_each_result_and_keeps_going_past_a_failure(runner):
+    with open_executor(runner, workers=2) as executor:
+        ended = {call[0]: future for call, future in run_unordered(executor, square_or_fail, [(i,) for i in range(6)])}
+        assert {number: ended[number].result() for number in (0, 1, 2, 4, 5)} == {0: 0, 1: 1, 2: 4, 4: 16, 5: 25}
+        assert isinstance(ended[3].exception(), ValueError)
+
+
+def test_processes_are_other_processes():
+    with open_executor("processes", workers=1) as executor:
+        assert executor.submit(process_id, 0).result() != os.getpid()
+
+
+def test_a_running_dask_cluster_is_used_by_its_address():
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
+        address = cluster.scheduler_address
+        with pytest.raises(InputError, match="belongs to --runner dask"), open_executor("threads", 1, address):
+            pass
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, protocol="tcp"
+    ) as cluster, open_executor("dask", None, cluster.scheduler_address) as executor:  # fmt: skip
+        assert executor.submit(square_or_fail, 7).result() == 49
+
+
+def test_a_scheduler_that_does_not_answer_is_an_input_error(monkeypatch):
+    monkeypatch.setattr("flows.runner.CONNECT_TIMEOUT", "1s")
+    with pytest.raises(InputError, match="no Dask scheduler answers"), open_executor("dask", 1, "tcp://127.0.0.1:9"):
+        pass
+
+
+def test_outside_a_flow_a_stage_is_its_function():
+    assert stage(square_or_fail)(4) == 16
+    with pytest.raises(ValueError, match="three"):
+        stage(square_or_fail)(3)
+    assert stage(square_or_fail).__name__ == "square_or_fail"
