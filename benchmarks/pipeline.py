@@ -31,11 +31,24 @@ def rows(grid: str = "demo") -> list[dict[str, Any]]:
     return [
         {"name": "pipeline wall", "value": wall, "unit": "s", "peer": peer, "ratio": wall / work},
         {"name": "clip cpu", "value": cpu / report.clips, "unit": "CPU-s/clip", "peer": None, "ratio": None},
-        {"name": "worker peak memory", "value": memory, "unit": "MiB", "peer": "limit 1536", "ratio": memory / 1536},
-        {"name": "finished run called again", "value": resume_wall, "unit": "s", "peer": "limit 3", "ratio": resume_wall / 3},
+        {
+            "name": "worker peak memory",
+            "value": memory,
+            "unit": "MiB",
+            "peer": "limit 1536",
+            "ratio": memory / 1536,
+        },
+        {
+            "name": "finished run called again",
+            "value": resume_wall,
+            "unit": "s",
+            "peer": "limit 3",
+            "ratio": resume_wall / 3,
+        },
     ]
 
 
 if __name__ == "__main__":
     for row in rows():
-        print(f"{row['name']:32} {row['value']:10.3f} {row['unit']:12} {row['ratio'] or float('nan'):6.3f} of {row['peer']}")
+        ratio = "" if row["ratio"] is None else f"{row['ratio']:.3f} of {row['peer']}"
+        print(f"{row['name']:32} {row['value']:10.3f} {row['unit']:12} {ratio}")

@@ -51,21 +51,36 @@ def scenario_problems(scenario: Scenario) -> list[str]:
     """Every rule the scenario breaks by itself, each as one sentence; empty when it is sound."""
     s = scenario
     problems = []
-    for name in ("precipitation_mm_h", "snow_accumulation_h", "peak_pressure_mpa", "hazard_length_m", "ramp_s", "release_s"):
+    for name in (
+        "precipitation_mm_h",
+        "snow_accumulation_h",
+        "peak_pressure_mpa",
+        "hazard_length_m",
+        "ramp_s",
+        "release_s",
+    ):
         if getattr(s, name) < 0:
             problems.append(f"{name} must not be negative; it is {getattr(s, name):g}")
     if s.initial_speed_km_h <= 0:
         problems.append(f"initial_speed_km_h must be positive; it is {s.initial_speed_km_h:g}")
     if s.weather == "dry" and s.precipitation_mm_h > 0:
-        problems.append(f"weather dry has no precipitation; precipitation_mm_h is {s.precipitation_mm_h:g}: name rain or snow")
+        problems.append(
+            f"weather dry has no precipitation; precipitation_mm_h is {s.precipitation_mm_h:g}: name rain or snow"
+        )
     if s.weather != "dry" and s.precipitation_mm_h == 0:
         problems.append(f"weather {s.weather} needs precipitation_mm_h above 0; it is 0")
     if s.weather == "snow" and s.snow_accumulation_h == 0:
-        problems.append("weather snow needs an accumulation time; snow_accumulation_h is 0: give the hours of snowfall")
+        problems.append(
+            "weather snow needs an accumulation time; snow_accumulation_h is 0: give the hours of snowfall"
+        )
     if s.weather != "snow" and s.snow_accumulation_h > 0:
-        problems.append(f"snow_accumulation_h belongs to snow; the weather is {s.weather} and it is {s.snow_accumulation_h:g}")
+        problems.append(
+            f"snow_accumulation_h belongs to snow; the weather is {s.weather} and it is {s.snow_accumulation_h:g}"
+        )
     if s.peak_pressure_mpa > 0 and (s.brake_onset_s is None) == (s.brake_onset_m is None):
-        problems.append("braking (peak_pressure_mpa above 0) needs exactly one of brake_onset_s and brake_onset_m")
+        problems.append(
+            "braking (peak_pressure_mpa above 0) needs exactly one of brake_onset_s and brake_onset_m"
+        )
     for name in ("brake_onset_s", "brake_onset_m", "hold_s"):
         value = getattr(s, name)
         if value is not None and value < 0:

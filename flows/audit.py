@@ -94,7 +94,9 @@ def read_manifest(layout: Layout) -> dict[str, Any]:
 def chosen_clips(manifest: Mapping[str, Any], share: float) -> list[Mapping[str, Any]]:
     """A share of the clips, drawn by hash: the same clips for the same dataset, spread over the grid."""
     count = math.ceil(share * len(manifest["clips"]))
-    drawn = sorted(manifest["clips"], key=lambda clip: sha256_of([f"{manifest['run_id']}/{clip['clip_id']}".encode()]))
+    drawn = sorted(
+        manifest["clips"], key=lambda clip: sha256_of([f"{manifest['run_id']}/{clip['clip_id']}".encode()])
+    )
     return drawn[:count]
 
 
@@ -136,7 +138,9 @@ def tool_differences(manifest: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _first_difference(layout: Layout, remade: Layout, plan: Plan, clip: Mapping[str, Any]) -> dict[str, Any] | None:
+def _first_difference(
+    layout: Layout, remade: Layout, plan: Plan, clip: Mapping[str, Any]
+) -> dict[str, Any] | None:
     clip_id, index = clip["clip_id"], clip["index"]
     new = read_json(remade.receipt(clip_id))["content"]
     changed = [name for name in (*STAGED_TABLES, *ARRAYS) if new[name] != clip["content"][name]]

@@ -21,13 +21,17 @@ Out = Annotated[str | None, typer.Option(help="Folder for the JSON this command 
 Runner = Annotated[str, typer.Option(help="threads, processes or dask.")]
 Workers = Annotated[int | None, typer.Option(help="How many at once; by default one a processor.", min=1)]
 Scheduler = Annotated[str | None, typer.Option(help="tcp:// or tls:// address of a running Dask scheduler.")]
-Prefect = Annotated[bool, typer.Option("--prefect", help="Run as a Prefect flow; implied by PREFECT_API_URL.")]
+Prefect = Annotated[
+    bool, typer.Option("--prefect", help="Run as a Prefect flow; implied by PREFECT_API_URL.")
+]
 
 
 @app.command()
 def generate(
     grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")],
-    out: Annotated[str, typer.Option(help="Dataset folder: new, empty, or an unfinished run of the same grid.")],
+    out: Annotated[
+        str, typer.Option(help="Dataset folder: new, empty, or an unfinished run of the same grid.")
+    ],
     runner: Runner = "dask",
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -36,7 +40,9 @@ def generate(
     as_json: Json = False,
 ) -> None:
     """Make the dataset of a scenario grid, or what is missing of it."""
-    report = _call("generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend)
+    report = _call(
+        "generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend
+    )
     layout = report.layout
     _show(
         {
@@ -218,3 +224,7 @@ def main() -> None:
             raise
         print(f"musync: {sentence}", file=sys.stderr)
         sys.exit(INPUT_WRONG)
+
+
+if __name__ == "__main__":
+    main()

@@ -13,10 +13,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from catalogs.gates import load_gates
 from numpy.typing import NDArray
+from tasks.eval.motion_agreement import pose_verdict
+from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.render.camera import Camera, body_poses
+from tasks.render.clip import render_clip
+from tasks.render.road_edit import apply_road_profile
+from tasks.surface.friction import surface_friction
+from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
+from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Controls, Rollout, rollout
 
 from catalogs.cameras import load_camera
-from catalogs.gates import load_gates
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.surfaces import load_surface
@@ -27,19 +38,8 @@ from flows.store.layout import Layout, write_json
 from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
-from tasks.eval.motion_agreement import pose_verdict
-from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.render.backend import select_backend
-from tasks.render.camera import Camera, body_poses
-from tasks.render.clip import render_clip
-from tasks.render.road_edit import apply_road_profile
 from tasks.scene.scene import Scene
-from tasks.surface.friction import surface_friction
-from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
-from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Controls, Rollout, rollout
 
 TICK_RATE_HZ = 1000
 
@@ -137,7 +137,13 @@ def drive(
         hold_speed_until_brake=False,
     )
     ride = rollout(
-        catalogue.vehicle, scenario.weather, friction, controls, hazard_of(scenario), mode=mode, duration_s=duration_s
+        catalogue.vehicle,
+        scenario.weather,
+        friction,
+        controls,
+        hazard_of(scenario),
+        mode=mode,
+        duration_s=duration_s,
     )
     facts = {
         "film_depth_mm": state.film_depth_mm,
@@ -152,7 +158,9 @@ def drive(
 def hazard_of(scenario: Scenario) -> RoadHazard:
     """The scenario's road feature."""
     return RoadHazard(
-        center_m=scenario.hazard_center_m, length_m=scenario.hazard_length_m, height_m=scenario.hazard_height_m
+        center_m=scenario.hazard_center_m,
+        length_m=scenario.hazard_length_m,
+        height_m=scenario.hazard_height_m,
     )
 
 
@@ -170,7 +178,11 @@ def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDA
 
 
 def picture(
-    scenario: Scenario, facts: Mapping[str, Any], frames: Mapping[str, NDArray[Any]], plan: Plan, catalogue: Catalogue
+    scenario: Scenario,
+    facts: Mapping[str, Any],
+    frames: Mapping[str, NDArray[Any]],
+    plan: Plan,
+    catalogue: Catalogue,
 ) -> dict[str, NDArray[Any]]:
     """The clip's finished frames, depth and class."""
     hazard = hazard_of(scenario)
@@ -194,7 +206,11 @@ def judge(
 ) -> dict[str, Any]:
     """Motion recovered from the finished frames, held against the telemetry."""
     recovered = recover_motion_pnp(
-        buffers["rgb"], buffers["depth"], catalogue.camera.K, catalogue.camera.T_rig_camera, class_id=buffers["class"]
+        buffers["rgb"],
+        buffers["depth"],
+        catalogue.camera.K,
+        catalogue.camera.T_rig_camera,
+        class_id=buffers["class"],
     )
     verdict = pose_verdict(recovered, frames["pitch"], frames["station"], load_gates())
     return {
@@ -212,4 +228,6 @@ def clip_plan_of(root: Path, clip_id: str) -> ClipPlan:
 def _json_numbers(values: Mapping[str, Any]) -> dict[str, Any]:
     """Plain JSON values; NaN, which means "not represented", becomes null."""
     plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in values.items()}
-    return {key: None if isinstance(value, float) and np.isnan(value) else value for key, value in plain.items()}
+    return {
+        key: None if isinstance(value, float) and np.isnan(value) else value for key, value in plain.items()
+    }

@@ -35,7 +35,10 @@ def describe(dataset: str) -> dict[str, Any]:
         "megabytes": round(sum(f.stat().st_size for f in layout.root.rglob("*") if f.is_file()) / 1e6, 1),
         "clips": [
             {"clip_id": clip["clip_id"], "label": clip["label"]}
-            | {k: clip["figures"][k] for k in ("surface_friction", "tyre_peak", "stopping_distance", "peak_pitch")}
+            | {
+                k: clip["figures"][k]
+                for k in ("surface_friction", "tyre_peak", "stopping_distance", "peak_pitch")
+            }
             | {"passed": clip["verdict"]["passed"]}
             for clip in manifest["clips"]
         ],

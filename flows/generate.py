@@ -14,6 +14,7 @@ from flows.runner import RunnerName, open_executor, run_unordered
 from flows.seal import seal
 from flows.store.frames import create_arrays
 from flows.store.layout import Layout, clear_partial_files, write_atomically, write_json
+from flows.store.lock import sole_writer
 from tasks.errors import InputError
 
 
@@ -50,9 +51,11 @@ def generate(
     plan = stage(prepare)(grid, layout, backend)
     if layout.manifest.is_file():
         return RunReport(layout=layout, run_id=plan.run_id, clips=len(plan.clips), made=0)
-    missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
-    cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
-    stage(seal)(layout, plan)
+    with sole_writer(layout):
+        clear_partial_files(layout)
+        missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
+        cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
+        stage(seal)(layout, plan)
     return RunReport(layout=layout, run_id=plan.run_id, clips=len(plan.clips), made=len(missing), cost=cost)
 
 
@@ -68,10 +71,11 @@ def prepare(grid: str, layout: Layout, backend: str) -> Plan:
             raise InputError(
                 f"{layout.root}: holds the dataset of another run: {'; '.join(differences[:5])}; give an empty folder"
             )
-        clear_partial_files(layout)
         return existing
     if layout.root.exists() and (not layout.root.is_dir() or any(layout.root.iterdir())):
-        raise InputError(f"{layout.root}: must be an empty or new folder, or a muSync dataset; it holds other files")
+        raise InputError(
+            f"{layout.root}: must be an empty or new folder, or a muSync dataset; it holds other files"
+        )
     for name, content in inputs.items():
         write_atomically(layout.inputs / name, content)
     write_json(layout.inputs / "grid.json", plan.settings.model_dump(mode="json"))
@@ -110,8 +114,13 @@ def fan_out(
     cost: dict[str, dict[str, float]] = {}
     failures: dict[str, BaseException] = {}
     labels = {clip.index: clip.label for clip in plan.clips}
-    with open_executor(runner, workers, scheduler) as executor, progress_bar("clips", len(indices)) as advance:
-        for (_, index), future in run_unordered(executor, make, ((str(layout.root), index) for index in indices)):
+    with (
+        open_executor(runner, workers, scheduler) as executor,
+        progress_bar("clips", len(indices)) as advance,
+    ):
+        for (_, index), future in run_unordered(
+            executor, make, ((str(layout.root), index) for index in indices)
+        ):
             error = future.exception()
             if error is None:
                 cost[labels[index]] = future.result()["cost"]
@@ -132,4 +141,3 @@ def fan_out(
             f" {type(first).__name__}: {first}; the others are kept: run the same command again to make just these"
         ) from first
     return cost
-

@@ -114,11 +114,21 @@ def make_plan(source: str | Path, backend: str) -> tuple[Plan, dict[str, bytes]]
                   for index, (label, scenario) in enumerate(grid.scenarios))  # fmt: skip
     repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()
     if repeated:
-        raise InputError(f"{source}: two scenarios of a grid must differ; some of these are equal: {', '.join(sorted(repeated))}")
+        raise InputError(
+            f"{source}: two scenarios of a grid must differ; some of these are equal: {', '.join(sorted(repeated))}"
+        )
     made_with = {"code": code_version(), "libraries": library_versions()}
-    run_id = content_id([asked, settings.model_dump(mode="json"), [clip.clip_id for clip in clips], made_with])
+    run_id = content_id(
+        [asked, settings.model_dump(mode="json"), [clip.clip_id for clip in clips], made_with]
+    )
     plan = Plan(
-        run_id=run_id, settings=settings, scene=scene, backend=backend, inputs=hashes, made_with=made_with, clips=clips
+        run_id=run_id,
+        settings=settings,
+        scene=scene,
+        backend=backend,
+        inputs=hashes,
+        made_with=made_with,
+        clips=clips,
     )
     return plan, inputs
 
@@ -134,7 +144,9 @@ def read_plan(root: Path) -> Plan:
     """
     content = read_json(Layout(root).plan)
     if content.get("format") != PLAN_FORMAT:
-        raise InputError(f"{Layout(root).plan}: the plan must be of format {PLAN_FORMAT}; it is {content.get('format')!r}")
+        raise InputError(
+            f"{Layout(root).plan}: the plan must be of format {PLAN_FORMAT}; it is {content.get('format')!r}"
+        )
     return Plan(
         run_id=content["run_id"],
         settings=GridFile.model_validate(content["grid"]),
@@ -142,7 +154,9 @@ def read_plan(root: Path) -> Plan:
         backend=content["backend"],
         inputs=content["inputs"],
         made_with=content["made_with"],
-        clips=tuple(ClipPlan(**clip | {"scenario": Scenario(**clip["scenario"])}) for clip in content["clips"]),
+        clips=tuple(
+            ClipPlan(**clip | {"scenario": Scenario(**clip["scenario"])}) for clip in content["clips"]
+        ),
     )
 
 
@@ -160,7 +174,9 @@ def plan_differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], place: 
     return differences
 
 
-def _clip_plan(index: int, label: str, scenario: Scenario, asked: Mapping[str, Any], grid_seed: int) -> ClipPlan:
+def _clip_plan(
+    index: int, label: str, scenario: Scenario, asked: Mapping[str, Any], grid_seed: int
+) -> ClipPlan:
     row = scenario.as_row()
     # the seed follows the scenario, not its place in the grid, so that a longer grid repeats its clips
     seed = str(int(sha256_of([f"{grid_seed}/{content_id(row)}".encode()])[:16], 16))

@@ -31,7 +31,9 @@ from flows import studies as _studies  # noqa: E402
 def as_flow(function: Callable[..., Any]) -> Any:
     """The Prefect flow of a pipeline function."""
     name = f"musync-{function.__name__.replace('_', '-')}"
-    return flow(function, name=name, persist_result=False, description=(function.__doc__ or "").split("\n")[0])
+    return flow(
+        function, name=name, persist_result=False, description=(function.__doc__ or "").split("\n")[0]
+    )
 
 
 generate = as_flow(_generate.generate)

@@ -16,7 +16,9 @@ ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUM
 
 
 @contextmanager
-def open_executor(runner: RunnerName, workers: int | None = None, scheduler: str | None = None) -> Iterator[Executor]:
+def open_executor(
+    runner: RunnerName, workers: int | None = None, scheduler: str | None = None
+) -> Iterator[Executor]:
     """An executor for the length of a run.
 
     Parameters
@@ -56,7 +58,11 @@ def _dask_client(workers: int, scheduler: str | None) -> Iterator[Any]:
     with dask.config.set(quiet):
         if scheduler is None:
             cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=None,
+                silence_logs=40,
             )
             with cluster, Client(cluster) as client:
                 yield client
@@ -64,7 +70,9 @@ def _dask_client(workers: int, scheduler: str | None) -> Iterator[Any]:
             try:
                 client = Client(scheduler, timeout=CONNECT_TIMEOUT)
             except (OSError, ValueError) as error:
-                raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
+                raise InputError(
+                    f"--scheduler {scheduler}: no Dask scheduler answers there ({error})"
+                ) from None
             with client:
                 yield client
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from tasks.render.contact_sheet import contact_sheet, encode_png
 
 from flows.plan import Plan
 from flows.store.frames import read_clip
@@ -14,7 +15,6 @@ from flows.store.telemetry import labelled_table, read_columns, write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.manifest import freeze
 from manifests.provenance import processor
-from tasks.render.contact_sheet import contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
 PREVIEW_FRAMES = (0, 20, 40, 80)
@@ -47,7 +47,10 @@ def _gather(layout: Layout, plan: Plan, table: str) -> list[Any]:
         by_weather.setdefault(clip.scenario.weather, []).append(clip.clip_id)
     for weather, clip_ids in by_weather.items():
         for part, start in enumerate(range(0, len(clip_ids), CLIPS_PER_FILE)):
-            staged = [pq.read_table(layout.staged(clip_id, table)) for clip_id in clip_ids[start : start + CLIPS_PER_FILE]]
+            staged = [
+                pq.read_table(layout.staged(clip_id, table))
+                for clip_id in clip_ids[start : start + CLIPS_PER_FILE]
+            ]
             path = layout.telemetry / table / f"family={weather}" / f"part-{part:04d}.parquet"
             write_parquet(pa.concat_tables(staged).unify_dictionaries().combine_chunks(), path)
             written.append(path)

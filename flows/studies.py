@@ -1,12 +1,11 @@
 """Studies of the vehicle model: the surface-parameter sensitivity, agreement with reference traces, speed."""
 
 import time
-from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from flows.store.layout import read_json, write_json
+from flows.store.layout import write_json
 from tasks.errors import InputError
 
 BENCHMARKS = ("rasteriser", "vehicle", "pose_checks", "pipeline")
@@ -14,9 +13,10 @@ BENCHMARKS = ("rasteriser", "vehicle", "pose_checks", "pipeline")
 
 def sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
+    from tasks.vehicle.sensitivity import sensitivity_study
+
     from catalogs.surfaces import load_surface
     from catalogs.vehicles import load_vehicle
-    from tasks.vehicle.sensitivity import sensitivity_study
 
     vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     started = time.process_time()

@@ -26,13 +26,16 @@ def first_row_difference(
         if unequal.any():
             tick = int(np.argmax(unequal))
             if first is None or tick < first["tick"]:
-                first = {"channel": channel, "tick": tick, "recorded": a[tick].tolist(), "remade": b[tick].tolist()}
+                first = {
+                    "channel": channel,
+                    "tick": tick,
+                    "recorded": a[tick].tolist(),
+                    "remade": b[tick].tolist(),
+                }
     return first
 
 
-def first_pixel_difference(
-    array: str, recorded: NDArray[Any], remade: NDArray[Any]
-) -> dict[str, Any] | None:
+def first_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[Any]) -> dict[str, Any] | None:
     """The earliest frame in which two pictures differ and the first such pixel; None when they are equal."""
     if recorded.shape != remade.shape:
         return {"channel": array, "tick": 0, "recorded": _shape(recorded), "remade": _shape(remade)}

@@ -1,4 +1,4 @@
-"""The frozen manifest of a dataset: what was asked, with what it was made, and the hash of everything made."""
+"""The frozen manifest of a dataset: what was asked, what it was made with, and every hash."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +11,10 @@ MANIFEST_FORMAT = "musync-manifest/1"
 
 
 def freeze(
-    plan: Mapping[str, Any], clips: list[Mapping[str, Any]], artifacts: Mapping[str, str], processor: Mapping[str, str]
+    plan: Mapping[str, Any],
+    clips: list[Mapping[str, Any]],
+    artifacts: Mapping[str, str],
+    processor: Mapping[str, str],
 ) -> bytes:
     """The manifest's one byte string (RFC 8785).
 
@@ -44,7 +47,9 @@ def check_format(manifest: Mapping[str, Any], place: Path) -> None:
 
 def recorded_files(manifest: Mapping[str, Any]) -> dict[str, tuple[str, str | None]]:
     """Every recorded file: relative path to (SHA-256, clip id or None where several clips share it)."""
-    files: dict[str, tuple[str, str | None]] = {path: (digest, None) for path, digest in manifest["artifacts"].items()}
+    files: dict[str, tuple[str, str | None]] = {
+        path: (digest, None) for path, digest in manifest["artifacts"].items()
+    }
     for clip in manifest["clips"]:
         files |= {path: (digest, clip["clip_id"]) for path, digest in clip["artifacts"].items()}
     return files

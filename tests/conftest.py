@@ -12,5 +12,7 @@ DATA = Path(os.environ.get("MUSYNC_DATA", Path(__file__).resolve().parents[2] / 
 def outside_data() -> Path:
     """The folder with reference/ and measured/; skips where it is absent."""
     if not (DATA / "reference").is_dir():
-        pytest.skip(f"no reference data at {DATA}; set MUSYNC_DATA to the folder that holds reference/ and measured/")
+        pytest.skip(
+            f"no reference data at {DATA}; set MUSYNC_DATA to the folder that holds reference/ and measured/"
+        )
     return DATA

@@ -106,7 +106,9 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
         for problem in scenario_problems(scenario):
             problems.setdefault(problem, []).append(label)
     if problems:
-        raise InputError([f"{place}: scenario {_some(labels)}: {problem}" for problem, labels in problems.items()])
+        raise InputError(
+            [f"{place}: scenario {_some(labels)}: {problem}" for problem, labels in problems.items()]
+        )
     return Grid(settings=settings, scenarios=tuple(scenarios))
 
 

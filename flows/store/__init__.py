@@ -1,1 +1,1 @@
-"""The dataset on disk: where things lie, Parquet telemetry, Zarr frames, and the commit that makes a clip count."""
+"""The dataset on disk: where things lie, Parquet telemetry, Zarr frames, and the commit of a clip."""

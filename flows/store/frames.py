@@ -21,7 +21,9 @@ ARRAYS: dict[str, tuple[str, tuple[str, ...], str]] = {
 }
 
 
-def create_arrays(path: Path, clips: int, frames: int, height: int, width: int, attributes: Mapping[str, Any]) -> None:
+def create_arrays(
+    path: Path, clips: int, frames: int, height: int, width: int, attributes: Mapping[str, Any]
+) -> None:
     """Create the group and its arrays, once, before any clip is written."""
     group = zarr.create_group(path, overwrite=False, attributes=dict(attributes))
     for name, (dtype, extra, meaning) in ARRAYS.items():

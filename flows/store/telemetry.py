@@ -49,7 +49,7 @@ def write_parquet(table: pa.Table, path: Path) -> None:
         compression_level=3,
         row_group_size=ROW_GROUP_ROWS,
         use_dictionary=[field.name for field in table.schema if pa.types.is_dictionary(field.type)],
-        column_encoding={name: "BYTE_STREAM_SPLIT" for name in floats},
+        column_encoding=dict.fromkeys(floats, "BYTE_STREAM_SPLIT"),
         write_page_checksum=True,
     )
     partial.replace(path)

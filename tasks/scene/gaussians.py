@@ -48,8 +48,14 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
     }  # fmt: skip
     for name, shape in shapes.items():
         if getattr(gaussians, name).shape != shape:
-            problems.append(f"{place}: {name} must have shape {shape}; it has {getattr(gaussians, name).shape}")
-    if gaussians.sh.ndim != 3 or gaussians.sh.shape[0] != n or gaussians.sh.shape[1:] not in {(k, 3) for k in (1, 4, 9, 16)}:
+            problems.append(
+                f"{place}: {name} must have shape {shape}; it has {getattr(gaussians, name).shape}"
+            )
+    if (
+        gaussians.sh.ndim != 3
+        or gaussians.sh.shape[0] != n
+        or gaussians.sh.shape[1:] not in {(k, 3) for k in (1, 4, 9, 16)}
+    ):
         problems.append(f"{place}: sh must have shape ({n}, 1|4|9|16, 3); it has {gaussians.sh.shape}")
     if problems:
         raise InputError(problems)
@@ -67,6 +73,8 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
         ):
             if not ok.all():
                 bad = np.flatnonzero(~ok)
-                problems.append(f"{place}: {name} must be {rule}; {len(bad)} of {n} are not, the first is number {bad[0]}")
+                problems.append(
+                    f"{place}: {name} must be {rule}; {len(bad)} of {n} are not, the first is number {bad[0]}"
+                )
     if problems:
         raise InputError(problems)

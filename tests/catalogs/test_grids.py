@@ -51,12 +51,21 @@ def test_all_faults_of_a_file_are_listed_at_once_each_with_its_place(tmp_path):
         load_grid(path)
     text = str(caught.value)
     assert len(caught.value.problems) == 5
-    for place in ("frames", "colour", "axes.w.a.weather", "axes.w.b.precipitaton_mm_h", "axes.w.c.precipitation_mm_h"):
+    for place in (
+        "frames",
+        "colour",
+        "axes.w.a.weather",
+        "axes.w.b.precipitaton_mm_h",
+        "axes.w.c.precipitation_mm_h",
+    ):
         assert f"{path}: {place}:" in text
 
 
 def test_a_rule_broken_by_many_scenarios_is_told_once(tmp_path):
-    path = grid_file(tmp_path, "{name: t, axes: {w: {s: {weather: snow, precipitation_mm_h: 1}}, r: {a: {}, b: {}, c: {}}}}")
+    path = grid_file(
+        tmp_path,
+        "{name: t, axes: {w: {s: {weather: snow, precipitation_mm_h: 1}}, r: {a: {}, b: {}, c: {}}}}",
+    )
     with pytest.raises(InputError) as caught:
         load_grid(path)
     assert caught.value.problems == (
@@ -100,7 +109,9 @@ def test_a_sound_scenario_has_no_problems():
     assert scenario_problems(Scenario(weather="snow", precipitation_mm_h=1.0, snow_accumulation_h=1.0)) == []
 
 
-@pytest.mark.parametrize(("center", "length", "fits"), [(50, 3, True), (1, 3, False), (99, 3, False), (50, 200, False)])
+@pytest.mark.parametrize(
+    ("center", "length", "fits"), [(50, 3, True), (1, 3, False), (99, 3, False), (50, 200, False)]
+)
 def test_a_hazard_must_lie_on_the_route(center, length, fits):
     scenario = Scenario(hazard_center_m=center, hazard_length_m=length, hazard_height_m=0.1)
     assert (route_problems(scenario, 100.0, "s") == []) == fits

@@ -20,8 +20,17 @@ def process_id(_: int) -> int:
 @pytest.mark.parametrize("runner", ["threads", "processes", "dask"])
 def test_every_runner_returns_each_result_and_keeps_going_past_a_failure(runner):
     with open_executor(runner, workers=2) as executor:
-        ended = {call[0]: future for call, future in run_unordered(executor, square_or_fail, [(i,) for i in range(6)])}
-        assert {number: ended[number].result() for number in (0, 1, 2, 4, 5)} == {0: 0, 1: 1, 2: 4, 4: 16, 5: 25}
+        ended = {
+            call[0]: future
+            for call, future in run_unordered(executor, square_or_fail, [(i,) for i in range(6)])
+        }
+        assert {number: ended[number].result() for number in (0, 1, 2, 4, 5)} == {
+            0: 0,
+            1: 1,
+            2: 4,
+            4: 16,
+            5: 25,
+        }
         assert isinstance(ended[3].exception(), ValueError)
 
 
@@ -35,7 +44,10 @@ def test_a_running_dask_cluster_is_used_by_its_address():
 
     with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
         address = cluster.scheduler_address
-        with pytest.raises(InputError, match="belongs to --runner dask"), open_executor("threads", 1, address):
+        with (
+            pytest.raises(InputError, match="belongs to --runner dask"),
+            open_executor("threads", 1, address),
+        ):
             pass
     with LocalCluster(
         n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, protocol="tcp"
@@ -45,7 +57,10 @@ def test_a_running_dask_cluster_is_used_by_its_address():
 
 def test_a_scheduler_that_does_not_answer_is_an_input_error(monkeypatch):
     monkeypatch.setattr("flows.runner.CONNECT_TIMEOUT", "1s")
-    with pytest.raises(InputError, match="no Dask scheduler answers"), open_executor("dask", 1, "tcp://127.0.0.1:9"):
+    with (
+        pytest.raises(InputError, match="no Dask scheduler answers"),
+        open_executor("dask", 1, "tcp://127.0.0.1:9"),
+    ):
         pass
 
 

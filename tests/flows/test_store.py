@@ -68,7 +68,17 @@ def test_arrays_say_their_dimensions_and_camera(layout):
 
 def test_hash_of_a_buffer_sees_values_type_and_shape():
     zeros = np.zeros((2, 3), np.uint8)
-    assert len({buffer_hash(zeros), buffer_hash(zeros.T), buffer_hash(zeros.view(np.int8)), buffer_hash(zeros + 1)}) == 4
+    assert (
+        len(
+            {
+                buffer_hash(zeros),
+                buffer_hash(zeros.T),
+                buffer_hash(zeros.view(np.int8)),
+                buffer_hash(zeros + 1),
+            }
+        )
+        == 4
+    )
 
 
 def columns() -> dict[str, np.ndarray]:

@@ -37,4 +37,6 @@ def test_nan_has_no_canonical_form():
 
 def test_hash_depends_on_the_bytes_and_not_on_how_they_are_cut():
     assert sha256_of([b"ab", b"c"]) == sha256_of([b"abc"])
-    assert sha256_of([b"abc"]) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"  # FIPS 180-2, B.1
+    assert (
+        sha256_of([b"abc"]) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    )  # FIPS 180-2, B.1

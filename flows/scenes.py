@@ -1,0 +1,113 @@
+"""Scenes made, imported and looked at."""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from catalogs.scenes.importers import import_scene
+from catalogs.scenes.stereo_folder import read_stereo_folder
+from tasks.render.composition import compose, encode_8bit
+from tasks.render.environment import environment_view
+from tasks.scene.stereo.reconstruct import reconstruct
+
+from catalogs.scenes import load_scene, write_scene
+from flows.store.layout import read_json
+from tasks.conventions import ROAD_CLASSES
+from tasks.errors import InputError
+from tasks.render.backend import select_backend
+
+
+def scene_from_stereo(folder: str, out: str) -> dict[str, Any]:
+    """Build a scene from a posed stereo sequence and report its held-out figures.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the folder, or if ``out`` is not empty.
+    """
+    _must_be_new(out)
+    result = reconstruct(read_stereo_folder(Path(folder)))
+    figures = result.figures()
+    write_scene(result.scene, Path(out), figures)
+    return {"scene": out, **figures}
+
+
+def scene_import(gaussians: str, route: str, out: str) -> dict[str, Any]:
+    """Make a scene folder of Gaussians trained elsewhere and a route.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the two files, or if ``out`` is not empty.
+    """
+    _must_be_new(out)
+    scene = import_scene(Path(gaussians), Path(route))
+    write_scene(scene, Path(out), {})
+    road = np.isin(scene.gaussians.class_id, ROAD_CLASSES).mean()
+    return {
+        "scene": out,
+        "gaussians": len(scene.gaussians),
+        "route_length_m": scene.route.length,
+        "road_share": float(road),
+    }
+
+
+def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> dict[str, Any]:
+    """Render one frame at a world-to-camera pose and write its buffers.
+
+    Raises
+    ------
+    InputError
+        If the pose file lacks a key or a matrix has the wrong shape.
+    """
+    viewmat, intrinsics, width, height = _read_pose(pose)
+    loaded = load_scene(scene)
+    engine = select_backend(backend)
+    gbuffer = engine.rasterise(engine.prepare(loaded.gaussians), viewmat, intrinsics, width, height)
+    sky = environment_view(loaded.environment, viewmat, intrinsics, width, height)
+    picture = encode_8bit(compose(gbuffer, sky, loaded.gaussians.display_encoded))
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(folder / "rgb.png"), picture[..., ::-1])
+    buffers = {
+        "depth": gbuffer.depth,
+        "alpha": gbuffer.alpha,
+        "normal": gbuffer.normal,
+        "class": gbuffer.class_id,
+    }
+    for name, buffer in buffers.items():
+        np.save(folder / f"{name}.npy", buffer)
+    return {"picture": str(folder / "rgb.png"), "backend": engine.name, "width": width, "height": height}
+
+
+def _read_pose(pose: str) -> tuple[np.ndarray, np.ndarray, int, int]:
+    content = read_json(Path(pose))
+    problems = [
+        f"{pose}: {key} is required; it is missing"
+        for key in ("viewmat", "K", "width", "height")
+        if key not in content
+    ]
+    matrices = {}
+    for key, shape in (("viewmat", (4, 4)), ("K", (3, 3))):
+        if key in content:
+            try:
+                matrices[key] = np.array(content[key], dtype=float)
+            except (TypeError, ValueError):
+                matrices[key] = np.empty(0)
+            if matrices[key].shape != shape or not np.isfinite(matrices[key]).all():
+                problems.append(
+                    f"{pose}: {key} must be a {shape[0]}x{shape[1]} matrix of finite numbers; it is not"
+                )
+    for key in ("width", "height"):
+        if key in content and not (isinstance(content[key], int) and content[key] > 0):
+            problems.append(f"{pose}: {key} must be a positive whole number; it is {content[key]!r}")
+    if problems:
+        raise InputError(problems)
+    return matrices["viewmat"], matrices["K"], content["width"], content["height"]
+
+
+def _must_be_new(out: str) -> None:
+    folder = Path(out)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{out}: must be a new or empty folder; it holds other files")
