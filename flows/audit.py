@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flows.clip import make_clip
 from flows.generate import create_frame_arrays, fan_out
 from flows.orchestration import stage
 from flows.plan import Plan, read_plan
@@ -118,7 +117,7 @@ def remake_and_compare(
         plan = read_plan(remade.root)
         create_frame_arrays(remade, plan)
         indices = sorted((clip["index"] for clip in chosen), reverse=True)
-        fan_out(remade, plan, indices, runner, workers, scheduler, make_clip)
+        fan_out(remade, plan, indices, runner, workers, scheduler)
         return [
             difference
             for clip in chosen

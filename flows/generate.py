@@ -1,9 +1,7 @@
 """A grid to a dataset: plan, make the missing clips, seal."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from flows.clip import make_clip
 from flows.failures import ClipsFailed, disk_full_sentence
@@ -108,7 +106,6 @@ def fan_out(
     runner: RunnerName,
     workers: int | None,
     scheduler: str | None,
-    make: Callable[[str, int], dict[str, Any]] = make_clip,
 ) -> dict[str, dict[str, float]]:
     """Make the clips on the runner; returns what each cost (CPU and wall seconds, peak memory)."""
     cost: dict[str, dict[str, float]] = {}
@@ -119,7 +116,7 @@ def fan_out(
         progress_bar("clips", len(indices)) as advance,
     ):
         for (_, index), future in run_unordered(
-            executor, make, ((str(layout.root), index) for index in indices)
+            executor, make_clip, ((str(layout.root), index) for index in indices)
         ):
             error = future.exception()
             if error is None:

@@ -1,0 +1,223 @@
+"""The whole pipeline on a toy street: a few Gaussians, a few frames, every promise of a dataset."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import flows.generate
+from catalogs.scenes import write_scene
+from flows.audit import audit
+from flows.clip import make_clip
+from flows.describe import describe
+from flows.failures import ClipsFailed
+from flows.generate import generate
+from flows.store.frames import read_clip
+from flows.store.layout import Layout
+from flows.store.telemetry import read_columns, write_parquet
+from manifests.canonical import canonical_bytes, sha256_of_file
+from tasks.conventions import TICK_CHANNELS
+from tasks.errors import InputError
+from tests.toy_street import TOY_CAMERA, toy_street
+
+GRID = """
+name: toy
+scene: {scene}
+camera: {camera}
+frames: {frames}
+frame_rate_hz: 10
+axes:
+  weather:
+    dry: {{weather: dry}}
+    snow-3: {{weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1}}
+  road:
+    flat: {{initial_speed_km_h: 40, peak_pressure_mpa: 2.3, brake_onset_s: 0.2}}
+    hump: {{initial_speed_km_h: 30, hazard_center_m: 6, hazard_length_m: 3.7, hazard_height_m: 0.075}}
+"""
+
+
+@pytest.fixture(scope="module")
+def grid(tmp_path_factory) -> str:
+    folder = tmp_path_factory.mktemp("inputs")
+    write_scene(toy_street(), folder / "scene", {})
+    (folder / "camera.yaml").write_text(TOY_CAMERA)
+    path = folder / "grid.yaml"
+    path.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=11))
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def dataset(grid, tmp_path_factory) -> Layout:
+    return generate(grid, str(tmp_path_factory.mktemp("data") / "toy"), runner="threads", workers=2).layout
+
+
+@pytest.fixture
+def copy(dataset, tmp_path) -> Layout:
+    shutil.copytree(dataset.root, tmp_path / "copy")
+    return Layout(tmp_path / "copy")
+
+
+def manifest_of(layout: Layout) -> dict:
+    return json.loads(layout.manifest.read_bytes())
+
+
+def test_a_dataset_has_telemetry_frames_a_preview_and_a_canonical_manifest(dataset):
+    manifest = manifest_of(dataset)
+    assert dataset.manifest.read_bytes() == canonical_bytes(manifest)
+    assert len(manifest["clips"]) == 4
+    assert not dataset.staging.exists()
+    assert (dataset.previews / "contact_sheet.png").stat().st_size > 1000
+    ticks = pq.read_table(dataset.telemetry / "ticks")
+    assert ticks.num_rows == 4 * 1001
+    assert {channel.name for channel in TICK_CHANNELS} <= set(ticks.column_names)
+    assert pq.read_table(dataset.telemetry / "frames").num_rows == 4 * 11
+    assert pq.read_table(dataset.telemetry / "clips.parquet").num_rows == 4
+
+
+def test_every_file_of_the_dataset_is_in_the_manifest(dataset):
+    manifest = manifest_of(dataset)
+    recorded = set(manifest["artifacts"]).union(*(clip["artifacts"] for clip in manifest["clips"]))
+    present = {dataset.relative(f) for f in dataset.root.rglob("*") if f.is_file()} - {"manifest.json"}
+    assert present == recorded
+
+
+def test_frame_rows_are_the_ticks_they_name(dataset):
+    clip = manifest_of(dataset)["clips"][0]
+    family = f"family={clip['scenario']['weather']}"
+    ticks = read_columns(dataset.telemetry / "ticks" / family, clip["clip_id"])
+    frames = read_columns(dataset.telemetry / "frames" / family, clip["clip_id"])
+    for channel in TICK_CHANNELS:
+        np.testing.assert_array_equal(frames[channel.name], ticks[channel.name][frames["tick"]])
+    np.testing.assert_array_equal(frames["t_ns"], np.arange(11) * 100_000_000)
+
+
+def test_snow_is_both_seen_and_felt(dataset):
+    clips = {clip["label"]: clip for clip in manifest_of(dataset)["clips"]}
+    dry, snow = clips["dry/flat"], clips["snow-3/flat"]
+    assert snow["figures"]["tyre_peak"] < 0.5 * dry["figures"]["tyre_peak"]
+    pictures = [read_clip(dataset.frames, clip["index"], "rgb")[0] for clip in (dry, snow)]
+    road = read_clip(dataset.frames, dry["index"], "class")[0] == 1
+    assert pictures[1][road].mean() > pictures[0][road].mean() + 30
+
+
+def test_the_hump_is_both_seen_and_felt(dataset):
+    clips = {clip["label"]: clip for clip in manifest_of(dataset)["clips"]}
+    flat, hump = (read_clip(dataset.frames, clips[f"dry/{road}"]["index"], "depth")[0] for road in ("flat", "hump"))
+    nearer = np.nan_to_num(flat - hump)
+    assert nearer.max() > 0.1, "the hump hides the road behind it"
+    assert clips["dry/hump"]["figures"]["peak_pitch"] > np.deg2rad(0.5)
+
+
+@pytest.mark.parametrize(("runner", "workers"), [("processes", 1), ("dask", 2)])
+def test_the_bytes_do_not_depend_on_the_runner(dataset, grid, tmp_path, runner, workers):
+    again = generate(grid, str(tmp_path / "again"), runner=runner, workers=workers).layout
+    assert again.manifest.read_bytes() == dataset.manifest.read_bytes()
+    for path in manifest_of(dataset)["artifacts"]:
+        assert sha256_of_file(again.root / path) == sha256_of_file(dataset.root / path), path
+
+
+def test_a_finished_dataset_is_not_made_again(dataset, grid):
+    assert generate(grid, str(dataset.root), runner="threads").made == 0
+
+
+def broken_on_two(root: str, index: int) -> dict:
+    if index == 2:
+        raise RuntimeError("lightning struck")
+    return make_clip(root, index)
+
+
+def full_on_two(root: str, index: int) -> dict:
+    if index == 2:
+        raise OSError(28, "No space left on device")
+    return make_clip(root, index)
+
+
+@pytest.mark.parametrize(
+    ("fault", "error", "sentence"),
+    [(broken_on_two, ClipsFailed, "lightning struck"), (full_on_two, InputError, "the disk is full")],
+)
+def test_what_is_made_before_a_failure_is_kept_and_resuming_makes_the_rest(
+    dataset, grid, tmp_path, monkeypatch, fault, error, sentence
+):
+    monkeypatch.setattr(flows.generate, "make_clip", fault)
+    layout = Layout(tmp_path / "data")
+    with pytest.raises(error, match=sentence):
+        generate(grid, str(layout.root), runner="threads", workers=1)
+    assert not layout.manifest.exists()
+    kept = sorted(path.name for path in layout.staging.glob("*.json"))
+    assert len(kept) >= 2
+    with pytest.raises(InputError, match=f"{len(kept)} of 4 clips are made"):
+        describe(str(layout.root))
+    monkeypatch.undo()
+    assert generate(grid, str(layout.root), runner="threads", workers=1).made == 4 - len(kept)
+    assert layout.manifest.read_bytes() == dataset.manifest.read_bytes()
+
+
+def test_another_grid_does_not_go_into_the_same_folder_and_the_difference_is_named(dataset, grid, tmp_path):
+    other = tmp_path / "other.yaml"
+    other.write_text(Path(grid).read_text().replace("frames: 11", "frames: 12"))
+    before = dataset.manifest.read_bytes()
+    with pytest.raises(InputError, match="grid.frames is 11 there and 12 here"):
+        generate(str(other), str(dataset.root), runner="threads")
+    assert dataset.manifest.read_bytes() == before
+
+
+def test_a_second_writer_is_told(dataset, grid, tmp_path):
+    from flows.store.lock import sole_writer
+
+    layout = Layout(tmp_path / "data")
+    flows.generate.prepare(grid, layout, "cpu")
+    with sole_writer(layout), pytest.raises(InputError, match="another run is writing"):
+        generate(grid, str(layout.root), runner="threads")
+
+
+def test_an_audit_makes_the_same_bytes_again(dataset, tmp_path):
+    result = audit(str(dataset.root), share=1.0, out=str(tmp_path), runner="processes", workers=2)
+    assert result["verified"], result
+    assert len(result["rerun"]) == 4
+    assert result["differences"] == []
+    assert json.loads((tmp_path / "audit.json").read_text()) == result
+
+
+def test_an_audit_draws_the_same_share_each_time(dataset):
+    first, second = (audit(str(dataset.root), share=0.3, runner="threads")["rerun"] for _ in range(2))
+    assert first == second
+    assert len(first) == 2
+
+
+def test_an_audit_names_a_damaged_file_and_its_clip(copy):
+    clip = manifest_of(copy)["clips"][1]
+    shard = next(iter(clip["artifacts"]))
+    content = bytearray((copy.root / shard).read_bytes())
+    content[len(content) // 2] ^= 1
+    (copy.root / shard).write_bytes(content)
+    result = audit(str(copy.root), share=0.0)
+    assert not result["verified"]
+    assert result["damaged"] == [{"path": shard, "clip_id": clip["clip_id"], "damage": "changed"}]
+
+
+def test_an_audit_names_the_first_channel_and_tick_that_differ(copy):
+    clip = manifest_of(copy)["clips"][0]
+    path = copy.telemetry / "ticks" / f"family={clip['scenario']['weather']}" / "part-0000.parquet"
+    table = pq.read_table(path)
+    speed = table["speed"].to_numpy().copy()
+    row = int(np.flatnonzero(np.array(table["clip_id"].to_pylist()) == clip["clip_id"])[417])
+    speed[row] += 1e-9
+    position = table.column_names.index("speed")
+    write_parquet(table.set_column(position, table.schema.field("speed"), [speed]), path)
+    forged = manifest_of(copy)
+    forged["clips"][0]["content"]["ticks"] = "0" * 64
+    copy.manifest.write_bytes(canonical_bytes(forged))
+    mismatches = audit(str(copy.root), share=1.0, runner="threads")["mismatches"]
+    assert [(m["clip_id"], m["stage"], m["channel"], m["tick"]) for m in mismatches] == [
+        (clip["clip_id"], "vehicle", "speed", 417)
+    ]
+
+
+def test_describe_lists_each_clip_with_its_stop_and_verdict(dataset):
+    facts = describe(str(dataset.root))
+    assert [clip["label"] for clip in facts["clips"]] == ["dry/flat", "dry/hump", "snow-3/flat", "snow-3/hump"]
+    assert all({"stopping_distance", "peak_pitch", "passed"} <= clip.keys() for clip in facts["clips"])
