@@ -14,10 +14,13 @@ QUIET_AND_LOCAL = {
     "DO_NOT_TRACK": "1",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
     "PREFECT_LOGGING_LEVEL": "WARNING",
+    "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
     "PREFECT_HOME": str(Path.cwd() / ".musync" / "prefect"),
 }
 for _name, _value in QUIET_AND_LOCAL.items():
     os.environ.setdefault(_name, _value)
+# Prefect's database fails to open in a home that does not exist yet
+Path(os.environ["PREFECT_HOME"]).mkdir(parents=True, exist_ok=True)
 
 from prefect import flow  # noqa: E402  (reads the environment when it is imported)
 

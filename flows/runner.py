@@ -1,5 +1,6 @@
 """Where the work of a run happens: threads, processes or Dask, behind one executor protocol."""
 
+import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
@@ -51,30 +52,23 @@ def open_executor(
 
 @contextmanager
 def _dask_client(workers: int, scheduler: str | None) -> Iterator[Any]:
-    import dask
     from distributed import Client, LocalCluster
 
-    quiet = {"distributed.logging.distributed": "error", "distributed.worker.daemon": True}
-    with dask.config.set(quiet):
-        if scheduler is None:
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=None,
-                silence_logs=40,
-            )
-            with cluster, Client(cluster) as client:
-                yield client
-        else:
-            try:
-                client = Client(scheduler, timeout=CONNECT_TIMEOUT)
-            except (OSError, ValueError) as error:
-                raise InputError(
-                    f"--scheduler {scheduler}: no Dask scheduler answers there ({error})"
-                ) from None
-            with client:
-                yield client
+    # a closing cluster says so in a dozen lines, and Prefect lets every library log
+    logging.getLogger("distributed").setLevel(logging.ERROR)
+    if scheduler is None:
+        cluster = LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+        )
+        with cluster, Client(cluster) as client:
+            yield client
+        return
+    try:
+        client = Client(scheduler, timeout=CONNECT_TIMEOUT)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
+    with client:
+        yield client
 
 
 def run_unordered(
