@@ -1,0 +1,98 @@
+"""What a measurement campaign holds, free of files: runs, split, tolerances."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+CHANNELS = (
+    "speed", "longitudinal_acceleration", "wheel_speed_front", "wheel_speed_rear", "pitch", "pitch_rate", "vertical_acceleration",
+)  # fmt: skip
+"""Measured responses in the order of a run's matrix; angles in degrees as test benches log them."""
+CHANNEL_UNITS = ("m/s", "m/s^2", "rad/s", "rad/s", "deg", "deg/s", "m/s^2")
+SESSION = ("pressure_gain", "mass", "pitch_gain", "wheel_radius", "damping", "stiffness", "slope")
+"""Session nuisances, by the name of the parameter that carries them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerances:
+    """One-sigma doubts about a session (relative, grade as slope) and about a single run.
+
+    Parameters
+    ----------
+    session : seven sigmas in the order of `SESSION` [1]
+    initial_speed : [m/s]
+    friction : relative [1]
+    acceleration_bias : [m/s^2]
+    pitch_offset : [deg]
+    """
+
+    session: tuple[float, ...]
+    initial_speed: float
+    friction: float
+    acceleration_bias: float
+    pitch_offset: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One measured run at a fixed rate.
+
+    Parameters
+    ----------
+    name : as in runs.csv
+    held_out : belongs to the runs that no fit may see
+    weather : dry, rain or snow
+    precipitation_mm_h, snow_accumulation_h : rate [mm/h] and time of snowfall [h]
+    direction : +1 along the route, -1 against it
+    disc_rise : disc temperature above ambient at the start [K]
+    hazard_center, hazard_length, hazard_height : road feature [m]; length 0 is a flat road
+    interval : time between samples [s]
+    pressure : float64 [N] measured brake pressure [MPa]
+    response : float64 [N, 7] measured channels in the order of `CHANNELS`
+    """
+
+    name: str
+    held_out: bool
+    weather: str
+    precipitation_mm_h: float
+    snow_accumulation_h: float
+    direction: int
+    disc_rise: float
+    hazard_center: float
+    hazard_length: float
+    hazard_height: float
+    interval: float
+    pressure: NDArray[np.float64]
+    response: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Campaign:
+    """All runs of one vehicle in one session, with the split fixed before anything is fitted.
+
+    Parameters
+    ----------
+    name, vehicle : of the campaign and of the catalogue entry it is compared with
+    runs : in the order of runs.csv
+    tolerances : what a session and a run may be off by
+    content_hash : SHA-256 over every file read
+    split_hash : SHA-256 over the names of the training and held-out runs
+    """
+
+    name: str
+    vehicle: str
+    runs: tuple[Run, ...]
+    tolerances: Tolerances
+    content_hash: str
+    split_hash: str
+
+    @property
+    def train(self) -> tuple[Run, ...]:
+        """Runs that may be fitted."""
+        return tuple(run for run in self.runs if not run.held_out)
+
+    @property
+    def held_out(self) -> tuple[Run, ...]:
+        """Runs that only judge."""
+        return tuple(run for run in self.runs if run.held_out)
