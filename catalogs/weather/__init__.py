@@ -1,0 +1,93 @@
+"""How weather looks: values with unit and source, and their typed loader."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import yaml
+
+from tasks.errors import InputError
+from tasks.render.weather.parameters import WeatherParameters
+
+FOLDER = Path(__file__).parent
+
+
+def load_weather(folder: Path = FOLDER) -> WeatherParameters:
+    """Read the weather catalogue.
+
+    Parameters
+    ----------
+    folder : holds one YAML file for each member of `WeatherParameters`
+
+    Returns
+    -------
+    WeatherParameters
+
+    Raises
+    ------
+    InputError
+        A file is missing or no YAML, a value is missing, unknown, without unit or source, or no finite number.
+    """
+    problems: list[str] = []
+    documents: dict[str, Any] = {}
+    for member in fields(WeatherParameters):
+        path = folder / f"{member.name}.yaml"
+        try:
+            documents[member.name] = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            problems.append(f"{path}: the weather catalogue needs this file; it is not there")
+        except yaml.YAMLError as error:
+            problems.append(f"{path}: must be YAML; {' '.join(str(error).split())}")
+    values: dict[str, Any] = {
+        name: _typed(kind, documents[name], f"{folder / name}.yaml", problems)
+        for name, kind in get_type_hints(WeatherParameters).items()
+        if name in documents
+    }
+    if problems:
+        raise InputError(problems)
+    return WeatherParameters(**values)
+
+
+def _typed(kind: Any, entries: object, place: str, problems: list[str]) -> Any:
+    """Build a parameter class from a mapping of its fields; None, and a problem, where that fails."""
+    if not isinstance(entries, Mapping):
+        problems.append(f"{place}: must map names to values; it holds {entries!r}")
+        return None
+    hints = get_type_hints(kind)
+    for name in sorted(set(entries) - set(hints)):
+        problems.append(f"{place}: {name} is not a known value; known are {', '.join(hints)}")
+    for name in sorted(set(hints) - set(entries)):
+        problems.append(f"{place}: {name} is missing; give it value, unit and source")
+    built: dict[str, Any] = {}
+    before = len(problems)
+    for name, hint in hints.items():
+        if name not in entries:
+            continue
+        where = f"{place}: {name}"
+        read = _typed if is_dataclass(hint) else _leaf
+        built[name] = read(hint, entries[name], where, problems)
+    return kind(**built) if len(built) == len(hints) and len(problems) == before else None
+
+
+def _leaf(hint: Any, entry: object, where: str, problems: list[str]) -> Any:
+    """One value; a problem where it lacks unit or source, or is not of the field's type."""
+    if not isinstance(entry, Mapping) or not {"value", "unit", "source"} <= set(entry):
+        problems.append(f"{where} must have value, unit and source; it is {entry!r}")
+        return None
+    value = entry["value"]
+    if hint is str:
+        if not isinstance(value, str):
+            problems.append(f"{where} must be a word; it is {value!r}")
+        return value
+    single = hint in (int, float)
+    numbers = [value] if single else value if isinstance(value, list) else []
+    sound = [type(n) is int or (hint is not int and type(n) is float and isfinite(n)) for n in numbers]
+    if not (sound and all(sound)):
+        rule = (
+            "a whole number" if hint is int else "a finite number" if single else "a list of finite numbers"
+        )
+        problems.append(f"{where} must be {rule}; it is {value!r}")
+        return None
+    return hint(value) if single else tuple(float(n) for n in numbers)

@@ -1,0 +1,41 @@
+"""One step of the composition, kept apart: what it lets through and what it adds."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layer:
+    """``picture gain + add``, in linear light and float32.
+
+    Parameters
+    ----------
+    name : light, wet, air or particles
+    gain : float32 [H, W, 1] or [H, W, 3] share of the picture below that is left [1]
+    add : float32 [H, W, 3] light that the layer adds [1]
+    """
+
+    name: str
+    gain: NDArray[np.float32]
+    add: NDArray[np.float32]
+
+
+def recompose(base: NDArray[np.float32], layers: Iterable[Layer]) -> NDArray[np.float32]:
+    """Apply layers to a picture in their order; the one way pictures are composed, so any layer can be redone.
+
+    Parameters
+    ----------
+    base : float32 [H, W, 3] linear picture [1]
+    layers : from the scene to the lens
+
+    Returns
+    -------
+    float32 [H, W, 3] linear picture [1]
+    """
+    picture = base
+    for layer in layers:
+        picture = picture * layer.gain + layer.add
+    return picture

@@ -1,0 +1,140 @@
+"""Where water stands smooth on the road: film level against texture and unevenness, point by point."""
+
+from dataclasses import dataclass
+from math import erf, exp, sqrt
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.render.weather.coverage_field import FieldParameters, fractal_noise
+from tasks.render.weather.random_streams import stream_key
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadWaterParameters:
+    """How a film of water lies on the road.
+
+    Parameters
+    ----------
+    wetting_mm : film depth at which 1 - 1/e of the surface is wet [mm]
+    texture_depth_mm : mean texture depth; the film is measured from the bottom of the texture [mm]
+    texture_spread_mm : standard deviation of the heights of the texture's peaks [mm]
+    unevenness_mm : standard deviation of the road's level over metres; water gathers where it is low [mm]
+    unevenness : its waves
+    ripple_slope : standard deviation of the slope of standing water and smooth film [1]
+    ripple_m : length of those ripples [m]
+    """
+
+    wetting_mm: float
+    texture_depth_mm: float
+    texture_spread_mm: float
+    unevenness_mm: float
+    unevenness: FieldParameters
+    ripple_slope: float
+    ripple_m: float
+
+
+def wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> float:
+    """Share of the road surface that is wet, 0 on a dry road and rising with the film.
+
+    Parameters
+    ----------
+    film_depth_mm : total film depth h_t [mm]
+    parameters : how the film lies
+
+    Returns
+    -------
+    float
+        Share [1].
+    """
+    return 1 - exp(-film_depth_mm / parameters.wetting_mm)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaterSurface:
+    """The water on the road pixels of one frame; 0 elsewhere.
+
+    Parameters
+    ----------
+    smooth : float32 [H, W] share of the pixel under smooth water [1]
+    normal : float32 [H, W, 3] unit normals of that water, world frame [1]
+    cosine : float32 [H, W] cosine of the angle at which the road is seen [1]
+    """
+
+    smooth: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    cosine: NDArray[np.float32]
+
+
+def water_surface(
+    depth: NDArray[np.float32],
+    rays: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    road: NDArray[np.bool_],
+    eye: NDArray[np.floating],
+    focal_px: float,
+    film_depth_mm: float,
+    parameters: RoadWaterParameters,
+    seed: int,
+) -> WaterSurface:
+    """Where the film drowns the road's texture, and how its surface lies.
+
+    The texture's peaks are normally distributed about the mean texture depth and the water level about the
+    film depth: the smooth share is the probability that a peak is drowned. It rises with the film everywhere.
+
+    Parameters
+    ----------
+    depth : float32 [H, W] camera z of the road [m]
+    rays : float32 [H, W, 3] world directions of the pixels, of camera z 1 [1]
+    normal : float32 [H, W, 3] unit normals of the road, world frame [1]
+    road : bool [H, W] pixels to compute
+    eye : [3] place of the camera [m]
+    focal_px : focal length [px]
+    film_depth_mm : total film depth h_t [mm]
+    parameters : how the film lies
+    seed : visual seed of the clip [1]
+
+    Returns
+    -------
+    WaterSurface
+    """
+    p = parameters
+    surface = WaterSurface(
+        smooth=np.zeros(road.shape, dtype=np.float32),
+        normal=np.zeros((*road.shape, 3), dtype=np.float32),
+        cosine=np.zeros(road.shape, dtype=np.float32),
+    )
+    _water(
+        depth, rays, normal, road, np.asarray(eye, dtype=np.float64), focal_px,
+        film_depth_mm, wetness(film_depth_mm, p), p.texture_depth_mm, p.texture_spread_mm,
+        p.unevenness_mm, p.unevenness.coarsest_m, p.unevenness.octaves, p.unevenness.roughness,
+        p.ripple_slope, p.ripple_m, np.uint64(stream_key(seed, "puddles")),
+        surface.smooth, surface.normal, surface.cosine,
+    )  # fmt: skip
+    return surface
+
+
+@numba.njit(cache=True, nogil=True)
+def _water(  # type: ignore[no-untyped-def]
+    depth, rays, normal, road, eye, focal, film, wet, texture, spread, uneven, coarsest, octaves, roughness,
+    ripple_slope, ripple, key, smooth, water, cosine,
+):  # fmt: skip
+    for row in range(road.shape[0]):
+        for column in range(road.shape[1]):
+            if not road[row, column]:
+                continue
+            ray, up, z = rays[row, column], normal[row, column], depth[row, column]
+            stretch = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
+            facing = max(-(ray[0] * up[0] + ray[1] * up[1] + ray[2] * up[2]) / stretch, 0.01)
+            x, y = eye[0] + z * ray[0], eye[1] + z * ray[1]
+            size = z * stretch / (focal * facing)
+            level = film + uneven * fractal_noise(x, y, size, coarsest, octaves, roughness, key)
+            smooth[row, column] = wet * 0.5 * (1 + erf((level - texture) / (spread * sqrt(2.0))))
+            cosine[row, column] = min(facing, 1.0)
+            nx = up[0] - ripple_slope * fractal_noise(x, y, size, ripple, 2, 0.6, key + np.uint64(1000))
+            ny = up[1] - ripple_slope * fractal_noise(x, y, size, ripple, 2, 0.6, key + np.uint64(2000))
+            length = sqrt(nx * nx + ny * ny + up[2] * up[2])
+            water[row, column, 0] = nx / length
+            water[row, column, 1] = ny / length
+            water[row, column, 2] = up[2] / length

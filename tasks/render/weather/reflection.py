@@ -1,0 +1,178 @@
+"""What a wet road mirrors: marching along the mirrored ray through the picture's own depth.
+
+A ray that meets a surface of the picture takes its colour. A ray that passes behind a surface and does not
+come out again takes that surface's colour: a car's front stands for its underside. A ray that leaves the
+picture goes on to the surface at its edge, as far as that can be believed, and else to the sky: a facade goes
+on above the frame.
+"""
+
+from math import exp, sqrt
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.render.weather.sky import sample_panorama
+
+STEPS = 26
+FIRST_STEP_M = 0.15
+STEP_GROWTH = 1.26
+HALVINGS = 5
+THICKNESS_M, THICKNESS_SHARE = 0.4, 0.04
+NEAREST_Z_M = 0.2
+EDGE_FADE = 0.35
+"""Share of the picture's height over which the surface at its edge is trusted to go on."""
+
+
+def mirrored_scene(
+    picture: NDArray[np.float32],
+    depth: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    road: NDArray[np.bool_],
+    environment: NDArray[np.float32],
+    T_world_camera: NDArray[np.floating],
+    K: NDArray[np.floating],
+    extinction: float,
+    airlight: NDArray[np.floating],
+) -> NDArray[np.float32]:
+    """Radiance arriving along the mirrored line of sight of every road pixel.
+
+    Parameters
+    ----------
+    picture : float32 [H, W, 3] the scene, without the veil of the air [1]
+    depth : float32 [H, W] camera z; NaN where there is none [m]
+    normal : float32 [H, W, 3] unit normals of the water surface, world frame [1]
+    road : bool [H, W] pixels to compute
+    environment : float32 [h, w, 3] sky and far field [1]
+    T_world_camera : [4, 4] camera pose [m]
+    K : [3, 3] intrinsics [px]
+    extinction : extinction coefficient of the air on the way from the mirrored object [m-1]
+    airlight : [3] radiance of air without end [1]
+
+    Returns
+    -------
+    float32 [H, W, 3] radiance; 0 off the road [1]
+    """
+    out = np.zeros_like(picture)
+    R = np.ascontiguousarray(np.asarray(T_world_camera)[:3, :3], dtype=np.float32)
+    camera = np.array((K[0, 0], K[1, 1], K[0, 2], K[1, 2]), dtype=np.float32)
+    _mirror(
+        picture, depth, normal, road, environment, R, camera,
+        np.float32(extinction), np.asarray(airlight, dtype=np.float32), out,
+    )  # fmt: skip
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _gap(u, v, z, depth):  # type: ignore[no-untyped-def]
+    """How far a point of the ray lies behind the surface seen at its pixel [m]; negative in front of it."""
+    surface = depth[int(v), int(u)]
+    return z - surface if surface == surface else np.float32(-1e9)
+
+
+@numba.njit(cache=True, nogil=True)
+def _blend_pixel(picture, u, v, out):  # type: ignore[no-untyped-def]
+    height, width = picture.shape[:2]
+    x = min(max(u - np.float32(0.5), np.float32(0)), np.float32(width - 1.001))
+    y = min(max(v - np.float32(0.5), np.float32(0)), np.float32(height - 1.001))
+    c0, r0 = int(x), int(y)
+    tx, ty = x - c0, y - r0
+    for c in range(3):
+        above = (1 - tx) * picture[r0, c0, c] + tx * picture[r0, c0 + 1, c]
+        below = (1 - tx) * picture[r0 + 1, c0, c] + tx * picture[r0 + 1, c0 + 1, c]
+        out[c] = (1 - ty) * above + ty * below
+
+
+@numba.njit(cache=True, nogil=True)
+def _place(origin, direction, t, camera):  # type: ignore[no-untyped-def]
+    """Pixel coordinates and camera z of a point of the ray."""
+    z = origin[2] + t * direction[2]
+    u = camera[0] * (origin[0] + t * direction[0]) / z + camera[2]
+    v = camera[1] * (origin[1] + t * direction[1]) / z + camera[3]
+    return u, v, z
+
+
+@numba.njit(cache=True, nogil=True)
+def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-untyped-def]
+    """Where a ray that left the picture at (u, v) meets the surface at its edge, gone on: u, v, t, belief."""
+    height, width = depth.shape
+    edge_u = min(max(u, np.float32(0.5)), np.float32(width - 0.5))
+    edge_v = min(max(v, np.float32(0.5)), np.float32(height - 0.5))
+    surface = depth[int(edge_v), int(edge_u)]
+    if surface != surface or direction[2] <= 0:
+        return edge_u, edge_v, t, np.float32(0)
+    t = max(t, (surface - origin[2]) / direction[2])
+    u, v, _ = _place(origin, direction, t, camera)
+    beyond = max(max(-v, v - height), max(-u, u - width), np.float32(0))
+    return edge_u, edge_v, t, np.float32(exp(-beyond / (EDGE_FADE * height)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _march(origin, direction, depth, camera):  # type: ignore[no-untyped-def]
+    """Follow a ray through the depth picture: pixel (u, v) and length t of what it meets, and how far to believe it."""
+    height, width = depth.shape
+    step, t = np.float32(FIRST_STEP_M) + np.float32(0.02) * origin[2], np.float32(0)
+    hidden, hidden_u, hidden_v, hidden_t = False, np.float32(0), np.float32(0), np.float32(0)
+    for _ in range(STEPS):
+        before, t = t, t + step
+        step *= np.float32(STEP_GROWTH)
+        u, v, z = _place(origin, direction, t, camera)
+        if z < np.float32(NEAREST_Z_M):
+            break
+        if u < 0 or v < 0 or u >= width or v >= height:
+            return _beyond_edge(origin, direction, t, u, v, depth, camera)
+        if _gap(u, v, z, depth) < 0:
+            hidden = False
+            continue
+        if hidden:
+            continue
+        near, far = before, t
+        for _ in range(HALVINGS):
+            middle = (near + far) / 2
+            u, v, z = _place(origin, direction, middle, camera)
+            if u < 0 or v < 0 or u >= width or v >= height or _gap(u, v, z, depth) >= 0:
+                far = middle
+            else:
+                near = middle
+        u, v, z = _place(origin, direction, far, camera)
+        if u < 0 or v < 0 or u >= width or v >= height:
+            continue
+        if _gap(u, v, z, depth) < np.float32(THICKNESS_M) + np.float32(THICKNESS_SHARE) * z:
+            return u, v, far, np.float32(1)
+        hidden, hidden_u, hidden_v, hidden_t = True, u, v, far
+    return hidden_u, hidden_v, hidden_t, np.float32(hidden)
+
+
+@numba.njit(cache=True, nogil=True)
+def _mirror(picture, depth, normal, road, environment, R, camera, extinction, airlight, out):  # type: ignore[no-untyped-def]
+    height, width = depth.shape
+    origin, direction = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
+    colour, sky = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
+    for row in range(height):
+        for column in range(width):
+            if not road[row, column]:
+                continue
+            z = depth[row, column]
+            origin[0] = (column + np.float32(0.5) - camera[2]) / camera[0] * z
+            origin[1] = (row + np.float32(0.5) - camera[3]) / camera[1] * z
+            origin[2] = z
+            away = np.float32(sqrt(origin[0] ** 2 + origin[1] ** 2 + z * z))
+            up = normal[row, column]
+            facing = np.float32(0)
+            for i in range(3):
+                facing += origin[i] / away * (R[0, i] * up[0] + R[1, i] * up[1] + R[2, i] * up[2])
+            for i in range(3):
+                across = R[0, i] * up[0] + R[1, i] * up[1] + R[2, i] * up[2]
+                direction[i] = origin[i] / away - 2 * facing * across
+            u, v, t, belief = _march(origin, direction, depth, camera)
+            if belief < 1:
+                x = R[0, 0] * direction[0] + R[0, 1] * direction[1] + R[0, 2] * direction[2]
+                y = R[1, 0] * direction[0] + R[1, 1] * direction[1] + R[1, 2] * direction[2]
+                z = R[2, 0] * direction[0] + R[2, 1] * direction[1] + R[2, 2] * direction[2]
+                sample_panorama(environment, x, y, z, sky)
+            if belief > 0:
+                _blend_pixel(picture, u, v, colour)
+            through = np.float32(exp(-extinction * t))
+            for c in range(3):
+                seen = through * colour[c] + (1 - through) * airlight[c]
+                out[row, column, c] = belief * seen + (1 - belief) * sky[c]
