@@ -1,0 +1,79 @@
+"""Rigid motions in the small: twists, poses and how a pixel moves with them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def pose_from_twist(twist: Floats) -> Floats:
+    """Exponential map of SE(3).
+
+    Parameters
+    ----------
+    twist : float64 [6] translation part [m], then rotation vector [rad]
+
+    Returns
+    -------
+    float64 [4, 4] pose
+
+    Source: Barfoot, State Estimation for Robotics, 2017, DOI 10.1017/9781316671528, section 7.1.
+    """
+    rho, phi = twist[:3], twist[3:]
+    angle = float(np.sqrt(phi @ phi))
+    W = skew(phi)
+    # below 1e-4 rad the next term of each series is under double precision
+    if angle < 1e-4:
+        a, b, c = 1.0 - angle**2 / 6, 0.5 - angle**2 / 24, 1 / 6 - angle**2 / 120
+    else:
+        a, b, c = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+    pose = np.eye(4)
+    pose[:3, :3] += a * W + b * (W @ W)
+    pose[:3, 3] = rho + b * (W @ rho) + c * (W @ (W @ rho))
+    return pose
+
+
+def skew(vector: Floats) -> Floats:
+    """Cross-product matrix [3, 3] of a 3-vector, in the vector's unit."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def invert_pose(pose: Floats) -> Floats:
+    """Inverse of a rigid pose [..., 4, 4]; NaN stays NaN."""
+    rotation = np.swapaxes(pose[..., :3, :3], -1, -2)
+    inverse = pose.copy()
+    inverse[..., :3, :3] = rotation
+    inverse[..., :3, 3] = -np.squeeze(rotation @ pose[..., :3, 3:], axis=-1)
+    return inverse
+
+
+def adjoint(pose: Floats) -> Floats:
+    """[6, 6] matrix that takes twists written in frame b to frame a, for ``pose = T_a_b``."""
+    rotation = pose[:3, :3]
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3] = matrix[3:, 3:] = rotation
+    matrix[:3, 3:] = skew(pose[:3, 3]) @ rotation
+    return matrix
+
+
+def projection_jacobian(points: Floats, K: Floats) -> Floats:
+    """How pixels move when the camera frame's points are moved by a small left twist.
+
+    Parameters
+    ----------
+    points : float64 [N, 3] in the camera frame [m], z > 0
+    K : float64 [3, 3] intrinsics [px]
+
+    Returns
+    -------
+    float64 [N, 2, 6] [px/m] for the translation part, [px/rad] for the rotation part
+    """
+    x, y, z = points.T
+    fx, fy, q = K[0, 0], K[1, 1], 1.0 / z
+    J = np.zeros((len(points), 2, 6))
+    J[:, 0, 0], J[:, 0, 2] = fx * q, -fx * x * q * q
+    J[:, 0, 3], J[:, 0, 4], J[:, 0, 5] = -fx * x * y * q * q, fx * (1 + x * x * q * q), -fx * y * q
+    J[:, 1, 1], J[:, 1, 2] = fy * q, -fy * y * q * q
+    J[:, 1, 3], J[:, 1, 4], J[:, 1, 5] = -fy * (1 + y * y * q * q), fy * x * y * q * q, fy * x * q
+    return J
