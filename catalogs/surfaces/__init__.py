@@ -1,0 +1,89 @@
+"""Pavements: what lies on a road in a given weather, and how it grips."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import model_validator
+
+from catalogs.entries import find_entry
+from catalogs.quantities import Bounded, CatalogueEntry, Scalar, checked, read_entry
+from tasks.surface.state import SurfaceParameters
+
+FOLDER = Path(__file__).parent
+
+Friction = Annotated[Bounded, checked("1", above=0, maximum=2)]
+Depth = Annotated[Bounded, checked("mm", above=0)]
+Exponent = Annotated[Scalar, checked("1")]
+
+
+class SurfaceEntry(CatalogueEntry):
+    """What a surface file must hold; the meanings stand at ``SurfaceParameters``."""
+
+    dry_friction: Friction
+    flooded_friction: Friction
+    film_decay_mm: Depth
+    texture_depth_mm: Depth
+    drainage_length: Annotated[Bounded, checked("m", above=0)]
+    crossfall: Annotated[Bounded, checked("m m-1", above=0)]
+    film_coefficient: Annotated[Scalar, checked("1", above=0)]
+    film_texture_exponent: Exponent
+    film_length_exponent: Exponent
+    film_rate_exponent: Annotated[Scalar, checked("1", above=0)]
+    film_crossfall_exponent: Exponent
+    bare_wet_friction: Friction
+    snow_friction: Friction
+    fresh_snow_density: Annotated[Bounded, checked("kg m-3", above=0)]
+    water_density: Annotated[Scalar, checked("kg m-3", above=0)]
+    full_cover_depth_mm: Depth
+
+    @model_validator(mode="after")
+    def _weather_lowers_friction(self) -> "SurfaceEntry":
+        problems = [
+            f"{lower} must not exceed {higher}; they are {a:g} and {b:g}"
+            for lower, higher in (
+                ("flooded_friction", "dry_friction"),
+                ("snow_friction", "bare_wet_friction"),
+            )
+            if (a := getattr(self, lower).value) > (b := getattr(self, higher).value)
+        ]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+
+def surface_names() -> tuple[str, ...]:
+    """Names of the surfaces in the catalogue."""
+    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.yaml")))
+
+
+def surface_source(name_or_path: str | Path) -> Path:
+    """The YAML file of a surface.
+
+    Raises
+    ------
+    InputError
+        If there is none; the sentence lists those that exist.
+    """
+    return find_entry(FOLDER, name_or_path, "surface")
+
+
+def load_surface(name_or_path: str | Path) -> SurfaceParameters:
+    """Read a surface by its name in the catalogue or from a YAML file.
+
+    Parameters
+    ----------
+    name_or_path : name, or path ending in .yaml
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file, or the names that exist.
+    """
+    entry = read_entry(SurfaceEntry, surface_source(name_or_path), "surface")
+    values = {name: getattr(entry, name).value for name in SurfaceEntry.model_fields}
+    bounds = {
+        name: quantity.bounds
+        for name in SurfaceEntry.model_fields
+        if isinstance(quantity := getattr(entry, name), Bounded)
+    }
+    return SurfaceParameters(**values, bounds=bounds)

@@ -1,0 +1,140 @@
+"""Vehicles: mechanical values, tyre families and frozen calibration."""
+
+from math import radians
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import model_validator
+
+from catalogs.entries import find_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
+from tasks.vehicle.parameters import TyreFamily, Vehicle
+
+FOLDER = Path(__file__).parent
+
+Mass = Annotated[Scalar, checked("kg", above=0)]
+Length = Annotated[Scalar, checked("m", above=0)]
+Inertia = Annotated[Scalar, checked("kg m2", above=0)]
+Stiffness = Annotated[Scalar, checked("N m-1", above=0)]
+Damping = Annotated[Scalar, checked("N s m-1", minimum=0)]
+Rate = Annotated[Scalar, checked("s-1", above=0)]
+Speed = Annotated[Scalar, checked("m s-1", above=0)]
+Scales = Annotated[Table, checked("1", above=0)]
+Durations = Annotated[Table, checked("s", above=0)]
+KNOT_TABLES = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release_s")
+
+
+class FamilyEntry(CatalogueEntry):
+    """What a tyre family must hold; the meanings stand at ``TyreFamily``."""
+
+    burckhardt: Annotated[Table, checked("1", above=0)]
+    surface_friction: Scales
+    efficiency: Scales
+    slip_stiffness: Scales
+    pitch_scale: Scales
+    hold_s: Durations
+    release_s: Durations
+
+    @model_validator(mode="after")
+    def _tables_match_their_knots(self) -> "FamilyEntry":
+        knots = self.surface_friction.value
+        problems = [
+            f"{name} must have one value per surface_friction knot ({len(knots)}); it has {count}"
+            for name in KNOT_TABLES
+            if (count := len(getattr(self, name).value)) != len(knots)
+        ]
+        if any(low >= high for low, high in zip(knots, knots[1:], strict=False)):
+            problems.append(f"surface_friction knots must ascend; they are {list(knots)}")
+        if len(self.burckhardt.value) != 3:
+            problems.append(f"burckhardt must be c1, c2, c3; it has {len(self.burckhardt.value)} values")
+        elif (c := self.burckhardt.value)[0] * c[1] <= c[2]:
+            problems.append(f"burckhardt must rise from zero slip: c1 c2 above c3; it is {list(c)}")
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+
+class FamiliesEntry(CatalogueEntry):
+    """One tyre family per kind of weather."""
+
+    dry: FamilyEntry
+    rain: FamilyEntry
+    snow: FamilyEntry
+
+
+class VehicleEntry(CatalogueEntry):
+    """What a vehicle file must hold; the meanings stand at ``Vehicle``."""
+
+    sprung_mass: Mass
+    unsprung_mass_f: Mass
+    unsprung_mass_r: Mass
+    cg_to_front_axle: Length
+    cg_to_rear_axle: Length
+    cg_height: Length
+    pitch_inertia: Inertia
+    suspension_stiffness_f: Stiffness
+    suspension_stiffness_r: Stiffness
+    suspension_damping_f: Damping
+    suspension_damping_r: Damping
+    tyre_stiffness_f: Stiffness
+    tyre_stiffness_r: Stiffness
+    wheel_radius: Length
+    wheel_inertia_f: Inertia
+    wheel_inertia_r: Inertia
+    brake_gain: Annotated[Scalar, checked("N m MPa-1", above=0)]
+    front_brake_share: Annotated[Scalar, checked("1", minimum=0, maximum=1)]
+    abs_release_width: Annotated[Scalar, checked("1", above=0)]
+    abs_build_rate: Rate
+    abs_release_rate: Rate
+    coast_deceleration: Annotated[Scalar, checked("m s-2", minimum=0)]
+    hold_ratio: Annotated[Scalar, checked("1", minimum=0)]
+    coupled_pitch_scale: Annotated[Scalar, checked("1", above=0)]
+    static_pitch: Annotated[Scalar, checked("deg", above=-45, below=45)]
+    slip_speed_floor: Speed
+    stop_speed: Speed
+    lock_speed: Annotated[Scalar, checked("rad s-1", above=0)]
+    gravity: Annotated[Scalar, checked("m s-2", above=0)]
+    families: FamiliesEntry
+
+
+def vehicle_names() -> tuple[str, ...]:
+    """Names of the vehicles in the catalogue."""
+    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.yaml")))
+
+
+def vehicle_source(name_or_path: str | Path) -> Path:
+    """The YAML file of a vehicle.
+
+    Raises
+    ------
+    InputError
+        If there is none; the sentence lists those that exist.
+    """
+    return find_entry(FOLDER, name_or_path, "vehicle")
+
+
+def load_vehicle(name_or_path: str | Path) -> Vehicle:
+    """Read a vehicle by its name in the catalogue or from a YAML file.
+
+    Parameters
+    ----------
+    name_or_path : name, or path ending in .yaml
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file, or the names that exist.
+    """
+    source = vehicle_source(name_or_path)
+    entry = read_entry(VehicleEntry, source, "vehicle")
+    values = {
+        name: quantity.value
+        for name in VehicleEntry.model_fields
+        if isinstance(quantity := getattr(entry, name), Scalar)
+    }
+    families = {
+        weather: TyreFamily(**{name: getattr(family, name).value for name in FamilyEntry.model_fields})
+        for weather, family in entry.families
+    }
+    values["static_pitch"] = radians(values["static_pitch"])
+    return Vehicle(name=source.stem, families=families, **values)

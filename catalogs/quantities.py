@@ -1,0 +1,124 @@
+"""Catalogue values at the file edge: each is written as value, unit and source, and is checked when read."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import yaml
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from tasks.errors import InputError
+
+Number = Annotated[float, Field(strict=True)]
+Text = Annotated[str, Field(strict=True, min_length=1)]
+
+
+class CatalogueEntry(BaseModel):
+    """Base of what a catalogue file holds: nothing unknown, nothing missing, nothing infinite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Scalar(CatalogueEntry):
+    """One number with its unit and source."""
+
+    value: Number
+    unit: Text
+    source: Text
+
+
+class Bounded(Scalar):
+    """One number with the declared range of a study around it."""
+
+    bounds: tuple[Number, Number]
+
+
+class Table(CatalogueEntry):
+    """A list of numbers with their unit and source."""
+
+    value: Annotated[tuple[Number, ...], Field(min_length=1)]
+    unit: Text
+    source: Text
+
+
+Entry = TypeVar("Entry", bound=CatalogueEntry)
+Value = TypeVar("Value", Scalar, Bounded, Table)
+
+
+def checked(
+    unit: str,
+    *,
+    above: float | None = None,
+    minimum: float | None = None,
+    maximum: float | None = None,
+    below: float | None = None,
+) -> AfterValidator:
+    """A rule for an annotation: the unit, and limits that every number of the entry keeps."""
+
+    def check(entry: Value) -> Value:
+        problems = [] if entry.unit == unit else [f"unit must be {unit}; it is {entry.unit}"]
+        numbers = entry.value if isinstance(entry.value, tuple) else (entry.value,)
+        if isinstance(entry, Bounded):
+            low, high = entry.bounds
+            numbers += entry.bounds
+            if not low <= entry.value <= high:
+                problems.append(
+                    f"value must lie within its bounds {low:g} to {high:g}; it is {entry.value:g}"
+                )
+        rules: tuple[tuple[float | None, str, Callable[[float, float], bool]], ...] = (
+            (above, "above", lambda number, limit: number > limit),
+            (minimum, "at least", lambda number, limit: number >= limit),
+            (maximum, "at most", lambda number, limit: number <= limit),
+            (below, "below", lambda number, limit: number < limit),
+        )
+        for limit, words, holds in rules:
+            problems += [
+                f"must be {words} {limit:g}; it is {number:g}"
+                for number in numbers
+                if limit is not None and not holds(number, limit)
+            ]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return entry
+
+    return AfterValidator(check)
+
+
+def read_entry(model: type[Entry], path: Path, kind: str) -> Entry:
+    """Read and check one YAML file.
+
+    Parameters
+    ----------
+    model : what the file must hold
+    path : the file
+    kind : what it is called in the sentences
+
+    Raises
+    ------
+    InputError
+        One sentence per problem, all of them at once.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: a {kind} must be readable YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: a {kind} must be a table of entries; it is {content!r:.60}")
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise InputError([f"{path}: {_sentence(problem)}" for problem in error.errors()]) from None
+
+
+def _sentence(problem: Any) -> str:
+    place = ".".join(str(part) for part in problem["loc"]) or "the whole entry"
+    match problem["type"]:
+        case "missing":
+            return f"{place} is missing: add it"
+        case "extra_forbidden":
+            return f"{place} is not a known key: remove it or correct its name"
+        case "value_error":
+            return f"{place}: {problem['msg'].removeprefix('Value error, ')}"
+        case _:
+            rule = problem["msg"].replace("Input should be", "must be")
+            return f"{place}: {rule}; it is {problem['input']!r:.60}"

@@ -1,0 +1,186 @@
+"""The 4-DOF half-car with unilateral tyre contact, and its RK4 integration.
+
+Its state is (z_s, theta, z_u,f, z_u,r) and then the rates of these, about static equilibrium.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tasks.vehicle.parameters import Vehicle
+
+HalfCarState = tuple[float, float, float, float, float, float, float, float]
+
+
+class HalfCar(NamedTuple):
+    """The half-car's values as the kernels take them; symbols as in the paper's Appendix B.
+
+    Parameters
+    ----------
+    sprung_mass, unsprung_f, unsprung_r : [kg]
+    pitch_inertia : [kg m2]
+    to_front, to_rear : l_f, l_r [m]
+    spring_f, spring_r : k_s [N/m]
+    damper_f, damper_r : c_s [N s/m]
+    tyre_f, tyre_r : k_t [N/m]
+    static_f, static_r : axle loads at rest [N]
+    """
+
+    sprung_mass: float
+    unsprung_f: float
+    unsprung_r: float
+    pitch_inertia: float
+    to_front: float
+    to_rear: float
+    spring_f: float
+    spring_r: float
+    damper_f: float
+    damper_r: float
+    tyre_f: float
+    tyre_r: float
+    static_f: float
+    static_r: float
+
+
+def half_car(vehicle: Vehicle) -> HalfCar:
+    """The half-car of a vehicle."""
+    static_f, static_r = vehicle.static_axle_loads
+    return HalfCar(
+        sprung_mass=vehicle.sprung_mass,
+        unsprung_f=vehicle.unsprung_mass_f,
+        unsprung_r=vehicle.unsprung_mass_r,
+        pitch_inertia=vehicle.pitch_inertia,
+        to_front=vehicle.cg_to_front_axle,
+        to_rear=vehicle.cg_to_rear_axle,
+        spring_f=vehicle.suspension_stiffness_f,
+        spring_r=vehicle.suspension_stiffness_r,
+        damper_f=vehicle.suspension_damping_f,
+        damper_r=vehicle.suspension_damping_r,
+        tyre_f=vehicle.tyre_stiffness_f,
+        tyre_r=vehicle.tyre_stiffness_r,
+        static_f=static_f,
+        static_r=static_r,
+    )
+
+
+@njit(cache=True, nogil=True)
+def contact_load(road_height: float, unsprung_height: float, stiffness: float, static_load: float) -> float:
+    """Load of one axle on the road, never negative [N] (paper, Eq. app_unilateral_contact).
+
+    Parameters
+    ----------
+    road_height, unsprung_height : about static equilibrium [m]
+    stiffness : k_t [N/m]
+    static_load : F_z^0 [N]
+    """
+    return static_load + max(stiffness * (road_height - unsprung_height), -static_load)
+
+
+@njit(cache=True, nogil=True)
+def suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
+    """Spring and damper force of the front and the rear axle, F_s,f and F_s,r [N] (paper, Appendix B).
+
+    Parameters
+    ----------
+    x : half-car state [m, rad, m/s, rad/s]
+    car : its values
+    """
+    heave, pitch, unsprung_f, unsprung_r, heave_rate, pitch_rate, unsprung_rate_f, unsprung_rate_r = x
+    force_f = car.spring_f * (heave - unsprung_f - car.to_front * pitch) + car.damper_f * (
+        heave_rate - unsprung_rate_f - car.to_front * pitch_rate
+    )
+    force_r = car.spring_r * (heave - unsprung_r + car.to_rear * pitch) + car.damper_r * (
+        heave_rate - unsprung_rate_r + car.to_rear * pitch_rate
+    )
+    return force_f, force_r
+
+
+@njit(cache=True, nogil=True)
+def half_car_rates(
+    x: HalfCarState, load_f: float, load_r: float, force_f: float, force_r: float, moment: float, car: HalfCar
+) -> HalfCarState:
+    """Rate of the half-car state (paper, Eq. app_half_car_complete).
+
+    Parameters
+    ----------
+    x : half-car state [m, rad, m/s, rad/s]
+    load_f, load_r : contact loads [N]
+    force_f, force_r : suspension forces [N]
+    moment : pitch moment on the body, nose-down positive [N m]
+    car : its values
+    """
+    return (
+        x[4],
+        x[5],
+        x[6],
+        x[7],
+        (-force_f - force_r) / car.sprung_mass,
+        (car.to_front * force_f - car.to_rear * force_r + moment) / car.pitch_inertia,
+        (force_f + load_f - car.static_f) / car.unsprung_f,
+        (force_r + load_r - car.static_r) / car.unsprung_r,
+    )
+
+
+@njit(cache=True, nogil=True)
+def moved(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
+    """The state after going along a rate for a step [s]."""
+    return (
+        x[0] + step * rate[0],
+        x[1] + step * rate[1],
+        x[2] + step * rate[2],
+        x[3] + step * rate[3],
+        x[4] + step * rate[4],
+        x[5] + step * rate[5],
+        x[6] + step * rate[6],
+        x[7] + step * rate[7],
+    )
+
+
+@njit(cache=True, nogil=True)
+def forced_rates(x: HalfCarState, road_f: float, road_r: float, moment: float, car: HalfCar) -> HalfCarState:
+    """Rate of the half-car state on given road heights [m] and pitch moment [N m]."""
+    load_f = contact_load(road_f, x[2], car.tyre_f, car.static_f)
+    load_r = contact_load(road_r, x[3], car.tyre_r, car.static_r)
+    force_f, force_r = suspension_forces(x, car)
+    return half_car_rates(x, load_f, load_r, force_f, force_r, moment, car)
+
+
+@njit(cache=True, nogil=True)
+def integrate_half_car(
+    road_f: NDArray[np.float64],
+    road_r: NDArray[np.float64],
+    moment: NDArray[np.float64],
+    step: float,
+    car: HalfCar,
+) -> NDArray[np.float64]:
+    """Half-car response from rest by RK4, with inputs linear between samples (paper, Appendix B).
+
+    Parameters
+    ----------
+    road_f, road_r : road height under each axle, shape (n,) [m]
+    moment : pitch moment, shape (n,) [N m]
+    step : sample interval [s]
+    car : the half-car
+
+    Returns
+    -------
+    States, shape (n, 8) [m, rad, m/s, rad/s].
+    """
+    states = np.empty((len(moment), 8))
+    x = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for n in range(len(moment)):
+        for column in range(8):
+            states[n, column] = x[column]
+        if n + 1 == len(moment):
+            break
+        middle_f = 0.5 * (road_f[n] + road_f[n + 1])
+        middle_r = 0.5 * (road_r[n] + road_r[n + 1])
+        middle_moment = 0.5 * (moment[n] + moment[n + 1])
+        k1 = forced_rates(x, road_f[n], road_r[n], moment[n], car)
+        k2 = forced_rates(moved(x, k1, 0.5 * step), middle_f, middle_r, middle_moment, car)
+        k3 = forced_rates(moved(x, k2, 0.5 * step), middle_f, middle_r, middle_moment, car)
+        k4 = forced_rates(moved(x, k3, step), road_f[n + 1], road_r[n + 1], moment[n + 1], car)
+        x = moved(moved(moved(moved(x, k1, step / 6), k2, step / 3), k3, step / 3), k4, step / 6)
+    return states

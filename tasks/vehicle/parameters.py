@@ -1,0 +1,161 @@
+"""The vehicle: specified mechanical values, frozen empirical tables, and what they give on one surface."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tasks.vehicle.tyre import TyreCurve, tyre_curve
+
+
+@dataclass(frozen=True, kw_only=True)
+class TyreFamily:
+    """Tyre curve and frozen calibration of one weather family (paper, Table frozen_empirical_params).
+
+    Parameters
+    ----------
+    burckhardt : c1, c2, c3 of the base curve [1]
+    surface_friction : ascending knots mu_c of the tables below [1]
+    efficiency : eta_tire at each knot, scales mu_c to the tyre's peak [1]
+    slip_stiffness : beta_kappa at each knot, scales slip [1]
+    pitch_scale : gamma_theta at each knot, scales the brake-pitch moment of paper mode [1]
+    hold_s : tau_h at each knot, low-speed hold of paper mode [s]
+    release_s : tau_r at each knot, low-speed release of paper mode [s]
+    """
+
+    burckhardt: tuple[float, float, float]
+    surface_friction: tuple[float, ...]
+    efficiency: tuple[float, ...]
+    slip_stiffness: tuple[float, ...]
+    pitch_scale: tuple[float, ...]
+    hold_s: tuple[float, ...]
+    release_s: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vehicle:
+    """One vehicle (paper, Tables frozen_physical_params and frozen_empirical_params).
+
+    Parameters
+    ----------
+    name : name of the catalogue entry
+    sprung_mass : m_s [kg]
+    unsprung_mass_f, unsprung_mass_r : m_u of each axle [kg]
+    cg_to_front_axle, cg_to_rear_axle : l_f and l_r [m]
+    cg_height : h_cg above the road [m]
+    pitch_inertia : I_y of the sprung body [kg m2]
+    suspension_stiffness_f, suspension_stiffness_r : k_s of each axle [N/m]
+    suspension_damping_f, suspension_damping_r : c_s of each axle [N s/m]
+    tyre_stiffness_f, tyre_stiffness_r : vertical, k_t of each axle [N/m]
+    wheel_radius : effective rolling radius, R [m]
+    wheel_inertia_f, wheel_inertia_r : I_w of each axle [kg m2]
+    brake_gain : torque of both axles together per pressure, K_p [N m/MPa]
+    front_brake_share : b_f; the rear has the rest [1]
+    abs_release_width : delta_a, relative to the target slip [1]
+    abs_build_rate, abs_release_rate : largest rates of the ABS torque scale [1/s]
+    coast_deceleration : a_coast [m/s2]
+    hold_ratio : rho_h of the low-speed pitch rule [1]
+    coupled_pitch_scale : extra brake-pitch scale on road features in paper mode [1]
+    static_pitch : body pitch at rest, nose-down positive; the rollout's pitch excludes it [rad]
+    slip_speed_floor : v_epsilon of the slip's denominator [m/s]
+    stop_speed : the vehicle stands at or below it [m/s]
+    lock_speed : in coupled mode, wheel speed below which brake friction turns proportional to it [rad/s]
+    gravity : g [m/s2]
+    families : tyre family of each kind of weather
+    """
+
+    name: str
+    sprung_mass: float
+    unsprung_mass_f: float
+    unsprung_mass_r: float
+    cg_to_front_axle: float
+    cg_to_rear_axle: float
+    cg_height: float
+    pitch_inertia: float
+    suspension_stiffness_f: float
+    suspension_stiffness_r: float
+    suspension_damping_f: float
+    suspension_damping_r: float
+    tyre_stiffness_f: float
+    tyre_stiffness_r: float
+    wheel_radius: float
+    wheel_inertia_f: float
+    wheel_inertia_r: float
+    brake_gain: float
+    front_brake_share: float
+    abs_release_width: float
+    abs_build_rate: float
+    abs_release_rate: float
+    coast_deceleration: float
+    hold_ratio: float
+    coupled_pitch_scale: float
+    static_pitch: float
+    slip_speed_floor: float
+    stop_speed: float
+    lock_speed: float
+    gravity: float
+    families: Mapping[str, TyreFamily]
+
+    @property
+    def mass(self) -> float:
+        """Mass of body and axles [kg]."""
+        return self.sprung_mass + self.unsprung_mass_f + self.unsprung_mass_r
+
+    @property
+    def wheelbase(self) -> float:
+        """Distance between the axles, L_w [m]."""
+        return self.cg_to_front_axle + self.cg_to_rear_axle
+
+    @property
+    def static_axle_loads(self) -> tuple[float, float]:
+        """Front and rear axle load at rest on a level road [N] (paper, Appendix B)."""
+        weight = self.sprung_mass * self.gravity
+        return (
+            weight * self.cg_to_rear_axle / self.wheelbase + self.unsprung_mass_f * self.gravity,
+            weight * self.cg_to_front_axle / self.wheelbase + self.unsprung_mass_r * self.gravity,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceResponse:
+    """What the frozen tables give on one surface.
+
+    Parameters
+    ----------
+    tyre : the peak-normalised curve on this surface
+    pitch_scale : gamma_theta [1]
+    hold_s, release_s : tau_h and tau_r [s]
+    extrapolated : the surface friction lies outside the knots, so the end values hold
+    """
+
+    tyre: TyreCurve
+    pitch_scale: float
+    hold_s: float
+    release_s: float
+    extrapolated: bool
+
+
+def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> SurfaceResponse:
+    """Tyre curve and pitch calibration at one surface friction: piecewise linear, clamped at the end knots.
+
+    Parameters
+    ----------
+    vehicle : holds the tables
+    family : dry, rain or snow
+    surface_friction : mu_c [1]
+    """
+    table = vehicle.families[family]
+    knots = table.surface_friction
+
+    def at(values: tuple[float, ...]) -> float:
+        return float(np.interp(surface_friction, knots, values))
+
+    # The knots are printed with six digits, so a friction within their rounding is on the end knot.
+    rounding = 5e-7
+    return SurfaceResponse(
+        tyre=tyre_curve(table.burckhardt, at(table.efficiency) * surface_friction, at(table.slip_stiffness)),
+        pitch_scale=at(table.pitch_scale),
+        hold_s=at(table.hold_s),
+        release_s=at(table.release_s),
+        extrapolated=not knots[0] - rounding <= surface_friction <= knots[-1] + rounding,
+    )

@@ -1,0 +1,51 @@
+"""Height and slope of the road feature at one station, as the kernels take them."""
+
+from math import cos, pi, sin
+from typing import NamedTuple
+
+from numba import njit
+
+from tasks.surface.road_profile import RoadHazard
+
+
+class RoadFeature(NamedTuple):
+    """A road hazard as numbers: middle [m], length [m] and signed height [m]."""
+
+    center: float
+    length: float
+    height: float
+
+
+def road_feature(hazard: RoadHazard) -> RoadFeature:
+    """The hazard as numbers; a flat road is a feature of height 0."""
+    return RoadFeature(float(hazard.center_m), float(hazard.length_m), float(hazard.height_m))
+
+
+@njit(cache=True, nogil=True)
+def height_at(station: float, road: RoadFeature) -> float:
+    """Road height H_g [m] (paper, Eq. shared_road_profile).
+
+    Parameters
+    ----------
+    station : [m]
+    road : the feature
+    """
+    offset = station - road.center
+    if road.height == 0.0 or abs(offset) > 0.5 * road.length:
+        return 0.0
+    return 0.5 * road.height * (1.0 + cos(2.0 * pi * offset / road.length))
+
+
+@njit(cache=True, nogil=True)
+def slope_at(station: float, road: RoadFeature) -> float:
+    """Road slope dH_g/ds [m/m].
+
+    Parameters
+    ----------
+    station : [m]
+    road : the feature
+    """
+    offset = station - road.center
+    if road.height == 0.0 or abs(offset) > 0.5 * road.length:
+        return 0.0
+    return -pi * road.height / road.length * sin(2.0 * pi * offset / road.length)

@@ -1,0 +1,195 @@
+"""From controls to telemetry: one rollout, logged at 1 kHz in the columns of the tick table."""
+
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import TICK_CHANNELS
+from tasks.errors import InputError
+from tasks.surface.road_profile import RoadHazard
+from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.parameters import SurfaceResponse, Vehicle, surface_response
+from tasks.vehicle.paper_mode import run_paper_mode
+from tasks.vehicle.wheels import DRIVE_COLUMNS
+
+Mode = Literal["paper", "coupled"]
+MODES: tuple[Mode, ...] = ("paper",)
+INTERNAL_STEP_S = 0.0005
+TICK_NS = 1_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controls:
+    """What the driver does (paper, Eq. overall_pipeline: u).
+
+    Parameters
+    ----------
+    initial_speed : speed at the start of the clip [m/s]
+    brake : brake command
+    hold_speed_until_brake : keep the speed until the brake onset; without an onset, throughout
+
+    Raises
+    ------
+    InputError
+        If the speed is not a positive number.
+    """
+
+    initial_speed: float
+    brake: BrakeCommand
+    hold_speed_until_brake: bool
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.initial_speed) and self.initial_speed > 0):
+            raise InputError(f"initial_speed must be a positive number of m/s; it is {self.initial_speed}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rollout:
+    """Telemetry of one clip.
+
+    Parameters
+    ----------
+    columns : every channel of ``TICK_CHANNELS`` at 1 kHz, from 0 to the duration inclusive; ``pitch`` excludes
+        the static pitch
+    mode : paper or coupled
+    surface_friction : mu_c [1]
+    tyre_peak : mu_eff [1]
+    slip_stiffness : beta [1]
+    target_slip : kappa*, of either axle [1]
+    static_pitch : to be added to ``pitch`` for the pitch of the body [rad]
+    brake_onset_time : NaN if the brake is never applied [s]
+    stop_time : when the vehicle comes to rest; NaN if it does not [s]
+    stopping_distance : from the brake onset to rest; NaN without either [m]
+    calibration_extrapolated : mu_c lies outside the calibrated knots, whose end values hold
+    """
+
+    columns: dict[str, NDArray[Any]]
+    mode: Mode
+    surface_friction: float
+    tyre_peak: float
+    slip_stiffness: float
+    target_slip: float
+    static_pitch: float
+    brake_onset_time: float
+    stop_time: float
+    stopping_distance: float
+    calibration_extrapolated: bool
+
+
+def rollout(
+    vehicle: Vehicle,
+    family: str,
+    surface_friction: float,
+    controls: Controls,
+    hazard: RoadHazard,
+    *,
+    mode: Mode,
+    duration_s: float,
+    step_s: float = INTERNAL_STEP_S,
+) -> Rollout:
+    """Drive one scenario; after a stop the vehicle rests and its body comes to rest too.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    family : tyre family: dry, rain or snow
+    surface_friction : mu_c [1]
+    controls : initial speed and brake
+    hazard : road feature
+    mode : paper follows the publication, coupled is the physical model
+    duration_s : length of the telemetry, whole milliseconds [s]
+    step_s : internal step, a whole fraction of a millisecond [s]
+
+    Raises
+    ------
+    InputError
+        Listing every argument that breaks a rule.
+    """
+    per_tick = _check(vehicle, family, surface_friction, mode, duration_s, step_s)
+    response = surface_response(vehicle, family, surface_friction)
+    steps = round(duration_s * 1000) * per_tick
+    run = run_paper_mode(
+        vehicle,
+        response,
+        controls.initial_speed,
+        controls.hold_speed_until_brake,
+        controls.brake.profile,
+        hazard,
+        steps=steps,
+        step=step_s,
+    )
+    full = dict(zip(DRIVE_COLUMNS, run.log.T, strict=True)) | {
+        "axle_load_f": run.loads[:, 0],
+        "axle_load_r": run.loads[:, 1],
+        "heave": run.states[:, 0],
+        "pitch": run.states[:, 1],
+        "unsprung_heave_f": run.states[:, 2],
+        "unsprung_heave_r": run.states[:, 3],
+        "heave_rate": run.states[:, 4],
+        "pitch_rate": run.states[:, 5],
+        "road_height_f": run.road[:, 0],
+        "road_height_r": run.road[:, 1],
+    }
+    return _rollout(vehicle, surface_friction, response, mode, full, run.onset, run.stop, step_s, per_tick)
+
+
+def _rollout(
+    vehicle: Vehicle,
+    surface_friction: float,
+    response: SurfaceResponse,
+    mode: Mode,
+    full: dict[str, NDArray[np.float64]],
+    onset: float,
+    stop: int,
+    step: float,
+    per_tick: int,
+) -> Rollout:
+    columns: dict[str, NDArray[Any]] = {name: column[::per_tick].copy() for name, column in full.items()}
+    columns["t_ns"] = np.arange(len(columns["speed"]), dtype=np.int64) * TICK_NS
+    columns["contact_f"] = columns["axle_load_f"] > 0
+    columns["contact_r"] = columns["axle_load_r"] > 0
+    braked, stopped = isfinite(onset), stop >= 0
+    distance = nan
+    if braked and stopped:
+        time = np.arange(len(full["station"])) * step
+        distance = float(full["station"][stop] - np.interp(onset, time, full["station"]))
+    return Rollout(
+        columns={channel.name: columns[channel.name] for channel in TICK_CHANNELS},
+        mode=mode,
+        surface_friction=surface_friction,
+        tyre_peak=response.tyre.peak,
+        slip_stiffness=response.tyre.slip_stiffness,
+        target_slip=response.tyre.target_slip,
+        static_pitch=vehicle.static_pitch,
+        brake_onset_time=onset if braked else nan,
+        stop_time=stop * step if stopped else nan,
+        stopping_distance=distance,
+        calibration_extrapolated=response.extrapolated,
+    )
+
+
+def _check(
+    vehicle: Vehicle, family: str, surface_friction: float, mode: str, duration_s: float, step_s: float
+) -> int:
+    """Internal steps per tick, once every argument keeps its rule."""
+    problems = []
+    if mode not in MODES:
+        problems.append(f"mode must be one of {', '.join(MODES)}; it is {mode}")
+    if family not in vehicle.families:
+        problems.append(f"tyre family {family}: no such family; there are: {', '.join(vehicle.families)}")
+    if not (isfinite(surface_friction) and surface_friction > 0):
+        problems.append(f"surface_friction must be a positive number; it is {surface_friction}")
+    whole = (
+        isfinite(duration_s) and duration_s > 0 and abs(duration_s * 1000 - round(duration_s * 1000)) < 1e-6
+    )
+    if not whole:
+        problems.append(f"duration_s must be a positive number of whole milliseconds; it is {duration_s}")
+    per_tick = round(0.001 / step_s) if isfinite(step_s) and 0 < step_s <= 0.001 else 0
+    if per_tick == 0 or abs(per_tick * step_s - 0.001) > 1e-12:
+        problems.append(f"step_s must divide a millisecond into whole steps; it is {step_s}")
+    if problems:
+        raise InputError(problems)
+    return per_tick

@@ -1,0 +1,249 @@
+"""Wheels, brakes and longitudinal motion of paper mode, by explicit Euler steps (paper, Appendix B).
+
+One step function serves the logged rollout and the lean stopping run.
+"""
+
+from math import inf, isinf, nan
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tasks.vehicle.brake import PressureProfile, abs_command, abs_update, brake_pressure, onset_reached
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.road import RoadFeature, slope_at
+from tasks.vehicle.tyre import TyreCurve, braking_slip, tyre_friction
+
+
+class Wheels(NamedTuple):
+    """Longitudinal values as the kernels take them.
+
+    Parameters
+    ----------
+    mass : m [kg]
+    radius : R [m]
+    inertia_f, inertia_r : I_w of each axle [kg m2]
+    gain_f, gain_r : brake torque per pressure of each axle [N m/MPa]
+    release_width : delta_a [1]
+    build_rate, release_rate : of the ABS torque scale [1/s]
+    coast : a_coast [m/s2]
+    speed_floor, stop_speed : [m/s]
+    static_f, static_r : axle loads without acceleration [N]
+    transfer : load moved to the front per deceleration, m h_cg / L_w [N s2/m]
+    wheelbase : L_w [m]
+    """
+
+    mass: float
+    radius: float
+    inertia_f: float
+    inertia_r: float
+    gain_f: float
+    gain_r: float
+    release_width: float
+    build_rate: float
+    release_rate: float
+    coast: float
+    speed_floor: float
+    stop_speed: float
+    static_f: float
+    static_r: float
+    transfer: float
+    wheelbase: float
+
+
+def wheels_of(vehicle: Vehicle) -> Wheels:
+    """The longitudinal values of a vehicle; loads as in the paper's analytic load transfer."""
+    share = vehicle.front_brake_share
+    weight = vehicle.mass * vehicle.gravity
+    return Wheels(
+        mass=vehicle.mass,
+        radius=vehicle.wheel_radius,
+        inertia_f=vehicle.wheel_inertia_f,
+        inertia_r=vehicle.wheel_inertia_r,
+        gain_f=share * vehicle.brake_gain,
+        gain_r=(1 - share) * vehicle.brake_gain,
+        release_width=vehicle.abs_release_width,
+        build_rate=vehicle.abs_build_rate,
+        release_rate=vehicle.abs_release_rate,
+        coast=vehicle.coast_deceleration,
+        speed_floor=vehicle.slip_speed_floor,
+        stop_speed=vehicle.stop_speed,
+        static_f=weight * vehicle.cg_to_rear_axle / vehicle.wheelbase,
+        static_r=weight * vehicle.cg_to_front_axle / vehicle.wheelbase,
+        transfer=vehicle.mass * vehicle.cg_height / vehicle.wheelbase,
+        wheelbase=vehicle.wheelbase,
+    )
+
+
+class AxleStep(NamedTuple):
+    """One axle in one step: slip [1], tyre force [N], brake torque [N m], ABS scale [1], wheel rate [rad/s2]."""
+
+    slip: float
+    force: float
+    torque: float
+    scale: float
+    rate: float
+
+
+@njit(cache=True, nogil=True)
+def axle_step(
+    speed: float,
+    omega: float,
+    load: float,
+    command: float,
+    scale: float,
+    inertia: float,
+    build: float,
+    release: float,
+    wheels: Wheels,
+    tyre: TyreCurve,
+) -> AxleStep:
+    """Slip, ABS, tyre force and wheel acceleration of one axle (paper, Eqs. app_abs_command and on).
+
+    Parameters
+    ----------
+    speed : v [m/s]
+    omega : wheel speed [rad/s]
+    load : on the tyre [N]
+    command : brake torque before ABS, b_a T_b^cmd [N m]
+    scale : ABS scale before the step [1]
+    inertia : I_w,a [kg m2]
+    build, release : largest change of the ABS scale in this step [1]
+    wheels, tyre : the rest of the values
+    """
+    slip = braking_slip(speed, wheels.radius * omega, wheels.speed_floor)
+    wanted = abs_command(slip, tyre.target_slip, wheels.release_width)
+    scale = abs_update(wanted, scale, build, release)
+    force = tyre_friction(slip, tyre) * load
+    torque = scale * command
+    return AxleStep(slip, force, torque, scale, (wheels.radius * force - torque) / inertia)
+
+
+@njit(cache=True, nogil=True)
+def transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float]:
+    """Axle loads by longitudinal load transfer, F_z^long [N] (paper, Appendix B).
+
+    Parameters
+    ----------
+    acceleration : dv/dt [m/s2]
+    wheels : static loads and transfer
+    """
+    moved = wheels.transfer * acceleration
+    return max(wheels.static_f - moved, 0.0), max(wheels.static_r + moved, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def stopping_run(
+    initial_speed: float, step: float, longest: int, profile: PressureProfile, wheels: Wheels, tyre: TyreCurve
+) -> tuple[float, float]:
+    """Brake on a flat road from t = 0 to the stop, keeping nothing on the way.
+
+    Parameters
+    ----------
+    initial_speed : at the brake onset [m/s]
+    step : Euler step [s]
+    longest : give up after this many steps
+    profile : brake command with its onset at 0
+    wheels, tyre : the vehicle on its surface
+
+    Returns
+    -------
+    Stopping distance [m] and time [s]; NaN when it does not stop.
+    """
+    speed, omega_f, omega_r = initial_speed, initial_speed / wheels.radius, initial_speed / wheels.radius
+    scale_f, scale_r, acceleration, distance = 1.0, 1.0, 0.0, 0.0
+    build, release = wheels.build_rate * step, wheels.release_rate * step
+    for n in range(longest):
+        pressure = brake_pressure(n * step, profile)
+        load_f, load_r = transferred_loads(acceleration, wheels)
+        f = axle_step(speed, omega_f, load_f, wheels.gain_f * pressure, scale_f, wheels.inertia_f, build, release, wheels, tyre)  # fmt: skip
+        r = axle_step(speed, omega_r, load_r, wheels.gain_r * pressure, scale_r, wheels.inertia_r, build, release, wheels, tyre)  # fmt: skip
+        scale_f, scale_r = f.scale, r.scale
+        acceleration = -(f.force + r.force) / wheels.mass - wheels.coast
+        after = speed + step * acceleration
+        distance += 0.5 * step * (speed + after)
+        speed = after
+        omega_f += step * f.rate
+        omega_r += step * r.rate
+        if speed <= wheels.stop_speed:
+            return distance, (n + 1) * step
+    return nan, nan
+
+
+DRIVE_COLUMNS = (
+    "station", "speed", "longitudinal_acceleration", "braking_slip_f", "braking_slip_r", "wheel_speed_f",
+    "wheel_speed_r", "tyre_force_f", "tyre_force_r", "tyre_load_f", "tyre_load_r", "brake_torque_f",
+    "brake_torque_r", "abs_scale_f", "abs_scale_r", "brake_pressure_mpa", "road_force",
+)  # fmt: skip
+"""Columns of the log that ``drive`` returns."""
+
+
+@njit(cache=True, nogil=True)
+def drive(
+    initial_speed: float,
+    hold_speed: bool,
+    steps: int,
+    step: float,
+    profile: PressureProfile,
+    road: RoadFeature,
+    loads: NDArray[np.float64],
+    wheels: Wheels,
+    tyre: TyreCurve,
+) -> tuple[NDArray[np.float64], float, int]:
+    """Drive, brake and stand, with every sample logged.
+
+    Parameters
+    ----------
+    initial_speed : [m/s]
+    hold_speed : keep the speed until the brake onset
+    steps : number of Euler steps
+    step : Euler step [s]
+    profile : brake command
+    road : road feature
+    loads : half-car loads of the front and rear axle at each sample, shape (steps + 1, 2) [N]; with shape
+        (0, 2) the analytic load transfer feeds the tyres
+    wheels, tyre : the vehicle on its surface
+
+    Returns
+    -------
+    The log, shape (steps + 1, len(DRIVE_COLUMNS)); the brake onset [s], infinite if it never comes; the sample
+    of the stop, -1 if there is none.
+    """
+    log = np.empty((steps + 1, 17))
+    station, speed = 0.0, initial_speed
+    omega_f, omega_r = initial_speed / wheels.radius, initial_speed / wheels.radius
+    scale_f, scale_r, acceleration = 1.0, 1.0, 0.0
+    build, release = wheels.build_rate * step, wheels.release_rate * step
+    onset, stop = inf, -1
+    for n in range(steps + 1):
+        if isinf(onset):
+            onset = onset_reached(n * step, station, speed, profile)
+        pressure = brake_pressure(n * step - onset, profile)
+        if len(loads) > 0:
+            load_f, load_r = loads[n, 0], loads[n, 1]
+        else:
+            load_f, load_r = transferred_loads(acceleration, wheels)
+        f = axle_step(speed, omega_f, load_f, wheels.gain_f * pressure, scale_f, wheels.inertia_f, build, release, wheels, tyre)  # fmt: skip
+        r = axle_step(speed, omega_r, load_r, wheels.gain_r * pressure, scale_r, wheels.inertia_r, build, release, wheels, tyre)  # fmt: skip
+        road_force = -load_f * slope_at(station, road) - load_r * slope_at(station - wheels.wheelbase, road)
+        acceleration = (road_force - f.force - r.force) / wheels.mass - wheels.coast
+        if stop >= 0:
+            road_force, acceleration = 0.0, 0.0
+        elif hold_speed and isinf(onset):
+            acceleration = 0.0
+        log[n] = (
+            station, speed, acceleration, f.slip, r.slip, omega_f, omega_r, f.force, r.force, load_f, load_r,
+            f.torque, r.torque, f.scale, r.scale, pressure, road_force,
+        )  # fmt: skip
+        if stop >= 0:
+            continue
+        after = speed + step * acceleration
+        station += 0.5 * step * (speed + after)
+        speed, scale_f, scale_r = after, f.scale, r.scale
+        omega_f += step * f.rate
+        omega_r += step * r.rate
+        if speed <= wheels.stop_speed:
+            stop = n + 1
+            speed, omega_f, omega_r, acceleration, scale_f, scale_r = 0.0, 0.0, 0.0, 0.0, 1.0, 1.0
+    return log, onset, stop
