@@ -14,7 +14,9 @@ OFFSET, AXES, LOG_OPACITY, NORMAL, SH = 0, 3, 12, 13, 16
 """First plane of each quantity inside a block; SH coefficient k of channel c is plane ``SH + 3 k + c``."""
 
 _MORTON_BITS = 21
-_PADDING_LOG_OPACITY = -1e30
+_BLOCKS_AT_ONCE = 256
+_NEVER_VISIBLE = -1e30
+"""Logarithmic opacity of what fills up the last block [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,35 +123,50 @@ def prepare(gaussians: Gaussians) -> PreparedGaussians:
     """
     check_gaussians(gaussians)
     order = morton_order(gaussians.means)
-    n, sh_count = len(order), gaussians.sh.shape[1]
-    block_count = -(-n // BLOCK)
-    blocks = np.zeros((block_count, SH + 3 * sh_count, BLOCK), dtype=np.float32)
-    blocks[:, LOG_OPACITY] = _PADDING_LOG_OPACITY
-    origins = np.zeros((block_count, 3))
-    radii, reach = np.zeros(block_count), np.zeros(block_count)
-    class_id = np.zeros(block_count * BLOCK, dtype=np.uint8)
-    class_id[:n] = gaussians.class_id[order]
-    for b in range(block_count):
-        members = order[b * BLOCK : (b + 1) * BLOCK]
-        block = blocks[b, :, : len(members)]
-        means = gaussians.means[members].astype(np.float64)
-        origins[b] = (means.min(axis=0) + means.max(axis=0)) / 2
-        offsets = means - origins[b]
-        scales = gaussians.scales[members].astype(np.float64)
-        axes = rotation_matrices(gaussians.quats_wxyz[members]) * scales[:, None, :]
-        radii[b] = np.sqrt((offsets**2).sum(axis=1).max())
-        reach[b] = scales.max()
-        block[OFFSET:AXES] = offsets.T
-        block[AXES:LOG_OPACITY] = axes.transpose(2, 1, 0).reshape(9, -1)
-        block[LOG_OPACITY] = np.log(gaussians.opacities[members].astype(np.float64))
-        block[NORMAL:SH] = gaussians.normals[members].T
-        block[SH:] = gaussians.sh[members].reshape(len(members), -1).T
+    n, block_count = len(order), -(-len(order) // BLOCK)
+    members = np.empty((block_count, BLOCK), dtype=np.int64)
+    members.ravel()[:n] = order
+    members.ravel()[n:] = order[-1:]
+    blocks = np.empty((block_count, SH + 3 * gaussians.sh.shape[1], BLOCK), dtype=np.float32)
+    origins, radii, reach = (
+        np.empty((block_count, 3)),
+        np.empty(block_count),
+        np.empty(block_count),
+    )
+    for first in range(0, block_count, _BLOCKS_AT_ONCE):
+        part = slice(first, first + _BLOCKS_AT_ONCE)
+        origins[part], radii[part], reach[part] = _pack(gaussians, members[part], blocks[part])
+    if n % BLOCK:
+        blocks[-1, LOG_OPACITY, n % BLOCK :] = _NEVER_VISIBLE
     return PreparedGaussians(
         blocks=blocks,
         origins=origins,
         radii=radii,
         reach=reach,
-        class_id=class_id,
+        class_id=gaussians.class_id[members].ravel(),
         order=order,
         display_encoded=gaussians.display_encoded,
+    )
+
+
+def _pack(
+    gaussians: Gaussians, members: NDArray[np.int64], blocks: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Fill the blocks [B, P, 64] with the members [B, 64]; returns their origins, radii and reach."""
+    count = len(members)
+    means = gaussians.means[members].astype(np.float64)
+    scales = gaussians.scales[members].astype(np.float64)
+    origins = (means.min(axis=1) + means.max(axis=1)) / 2
+    offsets = means - origins[:, None, :]
+    rotations = rotation_matrices(gaussians.quats_wxyz[members.ravel()]).reshape(count, BLOCK, 3, 3)
+    axes = rotations * scales[:, :, None, :]
+    blocks[:, OFFSET:AXES] = offsets.transpose(0, 2, 1)
+    blocks[:, AXES:LOG_OPACITY] = axes.transpose(0, 3, 2, 1).reshape(count, 9, BLOCK)
+    blocks[:, LOG_OPACITY] = np.log(gaussians.opacities[members].astype(np.float64))
+    blocks[:, NORMAL:SH] = gaussians.normals[members].transpose(0, 2, 1)
+    blocks[:, SH:] = gaussians.sh[members].reshape(count, BLOCK, -1).transpose(0, 2, 1)
+    return (
+        origins,
+        np.sqrt((offsets**2).sum(axis=2)).max(axis=1),
+        scales.max(axis=(1, 2)),
     )

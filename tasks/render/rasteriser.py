@@ -7,8 +7,9 @@ from tasks.render.binning import tile_lists
 from tasks.render.blending import blend
 from tasks.render.gbuffer import GBuffer
 from tasks.render.preparation import PreparedGaussians, prepare
-from tasks.render.projection import project, view_of
+from tasks.render.projection import project
 from tasks.render.splat_back import splat_back
+from tasks.render.view import view_of
 
 __all__ = ["PreparedGaussians", "prepare", "rasterise", "splat_back"]
 
@@ -41,16 +42,15 @@ def rasterise(
     view = view_of(viewmat, K, width, height)
     records, _ = project(prepared, view)
     starts, splats = tile_lists(records, width, height)
-    out = blend(records, starts, splats, width, height)
-    alpha = 1 - out[..., 0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        depth = out[..., 2] / alpha
-        normal = out[..., 6:9] / np.linalg.norm(out[..., 6:9], axis=-1, keepdims=True)
-    covered = alpha > 0
-    return GBuffer(
-        rgb=np.ascontiguousarray(out[..., 3:6]),
-        depth=np.where(covered, depth, np.nan).astype(np.float32),
-        alpha=alpha,
-        normal=np.where(covered[..., None], normal, 0).astype(np.float32),
-        class_id=np.where(out[..., 0] < 0.5, out[..., 1], 0).astype(np.uint8),
+    buffers = GBuffer(
+        rgb=np.empty((height, width, 3), dtype=np.float32),
+        depth=np.empty((height, width), dtype=np.float32),
+        alpha=np.empty((height, width), dtype=np.float32),
+        normal=np.empty((height, width, 3), dtype=np.float32),
+        class_id=np.empty((height, width), dtype=np.uint8),
     )
+    blend(
+        records, starts, splats,
+        buffers.rgb, buffers.depth, buffers.alpha, buffers.normal, buffers.class_id,
+    )  # fmt: skip
+    return buffers

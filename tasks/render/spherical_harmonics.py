@@ -6,6 +6,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.preparation import BLOCK, SH
+
 C0 = 0.5 * sqrt(1 / pi)
 C1 = 0.5 * sqrt(3 / pi)
 C2 = (0.5 * sqrt(15 / pi), 0.25 * sqrt(5 / pi), 0.25 * sqrt(15 / pi))
@@ -58,47 +60,69 @@ def sh_basis(directions: NDArray[np.floating], count: int) -> NDArray[np.float64
     return np.stack(values[:count], axis=-1)
 
 
-@numba.njit(cache=True, nogil=True)
-def shade_lanes(s, direction, basis, rgb, block, sh, count, lanes):  # type: ignore[no-untyped-def]
-    """Colours max(SH + 1/2, 0) of one block, `sh_basis` written for vector lanes.
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _load(planes, l):  # type: ignore[no-untyped-def]
+    return planes[l], planes[BLOCK + l], planes[2 * BLOCK + l]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _store(planes, l, values):  # type: ignore[no-untyped-def]
+    planes[l], planes[BLOCK + l], planes[2 * BLOCK + l] = values
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _add(rgb, block, k, l, value):  # type: ignore[no-untyped-def]
+    """Add basis function k's share in lane l."""
+    plane = SH + 3 * k
+    red = rgb[0] + value * block[plane, l]
+    green = rgb[1] + value * block[plane + 1, l]
+    blue = rgb[2] + value * block[plane + 2, l]
+    return red, green, blue
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def shade_lanes(directions, block, colours):  # type: ignore[no-untyped-def]
+    """Colours max(SH + 1/2, 0) of one block of Gaussians: `sh_basis`, one vector lane each.
 
     Parameters
     ----------
-    s : float32 scratch; ``direction``, ``basis`` and ``rgb`` are offsets into it of 3, 16 and 3 planes
-    block : float32 [P, lanes] whose planes from ``sh`` on hold 3 ``count`` coefficients [1]
+    directions : float32 [3 * 64] unit vectors from the camera, plane after plane [1]
+    block : float32 [P, 64] a block of `PreparedGaussians`
+    colours : float32 [3 * 64 or more] overwritten with the colours, plane after plane [1]
     """
-    for l in range(lanes):
-        s[basis + l] = _C0
+    count = (block.shape[0] - SH) // 3
+    for l in range(BLOCK):
+        _store(colours, l, _add((_HALF, _HALF, _HALF), block, 0, l, _C0))
     if count > 1:
-        for l in range(lanes):
-            x, y, z = s[direction + l], s[direction + lanes + l], s[direction + 2 * lanes + l]
-            s[basis + lanes + l] = -_C1 * y
-            s[basis + 2 * lanes + l] = _C1 * z
-            s[basis + 3 * lanes + l] = -_C1 * x
+        for l in range(BLOCK):
+            x, y, z = _load(directions, l)
+            rgb = _load(colours, l)
+            rgb = _add(rgb, block, 1, l, -_C1 * y)
+            rgb = _add(rgb, block, 2, l, _C1 * z)
+            rgb = _add(rgb, block, 3, l, -_C1 * x)
+            _store(colours, l, rgb)
     if count > 4:
-        for l in range(lanes):
-            x, y, z = s[direction + l], s[direction + lanes + l], s[direction + 2 * lanes + l]
-            s[basis + 4 * lanes + l] = _C20 * x * y
-            s[basis + 5 * lanes + l] = -_C20 * y * z
-            s[basis + 6 * lanes + l] = _C21 * (_TWO * z * z - x * x - y * y)
-            s[basis + 7 * lanes + l] = -_C20 * x * z
-            s[basis + 8 * lanes + l] = _C22 * (x * x - y * y)
+        for l in range(BLOCK):
+            x, y, z = _load(directions, l)
+            rgb = _load(colours, l)
+            rgb = _add(rgb, block, 4, l, _C20 * x * y)
+            rgb = _add(rgb, block, 5, l, -_C20 * y * z)
+            rgb = _add(rgb, block, 6, l, _C21 * (_TWO * z * z - x * x - y * y))
+            rgb = _add(rgb, block, 7, l, -_C20 * x * z)
+            rgb = _add(rgb, block, 8, l, _C22 * (x * x - y * y))
+            _store(colours, l, rgb)
     if count > 9:
-        for l in range(lanes):
-            x, y, z = s[direction + l], s[direction + lanes + l], s[direction + 2 * lanes + l]
+        for l in range(BLOCK):
+            x, y, z = _load(directions, l)
             xx, yy, zz = x * x, y * y, z * z
-            s[basis + 9 * lanes + l] = -_C30 * y * (_THREE * xx - yy)
-            s[basis + 10 * lanes + l] = _C31 * x * y * z
-            s[basis + 11 * lanes + l] = -_C32 * y * (_FOUR * zz - xx - yy)
-            s[basis + 12 * lanes + l] = _C33 * z * (_TWO * zz - _THREE * xx - _THREE * yy)
-            s[basis + 13 * lanes + l] = -_C32 * x * (_FOUR * zz - xx - yy)
-            s[basis + 14 * lanes + l] = _C34 * z * (xx - yy)
-            s[basis + 15 * lanes + l] = -_C30 * x * (xx - _THREE * yy)
-    for c in range(3):
-        for l in range(lanes):
-            s[rgb + c * lanes + l] = _HALF
-        for k in range(count):
-            for l in range(lanes):
-                s[rgb + c * lanes + l] += s[basis + k * lanes + l] * block[sh + 3 * k + c, l]
-        for l in range(lanes):
-            s[rgb + c * lanes + l] = max(s[rgb + c * lanes + l], _ZERO)
+            rgb = _load(colours, l)
+            rgb = _add(rgb, block, 9, l, -_C30 * y * (_THREE * xx - yy))
+            rgb = _add(rgb, block, 10, l, _C31 * x * y * z)
+            rgb = _add(rgb, block, 11, l, -_C32 * y * (_FOUR * zz - xx - yy))
+            rgb = _add(rgb, block, 12, l, _C33 * z * (_TWO * zz - _THREE * xx - _THREE * yy))
+            rgb = _add(rgb, block, 13, l, -_C32 * x * (_FOUR * zz - xx - yy))
+            rgb = _add(rgb, block, 14, l, _C34 * z * (xx - yy))
+            rgb = _add(rgb, block, 15, l, -_C30 * x * (xx - _THREE * yy))
+            _store(colours, l, rgb)
+    for l in range(3 * BLOCK):
+        colours[l] = max(colours[l], _ZERO)

@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.errors import InputError
 from tasks.render.binning import tile_lists
 from tasks.render.blending import blend_transposed
 from tasks.render.preparation import PreparedGaussians
-from tasks.render.projection import project, view_of
+from tasks.render.projection import project
+from tasks.render.view import view_of
 
 
 def splat_back(
@@ -41,12 +43,17 @@ def splat_back(
         The camera is unusable, or the residual's shape does not fit the picture.
     """
     view = view_of(viewmat, K, width, height)
-    residual = np.ascontiguousarray(residual, dtype=np.float32)
+    residual = np.asarray(residual, dtype=np.float32)
+    if residual.ndim != 3 or residual.shape[:2] != (height, width):
+        raise InputError(
+            f"splat_back: residual must have shape ({height}, {width}, channels); it has {residual.shape}"
+        )
     records, slots = project(prepared, view)
     starts, splats = tile_lists(records, width, height)
-    channels = residual.shape[2]
-    seen = np.zeros((len(records), channels + 1))
-    blend_transposed(records, starts, splats, residual, seen)
-    sums = np.zeros((len(prepared), channels + 1), dtype=np.float32)
+    # A channel of ones carries the weight's own sum.
+    channels = np.concatenate((residual, np.ones((height, width, 1), dtype=np.float32)), axis=2)
+    seen = np.zeros((len(records), channels.shape[2]))
+    blend_transposed(records, starts, splats, channels, seen)
+    sums = np.zeros((len(prepared), channels.shape[2]), dtype=np.float32)
     sums[prepared.order[slots]] = seen
-    return sums[:, :channels], sums[:, channels]
+    return sums[:, :-1], sums[:, -1]
