@@ -19,6 +19,10 @@ from tasks.scene.gaussians import Gaussians
 
 PLANE_CELL_M = 0.5
 QUANTILES = 1025
+EDGE_WIDTHS = 1.4
+"""Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
+NARROWEST = 0.35
+"""Width of the narrowest Gaussian, at the very edge, by that of its anchor."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -228,14 +232,17 @@ def snow_layer(
         colour = to_display(colour)
     sh = np.zeros((len(index), *gaussians.sh.shape[1:]), dtype=np.float32)
     sh[:, 0] = (colour - 0.5) / C0
-    # as wide as its anchor, lying in the surface and never thicker than the snow
-    wide = np.maximum(scales[on, 1:], 2e-3)
-    thin = np.clip(0.3 * rise, 1e-3, 0.5 * wide[:, 0])
+    # as wide as its anchor but not over the edge of its patch, and never thicker than the snow
+    wide = np.maximum(scales[on, 2], 2e-3)
+    if coverage < 1:
+        inside = (coverage - xi[on]) / _steepness(field, place, wide)
+        wide = np.clip(inside / EDGE_WIDTHS, NARROWEST * wide, wide)
+    thin = np.clip(0.3 * rise, 1e-3, 0.5 * wide)
     return replace(
         gaussians,
         means=(place + rise[:, None] * normal).astype(np.float32),
         quats_wxyz=_lying(normal).astype(np.float32),
-        scales=np.column_stack((wide[:, 1], wide[:, 1], thin)).astype(np.float32),
+        scales=np.column_stack((wide, wide, thin)).astype(np.float32),
         opacities=np.clip(hidden, 1 / 255, 1).astype(np.float32),
         sh=sh,
         normals=normal.astype(np.float32),
@@ -251,7 +258,10 @@ def whitened(
     depth_mm: float,
     parameters: SnowCoverParameters,
 ) -> Gaussians:
-    """The scene with snow on everything but the road that faces up, and damp road between the snow.
+    """The scene with snow on everything that faces up, and damp road between the snow.
+
+    The road under the snow layer is whitened too: far away a pixel blends many Gaussians, and dark ones between
+    the layer's would show through.
 
     Parameters
     ----------
@@ -269,7 +279,7 @@ def whitened(
     """
     p = parameters
     road = np.isin(gaussians.class_id, ROAD_CLASSES)
-    up = np.where(road | (gaussians.class_id == SemanticClass.SKY), 0.0, gaussians.normals[:, 2])
+    up = np.where(gaussians.class_id == SemanticClass.SKY, 0.0, gaussians.normals[:, 2])
     limit = np.cos(np.deg2rad(p.tilt_limit_deg))
     facing = np.clip((up - limit / 2) / (limit / 2), 0, 1)
     bears = np.flatnonzero(facing > 0)
@@ -280,6 +290,16 @@ def whitened(
     damp = np.where(road, p.damp_albedo_ratio, 1.0)
     snow = _snow_colour(np.zeros(len(gaussians)), white, p)
     return recoloured(gaussians, (1 - hidden) * damp, hidden[:, None] * snow)
+
+
+def _steepness(
+    field: SnowField, place: NDArray[np.float64], width: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Slope of the coverage field over a Gaussian's width [m-1]; where it is level the edge is far away."""
+    x, y = place[:, 0], place[:, 1]
+    along = coverage_rank(field, x + width, y) - coverage_rank(field, x - width, y)
+    across = coverage_rank(field, x, y + width) - coverage_rank(field, x, y - width)
+    return np.hypot(along, across) / (2 * width) + 1e-6
 
 
 def _snow_colour(

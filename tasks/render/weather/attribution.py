@@ -1,0 +1,91 @@
+"""Which layer changed which pixel, and the composition that the paper used for its particles."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import ROAD_CLASSES
+from tasks.render.gbuffer import GBuffer
+from tasks.render.weather.layer import recompose
+from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
+from tasks.render.weather.particles import Shutter
+from tasks.render.weather.scene_light import to_display
+from tasks.render.weather.snow_layer import coverage_rank
+
+LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
+"""Bit of each layer in an attribution picture."""
+
+
+def attribution(
+    weather: ClipWeather, frame: WeatherFrame, gbuffer: GBuffer, shutter: Shutter
+) -> NDArray[np.uint8]:
+    """Layers that changed each pixel by at least half an 8-bit step, as `LAYER_BITS` added up.
+
+    Parameters
+    ----------
+    weather : the clip's weather
+    frame : the frame
+    gbuffer : the rasterisation it was made from
+    shutter : its exposure
+
+    Returns
+    -------
+    uint8 [H, W] bits [1]
+    """
+    bits = np.where(snow_on_road(weather, gbuffer, shutter), LAYER_BITS["snow"], 0).astype(np.uint8)
+    picture = frame.base
+    for layer in frame.layers:
+        after = recompose(picture, (layer,))
+        step = np.abs(to_display(np.minimum(after, 1)) - to_display(np.minimum(picture, 1))).max(axis=-1)
+        bits |= np.where(step >= 0.5 / 255, LAYER_BITS[layer.name], 0).astype(np.uint8)
+        picture = after
+    return bits
+
+
+def snow_on_road(weather: ClipWeather, gbuffer: GBuffer, shutter: Shutter) -> NDArray[np.bool_]:
+    """Road pixels on which snow lies, by the coverage field at the point that the pixel sees.
+
+    Parameters
+    ----------
+    weather : the clip's weather
+    gbuffer : the rasterisation of its scene
+    shutter : pose and intrinsics
+
+    Returns
+    -------
+    bool [H, W]
+    """
+    mask = np.zeros(gbuffer.depth.shape, dtype=bool)
+    if weather.falling is None or weather.falling.snow is None:
+        return mask
+    road = np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5)
+    ray = pixel_rays(shutter)[road]
+    place = shutter.T_world_camera[:3, 3] + gbuffer.depth[road, None] * ray
+    xi = coverage_rank(weather.falling.snow, place[:, 0], place[:, 1])
+    mask[road] = xi <= weather.state.snow_coverage
+    return mask
+
+
+def paper_picture(frame: WeatherFrame) -> NDArray[np.uint8]:
+    """The 8-bit picture as the paper composes it (Appendix A.4).
+
+    The particles are isolated in display space, as the signed difference of a pair of 8-bit renders of the
+    street in its air with and without them, and that difference is added last to the finished still picture.
+
+    Parameters
+    ----------
+    frame : the frame
+
+    Returns
+    -------
+    uint8 [H, W, 3] sRGB
+    """
+    still = [layer for layer in frame.layers if layer.name != "particles"]
+    falling = [layer for layer in frame.layers if layer.name == "particles"]
+    without = recompose(frame.base, [layer for layer in still if layer.name != "wet"])
+    residual = _codes(recompose(without, falling)) - _codes(without)
+    return np.clip(_codes(recompose(frame.base, still)) + residual, 0, 255).astype(np.uint8)
+
+
+def _codes(picture: NDArray[np.float32]) -> NDArray[np.int16]:
+    """8-bit sRGB codes, rounded, as signed numbers."""
+    return np.rint(255 * np.minimum(to_display(picture), 1)).astype(np.int16)

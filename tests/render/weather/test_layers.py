@@ -1,0 +1,166 @@
+"""The whole weather on a small street: what comes out, what it is made of, and what refuses to run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tasks.conventions import SemanticClass
+from tasks.errors import InputError
+from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.weather.attribution import LAYER_BITS, attribution, paper_picture, snow_on_road
+from tasks.render.weather.layer import recompose
+from tasks.render.weather.layers import apply_weather, weather_scene
+from tasks.render.weather.parameters import WeatherState
+from tasks.render.weather.scene_light import appended, to_display, to_linear
+from tests.render.weather.conftest import shutter
+from tests.render.weather.scenes import clear_sky, road, surfels
+
+SKY = clear_sky()
+RAIN = {
+    rate: WeatherState(kind="rain", precipitation_mm_h=rate, film_depth_mm=film)
+    for rate, film in ((2, 0.189), (10, 0.489), (25, 0.839), (50, 1.263))
+}
+SNOW = {
+    rate: WeatherState(
+        kind="snow", precipitation_mm_h=rate, snow_depth_mm=10 * rate, snow_coverage=min(1, rate / 2)
+    )
+    for rate in (0.5, 1, 2, 3)
+}
+SIZE = {"width": 144, "height": 96, "focal": 120.0}
+
+
+@pytest.fixture(scope="module")
+def street():
+    y, z = np.meshgrid(np.arange(-4, 4, 0.12), np.arange(0, 4, 0.12))
+    wall = surfels(
+        np.column_stack((np.full(y.size, 16.0), y.ravel(), z.ravel())),
+        (-1, 0, 0),
+        0.08,
+        0.25,
+        SemanticClass.BUILDING,
+    )
+    return appended(road(), wall)
+
+
+def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005):
+    view = shutter(time_s=time_s, exposure_s=exposure_s, speed=speed, **SIZE)
+    scene, weather = weather_scene(street, SKY, state, parameters, SIZE["focal"], seed)
+    gbuffer = rasterise(prepare(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height)
+    picture = gbuffer.rgb + (1 - gbuffer.alpha[..., None]) * np.float32((0.2, 0.4, 0.8))
+    return weather, apply_weather(weather, picture, gbuffer, view), gbuffer, view
+
+
+def test_dry_weather_changes_no_bit(street, parameters):
+    scene, weather = weather_scene(street, SKY, WeatherState(kind="dry"), parameters, 120.0, 1)
+    assert scene is street
+    _, gbuffer = None, None
+    _, drawn, gbuffer, view = frame(street, WeatherState(kind="dry"), parameters)
+    assert drawn.picture is drawn.base
+    assert drawn.layers == ()
+    assert attribution(weather, drawn, gbuffer, view).max() == 0
+
+
+@pytest.mark.parametrize("state", [RAIN[25], SNOW[1]], ids=["rain", "snow"])
+def test_layers_recompose_to_the_picture_bit_for_bit(street, parameters, state):
+    _, drawn, _, _ = frame(street, state, parameters)
+    assert recompose(drawn.base, drawn.layers).tobytes() == drawn.picture.tobytes()
+    names = [layer.name for layer in drawn.layers]
+    assert names == (
+        ["light", "wet", "air", "particles"] if state.kind == "rain" else ["light", "air", "particles"]
+    )
+    assert np.isfinite(drawn.picture).all()
+    assert drawn.picture.min() >= 0
+    assert drawn.picture.dtype == np.float32
+
+
+@pytest.mark.parametrize("state", [RAIN[25], SNOW[1]], ids=["rain", "snow"])
+def test_the_same_inputs_give_the_same_bytes(street, parameters, state):
+    first, second = (frame(street, state, parameters)[1].picture for _ in range(2))
+    assert first.tobytes() == second.tobytes()
+    assert first.tobytes() != frame(street, state, parameters, seed=2)[1].picture.tobytes()
+
+
+@pytest.mark.parametrize("state", [RAIN[50], SNOW[2]], ids=["rain", "snow"])
+def test_when_the_car_stands_only_particles_move(street, parameters, state):
+    now = frame(street, state, parameters, speed=0, time_s=3.0)[1]
+    later = frame(street, state, parameters, speed=0, time_s=3.1)[1]
+    for first, second in zip(now.layers, later.layers, strict=True):
+        same = first.gain.tobytes() == second.gain.tobytes() and first.add.tobytes() == second.add.tobytes()
+        assert same == (first.name != "particles")
+    assert now.base.tobytes() == later.base.tobytes()
+
+
+def test_severity_is_ordered(street, parameters):
+    """Rain: less contrast of the far wall, more mirrored light; snow: more snow, then deeper veil."""
+    wet = [frame(street, state, parameters)[1].layers[1].add.sum() for state in RAIN.values()]
+    assert np.all(np.diff(wet) > 0)
+    masks = []
+    for state in SNOW.values():
+        weather, _, gbuffer, view = frame(street, state, parameters)
+        masks.append(snow_on_road(weather, gbuffer, view))
+    road = (gbuffer.class_id == SemanticClass.ROAD) & (gbuffer.alpha > 0.5)
+    assert masks[0].sum() < masks[1].sum() < masks[2].sum()
+    assert np.array_equal(masks[3], road)
+    for states in (RAIN, SNOW):
+        veil = [frame(street, state, parameters)[1].layers[-2].gain[48, 72, 0] for state in states.values()]
+        assert np.all(np.diff(veil) < 0)
+
+
+def test_particles_hide_more_as_the_rate_rises(street, parameters):
+    for states in (RAIN, SNOW):
+        cover = [
+            (1 - frame(street, state, parameters)[1].layers[-1].gain).mean() for state in states.values()
+        ]
+        assert np.all(np.diff(cover) > 0)
+
+
+def test_attribution_names_the_layers_that_changed_a_pixel(street, parameters):
+    weather, drawn, gbuffer, view = frame(street, RAIN[50], parameters)
+    bits = attribution(weather, drawn, gbuffer, view)
+    road = gbuffer.class_id == SemanticClass.ROAD
+    assert (bits[road] & LAYER_BITS["wet"] > 0).mean() > 0.95
+    assert not (bits[~road] & LAYER_BITS["wet"]).any()
+    assert not (bits & LAYER_BITS["snow"]).any()
+    falls = bits & LAYER_BITS["particles"] > 0
+    assert 0 < falls.mean() < 0.6
+    assert (drawn.layers[-1].gain[..., 0][falls] < 1).all()
+
+    weather, drawn, gbuffer, view = frame(street, SNOW[1], parameters)
+    snow = attribution(weather, drawn, gbuffer, view) & LAYER_BITS["snow"] > 0
+    white = drawn.base[..., 0] > 0.6
+    on_road = gbuffer.class_id == SemanticClass.ROAD
+    assert (snow == white)[on_road].mean() > 0.85
+
+
+def test_the_paper_s_composition_adds_the_residual_of_8_bit_pictures(street, parameters):
+    _, drawn, _, _ = frame(street, SNOW[2], parameters)
+    ours = np.rint(255 * np.minimum(to_display(drawn.picture), 1))
+    # without a wet layer the residual is added to the very picture it was taken from
+    assert np.array_equal(paper_picture(drawn), ours.astype(np.uint8))
+    _, wet, _, _ = frame(street, RAIN[50], parameters)
+    paper = paper_picture(wet)
+    ours = np.rint(255 * np.minimum(to_display(wet.picture), 1))
+    assert np.abs(paper - ours).max() < 40
+    assert np.abs(paper - ours).mean() < 1
+
+
+def test_display_transfer_is_its_own_inverse():
+    display = np.linspace(0, 1, 1001)
+    assert to_display(to_linear(display)) == pytest.approx(display, abs=1e-6)
+
+
+def test_every_rule_that_a_state_breaks_is_told_at_once(street, parameters):
+    broken = WeatherState(kind="snow", precipitation_mm_h=0.0, snow_coverage=1.2, snow_depth_mm=float("nan"))
+    with pytest.raises(InputError) as caught:
+        weather_scene(street, SKY, broken, parameters, 120.0, 1)
+    text = "\n".join(caught.value.problems)
+    for part in ("snow_coverage must not exceed 1; it is 1.2", "snow_depth_mm", "precipitation_mm_h above 0"):
+        assert part in text
+    assert len(caught.value.problems) == 3
+
+
+def test_a_scene_without_road_is_refused(street, parameters):
+    bare = replace(street, class_id=np.full(len(street), SemanticClass.BUILDING, np.uint8))
+    with pytest.raises(InputError, match="no Gaussian of the scene has class road"):
+        weather_scene(bare, SKY, RAIN[10], parameters, 120.0, 1)

@@ -1,0 +1,174 @@
+"""Snow on the ground: where it lies, how much of it, and what it looks like."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tasks.conventions import SemanticClass
+from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
+from tasks.render.weather.layers import pixel_rays
+from tasks.render.weather.scene_light import appended, mean_colours
+from tasks.render.weather.snow_layer import (
+    coverage_rank,
+    hidden_share,
+    local_depth_mm,
+    road_anchors,
+    snow_field,
+    snow_layer,
+    whitened,
+)
+from tests.render.weather.conftest import shutter
+from tests.render.weather.scenes import ASPHALT, road, surfels
+
+WHITE = np.full(3, ASPHALT / 0.1)
+COVERAGES = (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)
+
+
+@pytest.fixture(scope="module")
+def street():
+    return road()
+
+
+def layer_at(street, parameters, coverage, depth_mm=None, seed=5):
+    field = snow_field(street, parameters.snow_cover, seed)
+    depth_mm = 20.0 * coverage if depth_mm is None else depth_mm
+    return snow_layer(street, field, WHITE, coverage, depth_mm, parameters.snow_cover)
+
+
+def test_ranks_by_weight_are_uniform_and_keep_the_order():
+    rng = np.random.Generator(np.random.Philox(1))
+    values, weights = rng.standard_normal(5000) ** 3, rng.uniform(0.1, 2, 5000)
+    ranks = rank_uniform(values, weights)
+    assert np.all(np.diff(ranks[np.argsort(values)]) > 0)
+    for level in (0.1, 0.5, 0.9):
+        assert weights[ranks <= level].sum() / weights.sum() == pytest.approx(level, abs=1e-3)
+
+
+def test_fields_have_unit_variance_and_fade_under_a_wide_footprint():
+    waves = FieldParameters(coarsest_m=2.0, octaves=4, roughness=0.6)
+    x, y = np.meshgrid(np.arange(0, 200, 0.5), np.arange(0, 200, 0.5))
+    near = height_field(x, y, waves, 1, "test")
+    assert near.mean() == pytest.approx(0, abs=0.03)
+    assert near.std() == pytest.approx(1, abs=0.03)
+    spreads = [height_field(x, y, waves, 1, "test", footprint).std() for footprint in (0.05, 0.3, 0.8, 3.0)]
+    assert np.all(np.diff(spreads) < 0)
+    assert spreads[-1] == 0
+
+
+@pytest.mark.parametrize("coverage", COVERAGES)
+def test_as_much_of_the_road_is_covered_as_asked(street, parameters, coverage):
+    field = snow_field(street, parameters.snow_cover, 5)
+    xi = coverage_rank(field, street.means[:, 0], street.means[:, 1])
+    assert np.mean(xi <= coverage) == pytest.approx(coverage, abs=0.005)
+
+
+def test_more_coverage_adds_to_what_is_there(street, parameters):
+    anchors = [set(layer_at(street, parameters, coverage)[1].tolist()) for coverage in COVERAGES]
+    for less, more in pairwise(anchors):
+        assert less < more or (not less and more)
+
+
+def test_local_depth_keeps_the_mean_and_the_support():
+    xi = (np.arange(100000) + 0.5) / 100000
+    for coverage, mean in ((0.25, 5.0), (0.5, 10.0), (1.0, 20.0), (1.0, 30.0)):
+        depth = local_depth_mm(xi, coverage, mean, 20.0)
+        assert depth.mean() == pytest.approx(mean, rel=1e-3)
+        assert np.array_equal(depth > 0, xi < coverage)
+        assert np.all(np.diff(depth) <= 0)
+    assert local_depth_mm(xi, 0.0, 0.0, 20.0).max() == 0
+
+
+def test_snow_lies_over_its_anchors_along_their_normals(street, parameters):
+    layer, anchors = layer_at(street, parameters, 1.0, 30.0)
+    lift = layer.means - street.means[anchors]
+    assert np.abs(lift[:, :2]).max() < 1e-5
+    assert lift[:, 2].mean() == pytest.approx(0.030, rel=0.1)
+    assert lift[:, 2].min() > 0
+    assert np.array_equal(layer.class_id, street.class_id[anchors])
+
+
+def test_lifting_follows_a_tilted_road(parameters):
+    level = road(length=6.0)
+    turn = Rotation.from_euler("y", 12, degrees=True)
+    quats = np.tile(turn.as_quat(scalar_first=True).astype(np.float32), (len(level), 1))
+    slope = replace(
+        level, means=turn.apply(level.means).astype(np.float32), quats_wxyz=quats,
+        normals=turn.apply(level.normals).astype(np.float32),
+    )  # fmt: skip
+    layer, anchors = layer_at(slope, parameters, 1.0, 30.0)
+    assert len(anchors) > 0.9 * len(slope)
+    lift = layer.means - slope.means[anchors]
+    lift /= np.linalg.norm(lift, axis=1, keepdims=True)
+    assert lift @ turn.apply([0, 0, 1]) == pytest.approx(np.ones(len(lift)), abs=1e-3)
+
+
+def test_what_stands_up_or_floats_is_no_anchor(street, parameters):
+    kerb = surfels(np.array([[5.0, 0.0, 0.05]]), (0, 1, 0), 0.04, 0.2, SemanticClass.ROAD)
+    floating = surfels(np.array([[6.0, 0.0, 0.3]]), (0, 0, 1), 0.04, 0.2, SemanticClass.ROAD)
+    grass = surfels(np.array([[7.0, 0.0, 0.0]]), (0, 0, 1), 0.04, 0.2, SemanticClass.TERRAIN)
+    scene = appended(appended(appended(street, kerb), floating), grass)
+    index, normal = road_anchors(scene, parameters.snow_cover)
+    assert set(range(len(street), len(scene))).isdisjoint(index.tolist())
+    assert len(index) == len(street)
+    assert normal[:, 2].min() > np.cos(np.deg2rad(30))
+
+
+def test_round_gaussians_take_the_normal_of_their_neighbours(street, parameters):
+    round_road = replace(street, scales=np.full_like(street.scales, 0.05))
+    index, normal = road_anchors(round_road, parameters.snow_cover)
+    assert len(index) == len(street)
+    assert normal[:, 2].min() > 0.99
+
+
+def test_the_picture_shows_the_coverage_asked(street, parameters):
+    """Share of road pixels nearer to snow than to asphalt, from the car, by the field's share of the same pixels."""
+    view = shutter(width=240, height=160, focal=200.0)
+    middle = (ASPHALT * parameters.snow_cover.damp_albedo_ratio + 0.87 * WHITE[0]) / 2
+    seen, expected = [], []
+    for coverage in COVERAGES:
+        field = snow_field(street, parameters.snow_cover, 5)
+        amount = (coverage, 20.0 * coverage, parameters.snow_cover)
+        layer, _ = snow_layer(street, field, WHITE, *amount)
+        scene = appended(whitened(street, field, WHITE, *amount), layer)
+        gbuffer = rasterise(prepare(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
+        inside = gbuffer.alpha > 0.9
+        place = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
+        expected.append(float((coverage_rank(field, place[inside, 0], place[inside, 1]) <= coverage).mean()))
+        seen.append(float((gbuffer.rgb[inside].mean(axis=1) > middle).mean()))
+    assert np.all(np.diff(seen) > 0)
+    assert seen == pytest.approx(expected, abs=0.03)
+
+
+def test_snow_is_as_bright_as_its_albedo_in_the_light(street, parameters):
+    layer, _ = layer_at(street, parameters, 1.0, 30.0)
+    assert mean_colours(layer).mean(axis=0) == pytest.approx(
+        np.array(parameters.snow_cover.albedo) * WHITE, rel=0.02
+    )
+    assert hidden_share(np.array(10.0), parameters.snow_cover) > 0.99
+
+
+def test_snow_settles_on_what_faces_up_and_leaves_walls_bare(street, parameters):
+    flat = surfels(np.array([[5.0, 5.0, 0.1]]), (0, 0, 1), 0.1, 0.1, SemanticClass.SIDEWALK)
+    wall = surfels(np.array([[5.0, 6.0, 1.0]]), (0, 1, 0), 0.1, 0.1, SemanticClass.BUILDING)
+    scene = appended(appended(street, flat), wall)
+    field = snow_field(scene, parameters.snow_cover, 5)
+    colours = mean_colours(whitened(scene, field, WHITE, 1.0, 30.0, parameters.snow_cover))
+    assert colours[-2].mean() > 1.0
+    assert colours[-1] == pytest.approx(mean_colours(scene)[-1], rel=1e-5)
+
+
+def test_another_seed_lays_other_patches_of_the_same_share(street, parameters):
+    first, second = (set(layer_at(street, parameters, 0.5, seed=seed)[1].tolist()) for seed in (1, 2))
+    assert len(first) == pytest.approx(len(second), rel=0.05)
+    assert len(first & second) < 0.75 * len(first)
+
+
+def test_scenes_that_blend_display_colours_get_the_same_snow(street, parameters):
+    display = replace(street, display_encoded=True)
+    layer, _ = layer_at(display, parameters, 1.0, 30.0)
+    linear, _ = layer_at(street, parameters, 1.0, 30.0)
+    assert mean_colours(layer) == pytest.approx(mean_colours(linear), rel=1e-4)

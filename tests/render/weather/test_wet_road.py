@@ -1,0 +1,157 @@
+"""Water on the road: optics against closed forms, and what grows with the film."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tasks.render.weather.layer import recompose
+from tasks.render.weather.layers import pixel_rays
+from tasks.render.weather.puddles import water_surface, wetness
+from tasks.render.weather.reflection import mirrored_scene
+from tasks.render.weather.sky import sky_light
+from tasks.render.weather.wet_road import fresnel_reflectance, wet_albedo_ratio, wet_layer
+from tests.render.weather.conftest import shutter
+from tests.render.weather.scenes import ASPHALT, flat_gbuffer
+
+FILMS = (0.0, 0.05, 0.189, 0.489, 0.839, 1.263, 4.0)
+"""Film depths [mm]; the middle four are those of 2, 10, 25 and 50 mm/h."""
+VIEW = shutter(width=160, height=108, focal=133.0)
+
+
+@pytest.fixture(scope="module")
+def sky(parameters):
+    return sky_light(np.full(3, ASPHALT / 0.1), 0.002, 0.1, 2.0, parameters.sky)
+
+
+def wet(parameters, sky, film, wall_x=12.0, seed=1):
+    picture, gbuffer = flat_gbuffer(VIEW, wall_x)
+    cloudy, pose, p = np.full((8, 16, 3), 0.9, np.float32), VIEW.T_world_camera, parameters.wet_road
+    return picture, gbuffer, wet_layer(
+        picture, gbuffer, cloudy, sky, 0.0, pixel_rays(VIEW), pose, VIEW.K, film, p, seed
+    )  # fmt: skip
+
+
+def test_water_reflects_two_percent_straight_down_and_all_at_grazing():
+    assert fresnel_reflectance(1.0, 1.333) == pytest.approx((0.333 / 2.333) ** 2)
+    assert fresnel_reflectance(0.0, 1.333) == pytest.approx(1.0)
+    # Brewster's angle: only the perpendicular part is left, ((n^2 - 1) / (n^2 + 1))^2 / 2
+    brewster = np.cos(np.arctan(1.333))
+    assert fresnel_reflectance(brewster, 1.333) == pytest.approx(((1.333**2 - 1) / (1.333**2 + 1)) ** 2 / 2)
+    assert np.all(np.diff(fresnel_reflectance(np.linspace(0, 1, 100), 1.333)) < 0)
+
+
+def test_diffuse_reflectance_of_water_is_the_mean_over_the_hemisphere(parameters):
+    cosine = (np.arange(20000) + 0.5) / 20000
+    mean = np.mean(2 * cosine * fresnel_reflectance(cosine, 1.333))
+    assert parameters.wet_road.diffuse_reflectance == pytest.approx(mean, abs=0.001)
+
+
+def test_wet_asphalt_keeps_half_its_albedo_and_white_paint_more():
+    ratios = wet_albedo_ratio(np.array([0.05, 0.1, 0.3, 0.6]), 1.333, 0.066)
+    assert ratios[1] == pytest.approx(0.52, abs=0.01)
+    assert np.all(np.diff(ratios) > 0)
+    assert np.all(ratios < 1)
+
+
+def test_the_film_drowns_more_of_the_road_everywhere_as_it_rises(parameters):
+    _, gbuffer = flat_gbuffer(VIEW)
+    road = gbuffer.class_id == 1
+    shares = [
+        water_surface(
+            gbuffer.depth, pixel_rays(VIEW), gbuffer.normal, road, VIEW.T_world_camera[:3, 3], 133.0, film,
+            parameters.wet_road.water, 3,
+        ).smooth
+        for film in FILMS
+    ]  # fmt: skip
+    assert shares[0].max() == 0
+    assert np.all(np.diff(shares, axis=0) >= 0)
+    assert np.all(np.diff([share[road].mean() for share in shares]) > 0)
+    assert shares[-1][road].min() > 0.99
+    assert all(share[~road].max() == 0 for share in shares)
+    assert np.all(np.diff([wetness(film, parameters.wet_road.water) for film in FILMS]) > 0)
+
+
+def test_reflection_grows_and_the_road_darkens_with_the_film(parameters, sky):
+    layers = [wet(parameters, sky, film)[2] for film in FILMS]
+    road = flat_gbuffer(VIEW, 12.0)[1].class_id == 1
+    assert np.all(np.diff([layer.add[road].mean() for layer in layers]) > 0)
+    assert np.all(np.diff([layer.gain[road] for layer in layers], axis=0) <= 1e-6)
+
+
+def test_a_dry_film_changes_nothing_and_a_thin_one_little(parameters, sky):
+    picture, _, layer = wet(parameters, sky, 0.0)
+    assert np.array_equal(recompose(picture, [layer]), picture)
+    _, _, thin = wet(parameters, sky, 0.001)
+    assert np.abs(recompose(picture, [thin]) - picture).max() < 0.02
+
+
+def test_only_the_road_gets_wet(parameters, sky):
+    picture, gbuffer, layer = wet(parameters, sky, 1.2)
+    other = gbuffer.class_id != 1
+    assert np.all(layer.gain[other] == 1)
+    assert np.all(layer.add[other] == 0)
+    assert np.abs(recompose(picture, [layer])[~other] - picture[~other]).min() > 0
+
+
+def test_the_mirror_takes_and_gives_no_more_than_all_light(parameters, sky):
+    for film in FILMS:
+        picture, _, layer = wet(parameters, sky, film)
+        assert layer.gain.min() >= 0
+        assert layer.gain.max() <= 1
+        assert layer.add.max() <= max(picture.max(), 0.9) + 1e-5
+
+
+def test_a_mirrored_stripe_lies_straight_below_its_stripe():
+    picture, gbuffer = flat_gbuffer(VIEW, 12.0)
+    road = gbuffer.class_id == 1
+    sky = np.full((8, 16, 3), 0.9, np.float32)
+    mirrored = mirrored_scene(
+        picture, gbuffer.depth, gbuffer.normal, road, sky, VIEW.T_world_camera, VIEW.K, 0.0, np.ones(3)
+    )
+    horizon, foot = 54, 54 + 133.0 * 1.4 / 12.0
+    row = int(foot) + 6
+    # a point of the wall and its image stand symmetric about the wall's foot, in height over the road
+    source = round(2 * foot - row)
+    assert source > horizon - 10
+    assert mirrored[row, 10:-10] == pytest.approx(picture[source, 10:-10], abs=0.02)
+    # below the image of the wall's top there is sky
+    assert mirrored[-1, 80] == pytest.approx(np.full(3, 0.9), abs=1e-3)
+
+
+def test_mirrored_pictures_have_mirrored_reflections():
+    picture, gbuffer = flat_gbuffer(VIEW, 12.0)
+    picture = picture * np.linspace(0.5, 1.5, 160, dtype=np.float32)[None, :, None]
+    sky = np.full((8, 16, 3), 0.9, np.float32)
+
+    def reflect(picture, gbuffer):
+        road = gbuffer.class_id == 1
+        return mirrored_scene(
+            picture, gbuffer.depth, gbuffer.normal, road, sky, VIEW.T_world_camera, VIEW.K, 0.0, np.ones(3)
+        )
+
+    flipped = replace(gbuffer, depth=gbuffer.depth[:, ::-1].copy(), class_id=gbuffer.class_id[:, ::-1].copy())
+    straight = reflect(picture, gbuffer)
+    turned = reflect(picture[:, ::-1].copy(), flipped)
+    assert turned[:, ::-1] == pytest.approx(straight, abs=1e-4)
+
+
+def test_puddles_stay_where_they_are_as_the_car_drives(parameters):
+    """Two cameras a pixel's footprint apart see the same water at the same place in the world."""
+    p = replace(parameters.wet_road.water, ripple_slope=0.0)
+    shares = []
+    for x in (0.0, 1.0):
+        view = shutter(width=160, height=108, focal=133.0, x=x)
+        _, gbuffer = flat_gbuffer(view)
+        rays, eye = pixel_rays(view), view.T_world_camera[:3, 3]
+        surface = water_surface(
+            gbuffer.depth, rays, gbuffer.normal, gbuffer.class_id == 1, eye, 133.0, 0.6, p, 3
+        )
+        column = 80
+        place = eye[0] + gbuffer.depth[:, column] * rays[:, column, 0]
+        near = (gbuffer.class_id[:, column] == 1) & (place > 4.5) & (place < 7.0)
+        shares.append(
+            np.interp(np.linspace(4.8, 6.5, 20), place[near][::-1], surface.smooth[near, column][::-1])
+        )
+    assert shares[1] == pytest.approx(shares[0], abs=0.08)
+    assert np.ptp(shares[0]) > 0.1
