@@ -1,0 +1,84 @@
+"""The course of the road: route coordinates to the world, and the route itself."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from tasks.scene.route import Route
+from tasks.scene.street.layout import StreetLayout
+
+_STEP = 0.05
+_MARGIN = 150.0
+_ROUTE_STEP = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """The route's line in the plane, straight at first and then bending left.
+
+    Parameters
+    ----------
+    station : float64 [M] increasing stations [m]
+    x, y : float64 [M] position [m]
+    heading : float64 [M] direction, counter-clockwise from x [rad]
+    """
+
+    station: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    heading: NDArray[np.float64]
+
+    def heading_at(self, station: ArrayLike) -> NDArray[np.float64]:
+        """Direction of the road at a station [m], in [rad]."""
+        return np.interp(station, self.station, self.heading)
+
+    def to_world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World position of points [N, 3] given as station, lateral, height [m]."""
+        s, d, z = points.T
+        heading = self.heading_at(s)
+        x = np.interp(s, self.station, self.x) - d * np.sin(heading)
+        y = np.interp(s, self.station, self.y) + d * np.cos(heading)
+        return np.stack([x, y, z], axis=1)
+
+    def quaternions(self, station: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World quaternions wxyz [N, 4] [1] of local axes [N, 3, 3], rows in route coordinates, at stations [N] [m]."""
+        columns = [self.directions(station, axes[:, k]) for k in range(3)]
+        return Rotation.from_matrix(np.stack(columns, axis=2)).as_quat(scalar_first=True)
+
+    def directions(self, station: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World directions [N, 3] of vectors [N, 3] in route coordinates at stations [N] [m]."""
+        heading = self.heading_at(station)
+        cos, sin = np.cos(heading), np.sin(heading)
+        x, y, z = vectors.T
+        return np.stack([x * cos - y * sin, x * sin + y * cos, z], axis=1)
+
+
+def course(layout: StreetLayout) -> Course:
+    """Integrate the curvature, which grows smoothly from zero to one over the bend's radius."""
+    first, last = layout.station_range
+    n = round((last - first + 2 * _MARGIN) / _STEP) + 1
+    station = first - _MARGIN + _STEP * np.arange(n)
+    t = np.clip((station - layout.bend_start) / layout.bend_transition, 0.0, 1.0)
+    curvature = t * t * (3 - 2 * t) / layout.bend_radius
+    heading = _integral(curvature)
+    x, y = _integral(np.cos(heading)), _integral(np.sin(heading))
+    return Course(station=station, x=x - np.interp(0.0, station, x), y=y, heading=heading)
+
+
+def route(layout: StreetLayout, line: Course) -> Route:
+    """Rig poses every half metre along the lane's middle."""
+    station = np.linspace(0.0, layout.route_length, round(layout.route_length / _ROUTE_STEP) + 1)
+    heading = line.heading_at(station)
+    pose = np.tile(np.eye(4), (len(station), 1, 1))
+    pose[:, 0, 0] = pose[:, 1, 1] = np.cos(heading)
+    pose[:, 1, 0] = np.sin(heading)
+    pose[:, 0, 1] = -pose[:, 1, 0]
+    pose[:, 0, 3] = np.interp(station, line.station, line.x)
+    pose[:, 1, 3] = np.interp(station, line.station, line.y)
+    return Route(station=station, T_world_rig=pose)
+
+
+def _integral(rate: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * _STEP

@@ -1,0 +1,121 @@
+"""Dimensions and light of the built-in street, and the finest detail a camera on its route can see."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+EYE_HEIGHT = 1.4
+"""Height of the camera the street is sampled for [m]."""
+VIEW_SLOPE = (0.6, 0.4)
+"""Half width and half height of that camera's picture at unit depth [1]: 480x320 at a focal length of 400."""
+PIXEL = 1 / 400
+"""Width of one of its pixels at unit depth [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StreetLayout:
+    """A two-lane street: the ego route in the right lane, parking, pavement and facades on both sides.
+
+    Parameters
+    ----------
+    route_length : length of the ego route [m]
+    behind, beyond : how far the street goes on before and after the route [m]
+    bend_start : station at which the road begins to turn left [m]
+    bend_transition : length over which the curvature grows to its full value [m]
+    bend_radius : radius of the bend [m]
+    lane_width : width of a traffic lane [m]
+    parking_width : width of the parking strip on either side [m]
+    marking_width : width of a longitudinal marking [m]
+    dash_length, dash_gap : stroke and gap of the centre line [m]
+    crossing_station : where the pedestrian crossing begins [m]
+    crossing_length : extent of the crossing along the road [m]
+    crossing_bar : width of a bar of the crossing, and of the gap between two [m]
+    kerb_height, kerb_width : upstand and top width of the kerb [m]
+    pavement_width : from the kerb to the facades [m]
+    slab : edge of a paving slab [m]
+    ground_storey_height, storey_height : floor to floor [m]
+    lamp_spacing, lamp_height : of the street lamps on one side [m]
+    tree_spacing : between the trees of one side [m]
+    sun_azimuth_deg : direction of the sun, from the route's start heading to the left [deg]
+    sun_elevation_deg : height of the sun [deg]
+    sun_rgb : irradiance of the sun over pi, on a surface that faces it, linear light [1]
+    sky_rgb : irradiance of the whole sky over pi, linear light [1]
+    bounce_rgb : radiance of the sunlit surroundings, linear light [1]
+    """
+
+    route_length: float = 180.0
+    behind: float = 30.0
+    beyond: float = 130.0
+    bend_start: float = 40.0
+    bend_transition: float = 60.0
+    bend_radius: float = 450.0
+    lane_width: float = 3.5
+    parking_width: float = 2.2
+    marking_width: float = 0.15
+    dash_length: float = 3.0
+    dash_gap: float = 6.0
+    crossing_station: float = 34.0
+    crossing_length: float = 4.0
+    crossing_bar: float = 0.5
+    kerb_height: float = 0.12
+    kerb_width: float = 0.15
+    pavement_width: float = 3.2
+    slab: float = 0.6
+    ground_storey_height: float = 3.9
+    storey_height: float = 3.1
+    lamp_spacing: float = 28.0
+    lamp_height: float = 7.0
+    tree_spacing: float = 14.0
+    sun_azimuth_deg: float = 150.0
+    sun_elevation_deg: float = 46.0
+    sun_rgb: tuple[float, float, float] = (1.75, 1.62, 1.42)
+    sky_rgb: tuple[float, float, float] = (0.30, 0.37, 0.47)
+    bounce_rgb: tuple[float, float, float] = (0.24, 0.21, 0.18)
+
+    @property
+    def carriageway_left(self) -> float:
+        """Lateral position of the left kerb from the route [m]."""
+        return 1.5 * self.lane_width + self.parking_width
+
+    @property
+    def carriageway_right(self) -> float:
+        """Lateral position of the right kerb from the route [m], negative."""
+        return -(0.5 * self.lane_width + self.parking_width)
+
+    @property
+    def station_range(self) -> tuple[float, float]:
+        """First and last station that is built [m]."""
+        return -self.behind, self.route_length + self.beyond
+
+    def kerb(self, side: int) -> float:
+        """Lateral position of the kerb on the left (side 1) or the right (side -1) [m]."""
+        return self.carriageway_left if side > 0 else self.carriageway_right
+
+    def front(self, side: int) -> float:
+        """Lateral position of the facades on the left (side 1) or the right (side -1) [m]."""
+        return self.kerb(side) + side * (self.kerb_width + self.pavement_width)
+
+
+def nearest_depth(
+    layout: StreetLayout, station: ArrayLike, lateral: ArrayLike, height: ArrayLike = 0.0
+) -> NDArray[np.float64]:
+    """Depth at which a point first comes into the picture of a camera driving the route.
+
+    It bounds the detail that anybody can see there, and so sets the size of the Gaussians.
+
+    Parameters
+    ----------
+    layout : the street
+    station, lateral, height : the point in route coordinates, broadcast together [m]
+
+    Returns
+    -------
+    float64, shape of the broadcast: depth [m]; points behind the start count as far away, since a
+        camera that looks ahead never sees them
+    """
+    s, d, z = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (station, lateral, height)))
+    edge = np.maximum(np.abs(d) / VIEW_SLOPE[0], np.abs(z - EYE_HEIGHT) / VIEW_SLOPE[1])
+    ahead = s - layout.route_length
+    behind = np.where(s < -2.0, 12.0 - s, 0.0)
+    return np.maximum(np.maximum(edge, ahead), np.maximum(behind, EYE_HEIGHT / VIEW_SLOPE[1]))

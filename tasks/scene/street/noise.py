@@ -1,0 +1,51 @@
+"""Named random streams and smooth noise, so that every part of the street repeats on its own."""
+
+from hashlib import blake2b
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_LATTICE = 256
+
+
+def stream(seed: int, name: str) -> np.random.Generator:
+    """A counter-based generator of its own for one named part of the street.
+
+    Parameters
+    ----------
+    seed : the street's seed [1]
+    name : what the numbers are for; other names give independent numbers
+    """
+    key = blake2b(f"{seed}/{name}".encode(), digest_size=16).digest()
+    return np.random.Generator(np.random.Philox(key=np.frombuffer(key, dtype="<u8")))
+
+
+def fractal_noise(
+    rng: np.random.Generator, x: ArrayLike, y: ArrayLike, wavelength: float, octaves: int = 1
+) -> NDArray[np.float64]:
+    """Smooth noise of about zero mean and unit deviation, each octave half as long and half as strong.
+
+    Parameters
+    ----------
+    rng : draws the lattice
+    x, y : where to evaluate, broadcast together [m]
+    wavelength : lattice spacing of the first octave [m]
+    octaves : number of octaves [1]
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+    total, power = np.zeros(x.shape), 0.0
+    for octave in range(octaves):
+        lattice = rng.standard_normal((_LATTICE, _LATTICE))
+        u, v = x / wavelength * 2**octave, y / wavelength * 2**octave
+        i, j = np.floor(u).astype(np.int64), np.floor(v).astype(np.int64)
+        a, b = _ease(u - i), _ease(v - j)
+        i0, j0, i1, j1 = i % _LATTICE, j % _LATTICE, (i + 1) % _LATTICE, (j + 1) % _LATTICE
+        low = lattice[i0, j0] * (1 - a) + lattice[i1, j0] * a
+        high = lattice[i0, j1] * (1 - a) + lattice[i1, j1] * a
+        total += (low * (1 - b) + high * b) * 0.5**octave
+        power += 0.5 * 0.25**octave
+    return total / np.sqrt(power)
+
+
+def _ease(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    return t * t * (3 - 2 * t)

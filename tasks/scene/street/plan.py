@@ -1,0 +1,198 @@
+"""Where things stand: buildings, trees, cars and lamps, drawn from the seed before anything is built."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.scene.street.layout import StreetLayout
+from tasks.scene.street.noise import stream
+
+Roof = Literal["flat", "pitched", "mansard"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Building:
+    """One house front and the block behind it.
+
+    Parameters
+    ----------
+    number : running number, names its random streams [1]
+    side : 1 left, -1 right [1]
+    start : station of its near edge [m]
+    bay, bays : width of a window bay [m] and how many there are [1]
+    storeys : including the ground floor [1]
+    setback : of the front behind the building line [m]
+    shop : the ground floor is a row of shops
+    roof : kind of roof
+    """
+
+    number: int
+    side: int
+    start: float
+    bay: float
+    bays: int
+    storeys: int
+    setback: float
+    shop: bool
+    roof: Roof
+
+    @property
+    def width(self) -> float:
+        """Length of the front [m]."""
+        return self.bay * self.bays
+
+    def eaves(self, layout: StreetLayout) -> float:
+        """Height of the wall above the road [m]."""
+        return layout.kerb_height + layout.ground_storey_height + (self.storeys - 1) * layout.storey_height
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tree:
+    """A street tree: a trunk and a crown of leafy balls.
+
+    Parameters
+    ----------
+    number : running number [1]
+    station, lateral : foot of the trunk [m]
+    girth : radius of the trunk [m]
+    balls : float64 [K, 4] centre in route coordinates and radius of each ball of leaves [m]
+    """
+
+    number: int
+    station: float
+    lateral: float
+    girth: float
+    balls: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Car:
+    """A parked car.
+
+    Parameters
+    ----------
+    number : running number [1]
+    station, lateral : middle of the car [m]
+    facing : 1 along the route, -1 against it [1]
+    model : name of its shape
+    """
+
+    number: int
+    station: float
+    lateral: float
+    facing: int
+    model: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Everything that stands on the street."""
+
+    buildings: tuple[Building, ...]
+    trees: tuple[Tree, ...]
+    cars: tuple[Car, ...]
+    lamps: tuple[tuple[float, int], ...]
+
+
+MODELS = ("hatchback", "saloon", "estate", "van")
+
+
+def plan_street(layout: StreetLayout, seed: int) -> Plan:
+    """Draw the street from its seed.
+
+    Parameters
+    ----------
+    layout : dimensions
+    seed : the street's seed [1]
+    """
+    first, last = layout.station_range
+    lamps = tuple(
+        (float(s), side)
+        for side, offset in ((-1, 9.0), (1, 9.0 + layout.lamp_spacing / 2))
+        for s in np.arange(first + offset, last, layout.lamp_spacing)
+    )
+    buildings = tuple(b for side in (-1, 1) for b in _row_of_houses(layout, seed, side))
+    trees = tuple(t for side in (-1, 1) for t in _row_of_trees(layout, seed, side, lamps))
+    cars = tuple(c for side in (-1, 1) for c in _parked(layout, seed, side))
+    return Plan(buildings=buildings, trees=trees, cars=cars, lamps=lamps)
+
+
+def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]:
+    rng = stream(seed, f"houses {side}")
+    first, last = layout.station_range
+    houses: list[Building] = []
+    station, storeys = first - rng.uniform(0, 8), 4
+    while station < last + 12:
+        storeys = int(np.clip(storeys + rng.choice([-1, 1, 0, 1, -1]), 3, 5))
+        bay, bays = float(rng.uniform(2.7, 3.3)), int(rng.integers(3, 6))
+        houses.append(
+            Building(
+                number=2 * len(houses) + (side > 0),
+                side=side,
+                start=float(station),
+                bay=bay,
+                bays=bays,
+                storeys=storeys,
+                setback=float(rng.choice([0.0, 0.0, 0.15, 0.3])),
+                shop=bool(rng.random() < 0.4),
+                roof=("flat", "pitched", "mansard")[rng.choice(3, p=[0.25, 0.45, 0.3])],
+            )
+        )
+        station += bay * bays + (rng.uniform(3.5, 6.5) if rng.random() < 0.16 else 0.0)
+    return houses
+
+
+def _row_of_trees(layout: StreetLayout, seed: int, side: int, lamps: tuple[tuple[float, int], ...]) -> list[Tree]:
+    rng = stream(seed, f"trees {side}")
+    first, last = layout.station_range
+    posts = np.array([s for s, post_side in lamps if post_side == side])
+    lateral = layout.kerb(side) + side * (layout.kerb_width + 0.75)
+    trees: list[Tree] = []
+    for slot in np.arange(first + 4.0, last, layout.tree_spacing):
+        station = float(slot + rng.uniform(-1.5, 1.5))
+        crown = _crown(rng, station, lateral, layout)
+        girth = float(rng.uniform(0.11, 0.17))
+        near_crossing = -9.0 < station - layout.crossing_station < layout.crossing_length + 2.0
+        if rng.random() < 0.12 or near_crossing or np.abs(posts - station).min() < 2.0:
+            continue
+        number = 2 * len(trees) + (side > 0)
+        trees.append(Tree(number=number, station=station, lateral=lateral, girth=girth, balls=crown))
+    return trees
+
+
+def _crown(rng: np.random.Generator, station: float, lateral: float, layout: StreetLayout) -> NDArray[np.float64]:
+    """Balls of leaves that fill an egg: the big ones within, smaller ones around."""
+    height, radius = rng.uniform(6.3, 8.3), rng.uniform(1.7, 2.2)
+    base = 2.7 + layout.kerb_height
+    middle = np.array([station, lateral, (base + height) / 2 + 0.2])
+    half = np.array([radius, radius, (height - base) / 2])
+    n = 26
+    direction = rng.standard_normal((n, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    reach = rng.uniform(0.25, 1.0, n) ** 0.5
+    size = rng.uniform(0.36, 0.62, n) * (1.25 - 0.45 * reach)
+    centre = middle + direction * half * (reach * 0.78)[:, None]
+    return np.concatenate([centre, size[:, None] * radius / 1.5], axis=1)
+
+
+def _parked(layout: StreetLayout, seed: int, side: int) -> list[Car]:
+    rng = stream(seed, f"cars {side}")
+    first, last = layout.station_range
+    lateral = layout.kerb(side) - side * (layout.parking_width / 2 - 0.12)
+    cars: list[Car] = []
+    station = first + rng.uniform(2, 6)
+    while station < last - 10:
+        car = Car(
+            number=2 * len(cars) + (side > 0),
+            station=float(station),
+            lateral=float(lateral + rng.uniform(-0.08, 0.08)),
+            facing=-side,
+            model=str(rng.choice(MODELS, p=[0.4, 0.25, 0.22, 0.13])),
+        )
+        crossing = -8.5 < station - layout.crossing_station < layout.crossing_length + 5.5
+        if not crossing:
+            cars.append(car)
+        station += rng.choice([5.6, 6.2, 6.0, 11.5, 18.0], p=[0.22, 0.2, 0.13, 0.2, 0.25]) + rng.uniform(0, 0.8)
+    return cars

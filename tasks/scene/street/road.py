@@ -1,0 +1,88 @@
+"""The carriageway: asphalt with its wear, and the markings, all in the plane of height zero."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import SemanticClass
+from tasks.scene.street.layout import EYE_HEIGHT, PIXEL, StreetLayout, nearest_depth
+from tasks.scene.street.noise import stream
+from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
+from tasks.scene.street.surfels import Surfels, graded_cells, tiles
+
+CELL = 6.0
+"""Width of an asphalt cell where it is seen closest [px]."""
+_SLENDER = (2.4, 5.0)
+"""Least and greatest length of a cell over its width: the road is seen foreshortened."""
+
+
+def road(layout: StreetLayout, seed: int) -> Surfels:
+    """Surfels of the carriageway, class road or marking, normals straight up.
+
+    Parameters
+    ----------
+    layout : dimensions
+    seed : the street's seed [1]
+    """
+    first, last = layout.station_range
+    crossing = (layout.crossing_station, layout.crossing_station + layout.crossing_length)
+    stops = [first, -2.0, *crossing, layout.route_length + 3.0]
+    while stops[-1] < last:
+        stops.append(min(stops[-1] + 0.6 * (stops[-1] - layout.route_length) + 2.0, last))
+    stretches = [
+        _cells(layout, seed, start, stop, is_crossing=start == crossing[0])
+        for start, stop in zip(stops[:-1], stops[1:], strict=True)
+    ]
+    s, d, length, width, mark = np.concatenate(stretches, axis=1)
+    zero = np.zeros(len(s))
+    grain = stream(seed, "road grain").standard_normal((len(s), 2))
+    marked = mark > 0.5
+    return tiles(
+        np.stack([s, d, zero], axis=1),
+        np.stack([length, zero, zero], axis=1),
+        np.stack([zero, width, zero], axis=1),
+        np.where(marked, SemanticClass.MARKING, SemanticClass.ROAD).astype(np.uint8),
+        np.where(marked[:, None], paint_albedo(seed, s, d, grain), asphalt_albedo(layout, seed, s, d, width, grain)),
+        overlap=0.74,
+    )
+
+
+def _cells(layout: StreetLayout, seed: int, start: float, stop: float, *, is_crossing: bool) -> NDArray[np.float64]:
+    """Station, lateral, length, width [m] and 1 for paint of each cell of one stretch, as rows."""
+    rng = stream(seed, f"road {start:.3f}")
+    breaks, kind = _cross_section(layout, is_crossing)
+    nearest = nearest_depth(layout, start if start >= 0 else min(stop, 0.0) - 1e-9, (breaks[1:] + breaks[:-1]) / 2)
+    columns = []
+    for d, width, k in zip(*graded_cells(breaks, CELL * PIXEL * nearest, 0.55), strict=True):
+        cell = CELL * PIXEL * nearest[k]
+        length = cell * np.clip(nearest[k] / EYE_HEIGHT, *_SLENDER) * min(cell / width, 1.8)
+        if kind[k] != "asphalt":
+            length = layout.dash_length / max(round(layout.dash_length / length), 1)
+        n = max(round((stop - start) / length), 1)
+        length = (stop - start) / n
+        s = start + (np.arange(n) + 0.5) * length
+        if kind[k] == "asphalt":
+            s = np.clip(s + length * rng.uniform(-0.3, 0.3, n), start + 0.3 * length, stop - 0.3 * length)
+        on = {"asphalt": np.zeros(n), "solid": np.ones(n), "dashed": 1.0 * _on_dash(layout, s)}[kind[k]]
+        columns.append(np.stack([s, np.full(n, d), np.full(n, length), np.full(n, width), on]))
+    return np.concatenate(columns, axis=1)
+
+
+def _on_dash(layout: StreetLayout, s: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return s % (layout.dash_length + layout.dash_gap) < layout.dash_length
+
+
+def _cross_section(layout: StreetLayout, is_crossing: bool) -> tuple[NDArray[np.float64], list[str]]:
+    """Edges across the road from right to left [m], and what lies between each two."""
+    right, left, half = layout.carriageway_right, layout.carriageway_left, layout.marking_width / 2
+    if is_crossing:
+        bar = layout.crossing_bar
+        bars = int((left - right - 0.3 + bar) / (2 * bar))
+        margin = (left - right - (2 * bars - 1) * bar) / 2
+        breaks = [right, *(right + margin + bar * np.arange(2 * bars)), left]
+        return np.array(breaks), ["asphalt", "solid"] * bars + ["asphalt"]
+    lines = [-layout.lane_width / 2, layout.lane_width / 2, 1.5 * layout.lane_width]
+    breaks = [right, *(line + side * half for line in lines for side in (-1, 1)), left]
+    # the wide intervals are cut where the nearest view changes, so that cells grow outward
+    cuts = np.sort(np.concatenate([breaks, [-0.875, 0.0, 0.875, 3.0, 4.2, 6.3]]))
+    kinds = dict(zip(breaks[1:-1:2], ["solid", "dashed", "solid"], strict=True))
+    return cuts, [kinds.get(edge, "asphalt") for edge in cuts[:-1]]

@@ -1,0 +1,141 @@
+"""Flat Gaussians that tile surfaces, in route coordinates and before the light falls on them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tasks.conventions import SemanticClass
+
+OVERLAP = 0.68
+"""Standard deviation over cell size: below 0.6 the sky shows through, above 0.8 the picture turns soft."""
+THICKNESS = 0.002
+"""Standard deviation along the normal [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surfels:
+    """N flat Gaussians in route coordinates: station, lateral (left positive), height [m].
+
+    Parameters
+    ----------
+    centre : float64 [N, 3] positions [m]
+    axes : float64 [N, 3, 3] unit axes as rows, the last one the normal [1]
+    scale : float64 [N, 2] standard deviations along the first two axes [m]
+    albedo : float64 [N, 3] diffuse reflectance, linear light [1]
+    glow : float64 [N, 3] radiance that does not depend on the light that falls here: mirror images, lamps [1]
+    openness : float64 [N] share of the ambient light that reaches the surfel past its own object [1]
+    opacity : float64 [N] peak opacity [1]
+    class_id : uint8 [N] `SemanticClass`
+    """
+
+    centre: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    albedo: NDArray[np.float64]
+    glow: NDArray[np.float64]
+    openness: NDArray[np.float64]
+    opacity: NDArray[np.float64]
+    class_id: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.centre)
+
+
+def join(parts: Sequence[Surfels]) -> Surfels:
+    """All surfels of the parts, in order."""
+    return Surfels(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Surfels)})
+
+
+def tiles(
+    centre: ArrayLike,
+    edge_u: ArrayLike,
+    edge_v: ArrayLike,
+    class_id: SemanticClass | NDArray[np.uint8],
+    albedo: ArrayLike,
+    *,
+    glow: ArrayLike = 0.0,
+    openness: ArrayLike = 1.0,
+    opacity: ArrayLike = 1.0,
+    overlap: float = OVERLAP,
+) -> Surfels:
+    """One surfel per cell of a surface; leading shapes broadcast and are flattened.
+
+    Parameters
+    ----------
+    centre : [..., 3] middle of each cell [m]
+    edge_u, edge_v : [..., 3] the cell's edges; their cross product points outward [m]
+    class_id : one class, or one per cell
+    albedo, glow : [..., 3] see `Surfels` [1]
+    openness, opacity : [...] see `Surfels` [1]
+    overlap : standard deviation over cell size [1]
+    """
+    p, u, v = (np.asarray(x, dtype=np.float64) for x in (centre, edge_u, edge_v))
+    shape = np.broadcast_shapes(p.shape, u.shape, v.shape, np.shape(albedo))
+    n = int(np.prod(shape[:-1]))
+    p, u, v = (np.broadcast_to(x, shape).reshape(n, 3) for x in (p, u, v))
+    length_u = np.linalg.norm(u, axis=1, keepdims=True)
+    axis_u = u / length_u
+    normal = np.cross(u, v)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    axis_v = np.cross(normal, axis_u)
+    length_v = np.abs(np.einsum("ij,ij->i", v, axis_v))[:, None]
+    return Surfels(
+        centre=p,
+        axes=np.stack([axis_u, axis_v, normal], axis=1),
+        scale=overlap * np.concatenate([length_u, length_v], axis=1),
+        albedo=np.broadcast_to(np.asarray(albedo, dtype=np.float64), shape).reshape(n, 3),
+        glow=np.broadcast_to(np.asarray(glow, dtype=np.float64), shape).reshape(n, 3),
+        openness=np.broadcast_to(np.asarray(openness, dtype=np.float64), shape[:-1]).reshape(n),
+        opacity=np.broadcast_to(np.asarray(opacity, dtype=np.float64), shape[:-1]).reshape(n),
+        class_id=np.broadcast_to(np.asarray(class_id, dtype=np.uint8), shape[:-1]).reshape(n),
+    )
+
+
+def sheet_cells(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Centres and edges of the cells of a curved sheet given by its corner points.
+
+    Parameters
+    ----------
+    corners : float64 [..., n + 1, m + 1, 3] lattice of points [m]
+
+    Returns
+    -------
+    centre, edge_u, edge_v : float64 [..., n, m, 3] middle of each cell and its mean edges [m]
+    """
+    a, b = corners[..., :-1, :-1, :], corners[..., 1:, :-1, :]
+    c, d = corners[..., :-1, 1:, :], corners[..., 1:, 1:, :]
+    return (a + b + c + d) / 4, (b + d - a - c) / 2, (c + d - a - b) / 2
+
+
+def graded_cells(
+    breaks: ArrayLike, size: ArrayLike, fine: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Split a line at sharp edges, with cells that grow away from them, so that the edges stay crisp.
+
+    Parameters
+    ----------
+    breaks : [n + 1] increasing positions of the edges [m]
+    size : [n] or scalar, largest cell of each interval [m]
+    fine : largest cell next to an edge over ``size`` [1]
+
+    Returns
+    -------
+    centre, width : float64 [m] middle and width of each cell [m]
+    interval : int64 [m] which interval of ``breaks`` the cell lies in
+    """
+    edges = np.asarray(breaks, dtype=np.float64)
+    sizes = np.broadcast_to(np.asarray(size, dtype=np.float64), len(edges) - 1)
+    cells: list[tuple[float, float, int]] = []
+    for k, (low, high, largest) in enumerate(zip(edges[:-1], edges[1:], sizes, strict=True)):
+        pending = [(low, high)]
+        while pending:
+            a, b = pending.pop()
+            away = min((a + b) / 2 - low, high - (a + b) / 2)
+            if b - a > min(largest, max(fine * largest, 0.7 * away)) * 1.0001:
+                pending += [((a + b) / 2, b), (a, (a + b) / 2)]
+            else:
+                cells.append(((a + b) / 2, b - a, k))
+    centre, width, interval = zip(*cells, strict=True)
+    return np.array(centre), np.array(width), np.array(interval, dtype=np.int64)
