@@ -39,10 +39,11 @@ MAX_ALPHA, STOP = 0.999, 1e-4
 """Largest opacity of one splat at one pixel, and the transmittance at which a pixel closes [1]."""
 
 _BATCH = 64
-_PIXELS = TILE_WIDTH * TILE_HEIGHT
+PIXELS = TILE_WIDTH * TILE_HEIGHT
+"""Pixels of one tile [px]."""
 # Planes of a tile's state, one cache line apart from a power of two, which would evict one another.
 # Offsets are unsigned: a signed index may be negative, and the compiler would gather pixel by pixel.
-_PLANE = _PIXELS + 16
+_PLANE = PIXELS + 16
 _LIGHT, _CLASS, _ALPHA, _DEPTH, _RED, _GREEN, _BLUE, _NX, _NY, _NZ = (
     np.uint64(k * _PLANE) for k in range(10)
 )
