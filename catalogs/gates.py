@@ -7,6 +7,6 @@ import yaml
 GATES = Path(__file__).with_name("gates.yaml")
 
 
-def load_gates() -> dict[str, float]:
+def load_gates(path: Path = GATES) -> dict[str, float]:
     """Limit by name, in the unit that the name ends with; see ``gates.yaml`` for the sources."""
-    return {name: float(entry["value"]) for name, entry in yaml.safe_load(GATES.read_text()).items()}
+    return {name: float(entry["value"]) for name, entry in yaml.safe_load(path.read_text()).items()}

@@ -13,13 +13,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from catalogs.gates import load_gates
 from numpy.typing import NDArray
 from tasks.eval.motion_agreement import pose_verdict
+
+from catalogs.cameras import load_camera
+from catalogs.gates import load_gates
+from catalogs.scenario import Scenario
+from catalogs.scenes import load_scene
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from catalogs.weather import load_weather
+from flows.plan import ClipPlan, Plan, read_plan
+from flows.store.frames import ARRAYS, buffer_hash, write_clip
+from flows.store.layout import Layout, write_json
+from flows.store.telemetry import columns_hash, labelled_table, write_parquet
+from manifests.canonical import sha256_of_file
+from tasks.conventions import TICK_CHANNELS
 from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.render.backend import select_backend
 from tasks.render.camera import Camera, body_poses
 from tasks.render.clip import render_clip
 from tasks.render.road_edit import apply_road_profile
+from tasks.render.weather.parameters import WeatherParameters, WeatherState
+from tasks.scene.scene import Scene
 from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
@@ -27,21 +43,9 @@ from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Rollout, rollout
 
-from catalogs.cameras import load_camera
-from catalogs.scenario import Scenario
-from catalogs.scenes import load_scene
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
-from flows.plan import ClipPlan, Plan, read_plan
-from flows.store.frames import ARRAYS, buffer_hash, write_clip
-from flows.store.layout import Layout, write_json
-from flows.store.telemetry import columns_hash, labelled_table, write_parquet
-from manifests.canonical import sha256_of_file
-from tasks.conventions import TICK_CHANNELS
-from tasks.render.backend import select_backend
-from tasks.scene.scene import Scene
-
 TICK_RATE_HZ = 1000
+PIXEL_CENTRE = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
+"""The renderer puts pixel centres at +0.5, OpenCV and the judges at whole numbers [px]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +56,8 @@ class Catalogue:
     surface: SurfaceParameters
     camera: Camera
     scene: Scene
+    looks: WeatherParameters
+    gates: Mapping[str, float]
 
 
 @lru_cache(maxsize=2)
@@ -63,6 +69,8 @@ def catalogue_of(root: Path) -> Catalogue:
         surface=load_surface(inputs / "surface.yaml"),
         camera=load_camera(inputs / "camera.yaml"),
         scene=load_scene(read_plan(root).settings.scene),
+        looks=load_weather(inputs / "weather"),
+        gates=load_gates(inputs / "gates.yaml"),
     )
 
 
@@ -76,7 +84,7 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
 
     facts, ride = drive(clip.scenario, catalogue, plan.settings.vehicle_mode, plan.duration_s)
     frames = frame_rows(ride, plan, catalogue)
-    buffers = picture(clip.scenario, facts, frames, plan, catalogue)
+    buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed))
     frames |= judge(buffers, frames, catalogue)
     verdict = frames.pop("verdict")
 
@@ -183,9 +191,17 @@ def picture(
     frames: Mapping[str, NDArray[Any]],
     plan: Plan,
     catalogue: Catalogue,
+    seed: int,
 ) -> dict[str, NDArray[Any]]:
     """The clip's finished frames, depth and class."""
     hazard = hazard_of(scenario)
+    weather = WeatherState(
+        kind=scenario.weather,
+        precipitation_mm_h=scenario.precipitation_mm_h,
+        film_depth_mm=facts["film_depth_mm"],
+        snow_depth_mm=facts["snow_depth_mm"],
+        snow_coverage=facts["snow_coverage"],
+    )
     scene = catalogue.scene
     gaussians = scene.gaussians
     if hazard.height_m != 0:
@@ -196,7 +212,7 @@ def picture(
         )  # fmt: skip
     return render_clip(
         gaussians, scene.environment, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
-        film_depth_mm=facts["film_depth_mm"], snow_coverage=facts["snow_coverage"],
+        frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
         backend=select_backend(plan.backend),
     )  # fmt: skip
 
@@ -208,11 +224,11 @@ def judge(
     recovered = recover_motion_pnp(
         buffers["rgb"],
         buffers["depth"],
-        catalogue.camera.K,
+        catalogue.camera.K - PIXEL_CENTRE,
         catalogue.camera.T_rig_camera,
         class_id=buffers["class"],
     )
-    verdict = pose_verdict(recovered, frames["pitch"], frames["station"], load_gates())
+    verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)
     return {
         "recovered_pitch": recovered.pitch,
         "recovered_progress": recovered.progress,

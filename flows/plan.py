@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.cameras import camera_source
+from catalogs.gates import GATES
 from catalogs.grids import Grid, GridFile, load_grid
 from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.surfaces import surface_source
 from catalogs.vehicles import vehicle_source
+from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.store.layout import Layout, read_json
 from manifests.canonical import content_id, sha256_of
 from manifests.provenance import code_version, library_versions
@@ -94,6 +96,8 @@ def make_plan(source: str | Path, backend: str) -> tuple[Plan, dict[str, bytes]]
             inputs[name] = lookup(entry).read_bytes()
         except InputError as error:
             problems += error.problems
+    inputs["gates.yaml"] = GATES.read_bytes()
+    inputs |= {f"weather/{path.name}": path.read_bytes() for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
     try:
         scene = {"name": settings.scene, "sha256": scene_identity(settings.scene)}
         problems += _route_problems(grid)

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from tasks.render.contact_sheet import contact_sheet, encode_png
 
 from flows.plan import Plan
 from flows.store.frames import read_clip
@@ -15,6 +14,7 @@ from flows.store.telemetry import labelled_table, read_columns, write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.manifest import freeze
 from manifests.provenance import processor
+from tasks.render.contact_sheet import contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
 PREVIEW_FRAMES = (0, 20, 40, 80)
@@ -31,7 +31,7 @@ def seal(layout: Layout, plan: Plan) -> None:
         layout.telemetry / "clips.parquet",
         layout.previews / "contact_sheet.png",
         layout.plan,
-        *sorted(layout.inputs.iterdir()),
+        *sorted(path for path in layout.inputs.rglob("*") if path.is_file()),
         *sorted(layout.frames.rglob("zarr.json")),
     ]
     artifacts = {layout.relative(path): sha256_of_file(path) for path in shared}

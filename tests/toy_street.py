@@ -9,8 +9,13 @@ from tasks.scene.scene import Scene
 
 TOY_CAMERA = """\
 name: toy-96x64
-width: {value: 96, unit: px, source: a tenth of a dashcam}
-height: {value: 64, unit: px, source: a tenth of a dashcam}
+width: {value: 96, unit: px, source: a fifth of a dashcam}
+height: {value: 64, unit: px, source: a fifth of a dashcam}
+focal_length: {value: 80, unit: px, source: a fifth of a dashcam}
+behind_front_axle: {value: 0.6, unit: m, source: as a dashcam}
+left_of_centre: {value: 0.0, unit: m, source: as a dashcam}
+height_above_road: {value: 1.4, unit: m, source: as a dashcam}
+exposure: {value: 0.008, unit: s, source: as a dashcam}
 """
 
 
@@ -20,10 +25,14 @@ def toy_street(seed: int = 1) -> Scene:
     grid_x, grid_y = np.meshgrid(np.arange(-5, 60, 0.25), np.arange(-4, 4.01, 0.25), indexing="ij")
     road = np.stack([grid_x.ravel(), grid_y.ravel(), np.zeros(grid_x.size)], axis=1)
     wall_x, wall_z = np.meshgrid(np.arange(-5, 60, 0.4), np.arange(0.2, 4, 0.4), indexing="ij")
-    walls = [np.stack([wall_x.ravel(), np.full(wall_x.size, side), wall_z.ravel()], axis=1) for side in (-4.2, 4.2)]
+    walls = [
+        np.stack([wall_x.ravel(), np.full(wall_x.size, side), wall_z.ravel()], axis=1) for side in (-4.2, 4.2)
+    ]
     means = np.concatenate([road, *walls]).astype(np.float32)
     is_road = np.arange(len(means)) < len(road)
-    normals = np.where(is_road[:, None], [0, 0, 1], np.stack([0 * means[:, 1], -np.sign(means[:, 1]), 0 * means[:, 1]], 1))
+    normals = np.where(
+        is_road[:, None], [0, 0, 1], np.stack([0 * means[:, 1], -np.sign(means[:, 1]), 0 * means[:, 1]], 1)
+    )
     brightness = np.where(is_road, 0.12, 0.35)[:, None] * draw.uniform(0.3, 1.7, (len(means), 1))
     colour = brightness * np.where(is_road[:, None], [1, 1, 1.05], [1.1, 0.9, 0.7])
     thin, wide = 0.01, np.where(is_road, 0.15, 0.24)

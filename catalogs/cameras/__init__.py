@@ -1,0 +1,76 @@
+"""Cameras: picture size, focal length, and where they sit on the vehicle."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from scipy.spatial.transform import Rotation
+
+from catalogs.entries import find_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
+from tasks.render.camera import Camera
+
+FOLDER = Path(__file__).parent
+
+Pixels = Annotated[Scalar, checked("px", above=0)]
+Metres = Annotated[Scalar, checked("m")]
+
+LOOKING_FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Camera axes (x right, y down, z forward) in rig axes (x forward, y left, z up)."""
+
+
+class CameraEntry(CatalogueEntry):
+    """What a camera file must hold."""
+
+    name: Text
+    width: Annotated[Scalar, checked("px", minimum=16, maximum=8192)]
+    height: Annotated[Scalar, checked("px", minimum=16, maximum=8192)]
+    focal_length: Pixels
+    behind_front_axle: Metres
+    left_of_centre: Metres
+    height_above_road: Annotated[Scalar, checked("m", above=0)]
+    exposure: Annotated[Scalar, checked("s", above=0, maximum=0.1)]
+    pitch_down: Annotated[Scalar, checked("deg", minimum=-45, maximum=45)] = Field(
+        default=Scalar(value=0.0, unit="deg", source="level mount")
+    )
+
+
+def camera_source(name_or_path: str | Path) -> Path:
+    """The YAML file of a camera.
+
+    Raises
+    ------
+    InputError
+        If there is none; the sentence lists those that exist.
+    """
+    return find_entry(FOLDER, name_or_path, "camera")
+
+
+def load_camera(name_or_path: str | Path) -> Camera:
+    """Read a camera by its name in the catalogue or from a YAML file.
+
+    Parameters
+    ----------
+    name_or_path : name, or path ending in .yaml
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file, or the names that exist.
+    """
+    entry = read_entry(CameraEntry, camera_source(name_or_path), "camera")
+    width, height, f = int(entry.width.value), int(entry.height.value), entry.focal_length.value
+    mount = np.eye(4)
+    mount[:3, :3] = (
+        Rotation.from_euler("y", entry.pitch_down.value, degrees=True).as_matrix() @ LOOKING_FORWARD
+    )
+    mount[:3, 3] = (-entry.behind_front_axle.value, entry.left_of_centre.value, entry.height_above_road.value)
+    return Camera(
+        name=entry.name,
+        width=width,
+        height=height,
+        K=np.array([[f, 0.0, width / 2], [0.0, f, height / 2], [0.0, 0.0, 1.0]]),
+        T_rig_camera=mount,
+        exposure_s=entry.exposure.value,
+    )

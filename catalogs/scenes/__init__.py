@@ -1,0 +1,53 @@
+"""Scenes by name or folder: the built-in street, and what was imported or reconstructed."""
+
+from functools import lru_cache
+from pathlib import Path
+
+from catalogs.scenes.folder import read_scene, scene_hash, write_scene
+from catalogs.scenes.street_cache import cached_street
+from tasks.errors import InputError
+from tasks.scene.scene import Scene
+
+BUILT_IN = ("street",)
+
+
+def scene_folder(name_or_folder: str | Path) -> Path:
+    """The folder of a scene; the built-in street is generated on first use and kept in the user's cache.
+
+    Raises
+    ------
+    InputError
+        If there is no such scene; the sentence lists the built-in ones.
+    """
+    if str(name_or_folder) in BUILT_IN:
+        return cached_street()
+    folder = Path(name_or_folder)
+    if not (folder / "scene.json").is_file():
+        raise InputError(
+            f"scene {name_or_folder}: no such scene; give a scene folder or one of: {', '.join(BUILT_IN)}"
+        )
+    return folder
+
+
+@lru_cache(maxsize=2)
+def load_scene(name_or_folder: str) -> Scene:
+    """Read a scene and verify it.
+
+    Parameters
+    ----------
+    name_or_folder : a built-in name, or a scene folder
+
+    Raises
+    ------
+    InputError
+        If it is missing, damaged, or holds a value that no scene may hold.
+    """
+    return read_scene(scene_folder(name_or_folder))
+
+
+def scene_identity(name_or_folder: str) -> str:
+    """SHA-256 that identifies a scene's content."""
+    return scene_hash(scene_folder(name_or_folder))
+
+
+__all__ = ["load_scene", "scene_folder", "scene_identity", "write_scene"]

@@ -1,4 +1,4 @@
-"""A clip's frames, one after the other, from rig poses to finished pictures."""
+"""A clip's frames, one after the other, from rig poses to finished pictures in their weather."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,9 @@ from tasks.render.backend import Backend
 from tasks.render.camera import Camera, viewmat
 from tasks.render.composition import compose, encode_8bit, round_depth
 from tasks.render.environment import environment_view
-from tasks.render.road_shade import RoadShade, shade_road
+from tasks.render.weather.layers import apply_weather, weather_scene
+from tasks.render.weather.parameters import WeatherParameters, WeatherState
+from tasks.render.weather.particles import Shutter
 from tasks.scene.gaussians import Gaussians
 
 
@@ -17,9 +19,10 @@ def render_clip(
     camera: Camera,
     T_world_rig: NDArray[np.float64],
     *,
-    film_depth_mm: float,
-    snow_coverage: float,
-    shade: RoadShade,
+    frame_rate_hz: float,
+    weather: WeatherState,
+    looks: WeatherParameters,
+    seed: int,
     backend: Backend,
 ) -> dict[str, NDArray[np.generic]]:
     """Render every frame of a clip.
@@ -27,12 +30,13 @@ def render_clip(
     Parameters
     ----------
     gaussians : the street with the clip's road edit in it
-    environment : float32 [He, We, 3] sky and far field, as in `Scene.environment` [1]
-    camera : intrinsics and mount
+    environment : float32 [He, We, 3] clear sky and far field, as in `Scene.environment` [1]
+    camera : intrinsics, mount and exposure
     T_world_rig : float64 [F, 4, 4] rig poses with heave and pitch
-    film_depth_mm : water film on the road [mm]
-    snow_coverage : share of the road that snow covers [1]
-    shade : how a film darkens and snow whitens the road
+    frame_rate_hz : frames per second [Hz]
+    weather : what falls, and what lies on the road
+    looks : how that looks
+    seed : visual seed; it moves particles and snow, and nothing else [1]
     backend : the rasteriser
 
     Returns
@@ -40,17 +44,29 @@ def render_clip(
     ``rgb`` uint8 [F, H, W, 3] sRGB, ``depth`` float32 [F, H, W] camera z [m] (NaN where nothing is seen),
     ``class`` uint8 [F, H, W] `SemanticClass`
     """
-    prepared = backend.prepare(gaussians)
+    scene, clip_weather = weather_scene(gaussians, environment, weather, looks, float(camera.K[0, 0]), seed)
+    prepared = backend.prepare(scene)
+    T_world_camera = T_world_rig @ camera.T_rig_camera
+    velocity = np.gradient(T_world_camera[:, :3, 3], 1 / frame_rate_hz, axis=0)
     shape = (len(T_world_rig), camera.height, camera.width)
     rgb = np.empty((*shape, 3), np.uint8)
     depth = np.empty(shape, np.float32)
     class_id = np.empty(shape, np.uint8)
-    for frame, pose in enumerate(T_world_rig):
-        view = viewmat(pose @ camera.T_rig_camera)
+    for frame, pose in enumerate(T_world_camera):
+        view = viewmat(pose)
         gbuffer = backend.rasterise(prepared, view, camera.K, camera.width, camera.height)
         sky = environment_view(environment, view, camera.K, camera.width, camera.height)
+        shutter = Shutter(
+            T_world_camera=pose,
+            K=camera.K,
+            width=camera.width,
+            height=camera.height,
+            velocity=velocity[frame],
+            time_s=frame / frame_rate_hz,
+            exposure_s=camera.exposure_s,
+        )
         clear = compose(gbuffer, sky, gaussians.display_encoded)
-        rgb[frame] = encode_8bit(shade_road(clear, gbuffer.class_id, film_depth_mm, snow_coverage, shade))
+        rgb[frame] = encode_8bit(apply_weather(clip_weather, clear, gbuffer, shutter).picture)
         depth[frame] = round_depth(gbuffer.depth)
         class_id[frame] = gbuffer.class_id
     return {"rgb": rgb, "depth": depth, "class": class_id}

@@ -1,9 +1,15 @@
 """The reference route P_0(s): rig poses along arc length."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation, Slerp
+
+from tasks.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,14 +21,166 @@ class Route:
 
     Parameters
     ----------
-    station : float64 [M] strictly increasing arc length, starting at 0 [m]
+    station : float64 [M] strictly increasing arc length, starting at 0, M >= 2 [m]
     T_world_rig : float64 [M, 4, 4] rig-to-world poses
+
+    Raises
+    ------
+    InputError
+        Listing every rule the arrays break.
     """
 
     station: NDArray[np.float64]
     T_world_rig: NDArray[np.float64]
 
+    def __post_init__(self) -> None:
+        problems = []
+        count = len(self.station)
+        if count < 2 or self.T_world_rig.shape != (count, 4, 4):
+            raise InputError(
+                f"a route needs two poses or more, [M] stations and [M, 4, 4] poses;"
+                f" it has {self.station.shape} and {self.T_world_rig.shape}"
+            )
+        if not (np.isfinite(self.station).all() and np.isfinite(self.T_world_rig).all()):
+            raise InputError("a route's stations and poses must be finite; some are not")
+        steps = np.diff(self.station)
+        if self.station[0] != 0 or (steps <= 0).any():
+            problems.append(
+                "a route's stations must start at 0 and increase;"
+                f" they start at {self.station[0]:g} and the smallest step is {steps.min():g} m"
+            )
+        R = self.T_world_rig[:, :3, :3]
+        off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+        if off.max() > 1e-6 or (np.linalg.det(R) < 0).any():
+            problems.append(
+                f"a route's poses must be right-handed rotations; pose {int(off.argmax())} is off by"
+                f" {off.max():.1e}"
+            )
+        if problems:
+            raise InputError(problems)
+
     @property
     def length(self) -> float:
         """Arc length [m]."""
         return float(self.station[-1])
+
+    def pose(self, station: ArrayLike) -> NDArray[np.float64]:
+        """P_0(s): position by a cubic through the poses along their headings, attitude by quaternion slerp.
+
+        Parameters
+        ----------
+        station : scalar or [N], within the route [m]
+
+        Returns
+        -------
+        float64 [4, 4] or [N, 4, 4]
+
+        Raises
+        ------
+        InputError
+            If a station lies beyond the route.
+        """
+        s = np.asarray(station, dtype=np.float64)
+        if s.size and (s.min() < 0 or s.max() > self.length):
+            worst = s.max() if s.max() > self.length else s.min()
+            raise InputError(
+                f"the station must lie on the route, 0 to {self.length:.2f} m; it is {worst:.2f} m"
+            )
+        poses = np.zeros((s.size, 4, 4))
+        poses[:, :3, 3] = self._position(s.ravel())
+        poses[:, :3, :3] = self._attitude(s.ravel()).as_matrix()
+        poses[:, 3, 3] = 1.0
+        return poses.reshape(*s.shape, 4, 4)
+
+    def project(
+        self, points: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Route coordinates of points: station along the route, lateral leftward, height above the road.
+
+        Points before the start or beyond the end get stations along the end poses' headings.
+
+        Parameters
+        ----------
+        points : [N, 3] world frame [m]
+
+        Returns
+        -------
+        station, lateral, height : float64 [N] [m]
+        """
+        points = np.asarray(points, dtype=np.float64)
+        _, nearest = self._tree.query(points[:, :2])
+        s_grid, poses = self._fine
+        local = np.einsum("nji,nj->ni", poses[nearest, :3, :3], points - poses[nearest, :3, 3])
+        return s_grid[nearest] + local[:, 0], local[:, 1], local[:, 2]
+
+    @cached_property
+    def _position(self) -> CubicHermiteSpline:
+        # unit-speed tangents from the knots themselves: the rig's x axis may differ by its mounting pitch
+        tangents = np.gradient(self.T_world_rig[:, :3, 3], self.station, axis=0, edge_order=1)
+        return CubicHermiteSpline(self.station, self.T_world_rig[:, :3, 3], tangents, axis=0)
+
+    @cached_property
+    def _attitude(self) -> Slerp:
+        return Slerp(self.station, Rotation.from_matrix(self.T_world_rig[:, :3, :3]))
+
+    @cached_property
+    def _fine(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        grid = np.linspace(0, self.length, max(2, int(np.ceil(self.length / 0.25)) + 1))
+        return grid, self.pose(grid)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._fine[1][:, :2, 3])
+
+
+def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01) -> Route:
+    """A route through poses, with stations by chord length; poses at a standstill are dropped.
+
+    Parameters
+    ----------
+    T_world_rig : float64 [M, 4, 4]
+    standstill : a pose closer than this to the last kept one is dropped [m]
+    """
+    kept = [0]
+    for i in range(1, len(T_world_rig)):
+        if np.linalg.norm(T_world_rig[i, :3, 3] - T_world_rig[kept[-1], :3, 3]) > standstill:
+            kept.append(i)
+    poses = T_world_rig[kept]
+    steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+    return Route(station=np.concatenate([[0.0], np.cumsum(steps)]), T_world_rig=poses)
+
+
+def route_from_positions(positions: NDArray[np.float64]) -> Route:
+    """A route through points on the road, facing along its tangent with the roof up.
+
+    Parameters
+    ----------
+    positions : float64 [M, 3] world frame, z up [m]
+    """
+    forward = np.gradient(positions, axis=0)
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    left = np.cross([0.0, 0.0, 1.0], forward)
+    left /= np.linalg.norm(left, axis=1, keepdims=True)
+    poses = np.tile(np.eye(4), (len(positions), 1, 1))
+    poses[:, :3, 0], poses[:, :3, 1], poses[:, :3, 2] = forward, left, np.cross(forward, left)
+    poses[:, :3, 3] = positions
+    return route_from_poses(poses)
+
+
+def extend_route(route: Route, ahead_m: float, spacing_m: float = 1.0) -> Route:
+    """The route with a straight extension along its last pose.
+
+    Parameters
+    ----------
+    route : the route
+    ahead_m : length of the extension [m]
+    spacing_m : distance of the added poses [m]
+    """
+    steps = np.linspace(0, ahead_m, int(np.ceil(ahead_m / spacing_m)) + 1)[1:]
+    last = route.T_world_rig[-1]
+    added = np.tile(last, (len(steps), 1, 1))
+    added[:, :3, 3] = last[:3, 3] + steps[:, None] * last[:3, 0]
+    return Route(
+        station=np.concatenate([route.station, route.length + steps]),
+        T_world_rig=np.concatenate([route.T_world_rig, added]),
+    )

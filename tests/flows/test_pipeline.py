@@ -35,7 +35,7 @@ axes:
     snow-3: {{weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1}}
   road:
     flat: {{initial_speed_km_h: 40, peak_pressure_mpa: 2.3, brake_onset_s: 0.2}}
-    hump: {{initial_speed_km_h: 30, hazard_center_m: 6, hazard_length_m: 3.7, hazard_height_m: 0.075}}
+    hump: {{initial_speed_km_h: 40, hazard_center_m: 4, hazard_length_m: 3.7, hazard_height_m: 0.075}}
 """
 
 

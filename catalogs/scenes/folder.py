@@ -1,0 +1,136 @@
+"""A scene folder: one .npy file per array, and scene.json with what they are and their hashes."""
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import ROAD_CLASSES
+from tasks.errors import InputError
+from tasks.scene.gaussians import Gaussians, check_gaussians
+from tasks.scene.route import Route
+from tasks.scene.scene import Scene
+
+SCENE_FORMAT = "musync-scene/1"
+GAUSSIAN_ARRAYS = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
+SCENE_ARRAYS = (*GAUSSIAN_ARRAYS, "station", "T_world_rig", "environment")
+
+
+def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
+    """Write a scene beside its target, then rename it there.
+
+    Parameters
+    ----------
+    scene : the scene
+    folder : new or empty folder
+    facts : further entries of scene.json, such as held-out figures, source and licence
+
+    Raises
+    ------
+    InputError
+        If the folder holds other files.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: must be a new or empty folder; it holds other files")
+    partial = folder.with_name(folder.name + ".partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    try:
+        for name, array in _arrays(scene).items():
+            np.save(partial / f"{name}.npy", np.ascontiguousarray(array), allow_pickle=False)
+        content = {
+            "format": SCENE_FORMAT,
+            "name": scene.name,
+            "gaussians": len(scene.gaussians),
+            "route_length_m": scene.route.length,
+            "road_share": float(np.isin(scene.gaussians.class_id, ROAD_CLASSES).mean()),
+            "held_out_psnr_db": None,
+            "display_encoded": scene.gaussians.display_encoded,
+            "carriageway_left": scene.carriageway_left,
+            "carriageway_right": scene.carriageway_right,
+            "sha256": {f"{name}.npy": _file_hash(partial / f"{name}.npy") for name in SCENE_ARRAYS},
+        }
+        (partial / "scene.json").write_text(json.dumps(content | facts, indent=1, sort_keys=True) + "\n")
+        if folder.exists():
+            folder.rmdir()
+        partial.rename(folder)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def read_scene(folder: Path) -> Scene:
+    """Read a scene folder, and verify hashes, shapes and values.
+
+    Raises
+    ------
+    InputError
+        Naming every file at fault.
+    """
+    content = _read_facts(folder)
+    problems = [
+        f"{folder / name}: must have the SHA-256 of scene.json;"
+        f" {'it is missing' if digest is None else 'its bytes differ'}"
+        for name, expected in sorted(content["sha256"].items())
+        if (digest := _file_hash(folder / name)) != expected
+    ]
+    if problems:
+        raise InputError(problems)
+    try:
+        arrays = {name: np.load(folder / f"{name}.npy", allow_pickle=False) for name in SCENE_ARRAYS}
+    except (OSError, ValueError) as error:
+        raise InputError(f"{folder}: {error}") from None
+    gaussians = Gaussians(
+        **{name: arrays[name] for name in GAUSSIAN_ARRAYS}, display_encoded=content["display_encoded"]
+    )
+    check_gaussians(gaussians, str(folder))
+    return Scene(
+        name=content["name"],
+        gaussians=gaussians,
+        route=Route(station=arrays["station"], T_world_rig=arrays["T_world_rig"]),
+        environment=arrays["environment"],
+        carriageway_left=content["carriageway_left"],
+        carriageway_right=content["carriageway_right"],
+    )
+
+
+def scene_hash(folder: Path) -> str:
+    """SHA-256 over the hashes of the scene's arrays and the facts that change its picture."""
+    content = _read_facts(folder)
+    decisive = {
+        key: content[key] for key in ("sha256", "display_encoded", "carriageway_left", "carriageway_right")
+    }
+    return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
+
+
+def _arrays(scene: Scene) -> dict[str, NDArray[Any]]:
+    arrays: dict[str, NDArray[Any]] = {name: getattr(scene.gaussians, name) for name in GAUSSIAN_ARRAYS}
+    return arrays | {
+        "station": scene.route.station,
+        "T_world_rig": scene.route.T_world_rig,
+        "environment": scene.environment,
+    }
+
+
+def _read_facts(folder: Path) -> dict[str, Any]:
+    path = folder / "scene.json"
+    try:
+        content = json.loads(path.read_text())
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; is this a scene folder?") from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: must be valid JSON; {error}") from None
+    if not isinstance(content, dict) or content.get("format") != SCENE_FORMAT:
+        found = content.get("format") if isinstance(content, dict) else content
+        raise InputError(f"{path}: the scene must be of format {SCENE_FORMAT}; it is {found!r}")
+    return content
+
+
+def _file_hash(path: Path) -> str | None:
+    if not path.is_file():
+        return None
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,0 +1,61 @@
+"""The visible half of the road-elevation profile: H_g moves and tilts the road's Gaussians."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tasks.conventions import ROAD_CLASSES, SemanticClass
+from tasks.scene.gaussians import Gaussians
+from tasks.scene.route import Route
+
+STANDING_CLASSES = (SemanticClass.VEHICLE, SemanticClass.POLE, SemanticClass.OTHER)
+"""Classes that stand on the road and ride with it, inside the carriageway."""
+
+Profile = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def apply_road_profile(
+    gaussians: Gaussians,
+    route: Route,
+    elevation: Profile,
+    slope: Profile,
+    carriageway_left: float,
+    carriageway_right: float,
+) -> tuple[Gaussians, NDArray[np.bool_]]:
+    """Lift the road along the route's normal by H_g(s) and turn its Gaussians by the slope.
+
+    A rigid turn of each Gaussian keeps its footprint; the road's surface grows by sqrt(1 + H_g'^2), which
+    is 0.2 % at a 75 mm x 3.7 m hump's steepest point and 0.8 % at an 80 mm x 2 m depression's.
+
+    Parameters
+    ----------
+    gaussians : the street
+    route : gives station, lateral position and the local normal
+    elevation, slope : H_g(s) [m] and H_g'(s) [1] at stations [m]
+    carriageway_left, carriageway_right : lateral extent that the profile spans [m]
+
+    Returns
+    -------
+    The edited Gaussians, and bool [N] which of them moved; the others are bitwise unchanged.
+    """
+    station, lateral, _ = route.project(gaussians.means)
+    lift = elevation(station)
+    within = (lateral <= carriageway_left) & (lateral >= carriageway_right)
+    rides = np.isin(gaussians.class_id, ROAD_CLASSES) | (
+        np.isin(gaussians.class_id, STANDING_CLASSES) & within
+    )
+    moved = rides & (lift != 0)
+    if not moved.any():
+        return gaussians, moved
+    frame = route.pose(np.clip(station[moved], 0, route.length))[:, :3, :3]
+    left, up = frame[:, :, 1], frame[:, :, 2]
+    # a climbing road turns its normal backward: a negative rotation about the leftward axis
+    turn = Rotation.from_rotvec(-np.arctan(slope(station[moved]))[:, None] * left)
+    means, quats, normals = gaussians.means.copy(), gaussians.quats_wxyz.copy(), gaussians.normals.copy()
+    means[moved] = means[moved] + lift[moved, None] * up
+    quats[moved] = (turn * Rotation.from_quat(quats[moved], scalar_first=True)).as_quat(scalar_first=True)
+    normals[moved] = turn.apply(normals[moved])
+    return replace(gaussians, means=means, quats_wxyz=quats, normals=normals), moved
