@@ -1,0 +1,163 @@
+"""The same views drawn by gsplat 1.5 (Apache-2.0) on a CUDA device.
+
+gsplat compiles its kernels with nvcc at first use. It blends colours that are evaluated before, here
+three of light and three of the normal, and expected depth; the class is found from the list of
+(Gaussian, pixel) pairs that it can return.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import gsplat
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from tasks.render.blending import MAX_ALPHA
+from tasks.render.gbuffer import GBuffer
+from tasks.render.projection import LOW_PASS, NEAR
+from tasks.render.view import view_of
+from tasks.scene.gaussians import Gaussians, check_gaussians
+
+_EVERY_BATCH = 2**31 - 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceGaussians:
+    """A cloud on the device: the arrays of `Gaussians` as tensors."""
+
+    means: torch.Tensor
+    quats: torch.Tensor
+    scales: torch.Tensor
+    opacities: torch.Tensor
+    sh: torch.Tensor
+    normals: torch.Tensor
+    class_id: torch.Tensor
+
+
+class GsplatBackend:
+    """gsplat as a `tasks.render.backend.Backend`.
+
+    Parameters
+    ----------
+    device : torch device with gsplat's kernels
+    """
+
+    name = "gsplat"
+
+    def __init__(self, device: str = "cuda"):
+        self.device = torch.device(device)
+        if self.device.type == "cuda" and not torch.cuda.is_available():
+            raise RuntimeError("torch finds no CUDA device")
+
+    def prepare(self, gaussians: Gaussians) -> DeviceGaussians:
+        """Check a cloud and copy it to the device.
+
+        Raises
+        ------
+        InputError
+            An array has a wrong shape, a NaN or a value out of range.
+        """
+        check_gaussians(gaussians)
+        return DeviceGaussians(
+            means=self._tensor(gaussians.means),
+            quats=self._tensor(gaussians.quats_wxyz),
+            scales=self._tensor(gaussians.scales),
+            opacities=self._tensor(gaussians.opacities),
+            sh=self._tensor(gaussians.sh),
+            normals=self._tensor(gaussians.normals),
+            class_id=self._tensor(gaussians.class_id),
+        )
+
+    @torch.no_grad()
+    def rasterise(
+        self,
+        prepared: DeviceGaussians,
+        viewmat: NDArray[np.floating],
+        K: NDArray[np.floating],
+        width: int,
+        height: int,
+    ) -> GBuffer:
+        """Draw one view; see `tasks.render.rasteriser.rasterise`."""
+        view = view_of(viewmat, K, width, height)
+        direction = prepared.means - self._tensor(view.eye.astype(np.float32))
+        degree = int(prepared.sh.shape[1] ** 0.5) - 1
+        colours = (gsplat.spherical_harmonics(degree, direction, prepared.sh) + 0.5).clamp_min(0)
+        away = (prepared.normals * direction).sum(dim=1, keepdim=True) > 0
+        blended, alpha, splats = gsplat.rasterization(
+            means=prepared.means,
+            quats=prepared.quats,
+            scales=prepared.scales,
+            opacities=prepared.opacities,
+            colors=torch.cat((colours, torch.where(away, -prepared.normals, prepared.normals)), dim=1),
+            viewmats=self._tensor(view.viewmat.astype(np.float32))[None],
+            Ks=self._tensor(view.K.astype(np.float32))[None],
+            width=width,
+            height=height,
+            near_plane=NEAR,
+            eps2d=LOW_PASS,
+            render_mode="RGB+ED",
+            packed=False,
+        )
+        alpha = alpha[0, ..., 0]
+        normal = torch.nn.functional.normalize(blended[0, ..., 3:6], dim=-1)
+        depth = torch.where(alpha > 0, blended[0, ..., 6], torch.nan)
+        return GBuffer(
+            rgb=blended[0, ..., :3].cpu().numpy(),
+            depth=depth.cpu().numpy(),
+            alpha=alpha.cpu().numpy(),
+            normal=normal.cpu().numpy(),
+            class_id=self._class_id(splats, prepared.class_id, width, height),
+        )
+
+    def _class_id(
+        self, splats: dict[str, Any], class_id: torch.Tensor, width: int, height: int
+    ) -> NDArray[np.uint8]:
+        gaussian, pixel, _ = gsplat.rasterize_to_indices_in_range(
+            0,
+            _EVERY_BATCH,
+            torch.ones((1, height, width), device=self.device),
+            splats["means2d"],
+            splats["conics"],
+            splats["opacities"],
+            width,
+            height,
+            splats["tile_size"],
+            splats["isect_offsets"],
+            splats["flatten_ids"],
+        )
+        a, b, c = splats["conics"][0, gaussian].T
+        dx = pixel % width + 0.5 - splats["means2d"][0, gaussian, 0]
+        dy = pixel // width + 0.5 - splats["means2d"][0, gaussian, 1]
+        power = 0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy
+        alpha = (splats["opacities"][0, gaussian] * torch.exp(-power)).clamp_max(MAX_ALPHA)
+        halves = first_below_half(alpha, pixel)
+        picture = torch.zeros(height * width, dtype=torch.uint8, device=self.device)
+        picture[pixel[halves]] = class_id[gaussian[halves]]
+        return picture.reshape(height, width).cpu().numpy()
+
+    def _tensor(self, array: NDArray[Any]) -> torch.Tensor:
+        return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)
+
+
+def first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
+    """Which splats bring their pixel's transmittance from one half or more to less.
+
+    Parameters
+    ----------
+    alpha : [M] opacity of each splat at its pixel, below 1 [1]
+    pixel : [M] pixel of each, all of one pixel together and nearest first [1]
+
+    Returns
+    -------
+    bool [M]
+    """
+    opaqueness = -torch.log1p(-alpha.double())
+    behind = torch.cumsum(opaqueness, dim=0)
+    front = behind - opaqueness
+    starts = torch.ones_like(pixel, dtype=torch.bool)
+    starts[1:] = pixel[1:] != pixel[:-1]
+    # What had gathered before the pixel's own first splat.
+    before = front[starts][torch.cumsum(starts, dim=0) - 1]
+    half = np.log(2.0)
+    return (front - before <= half) & (behind - before > half)
