@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.gbuffer import GBuffer
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
@@ -22,7 +23,7 @@ from tasks.render.weather.layer import Layer, recompose
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter, visible_streaks
 from tasks.render.weather.precipitation import Population, population
-from tasks.render.weather.scene_light import appended, road_light, without_sun
+from tasks.render.weather.scene_light import appended, ground_light, without_sun
 from tasks.render.weather.sky import SkyLight, light_from, overcast_environment, sky_light
 from tasks.render.weather.snow_layer import SnowField, snow_field, snow_layer, whitened
 from tasks.render.weather.streaks import draw_streaks
@@ -141,18 +142,18 @@ def weather_scene(
     p = parameters
     falls = population(p.rain if state.kind == "rain" else p.snowfall, state.precipitation_mm_h)
     air = precipitating_air(falls, p.air.near, focal_px, p.air.haze_visual_range_m)
-    light = road_light(gaussians, p.sky.asphalt_albedo)
+    white = ground_light(gaussians, SemanticClass.ROAD).lit / p.sky.asphalt_albedo
     covered = state.snow_coverage if state.kind == "snow" else 0.0
     ground = (1 - covered) * p.sky.asphalt_albedo + covered * float(np.mean(p.snow_cover.albedo))
     opened = p.sky.exposure_ev_snow if state.kind == "snow" else p.sky.exposure_ev_rain
-    sky = sky_light(light.white, air.extinction, ground, opened, p.sky)
-    scene = without_sun(gaussians, light, p.sky.shadow_kept)
+    sky = sky_light(white, air.extinction, ground, opened, p.sky)
+    scene = without_sun(gaussians, p.sky.shadow_kept)
     field = None
     if state.kind == "snow":
         field = snow_field(gaussians, p.snow_cover, seed)
         amount = (state.snow_coverage, state.snow_depth_mm, p.snow_cover)
-        layer, _ = snow_layer(scene, field, light.white, *amount)
-        scene = appended(whitened(scene, field, light.white, *amount), layer)
+        layer, _ = snow_layer(scene, field, white, *amount)
+        scene = appended(whitened(scene, field, white, *amount), layer)
     falling = Falling(
         population=falls,
         air=air,

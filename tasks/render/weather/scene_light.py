@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
@@ -13,13 +14,17 @@ from tasks.render.weather.ground_grid import GroundGrid, ground_grid, read_betwe
 from tasks.render.weather.sky import LUMINANCE
 from tasks.scene.gaussians import Gaussians
 
-LIGHT_CELL_M = 1.0
-"""Light and shade are read over three cells: larger than a mark on the road, smaller than a building's shadow."""
+LIGHT_CELL_M = 0.3
+"""Light and shade are read over windows of three cells: wider than the grain, narrow enough for a shadow's edge."""
 
-SHADED_CLASSES = (
-    SemanticClass.ROAD, SemanticClass.MARKING, SemanticClass.KERB, SemanticClass.SIDEWALK, SemanticClass.TERRAIN,
-)  # fmt: skip
-"""Ground on which the road's light and shade are softened under cloud."""
+ILLUMINATION_RANGE = (0.15, 1.7)
+"""Relative light that can be believed; beyond it is another material."""
+
+LIT_ALIKE = {
+    SemanticClass.ROAD: (SemanticClass.ROAD, SemanticClass.MARKING, SemanticClass.KERB),
+    SemanticClass.SIDEWALK: (SemanticClass.SIDEWALK,),
+}
+"""Ground of nearly one reflectance, from which light and shade are read, and the classes that share its light."""
 
 
 def to_linear(display: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -93,76 +98,80 @@ def recoloured(gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np
 
 
 @dataclass(frozen=True, kw_only=True)
-class RoadLight:
-    """The clear light on the road, place by place.
+class GroundLight:
+    """The clear light on the ground of one class, place by place.
 
     Parameters
     ----------
-    white : float64 [3] radiance of a white surface lying in the brighter light [1]
-    grid : cells over the road
-    illumination : float64 [cells] light by that brighter light; 1 where there is no road [1]
+    lit : float64 [3] radiance of that ground in the brighter light [1]
+    grid : cells over it
+    illumination : float64 [cells] light by that brighter light [1]
     """
 
-    white: NDArray[np.float64]
+    lit: NDArray[np.float64]
     grid: GroundGrid
     illumination: NDArray[np.float64]
 
 
-def road_light(gaussians: Gaussians, asphalt_albedo: float) -> RoadLight:
-    """Read the light off the road, whose reflectance is known.
+def ground_light(gaussians: Gaussians, ground: SemanticClass) -> GroundLight:
+    """Read the light off ground of nearly one reflectance.
 
-    Means over cells leave the asphalt's grain out. The upper quartile of the cells stands for the lit road:
-    where half the street lies in shadow the median would not.
+    Means over cells leave the grain out. The upper quartile of the cells stands for the lit ground: where half
+    the street lies in shadow the median would not.
 
     Parameters
     ----------
     gaussians : the scene in clear weather
-    asphalt_albedo : reflectance of dry road [1]
+    ground : class to read
 
     Returns
     -------
-    RoadLight
+    GroundLight
 
     Raises
     ------
     InputError
-        No Gaussian is of class road.
+        No Gaussian is of that class.
     """
-    road = gaussians.class_id == SemanticClass.ROAD
-    if not road.any():
+    member = gaussians.class_id == ground
+    if not member.any():
+        name = ground.name.lower()
         raise InputError(
-            "weather: the light is read off the road, and no Gaussian of the scene has class road"
+            f"weather: the light is read off the {name}, and no Gaussian of the scene has class {name}"
         )
-    place = gaussians.means[road, :2]
+    place = gaussians.means[member, :2]
     grid = ground_grid(place, LIGHT_CELL_M)
-    sums = window_sums(grid, place, np.column_stack((np.ones(len(place)), mean_colours(gaussians)[road])))
+    sums = window_sums(grid, place, np.column_stack((np.ones(len(place)), mean_colours(gaussians)[member])))
     seen = sums[..., 0] > 0.5
     cells = sums[seen, 1:] / sums[seen, :1]
     lit = np.quantile(cells, 0.75, axis=0)
-    illumination = np.ones(grid.shape)
-    illumination[seen] = np.clip((cells @ LUMINANCE) / max(float(lit @ LUMINANCE), 1e-9), 0.02, 2.0)
-    return RoadLight(white=lit / asphalt_albedo, grid=grid, illumination=illumination)
+    known = np.ones(grid.shape)
+    known[seen] = np.clip((cells @ LUMINANCE) / max(float(lit @ LUMINANCE), 1e-9), *ILLUMINATION_RANGE)
+    nearest = distance_transform_edt(~seen, return_distances=False, return_indices=True)
+    return GroundLight(lit=lit, grid=grid, illumination=known[tuple(nearest)])
 
 
-def without_sun(gaussians: Gaussians, light: RoadLight, shadow_kept: float) -> Gaussians:
+def without_sun(gaussians: Gaussians, shadow_kept: float) -> Gaussians:
     """The scene with light and shade on the ground drawn together, as under cloud.
 
     Parameters
     ----------
     gaussians : the scene in clear weather
-    light : the clear light on its road
     shadow_kept : power to which relative light is left [1]
 
     Returns
     -------
     Gaussians
-        Colours of `SHADED_CLASSES` multiplied by illumination^(shadow_kept - 1).
+        Colours of the classes in `LIT_ALIKE` multiplied by illumination^(shadow_kept - 1).
     """
-    ground = np.isin(gaussians.class_id, SHADED_CLASSES)
     gain = np.ones(len(gaussians))
-    gain[ground] = read_between(light.grid, light.illumination, gaussians.means[ground, :2]) ** (
-        shadow_kept - 1
-    )
+    for ground, alike in LIT_ALIKE.items():
+        if not (gaussians.class_id == ground).any():
+            continue
+        light = ground_light(gaussians, ground)
+        members = np.isin(gaussians.class_id, alike)
+        relative = read_between(light.grid, light.illumination, gaussians.means[members, :2])
+        gain[members] = relative ** (shadow_kept - 1)
     return recoloured(gaussians, gain, np.zeros((len(gaussians), 3)))
 
 
