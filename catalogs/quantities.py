@@ -57,7 +57,7 @@ def checked(
 
     def check(entry: Value) -> Value:
         problems = [] if entry.unit == unit else [f"unit must be {unit}; it is {entry.unit}"]
-        numbers = entry.value if isinstance(entry.value, tuple) else (entry.value,)
+        numbers: tuple[float, ...] = entry.value if isinstance(entry.value, tuple) else (entry.value,)
         if isinstance(entry, Bounded):
             low, high = entry.bounds
             numbers += entry.bounds

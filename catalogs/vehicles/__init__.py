@@ -1,5 +1,6 @@
 """Vehicles: mechanical values, tyre families and frozen calibration."""
 
+from itertools import pairwise
 from math import radians
 from pathlib import Path
 from typing import Annotated
@@ -43,7 +44,7 @@ class FamilyEntry(CatalogueEntry):
             for name in KNOT_TABLES
             if (count := len(getattr(self, name).value)) != len(knots)
         ]
-        if any(low >= high for low, high in zip(knots, knots[1:], strict=False)):
+        if any(low >= high for low, high in pairwise(knots)):
             problems.append(f"surface_friction knots must ascend; they are {list(knots)}")
         if len(self.burckhardt.value) != 3:
             problems.append(f"burckhardt must be c1, c2, c3; it has {len(self.burckhardt.value)} values")

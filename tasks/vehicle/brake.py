@@ -106,10 +106,10 @@ def brake_pressure(since_onset: float, profile: PressureProfile) -> float:
 
 
 @njit(cache=True, nogil=True)
-def onset_reached(time: float, station: float, speed: float, profile: PressureProfile) -> float:
-    """Time of the brake onset once it has come, else infinity [s].
+def onset_by_position(time: float, station: float, speed: float, profile: PressureProfile) -> float:
+    """Time of the brake onset once its position is passed, else infinity [s].
 
-    A position trigger is crossed between samples; the crossing time is that of the present speed.
+    The position is passed between two samples; the time of passing is that of the present speed.
 
     Parameters
     ----------
@@ -118,11 +118,9 @@ def onset_reached(time: float, station: float, speed: float, profile: PressurePr
     speed : [m/s]
     profile : the command
     """
-    if time >= profile.onset_time:
-        return profile.onset_time
-    if station >= profile.onset_station and speed > 0.0:
-        return max(time - (station - profile.onset_station) / speed, 0.0)
-    return inf
+    if station < profile.onset_station or speed <= 0.0:
+        return inf
+    return max(time - (station - profile.onset_station) / speed, 0.0)
 
 
 @njit(cache=True, nogil=True)

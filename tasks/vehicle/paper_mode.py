@@ -5,6 +5,7 @@ wheels are passed over the whole time grid in turn. Road and brake response are 
 """
 
 from dataclasses import dataclass
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +13,23 @@ from numpy.typing import NDArray
 from tasks.surface.road_profile import RoadHazard, road_elevation
 from tasks.vehicle.brake import PressureProfile
 from tasks.vehicle.half_car import half_car, integrate_half_car
+from tasks.vehicle.history import History
 from tasks.vehicle.low_speed import brake_pitch_input
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 from tasks.vehicle.road import road_feature
-from tasks.vehicle.wheels import drive, wheels_of
+from tasks.vehicle.wheels import DRIVE_COLUMNS, drive, wheels_of
 
 FIXED_POINT_PASSES = 5
 ANALYTIC_LOADS = np.empty((0, 2))
+STATE_COLUMNS = (
+    "heave", "pitch", "unsprung_heave_f", "unsprung_heave_r",
+    "heave_rate", "pitch_rate", "unsprung_rate_f", "unsprung_rate_r",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class PaperRun:
-    """A rollout on the internal grid.
+    """A run on the internal grid.
 
     Parameters
     ----------
@@ -137,3 +143,30 @@ def body_response(
     static = np.array([car.static_f, car.static_r])
     loads = static + np.maximum(np.array([car.tyre_f, car.tyre_r]) * deflection, -static)
     return states, np.stack([road_f, road_r], axis=1), loads
+
+
+def history_of(run: PaperRun, step: float, per_tick: int) -> History:
+    """The run at every ``per_tick``-th sample.
+
+    Parameters
+    ----------
+    run : on the internal grid
+    step : of that grid [s]
+    per_tick : samples per tick
+    """
+    station = run.log[:, 0]
+    onset_station = inf
+    if isfinite(run.onset):
+        onset_station = float(np.interp(run.onset, np.arange(len(station)) * step, station))
+    ticks = slice(None, None, per_tick)
+    columns = dict(zip(DRIVE_COLUMNS, run.log[ticks].T.copy(), strict=True))
+    columns |= dict(zip(STATE_COLUMNS, run.states[ticks].T.copy(), strict=True))
+    for index, axle in enumerate("fr"):
+        columns[f"road_height_{axle}"] = run.road[ticks, index].copy()
+        columns[f"axle_load_{axle}"] = run.loads[ticks, index].copy()
+    return History(
+        columns=columns,
+        onset=run.onset,
+        onset_station=onset_station,
+        stop_time=run.stop * step if run.stop >= 0 else inf,
+    )

@@ -11,12 +11,12 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.parameters import SurfaceResponse, Vehicle, surface_response
-from tasks.vehicle.paper_mode import run_paper_mode
-from tasks.vehicle.wheels import DRIVE_COLUMNS
+from tasks.vehicle.coupled_mode import run_coupled_mode
+from tasks.vehicle.paper_mode import history_of, run_paper_mode
+from tasks.vehicle.parameters import Vehicle, surface_response
 
 Mode = Literal["paper", "coupled"]
-MODES: tuple[Mode, ...] = ("paper",)
+MODES: tuple[Mode, ...] = ("paper", "coupled")
 INTERNAL_STEP_S = 0.0005
 TICK_NS = 1_000_000
 
@@ -110,52 +110,23 @@ def rollout(
     """
     per_tick = _check(vehicle, family, surface_friction, mode, duration_s, step_s)
     response = surface_response(vehicle, family, surface_friction)
+    arguments = (
+        vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile, hazard
+    )  # fmt: skip
     steps = round(duration_s * 1000) * per_tick
-    run = run_paper_mode(
-        vehicle,
-        response,
-        controls.initial_speed,
-        controls.hold_speed_until_brake,
-        controls.brake.profile,
-        hazard,
-        steps=steps,
-        step=step_s,
-    )
-    full = dict(zip(DRIVE_COLUMNS, run.log.T, strict=True)) | {
-        "axle_load_f": run.loads[:, 0],
-        "axle_load_r": run.loads[:, 1],
-        "heave": run.states[:, 0],
-        "pitch": run.states[:, 1],
-        "unsprung_heave_f": run.states[:, 2],
-        "unsprung_heave_r": run.states[:, 3],
-        "heave_rate": run.states[:, 4],
-        "pitch_rate": run.states[:, 5],
-        "road_height_f": run.road[:, 0],
-        "road_height_r": run.road[:, 1],
-    }
-    return _rollout(vehicle, surface_friction, response, mode, full, run.onset, run.stop, step_s, per_tick)
-
-
-def _rollout(
-    vehicle: Vehicle,
-    surface_friction: float,
-    response: SurfaceResponse,
-    mode: Mode,
-    full: dict[str, NDArray[np.float64]],
-    onset: float,
-    stop: int,
-    step: float,
-    per_tick: int,
-) -> Rollout:
-    columns: dict[str, NDArray[Any]] = {name: column[::per_tick].copy() for name, column in full.items()}
+    if mode == "paper":
+        history = history_of(run_paper_mode(*arguments, steps=steps, step=step_s), step_s, per_tick)
+    else:
+        history = run_coupled_mode(*arguments, steps=steps, step=step_s, per_tick=per_tick)
+    columns: dict[str, NDArray[Any]] = dict(history.columns)
     columns["t_ns"] = np.arange(len(columns["speed"]), dtype=np.int64) * TICK_NS
     columns["contact_f"] = columns["axle_load_f"] > 0
     columns["contact_r"] = columns["axle_load_r"] > 0
-    braked, stopped = isfinite(onset), stop >= 0
+    braked = history.onset <= duration_s
+    stopped = isfinite(history.stop_time)
     distance = nan
-    if braked and stopped:
-        time = np.arange(len(full["station"])) * step
-        distance = float(full["station"][stop] - np.interp(onset, time, full["station"]))
+    if braked and stopped and history.stop_time >= history.onset:
+        distance = float(columns["station"][-1] - history.onset_station)
     return Rollout(
         columns={channel.name: columns[channel.name] for channel in TICK_CHANNELS},
         mode=mode,
@@ -164,8 +135,8 @@ def _rollout(
         slip_stiffness=response.tyre.slip_stiffness,
         target_slip=response.tyre.target_slip,
         static_pitch=vehicle.static_pitch,
-        brake_onset_time=onset if braked else nan,
-        stop_time=stop * step if stopped else nan,
+        brake_onset_time=history.onset if braked else nan,
+        stop_time=history.stop_time if stopped else nan,
         stopping_distance=distance,
         calibration_extrapolated=response.extrapolated,
     )

@@ -56,6 +56,21 @@ def tyre_friction(braking_slip: float, tyre: TyreCurve) -> float:
 
 
 @njit(cache=True, nogil=True)
+def tyre_slope(braking_slip: float, tyre: TyreCurve) -> float:
+    """Rise of ``tyre_friction`` with slip, its derivative [1].
+
+    Parameters
+    ----------
+    braking_slip : kappa, 0 or more [1]
+    tyre : the scaled curve
+    """
+    x = tyre.slip_stiffness * braking_slip
+    return (
+        tyre.peak / tyre.base_peak * tyre.slip_stiffness * (tyre.c1 * tyre.c2 * exp(-tyre.c2 * x) - tyre.c3)
+    )
+
+
+@njit(cache=True, nogil=True)
 def braking_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
     """Braking slip kappa, clipped to [0, 1] [1] (paper, Eq. tire_force).
 

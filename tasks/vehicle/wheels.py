@@ -3,17 +3,32 @@
 One step function serves the logged rollout and the lean stopping run.
 """
 
-from math import inf, isinf, nan
+from math import isinf, nan
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tasks.vehicle.brake import PressureProfile, abs_command, abs_update, brake_pressure, onset_reached
+from tasks.vehicle.brake import PressureProfile, abs_command, abs_update, brake_pressure, onset_by_position
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.road import RoadFeature, slope_at
 from tasks.vehicle.tyre import TyreCurve, braking_slip, tyre_friction
+
+
+class Axle(NamedTuple):
+    """The wheels of one axle.
+
+    Parameters
+    ----------
+    inertia : I_w [kg m2]
+    brake_gain : brake torque per pressure, b_a K_p [N m/MPa]
+    static_load : without acceleration, as the analytic load transfer has it [N]
+    """
+
+    inertia: float
+    brake_gain: float
+    static_load: float
 
 
 class Wheels(NamedTuple):
@@ -21,58 +36,56 @@ class Wheels(NamedTuple):
 
     Parameters
     ----------
+    front, rear : the axles
     mass : m [kg]
     radius : R [m]
-    inertia_f, inertia_r : I_w of each axle [kg m2]
-    gain_f, gain_r : brake torque per pressure of each axle [N m/MPa]
-    release_width : delta_a [1]
+    wheelbase : L_w [m]
+    transfer : load moved to the front per deceleration, m h_cg / L_w [N s2/m]
+    release_width : delta_a of the ABS [1]
     build_rate, release_rate : of the ABS torque scale [1/s]
     coast : a_coast [m/s2]
     speed_floor, stop_speed : [m/s]
-    static_f, static_r : axle loads without acceleration [N]
-    transfer : load moved to the front per deceleration, m h_cg / L_w [N s2/m]
-    wheelbase : L_w [m]
     """
 
+    front: Axle
+    rear: Axle
     mass: float
     radius: float
-    inertia_f: float
-    inertia_r: float
-    gain_f: float
-    gain_r: float
+    wheelbase: float
+    transfer: float
     release_width: float
     build_rate: float
     release_rate: float
     coast: float
     speed_floor: float
     stop_speed: float
-    static_f: float
-    static_r: float
-    transfer: float
-    wheelbase: float
 
 
 def wheels_of(vehicle: Vehicle) -> Wheels:
-    """The longitudinal values of a vehicle; loads as in the paper's analytic load transfer."""
+    """The longitudinal values of a vehicle."""
     share = vehicle.front_brake_share
-    weight = vehicle.mass * vehicle.gravity
+    load_per_lever = vehicle.mass * vehicle.gravity / vehicle.wheelbase
     return Wheels(
+        front=Axle(
+            inertia=vehicle.wheel_inertia_f,
+            brake_gain=share * vehicle.brake_gain,
+            static_load=load_per_lever * vehicle.cg_to_rear_axle,
+        ),
+        rear=Axle(
+            inertia=vehicle.wheel_inertia_r,
+            brake_gain=(1 - share) * vehicle.brake_gain,
+            static_load=load_per_lever * vehicle.cg_to_front_axle,
+        ),
         mass=vehicle.mass,
         radius=vehicle.wheel_radius,
-        inertia_f=vehicle.wheel_inertia_f,
-        inertia_r=vehicle.wheel_inertia_r,
-        gain_f=share * vehicle.brake_gain,
-        gain_r=(1 - share) * vehicle.brake_gain,
+        wheelbase=vehicle.wheelbase,
+        transfer=vehicle.mass * vehicle.cg_height / vehicle.wheelbase,
         release_width=vehicle.abs_release_width,
         build_rate=vehicle.abs_build_rate,
         release_rate=vehicle.abs_release_rate,
         coast=vehicle.coast_deceleration,
         speed_floor=vehicle.slip_speed_floor,
         stop_speed=vehicle.stop_speed,
-        static_f=weight * vehicle.cg_to_rear_axle / vehicle.wheelbase,
-        static_r=weight * vehicle.cg_to_front_axle / vehicle.wheelbase,
-        transfer=vehicle.mass * vehicle.cg_height / vehicle.wheelbase,
-        wheelbase=vehicle.wheelbase,
     )
 
 
@@ -91,11 +104,10 @@ def axle_step(
     speed: float,
     omega: float,
     load: float,
-    command: float,
+    pressure: float,
     scale: float,
-    inertia: float,
-    build: float,
-    release: float,
+    step: float,
+    axle: Axle,
     wheels: Wheels,
     tyre: TyreCurve,
 ) -> AxleStep:
@@ -106,18 +118,17 @@ def axle_step(
     speed : v [m/s]
     omega : wheel speed [rad/s]
     load : on the tyre [N]
-    command : brake torque before ABS, b_a T_b^cmd [N m]
+    pressure : brake pressure [MPa]
     scale : ABS scale before the step [1]
-    inertia : I_w,a [kg m2]
-    build, release : largest change of the ABS scale in this step [1]
-    wheels, tyre : the rest of the values
+    step : [s]
+    axle, wheels, tyre : the rest of the values
     """
     slip = braking_slip(speed, wheels.radius * omega, wheels.speed_floor)
     wanted = abs_command(slip, tyre.target_slip, wheels.release_width)
-    scale = abs_update(wanted, scale, build, release)
+    scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
     force = tyre_friction(slip, tyre) * load
-    torque = scale * command
-    return AxleStep(slip, force, torque, scale, (wheels.radius * force - torque) / inertia)
+    torque = axle.brake_gain * scale * pressure
+    return AxleStep(slip, force, torque, scale, (wheels.radius * force - torque) / axle.inertia)
 
 
 @njit(cache=True, nogil=True)
@@ -130,7 +141,7 @@ def transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float
     wheels : static loads and transfer
     """
     moved = wheels.transfer * acceleration
-    return max(wheels.static_f - moved, 0.0), max(wheels.static_r + moved, 0.0)
+    return max(wheels.front.static_load - moved, 0.0), max(wheels.rear.static_load + moved, 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -153,12 +164,11 @@ def stopping_run(
     """
     speed, omega_f, omega_r = initial_speed, initial_speed / wheels.radius, initial_speed / wheels.radius
     scale_f, scale_r, acceleration, distance = 1.0, 1.0, 0.0, 0.0
-    build, release = wheels.build_rate * step, wheels.release_rate * step
     for n in range(longest):
         pressure = brake_pressure(n * step, profile)
         load_f, load_r = transferred_loads(acceleration, wheels)
-        f = axle_step(speed, omega_f, load_f, wheels.gain_f * pressure, scale_f, wheels.inertia_f, build, release, wheels, tyre)  # fmt: skip
-        r = axle_step(speed, omega_r, load_r, wheels.gain_r * pressure, scale_r, wheels.inertia_r, build, release, wheels, tyre)  # fmt: skip
+        f = axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
+        r = axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
         scale_f, scale_r = f.scale, r.scale
         acceleration = -(f.force + r.force) / wheels.mass - wheels.coast
         after = speed + step * acceleration
@@ -214,23 +224,22 @@ def drive(
     station, speed = 0.0, initial_speed
     omega_f, omega_r = initial_speed / wheels.radius, initial_speed / wheels.radius
     scale_f, scale_r, acceleration = 1.0, 1.0, 0.0
-    build, release = wheels.build_rate * step, wheels.release_rate * step
-    onset, stop = inf, -1
+    onset, stop = profile.onset_time, -1
     for n in range(steps + 1):
         if isinf(onset):
-            onset = onset_reached(n * step, station, speed, profile)
+            onset = onset_by_position(n * step, station, speed, profile)
         pressure = brake_pressure(n * step - onset, profile)
         if len(loads) > 0:
             load_f, load_r = loads[n, 0], loads[n, 1]
         else:
             load_f, load_r = transferred_loads(acceleration, wheels)
-        f = axle_step(speed, omega_f, load_f, wheels.gain_f * pressure, scale_f, wheels.inertia_f, build, release, wheels, tyre)  # fmt: skip
-        r = axle_step(speed, omega_r, load_r, wheels.gain_r * pressure, scale_r, wheels.inertia_r, build, release, wheels, tyre)  # fmt: skip
+        f = axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
+        r = axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
         road_force = -load_f * slope_at(station, road) - load_r * slope_at(station - wheels.wheelbase, road)
         acceleration = (road_force - f.force - r.force) / wheels.mass - wheels.coast
         if stop >= 0:
             road_force, acceleration = 0.0, 0.0
-        elif hold_speed and isinf(onset):
+        elif hold_speed and n * step < onset:
             acceleration = 0.0
         log[n] = (
             station, speed, acceleration, f.slip, r.slip, omega_f, omega_r, f.force, r.force, load_f, load_r,

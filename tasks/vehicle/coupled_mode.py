@@ -1,0 +1,325 @@
+"""Coupled mode: one time loop over speed, wheels, body and contact, by a W-method of second order.
+
+The method is ROS2 (Verwer et al. 1999, doi:10.1137/S1064827597326651), which keeps its order for any matrix in
+the place of the Jacobian. Here that matrix holds only the stiff slip that ties speed and wheels: with it the
+wheels stay quiet to standstill; everywhere else (body, axles, road) the method is Heun's.
+"""
+
+from math import inf, isinf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tasks.surface.road_profile import RoadHazard
+from tasks.vehicle.brake import PressureProfile, brake_pressure, onset_by_position
+from tasks.vehicle.half_car import HalfCarState, half_car_rates, moved
+from tasks.vehicle.history import History
+from tasks.vehicle.parameters import SurfaceResponse, Vehicle
+from tasks.vehicle.ports import AxlePorts, Chassis, Motion, Ports, chassis_of, lock_share, ports_at
+from tasks.vehicle.road import RoadFeature, road_feature
+from tasks.vehicle.tyre import TyreCurve, tyre_slope
+from tasks.vehicle.wheels import Axle
+
+GAMMA = 1.0 - sqrt(0.5)
+REST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+COUPLED_COLUMNS = (
+    "station", "speed", "longitudinal_acceleration", "braking_slip_f", "braking_slip_r", "wheel_speed_f",
+    "wheel_speed_r", "tyre_force_f", "tyre_force_r", "tyre_load_f", "tyre_load_r", "brake_torque_f",
+    "brake_torque_r", "abs_scale_f", "abs_scale_r", "brake_pressure_mpa", "road_force", "heave", "pitch",
+    "unsprung_heave_f", "unsprung_heave_r", "heave_rate", "pitch_rate", "road_height_f", "road_height_r",
+)  # fmt: skip
+"""Columns of the log that ``drive_coupled`` returns."""
+
+
+@njit(cache=True, nogil=True)
+def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis) -> Motion:
+    """Rates of station, speed and wheel speeds (paper, Eq. app_longitudinal_complete).
+
+    Parameters
+    ----------
+    motion : the state
+    ports : what acts in it
+    standing : the vehicle has come to rest
+    chassis : the values
+    """
+    if standing:
+        return Motion(0.0, 0.0, 0.0, 0.0)
+    wheels = chassis.wheels
+    return Motion(
+        motion.speed,
+        ports.acceleration,
+        (wheels.radius * ports.front.tyre_force - ports.front.brake_torque) / wheels.front.inertia,
+        (wheels.radius * ports.rear.tyre_force - ports.rear.brake_torque) / wheels.rear.inertia,
+    )
+
+
+class AxleSlope(NamedTuple):
+    """How one axle's wheel and the vehicle's speed answer to each other, per wheel speed and per speed [1/s].
+
+    Parameters
+    ----------
+    speed_by_speed, speed_by_wheel : change of dv/dt
+    wheel_by_speed, wheel_by_wheel : change of domega/dt
+    """
+
+    speed_by_speed: float
+    speed_by_wheel: float
+    wheel_by_speed: float
+    wheel_by_wheel: float
+
+
+@njit(cache=True, nogil=True)
+def axle_slope(
+    ports: AxlePorts,
+    motion: Motion,
+    omega: float,
+    pressure: float,
+    axle: Axle,
+    chassis: Chassis,
+    tyre: TyreCurve,
+) -> AxleSlope:
+    """Derivatives of speed and wheel rate through the slip of one axle.
+
+    Parameters
+    ----------
+    ports : of the axle
+    motion : longitudinal state
+    omega : wheel speed of the axle [rad/s]
+    pressure : [MPa]
+    axle, chassis, tyre : the values
+    """
+    wheels = chassis.wheels
+    if abs(ports.slip) >= 1.0:
+        return AxleSlope(0.0, 0.0, 0.0, 0.0)
+    slip_per_wheel = -wheels.radius / max(motion.speed, wheels.speed_floor)
+    slip_per_speed = (
+        (1.0 - ports.slip) / motion.speed if motion.speed > wheels.speed_floor else 1.0 / wheels.speed_floor
+    )
+    force = tyre_slope(abs(ports.slip), tyre) * ports.load
+    share = lock_share(omega, chassis.lock_speed)
+    torque = 0.0
+    if 0.0 < ports.abs_scale < 1.0:
+        torque = -axle.brake_gain * pressure * share / (wheels.release_width * tyre.target_slip)
+    locking = axle.brake_gain * pressure * ports.abs_scale / chassis.lock_speed if abs(share) < 1.0 else 0.0
+    turning = wheels.radius * force - torque
+    return AxleSlope(
+        -force * slip_per_speed / wheels.mass,
+        -force * slip_per_wheel / wheels.mass,
+        turning * slip_per_speed / axle.inertia,
+        (turning * slip_per_wheel - locking) / axle.inertia,
+    )
+
+
+@njit(cache=True, nogil=True)
+def without_speed(slope: AxleSlope) -> AxleSlope:
+    """The same derivatives while the speed is held from outside."""
+    return AxleSlope(0.0, 0.0, slope.wheel_by_speed, slope.wheel_by_wheel)
+
+
+@njit(cache=True, nogil=True)
+def solve_slip(rates: Motion, front: AxleSlope, rear: AxleSlope, g: float) -> Motion:
+    """Solve (1 - g J) k = rates, where J couples only speed and wheel speeds.
+
+    Parameters
+    ----------
+    rates : right-hand side
+    front, rear : the entries of J
+    g : step times gamma [s]
+    """
+    pivot_f = 1.0 - g * front.wheel_by_wheel
+    pivot_r = 1.0 - g * rear.wheel_by_wheel
+    to_f, to_r = g * front.speed_by_wheel / pivot_f, g * rear.speed_by_wheel / pivot_r
+    pivot_v = 1.0 - g * (front.speed_by_speed + rear.speed_by_speed)
+    pivot_v -= g * (to_f * front.wheel_by_speed + to_r * rear.wheel_by_speed)
+    speed = (rates.speed + to_f * rates.omega_f + to_r * rates.omega_r) / pivot_v
+    return Motion(
+        rates.station,
+        speed,
+        (rates.omega_f + g * front.wheel_by_speed * speed) / pivot_f,
+        (rates.omega_r + g * rear.wheel_by_speed * speed) / pivot_r,
+    )
+
+
+@njit(cache=True, nogil=True)
+def drive_coupled(
+    initial_speed: float,
+    hold_speed: bool,
+    steps: int,
+    per_tick: int,
+    step: float,
+    profile: PressureProfile,
+    road: RoadFeature,
+    chassis: Chassis,
+    tyre: TyreCurve,
+) -> tuple[NDArray[np.float64], float, float, float]:
+    """Drive, brake and stand, logging every ``per_tick``-th sample.
+
+    Parameters
+    ----------
+    initial_speed : [m/s]
+    hold_speed : keep the speed until the brake onset
+    steps : number of internal steps
+    per_tick : internal steps between logged samples
+    step : internal step [s]
+    profile : brake command
+    road : road feature
+    chassis, tyre : the vehicle on its surface
+
+    Returns
+    -------
+    The log, shape (steps / per_tick + 1, len(COUPLED_COLUMNS)); the brake onset [s], the station there [m] and
+    the time of the stop [s], each infinite if it never comes.
+    """
+    log = np.empty((steps // per_tick + 1, 25))
+    wheels = chassis.wheels
+    rolling = initial_speed / wheels.radius
+    motion, x = Motion(0.0, initial_speed, rolling, rolling), REST
+    scale_f, scale_r = 1.0, 1.0
+    onset, onset_station, stop = profile.onset_time, inf, inf
+    standing = False
+    for n in range(steps + 1):
+        time = n * step
+        if isinf(onset):
+            onset = onset_by_position(time, motion.station, motion.speed, profile)
+        if isinf(onset_station) and time >= onset:
+            onset_station = motion.station - motion.speed * (time - onset)
+        held = hold_speed and time < onset
+        pressure = brake_pressure(time - onset, profile)
+        ports = ports_at(motion, x, pressure, scale_f, scale_r, step, standing, held, chassis, tyre, road)
+        if n % per_tick == 0:
+            f, r = ports.front, ports.rear
+            log[n // per_tick] = (
+                motion.station, motion.speed, ports.acceleration, f.slip, r.slip, motion.omega_f, motion.omega_r,
+                f.tyre_force, r.tyre_force, f.load, r.load, f.brake_torque, r.brake_torque, f.abs_scale,
+                r.abs_scale, pressure, ports.road_force, x[0], x[1], x[2], x[3], x[4], x[5], f.road_height,
+                r.road_height,
+            )  # fmt: skip
+        motion, x, scale_f, scale_r = coupled_step(
+            motion, x, ports, pressure, brake_pressure(time + step - onset, profile), scale_f, scale_r, step,
+            standing, held, chassis, tyre, road,
+        )  # fmt: skip
+        if not standing and motion.speed <= wheels.stop_speed:
+            standing, stop = True, time + step
+            motion = Motion(motion.station, 0.0, 0.0, 0.0)
+            scale_f, scale_r = 1.0, 1.0
+    return log, onset, onset_station, stop
+
+
+@njit(cache=True, nogil=True)
+def coupled_step(
+    motion: Motion,
+    x: HalfCarState,
+    ports: Ports,
+    pressure: float,
+    next_pressure: float,
+    scale_f: float,
+    scale_r: float,
+    step: float,
+    standing: bool,
+    held: bool,
+    chassis: Chassis,
+    tyre: TyreCurve,
+    road: RoadFeature,
+) -> tuple[Motion, HalfCarState, float, float]:
+    """One ROS2 step from a state whose ports are known.
+
+    Parameters
+    ----------
+    motion, x : longitudinal and half-car state
+    ports : what acts in it
+    pressure, next_pressure : now and after the step [MPa]
+    scale_f, scale_r : ABS scales [1]
+    step : [s]
+    standing, held : at rest; speed held from outside
+    chassis, tyre, road : the values
+
+    Returns
+    -------
+    The longitudinal and half-car state and the ABS scales after the step.
+    """
+    body, wheels = chassis.body, chassis.wheels
+    front = axle_slope(ports.front, motion, motion.omega_f, pressure, wheels.front, chassis, tyre)
+    rear = axle_slope(ports.rear, motion, motion.omega_r, pressure, wheels.rear, chassis, tyre)
+    if held:
+        front, rear = without_speed(front), without_speed(rear)
+    k1 = solve_slip(motion_rates(motion, ports, standing, chassis), front, rear, GAMMA * step)
+    h1 = half_car_rates(
+        x, ports.front.load, ports.rear.load, ports.front.suspension_force, ports.rear.suspension_force,
+        ports.pitch_moment, body,
+    )  # fmt: skip
+    ahead = Motion(
+        motion.station + step * k1.station,
+        motion.speed + step * k1.speed,
+        motion.omega_f + step * k1.omega_f,
+        motion.omega_r + step * k1.omega_r,
+    )
+    x_ahead = moved(x, h1, step)
+    later = ports_at(
+        ahead, x_ahead, next_pressure, scale_f, scale_r, step, standing, held, chassis, tyre, road
+    )
+    f2 = motion_rates(ahead, later, standing, chassis)
+    rest = Motion(
+        f2.station - 2.0 * k1.station,
+        f2.speed - 2.0 * k1.speed,
+        f2.omega_f - 2.0 * k1.omega_f,
+        f2.omega_r - 2.0 * k1.omega_r,
+    )
+    k2 = solve_slip(rest, front, rear, GAMMA * step)
+    h2 = half_car_rates(
+        x_ahead, later.front.load, later.rear.load, later.front.suspension_force, later.rear.suspension_force,
+        later.pitch_moment, body,
+    )  # fmt: skip
+    after = Motion(
+        motion.station + step * (1.5 * k1.station + 0.5 * k2.station),
+        motion.speed + step * (1.5 * k1.speed + 0.5 * k2.speed),
+        motion.omega_f + step * (1.5 * k1.omega_f + 0.5 * k2.omega_f),
+        motion.omega_r + step * (1.5 * k1.omega_r + 0.5 * k2.omega_r),
+    )
+    x_after = moved(moved(x, h1, 0.5 * step), h2, 0.5 * step)
+    return after, x_after, later.front.abs_scale, later.rear.abs_scale
+
+
+def run_coupled_mode(
+    vehicle: Vehicle,
+    response: SurfaceResponse,
+    initial_speed: float,
+    hold_speed: bool,
+    profile: PressureProfile,
+    hazard: RoadHazard,
+    *,
+    steps: int,
+    step: float,
+    per_tick: int,
+) -> History:
+    """Simulate one run with the physical model.
+
+    Of the calibration only the tyre's peak and slip stiffness are used; pitch follows from the forces.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    response : its tyres on the surface
+    initial_speed : [m/s]
+    hold_speed : keep the speed until the brake onset
+    profile : brake command
+    hazard : road feature
+    steps, step : number and length of the internal steps [s]
+    per_tick : internal steps between ticks
+    """
+    log, onset, onset_station, stop_time = drive_coupled(
+        initial_speed,
+        hold_speed,
+        steps,
+        per_tick,
+        step,
+        profile,
+        road_feature(hazard),
+        chassis_of(vehicle),
+        response.tyre,
+    )
+    columns = dict(zip(COUPLED_COLUMNS, log.T.copy(), strict=True))
+    columns |= {f"axle_load_{axle}": columns[f"tyre_load_{axle}"] for axle in "fr"}
+    return History(columns=columns, onset=onset, onset_station=onset_station, stop_time=stop_time)
