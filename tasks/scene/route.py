@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation, Slerp
 
 from tasks.errors import InputError
+
+SAMPLING = 0.25
+"""Step of the samples from which points find their foot on the route [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,10 +85,10 @@ class Route:
             If a station lies beyond the route.
         """
         s = np.asarray(station, dtype=np.float64)
-        if s.size and (s.min() < 0 or s.max() > self.length):
-            worst = s.max() if s.max() > self.length else s.min()
+        beyond = ~((s >= 0) & (s <= self.length))
+        if beyond.any():
             raise InputError(
-                f"the station must lie on the route, 0 to {self.length:.2f} m; it is {worst:.2f} m"
+                f"the station must lie on the route, 0 to {self.length:.2f} m; it is {s[beyond][0]:.2f} m"
             )
         poses = np.zeros((s.size, 4, 4))
         poses[:, :3, 3] = self._position(s.ravel())
@@ -108,15 +112,25 @@ class Route:
         station, lateral, height : float64 [N] [m]
         """
         points = np.asarray(points, dtype=np.float64)
+        fine = self._fine
         _, nearest = self._tree.query(points[:, :2])
-        s_grid, poses = self._fine
-        local = np.einsum("nji,nj->ni", poses[nearest, :3, :3], points - poses[nearest, :3, 3])
-        return s_grid[nearest] + local[:, 0], local[:, 1], local[:, 2]
+        pose = fine.pose[nearest]
+        x, y, z = np.einsum("nji,nj->in", pose[:, :3, :3], points - pose[:, :3, 3])
+        # From the nearest sample on, the frame advances by t and turns by w for every metre of station; the
+        # foot of the point is where its x vanishes. Beyond the ends the frame no longer turns.
+        ends = ((nearest == 0) & (x < 0)) | ((nearest == len(fine.station) - 1) & (x > 0))
+        wx, wy, wz = np.where(ends, 0.0, fine.turn[nearest].T)
+        tx, ty, tz = np.where(ends, [[1.0], [0.0], [0.0]], fine.tangent[nearest].T)
+        step = np.where(ends, x, np.clip(x / np.maximum(tx + wy * z - wz * y, 0.1), -SAMPLING, SAMPLING))
+        lateral = y - step * (ty + wz * x / 2 - wx * z)
+        height = z - step * (tz + wx * y - wy * x / 2)
+        return fine.station[nearest] + step, lateral, height
 
     @cached_property
     def _position(self) -> CubicHermiteSpline:
         # unit-speed tangents from the knots themselves: the rig's x axis may differ by its mounting pitch
-        tangents = np.gradient(self.T_world_rig[:, :3, 3], self.station, axis=0, edge_order=1)
+        edges: Literal[1, 2] = 2 if len(self.station) > 2 else 1
+        tangents = np.gradient(self.T_world_rig[:, :3, 3], self.station, axis=0, edge_order=edges)
         return CubicHermiteSpline(self.station, self.T_world_rig[:, :3, 3], tangents, axis=0)
 
     @cached_property
@@ -124,13 +138,29 @@ class Route:
         return Slerp(self.station, Rotation.from_matrix(self.T_world_rig[:, :3, :3]))
 
     @cached_property
-    def _fine(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        grid = np.linspace(0, self.length, max(2, int(np.ceil(self.length / 0.25)) + 1))
-        return grid, self.pose(grid)
+    def _fine(self) -> "_Samples":
+        station = np.linspace(0, self.length, max(3, int(np.ceil(self.length / SAMPLING)) + 1))
+        pose = self.pose(station)
+        R = Rotation.from_matrix(pose[:, :3, :3])
+        between = (R[:-1].inv() * R[1:]).as_rotvec() / station[1]
+        turn = (between[np.r_[0, : len(between)]] + between[np.r_[: len(between), -1]]) / 2
+        return _Samples(
+            station=station, pose=pose, tangent=R.inv().apply(self._position(station, 1)), turn=turn
+        )
 
     @cached_property
     def _tree(self) -> cKDTree:
-        return cKDTree(self._fine[1][:, :2, 3])
+        return cKDTree(self._fine.pose[:, :2, 3])
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Samples:
+    """The route at close, equal steps: stations, poses, and direction and turning per metre in the rig frame."""
+
+    station: NDArray[np.float64]
+    pose: NDArray[np.float64]
+    tangent: NDArray[np.float64]
+    turn: NDArray[np.float64]
 
 
 def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01) -> Route:
@@ -140,31 +170,55 @@ def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01)
     ----------
     T_world_rig : float64 [M, 4, 4]
     standstill : a pose closer than this to the last kept one is dropped [m]
+
+    Raises
+    ------
+    InputError
+        If fewer than two poses remain.
     """
-    kept = [0]
-    for i in range(1, len(T_world_rig)):
-        if np.linalg.norm(T_world_rig[i, :3, 3] - T_world_rig[kept[-1], :3, 3]) > standstill:
-            kept.append(i)
-    poses = T_world_rig[kept]
+    poses = T_world_rig[_moving(T_world_rig[:, :3, 3], standstill)]
     steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     return Route(station=np.concatenate([[0.0], np.cumsum(steps)]), T_world_rig=poses)
 
 
-def route_from_positions(positions: NDArray[np.float64]) -> Route:
+def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.01) -> Route:
     """A route through points on the road, facing along its tangent with the roof up.
 
     Parameters
     ----------
     positions : float64 [M, 3] world frame, z up [m]
+    standstill : a point closer than this to the last kept one is dropped [m]
+
+    Raises
+    ------
+    InputError
+        If fewer than two points remain, or the route stands upright somewhere.
     """
-    forward = np.gradient(positions, axis=0)
-    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    kept = positions[_moving(positions, standstill)]
+    if len(kept) < 2:
+        raise InputError(f"a route needs two points {standstill:g} m apart or more; it has {len(kept)}")
+    steps = np.linalg.norm(np.diff(kept, axis=0), axis=1)
+    station = np.concatenate([[0.0], np.cumsum(steps)])
+    forward = np.gradient(kept, station, axis=0, edge_order=2 if len(kept) > 2 else 1)
     left = np.cross([0.0, 0.0, 1.0], forward)
+    upright = np.linalg.norm(left, axis=1) < 1e-3
+    if upright.any():
+        raise InputError(f"a route must not stand upright or turn on the spot; point {upright.argmax()} does")
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
     left /= np.linalg.norm(left, axis=1, keepdims=True)
-    poses = np.tile(np.eye(4), (len(positions), 1, 1))
-    poses[:, :3, 0], poses[:, :3, 1], poses[:, :3, 2] = forward, left, np.cross(forward, left)
-    poses[:, :3, 3] = positions
-    return route_from_poses(poses)
+    poses = np.tile(np.eye(4), (len(kept), 1, 1))
+    poses[:, :3, :3] = np.stack([forward, left, np.cross(forward, left)], axis=2)
+    poses[:, :3, 3] = kept
+    return Route(station=station, T_world_rig=poses)
+
+
+def _moving(positions: NDArray[np.float64], standstill: float) -> list[int]:
+    """Numbers of the positions that lie farther than ``standstill`` from the last one kept."""
+    kept = [0]
+    for i in range(1, len(positions)):
+        if np.linalg.norm(positions[i] - positions[kept[-1]]) > standstill:
+            kept.append(i)
+    return kept
 
 
 def extend_route(route: Route, ahead_m: float, spacing_m: float = 1.0) -> Route:
