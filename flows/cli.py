@@ -147,10 +147,15 @@ def scene_import(
     gaussians: Annotated[str, typer.Argument(help=".ply, compressed .ply, .splat or .spz file.")],
     route: Annotated[str, typer.Option(help="Route: CSV, KITTI poses, TUM or nerfstudio transforms.json.")],
     out: Annotated[str, typer.Option(help="Scene folder to make.")],
+    camera_height: Annotated[
+        float, typer.Option(help="Height of the route's cameras above the road [m].")
+    ] = 1.5,
+    half_width: Annotated[float, typer.Option(help="Half the carriageway's width [m].")] = 3.5,
     as_json: Json = False,
 ) -> None:
     """Make a scene of Gaussians trained elsewhere and a route through them."""
-    _show(_call("scene_import", False, gaussians, route, out), as_json)
+    sizes = {"camera_height": camera_height, "half_width": half_width}
+    _show(_call("scene_import", False, gaussians, route, out, **sizes), as_json)
 
 
 def _call(name: str, prefect: bool, *args: Any, **kwargs: Any) -> Any:
@@ -171,7 +176,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
     module = {
         "generate": "generate", "audit": "audit", "describe": "describe", "validate": "describe",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
-        "scene_from_stereo": "scenes", "scene_import": "scenes", "render_pose": "scenes",
+        "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)
     return function

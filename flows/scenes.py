@@ -5,45 +5,49 @@ from typing import Any
 
 import cv2
 import numpy as np
-from catalogs.scenes.importers import import_scene
-from catalogs.scenes.stereo_folder import read_stereo_folder
-from tasks.render.composition import compose, encode_8bit
-from tasks.render.environment import environment_view
-from tasks.scene.stereo.reconstruct import reconstruct
 
 from catalogs.scenes import load_scene, write_scene
+from catalogs.scenes.folder import must_be_new
+from catalogs.scenes.gaussian_files import read_gaussians
+from catalogs.scenes.route_files import read_route
 from flows.store.layout import read_json
 from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
 from tasks.render.backend import select_backend
+from tasks.render.composition import compose, encode_8bit
+from tasks.render.environment import environment_view, plain_sky
+from tasks.scene.classify import classify_road
+from tasks.scene.scene import Scene
+from tasks.scene.transform import moved
 
 
-def scene_from_stereo(folder: str, out: str) -> dict[str, Any]:
-    """Build a scene from a posed stereo sequence and report its held-out figures.
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the folder, or if ``out`` is not empty.
-    """
-    _must_be_new(out)
-    result = reconstruct(read_stereo_folder(Path(folder)))
-    figures = result.figures()
-    write_scene(result.scene, Path(out), figures)
-    return {"scene": out, **figures}
-
-
-def scene_import(gaussians: str, route: str, out: str) -> dict[str, Any]:
+def scene_import(
+    gaussians: str, route: str, out: str, *, camera_height: float = 1.5, half_width: float = 3.5
+) -> dict[str, Any]:
     """Make a scene folder of Gaussians trained elsewhere and a route.
 
+    Parameters
+    ----------
+    camera_height : of the route's camera poses above the road [m]
+    half_width : of the carriageway, to either side of the route [m]
+
     Raises
     ------
     InputError
-        Listing every problem of the two files, or if ``out`` is not empty.
+        Listing the problems of the files, or if ``out`` is not empty.
     """
-    _must_be_new(out)
-    scene = import_scene(Path(gaussians), Path(route))
-    write_scene(scene, Path(out), {})
+    must_be_new(Path(out))
+    course, T_world_source = read_route(Path(route), camera_height)
+    cloud = moved(read_gaussians(Path(gaussians)), T_world_source)
+    scene = Scene(
+        name=Path(out).name,
+        gaussians=classify_road(cloud, course, half_width, -half_width),
+        route=course,
+        environment=plain_sky(),
+        carriageway_left=half_width,
+        carriageway_right=-half_width,
+    )
+    write_scene(scene, Path(out), {"source": Path(gaussians).name})
     road = np.isin(scene.gaussians.class_id, ROAD_CLASSES).mean()
     return {
         "scene": out,
@@ -105,9 +109,3 @@ def _read_pose(pose: str) -> tuple[np.ndarray, np.ndarray, int, int]:
     if problems:
         raise InputError(problems)
     return matrices["viewmat"], matrices["K"], content["width"], content["height"]
-
-
-def _must_be_new(out: str) -> None:
-    folder = Path(out)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{out}: must be a new or empty folder; it holds other files")

@@ -34,8 +34,7 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
     InputError
         If the folder holds other files.
     """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: must be a new or empty folder; it holds other files")
+    must_be_new(folder)
     partial = folder.with_name(folder.name + ".partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
@@ -60,6 +59,12 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
         partial.rename(folder)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def must_be_new(folder: Path) -> None:
+    """Raise `InputError` if the folder holds anything."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: must be a new or empty folder; it holds other files")
 
 
 def read_scene(folder: Path) -> Scene:

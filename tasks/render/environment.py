@@ -38,3 +38,21 @@ def environment_view(
         cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REPLICATE,
     )
+
+
+def plain_sky(rows: int = 64) -> NDArray[np.float32]:
+    """A cloudless gradient from blue zenith to pale horizon over grey ground, for scenes without a sky.
+
+    Parameters
+    ----------
+    rows : height of the panorama [px]
+
+    Returns
+    -------
+    float32 [rows, 2 rows, 3] linear [1]
+    """
+    elevation = np.linspace(np.pi / 2, -np.pi / 2, rows)[:, None]
+    horizon, zenith, ground = np.array([[0.70, 0.76, 0.82], [0.16, 0.30, 0.60], [0.18, 0.18, 0.17]])
+    above = horizon + (zenith - horizon) * np.sin(np.clip(elevation, 0, None)) ** 0.5
+    column = np.where(elevation >= 0, above, ground).astype(np.float32)
+    return np.repeat(column[:, None, :], 2 * rows, axis=1)

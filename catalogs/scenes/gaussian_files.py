@@ -1,0 +1,112 @@
+"""Gaussians trained elsewhere: .ply (INRIA), compressed .ply, .splat and .spz.
+
+gsply reads the .ply forms; GaussForge turns the others into .ply first.
+"""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import gaussforge
+import gsply
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
+
+from tasks.conventions import SemanticClass
+from tasks.errors import InputError
+from tasks.scene.gaussians import Gaussians, check_gaussians
+
+FORMATS = (".compressed.ply", ".ply", ".splat", ".spz")
+SMALLEST_OPACITY = 1e-6
+"""Logits of fully transparent Gaussians underflow; they are kept, invisible [1]."""
+
+
+def read_gaussians(path: Path) -> Gaussians:
+    """Read a file of Gaussians, in its own frame; the class is OTHER, the normal the shortest axis.
+
+    Parameters
+    ----------
+    path : the file; its ending names the format
+
+    Raises
+    ------
+    InputError
+        If the file is missing, of an unknown format, truncated, empty, or holds values no Gaussian may have.
+    """
+    form = next((ending for ending in FORMATS if path.name.lower().endswith(ending)), None)
+    if form is None:
+        raise InputError(
+            f"{path}: Gaussians must come as one of {', '.join(FORMATS)}; it ends in {path.suffix!r}"
+        )
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    data = _decoded(path, form[1:])
+    n = len(data.means)
+    if n == 0:
+        raise InputError(f"{path}: must hold at least one Gaussian; it holds none")
+    norms = np.linalg.norm(data.quats, axis=1, keepdims=True)
+    with np.errstate(invalid="ignore", over="ignore"):
+        quats = np.where(norms > 0, data.quats / np.where(norms > 0, norms, 1), [1, 0, 0, 0]).astype(
+            np.float32
+        )
+        scales = np.exp(data.scales)
+    rest = np.empty((n, 0, 3), np.float32) if data.shN is None else data.shN.reshape(n, -1, 3)
+    gaussians = Gaussians(
+        means=np.ascontiguousarray(data.means),
+        quats_wxyz=quats,
+        scales=scales,
+        opacities=np.clip(expit(data.opacities.ravel()), SMALLEST_OPACITY, None).astype(np.float32),
+        sh=np.concatenate([data.sh0.reshape(n, 1, 3), rest], axis=1),
+        normals=shortest_axis(quats, scales),
+        class_id=np.full(n, SemanticClass.OTHER, np.uint8),
+        display_encoded=True,
+    )
+    check_gaussians(gaussians, str(path))
+    return gaussians
+
+
+def shortest_axis(quats_wxyz: NDArray[np.float32], scales: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Direction of each Gaussian's smallest standard deviation, float32 [N, 3] [1].
+
+    Parameters
+    ----------
+    quats_wxyz : float32 [N, 4] unit quaternions [1]
+    scales : float32 [N, 3] [m]
+    """
+    w, x, y, z = quats_wxyz.T
+    axes = np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1),
+            np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], axis=1),
+            np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1),
+        ],
+        axis=1,
+    )
+    return axes[np.arange(len(scales)), np.argmin(scales, axis=1)].astype(np.float32)
+
+
+def _decoded(path: Path, form: str) -> Any:
+    """The file as gsply's arrays: logarithmic scales, logit opacities, SH by coefficient."""
+    if form.endswith("ply"):
+        return _read_ply(path, path, form)
+    answer = gaussforge.GaussForge().convert(path.read_bytes(), form, "ply")
+    if "error" in answer:
+        raise _broken(path, form)
+    with tempfile.NamedTemporaryFile(suffix=".ply") as plain:
+        plain.write(answer["data"])
+        plain.flush()
+        return _read_ply(Path(plain.name), path, form)
+
+
+def _read_ply(plain: Path, path: Path, form: str) -> Any:
+    try:
+        return gsply.plyread(plain)
+    except (ValueError, OSError, IndexError, KeyError):
+        raise _broken(path, form) from None
+
+
+def _broken(path: Path, form: str) -> InputError:
+    return InputError(
+        f"{path}: must be a whole .{form} file of Gaussians; it cannot be decoded: is it truncated?"
+    )

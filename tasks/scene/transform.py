@@ -1,0 +1,61 @@
+"""Moving a cloud of Gaussians rigidly, its view-dependent colour included."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tasks.render.spherical_harmonics import sh_basis
+from tasks.scene.gaussians import Gaussians
+
+BANDS = ((1, 4), (4, 9), (9, 16))
+"""First and last coefficient of the bands 1, 2 and 3; band 0 does not turn."""
+SAMPLES = 64
+"""Directions of the fit below: it is exact for any number of directions that spans the largest band."""
+
+
+def moved(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussians:
+    """The cloud in another frame.
+
+    Parameters
+    ----------
+    gaussians : in the source frame
+    T_world_source : float64 [4, 4] rigid source-to-world transform [m]
+    """
+    R = T_world_source[:3, :3]
+    turn = Rotation.from_matrix(R)
+    quats = (turn * Rotation.from_quat(gaussians.quats_wxyz, scalar_first=True)).as_quat(scalar_first=True)
+    return replace(
+        gaussians,
+        means=(gaussians.means @ R.T + T_world_source[:3, 3]).astype(np.float32),
+        quats_wxyz=quats.astype(np.float32),
+        normals=(gaussians.normals @ R.T).astype(np.float32),
+        sh=rotated_sh(gaussians.sh, R),
+    )
+
+
+def rotated_sh(sh: NDArray[np.float32], rotation: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Coefficients of the turned colour function: ``f'(d) = f(R^T d)``.
+
+    Each band is invariant under rotation, so its matrix follows from values at enough directions:
+    ``Y(d) c' = Y(R^T d) c`` in the band.
+
+    Parameters
+    ----------
+    sh : float32 [N, K, 3] coefficients [1]
+    rotation : float64 [3, 3] source to world [1]
+    """
+    count = sh.shape[1]
+    # a spiral over the sphere: spread evenly, the same every time
+    z = np.linspace(-0.98, 0.98, SAMPLES)
+    azimuth = np.pi * (3 - np.sqrt(5)) * np.arange(SAMPLES)
+    ring = np.sqrt(1 - z**2)
+    directions = np.stack([ring * np.cos(azimuth), ring * np.sin(azimuth), z], axis=1)
+    at, back = sh_basis(directions, count), sh_basis(directions @ rotation, count)
+    turned = sh.astype(np.float64)
+    for first, last in BANDS:
+        if count >= last:
+            matrix = np.linalg.lstsq(at[:, first:last], back[:, first:last], rcond=None)[0]
+            turned[:, first:last] = np.einsum("ij,njc->nic", matrix, sh[:, first:last].astype(np.float64))
+    return turned.astype(np.float32)
