@@ -1,24 +1,26 @@
-"""A seeded street-like cloud for measurements: a road between two facades, with clutter along the sides."""
+"""A seeded street-like cloud for measurements: a road between two facades, with bushes along the sides."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.scene.gaussians import Gaussians
 
 LENGTH, HALF_WIDTH, WALL_HEIGHT = 120.0, 9.0, 12.0
-"""Extent of the corridor: x in 0..120 m, y in -9..9 m, z in 0..12 m [m]."""
+"""The corridor: x in 0..120 m, y in -9..9 m, z in 0..12 m [m]."""
 
 _SURFACES = (
-    # share of the Gaussians, class, normal
-    (0.30, SemanticClass.ROAD, (0.0, 0.0, 1.0)),
-    (0.25, SemanticClass.BUILDING, (0.0, -1.0, 0.0)),
-    (0.25, SemanticClass.BUILDING, (0.0, 1.0, 0.0)),
-    (0.20, SemanticClass.VEGETATION, (0.0, 0.0, 1.0)),
+    # class, share of the Gaussians, normal
+    (SemanticClass.ROAD, 0.30, (0.0, 0.0, 1.0)),
+    (SemanticClass.BUILDING, 0.25, (0.0, -1.0, 0.0)),
+    (SemanticClass.BUILDING, 0.25, (0.0, 1.0, 0.0)),
+    (SemanticClass.VEGETATION, 0.20, (0.0, 0.0, 1.0)),
 )
+_BUSHES = 60
 
 
 def corridor(count: int, sh_count: int = 16, seed: int = 0) -> Gaussians:
-    """Flat Gaussians about as large as their spacing, 30 % thick clutter blobs aside.
+    """Gaussians about as large as their spacing, flat on the road and the walls, thick in the bushes.
 
     Parameters
     ----------
@@ -27,46 +29,55 @@ def corridor(count: int, sh_count: int = 16, seed: int = 0) -> Gaussians:
     seed : of every random draw [1]
     """
     rng = np.random.default_rng(seed)
-    means, normals, classes = [], [], []
-    for share, label, normal in _SURFACES:
-        n = round(count * share) if label != SemanticClass.VEGETATION else count - sum(map(len, means))
-        x = rng.uniform(0, LENGTH, n)
-        if label == SemanticClass.ROAD:
-            points = np.column_stack((x, rng.uniform(-HALF_WIDTH, HALF_WIDTH, n), rng.normal(0, 0.01, n)))
-        elif label == SemanticClass.BUILDING:
-            side = -normal[1] * (HALF_WIDTH + rng.normal(0, 0.02, n))
-            points = np.column_stack((x, side, rng.uniform(0, WALL_HEIGHT, n)))
-        else:
-            bushes = np.column_stack((
-                rng.uniform(0, LENGTH, 60), rng.choice((-1, 1), 60) * rng.uniform(4.5, 8, 60), rng.uniform(0.5, 3, 60),
-            ))  # fmt: skip
-            points = bushes[rng.integers(0, 60, n)] + rng.normal(0, (0.8, 0.5, 0.6), (n, 3))
-        means.append(points)
-        normals.append(np.tile(normal, (n, 1)))
-        classes.append(np.full(n, label, dtype=np.uint8))
-    area = LENGTH * (2 * HALF_WIDTH + 2 * WALL_HEIGHT)
-    spacing = np.sqrt(area / (0.8 * count))
-    normal = np.concatenate(normals) + rng.normal(0, 0.05, (count, 3))
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    # The local z axis is the normal: turn z onto it by the half-way quaternion, after a random spin.
-    quats = np.column_stack((1 + normal[:, 2], -normal[:, 1], normal[:, 0], np.zeros(count)))
+    sizes = [round(count * share) for _, share, _ in _SURFACES]
+    sizes[-1] = count - sum(sizes[:-1])
+    class_id = np.repeat([label for label, _, _ in _SURFACES], sizes).astype(np.uint8)
+    means = np.concatenate([
+        _points(rng, label, normal, size)
+        for (label, _, normal), size in zip(_SURFACES, sizes, strict=True)
+    ])  # fmt: skip
+    normals = np.repeat([normal for _, _, normal in _SURFACES], sizes, axis=0)
+    normals = normals + 0.05 * rng.standard_normal((count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    # The quaternion half way between no turn and a half turn takes the local z axis to the normal.
+    quats = np.column_stack((1 + normals[:, 2], -normals[:, 1], normals[:, 0], np.zeros(count)))
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
-    scales = spacing * np.exp(rng.normal(np.log(0.6), 0.35, (count, 3)))
-    scales[:, 2] *= np.where(np.concatenate(classes) == SemanticClass.VEGETATION, 0.5, 0.1)
-    sh = rng.normal(0, 0.06, (count, sh_count, 3))
-    sh[:, 0] = rng.normal(0, 0.5, (count, 3))
+    area = LENGTH * 2 * (HALF_WIDTH + WALL_HEIGHT)
+    spacing = np.sqrt(area / sum(sizes[:-1]))
+    scales = 0.6 * spacing * np.exp(0.35 * rng.standard_normal((count, 3)))
+    scales[:, 2] *= np.where(class_id == SemanticClass.VEGETATION, 0.5, 0.1)
+    sh = rng.standard_normal((count, sh_count, 3), dtype=np.float32)
+    sh *= np.where(np.arange(sh_count) == 0, 0.5, 0.06).astype(np.float32)[:, None]
     return Gaussians(
-        means=np.concatenate(means).astype(np.float32),
+        means=means.astype(np.float32),
         quats_wxyz=quats.astype(np.float32),
         scales=scales.astype(np.float32),
         opacities=rng.beta(2.0, 1.0, count).clip(0.02, 0.995).astype(np.float32),
-        sh=sh.astype(np.float32),
-        normals=normal.astype(np.float32),
-        class_id=np.concatenate(classes),
+        sh=sh,
+        normals=normals.astype(np.float32),
+        class_id=class_id,
     )
 
 
-def driver_view(station: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+def _points(
+    rng: np.random.Generator, label: SemanticClass, normal: tuple[float, float, float], size: int
+) -> NDArray[np.float64]:
+    if label == SemanticClass.VEGETATION:
+        x, away, z = rng.uniform((0, 4.5, 0.5), (LENGTH, 8, 3), (_BUSHES, 3)).T
+        bushes = np.column_stack((x, away * rng.choice((-1, 1), _BUSHES), z))
+        return bushes[rng.integers(0, _BUSHES, size)] + rng.normal(0, (0.8, 0.5, 0.6), (size, 3))
+    along = rng.uniform(0, LENGTH, size)
+    if label == SemanticClass.ROAD:
+        across, height = rng.uniform(-HALF_WIDTH, HALF_WIDTH, size), rng.normal(0, 0.01, size)
+    else:
+        across, height = (
+            -normal[1] * HALF_WIDTH + rng.normal(0, 0.02, size),
+            rng.uniform(0, WALL_HEIGHT, size),
+        )
+    return np.column_stack((along, across, height))
+
+
+def driver_view(station: float, width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A camera 1.5 m above the road, looking along it, 77 degrees wide.
 
     Parameters
