@@ -41,7 +41,7 @@ from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Controls, Rollout, rollout
+from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
 
 TICK_RATE_HZ = 1000
 PIXEL_CENTRE = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
@@ -122,7 +122,7 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
 
 
 def drive(
-    scenario: Scenario, catalogue: Catalogue, mode: str, duration_s: float
+    scenario: Scenario, catalogue: Catalogue, mode: Mode, duration_s: float
 ) -> tuple[dict[str, Any], Rollout]:
     """Weather to surface state to friction to vehicle motion."""
     weather = Weather(

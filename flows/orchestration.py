@@ -20,11 +20,12 @@ def stage(function: Callable[P, R]) -> Callable[P, R]:
     def run(*args: P.args, **kwargs: P.kwargs) -> R:
         if "prefect" in sys.modules:
             from prefect import task
+            from prefect.cache_policies import NO_CACHE
             from prefect.context import FlowRunContext
 
             if FlowRunContext.get() is not None:
                 # results stay in memory and arguments are not hashed: receipts and files are our record
-                return task(function, persist_result=False, cache_policy=None)(*args, **kwargs)
+                return task(persist_result=False, cache_policy=NO_CACHE)(function)(*args, **kwargs)
         return function(*args, **kwargs)
 
     return run

@@ -86,7 +86,8 @@ def make_plan(source: str | Path, backend: str) -> tuple[Plan, dict[str, bytes]]
     """
     grid = load_grid(source)
     settings = grid.settings
-    inputs, problems = {}, []
+    inputs: dict[str, bytes] = {}
+    problems: list[str] = []
     for name, lookup, entry in (
         ("vehicle.yaml", vehicle_source, settings.vehicle),
         ("surface.yaml", surface_source, settings.surface),

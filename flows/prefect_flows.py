@@ -35,9 +35,8 @@ from flows import studies as _studies  # noqa: E402
 def as_flow(function: Callable[..., Any]) -> Any:
     """The Prefect flow of a pipeline function."""
     name = f"musync-{function.__name__.replace('_', '-')}"
-    return flow(
-        function, name=name, persist_result=False, description=(function.__doc__ or "").split("\n")[0]
-    )
+    description = (function.__doc__ or "").split("\n")[0]
+    return flow(name=name, persist_result=False, description=description)(function)
 
 
 generate = as_flow(_generate.generate)

@@ -74,7 +74,7 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(folder / "rgb.png"), picture[..., ::-1])
-    buffers = {
+    buffers: dict[str, Any] = {
         "depth": gbuffer.depth,
         "alpha": gbuffer.alpha,
         "normal": gbuffer.normal,
