@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.eval.motion import FrameStep, RecoveredMotion, check_clip, failed_step, integrate_motion, place_frames
-from tasks.eval.rigid import Floats, adjoint, invert_pose, pose_from_twist, projection_jacobian
+from tasks.eval.rigid import (
+    Floats,
+    adjoint,
+    advance_pose,
+    invert_pose,
+    pose_from_twist,
+    projection_jacobian,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,17 +113,11 @@ def recover_motion_pnp(
             step = _place(earlier, later, predicted, K, chosen.track_levels, chosen)
             if not step.failure:
                 return step
-        guesses = [_advance(way, T_rig_camera) for way in chosen.search_advances]
+        guesses = [advance_pose(way, T_rig_camera) for way in chosen.search_advances]
         found = [_place(earlier, later, guess, K, chosen.search_levels, chosen) for guess in guesses]
         return max(found, key=lambda step: (not step.failure, step.inliers))
 
     return integrate_motion("pnp", place_frames(len(frames), place), T_rig_camera, route_rotations)
-
-
-def _advance(way: float, T_rig_camera: Floats) -> Floats:
-    ahead = np.eye(4)
-    ahead[0, 3] = way
-    return invert_pose(T_rig_camera) @ ahead @ T_rig_camera
 
 
 def _prepare(

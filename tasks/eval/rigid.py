@@ -48,6 +48,13 @@ def invert_pose(pose: Floats) -> Floats:
     return inverse
 
 
+def advance_pose(way: float, T_rig_camera: Floats) -> Floats:
+    """``T_earlier_later`` [4, 4] of a camera on a mount [m] whose rig goes `way` straight ahead [m]."""
+    ahead = np.eye(4)
+    ahead[0, 3] = way
+    return invert_pose(T_rig_camera) @ ahead @ T_rig_camera
+
+
 def adjoint(pose: Floats) -> Floats:
     """[6, 6] matrix that takes twists written in frame b to frame a, for ``pose = T_a_b``."""
     rotation = pose[:3, :3]
