@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -110,15 +111,15 @@ def sheet_cells(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
 
 
 def graded_cells(
-    breaks: ArrayLike, size: ArrayLike, fine: float
+    breaks: ArrayLike, size: ArrayLike, fine: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Split a line at sharp edges, with cells that grow away from them, so that the edges stay crisp.
 
     Parameters
     ----------
     breaks : [n + 1] increasing positions of the edges [m]
-    size : [n] or scalar, largest cell of each interval [m]
-    fine : largest cell next to an edge over ``size`` [1]
+    size : [n] or scalar, largest cell of each interval, kept to within a quarter [m]
+    fine : [n] or scalar, largest cell next to an edge over ``size``; from 1 on all cells are alike [1]
 
     Returns
     -------
@@ -126,16 +127,109 @@ def graded_cells(
     interval : int64 [m] which interval of ``breaks`` the cell lies in
     """
     edges = np.asarray(breaks, dtype=np.float64)
-    sizes = np.broadcast_to(np.asarray(size, dtype=np.float64), len(edges) - 1)
-    cells: list[tuple[float, float, int]] = []
-    for k, (low, high, largest) in enumerate(zip(edges[:-1], edges[1:], sizes, strict=True)):
-        pending = [(low, high)]
-        while pending:
-            a, b = pending.pop()
-            away = min((a + b) / 2 - low, high - (a + b) / 2)
-            if b - a > min(largest, max(fine * largest, 0.7 * away)) * 1.0001:
-                pending += [((a + b) / 2, b), (a, (a + b) / 2)]
-            else:
-                cells.append(((a + b) / 2, b - a, k))
-    centre, width, interval = zip(*cells, strict=True)
-    return np.array(centre), np.array(width), np.array(interval, dtype=np.int64)
+    n = len(edges) - 1
+    cuts, interval = [edges[:1]], []
+    for k, (largest, share) in enumerate(zip(np.broadcast_to(size, n), np.broadcast_to(fine, n), strict=True)):
+        length = edges[k + 1] - edges[k]
+        if share >= 1:
+            inner = np.arange(1, int(np.ceil(length / (1.25 * largest)))) * largest
+            inner *= length / (largest * (len(inner) + 1))
+        else:
+            inner = np.array(_graded(length, largest, share))
+        cuts += [edges[k] + inner, edges[k + 1 : k + 2]]
+        interval += [k] * (len(inner) + 1)
+    cut = np.concatenate(cuts)
+    return (cut[1:] + cut[:-1]) / 2, np.diff(cut), np.array(interval, dtype=np.int64)
+
+
+def _graded(length: float, largest: float, share: float) -> list[float]:
+    """Inner cuts of an interval [m]: halved until no cell is too large for its distance from the ends."""
+    cuts, pending = [], [(0.0, length)]
+    while pending:
+        a, b = pending.pop()
+        away = min((a + b) / 2, length - (a + b) / 2)
+        if b - a > 1.25 * min(largest, max(share * largest, 0.7 * away)):
+            cuts.append((a + b) / 2)
+            pending += [((a + b) / 2, b), (a, (a + b) / 2)]
+    return sorted(cuts)
+
+
+def tube(
+    path: ArrayLike,
+    radius: ArrayLike,
+    around: int,
+    class_id: SemanticClass,
+    albedo: ArrayLike,
+    *,
+    glow: ArrayLike = 0.0,
+) -> Surfels:
+    """A round tube along a path, open at both ends.
+
+    Parameters
+    ----------
+    path : [n + 1, 3] its axis, from the foot up [m]
+    radius : [n + 1] or scalar [m]
+    around : cells around it [1]
+    class_id : its class
+    albedo, glow : broadcast to [around, n, 3]; see `Surfels` [1]
+    """
+    axis = np.asarray(path, dtype=np.float64)
+    run = np.gradient(axis, axis=0)
+    run /= np.linalg.norm(run, axis=1, keepdims=True)
+    helper = np.where(np.abs(run[:, 2:]) > 0.9, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    side = np.cross(helper, run)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    other = np.cross(run, side)
+    angle = 2 * np.pi * np.arange(around + 1)[:, None, None] / around
+    thickness = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(axis))[:, None]
+    corners = axis + thickness * (np.cos(angle) * side + np.sin(angle) * other)
+    return tiles(*sheet_cells(corners), class_id, albedo, glow=glow)
+
+
+def panel(
+    origin: ArrayLike,
+    edge_u: ArrayLike,
+    edge_v: ArrayLike,
+    cell: float,
+    class_id: SemanticClass,
+    albedo: ArrayLike,
+    *,
+    rng: np.random.Generator | None = None,
+    grain: float = 0.0,
+    glow: ArrayLike = 0.0,
+) -> Surfels:
+    """A plain rectangle in square cells.
+
+    Parameters
+    ----------
+    origin : [3] its first corner [m]
+    edge_u, edge_v : [3] its sides; their cross product points outward [m]
+    cell : largest cell [m]
+    class_id : its class
+    albedo, glow : [3] see `Surfels` [1]
+    rng : draws the grain; None for an even colour
+    grain : relative deviation of the reflectance from cell to cell [1]
+    """
+    corner, u, v = (np.asarray(x, dtype=np.float64) for x in (origin, edge_u, edge_v))
+    nu, nv = (max(int(np.ceil(np.linalg.norm(edge) / cell)), 1) for edge in (u, v))
+    a, b = np.meshgrid((np.arange(nu) + 0.5) / nu, (np.arange(nv) + 0.5) / nv, indexing="ij")
+    tone = np.ones((nu, nv, 1)) if rng is None else 1 + grain * rng.standard_normal((nu, nv, 1))
+    return tiles(
+        corner + a[..., None] * u + b[..., None] * v, u / nu, v / nv, class_id, np.asarray(albedo) * tone, glow=glow
+    )
+
+
+def box(
+    low: ArrayLike, high: ArrayLike, cell: float, class_id: SemanticClass, albedo: ArrayLike, **grain: Any
+) -> Surfels:
+    """The four walls and the top of an upright box; parameters as `panel`, between two corners [3] [m]."""
+    a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    x, y, z = np.diag(b - a)
+    sides = (
+        (a, x, z),
+        (a + x, y, z),
+        (a + x + y, -x, z),
+        (a + y, -y, z),
+        (a + z, x, y),
+    )
+    return join([panel(origin, u, v, cell, class_id, albedo, **grain) for origin, u, v in sides])

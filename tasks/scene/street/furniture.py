@@ -1,0 +1,127 @@
+"""Lamp posts, signs, bollards, bins and a letter box."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import SemanticClass
+from tasks.scene.street import palette
+from tasks.scene.street.layout import StreetLayout
+from tasks.scene.street.noise import stream
+from tasks.scene.street.plan import Plan
+from tasks.scene.street.surfels import Surfels, box, join, tiles, tube
+
+Floats = NDArray[np.float64]
+
+_POST_INSET = 0.45
+"""Of posts from the kerb's edge [m]."""
+
+
+def furniture(layout: StreetLayout, plan: Plan, seed: int) -> Surfels:
+    """Surfels of the street furniture, classes pole and other.
+
+    Parameters
+    ----------
+    layout : dimensions
+    plan : what stands where
+    seed : the street's seed [1]
+    """
+    parts = [part for station, side in plan.lamps for part in _lamp(layout, station, side)]
+    parts += _crossing_signs(layout)
+    rng = stream(seed, "bins")
+    for station, side in plan.lamps[::2]:
+        parts += _bin(layout, station + rng.uniform(1.2, 2.2), side)
+    parts.append(_letter_box(layout, layout.crossing_station - 12.0))
+    return join(parts)
+
+
+def post_boxes(layout: StreetLayout, plan: Plan) -> Floats:
+    """Boxes [K, 2, 3] that cast the lamp posts' shadows [m]."""
+    half = np.array([0.06, 0.06, 0.0])
+    boxes = []
+    for station, side in plan.lamps:
+        foot = np.array([station, _post_line(layout, side), layout.kerb_height])
+        boxes.append([foot - half, foot + half + [0, 0, layout.lamp_height]])
+    return np.array(boxes)
+
+
+def _post_line(layout: StreetLayout, side: int) -> float:
+    return layout.kerb(side) + side * (layout.kerb_width + _POST_INSET)
+
+
+def _lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
+    foot = np.array([station, _post_line(layout, side), layout.kerb_height])
+    top = layout.lamp_height
+    t = np.linspace(0, 1, 25)[:, None]
+    pole, steel = SemanticClass.POLE, palette.METAL_DARK
+    inward = np.array([0, -side, 0])
+    reach = 1.5
+    bend = np.linspace(0, np.pi / 2, 7)[:, None]
+    arm = foot + [0, 0, top] + 0.5 * ((1 - np.cos(bend)) * inward + np.sin(bend) * np.array([0, 0, 1]))
+    out = arm[-1] + np.linspace(0, reach - 0.5, 5)[1:, None] * inward
+    head = out[-1] + 0.3 * inward
+    return [
+        tube(foot + t[:4] * [0, 0, top], 0.10, 8, pole, steel),
+        tube(foot + t[3:] * [0, 0, top], 0.075 - 0.03 * t[3:, 0], 6, pole, steel),
+        tube(np.concatenate([arm, out]), 0.035, 6, pole, steel),
+        box(head - [0.13, 0.38, 0.03], head + [0.13, 0.38, 0.08], 0.13, pole, steel),
+        tiles(
+            head + np.array([[0, y, -0.035] for y in (-0.24, -0.08, 0.08, 0.24)]),
+            [0, 0.16, 0],
+            [0.2, 0, 0],
+            pole,
+            palette.HEAD_LIGHT,
+        ),
+    ]
+
+
+def _crossing_signs(layout: StreetLayout) -> list[Surfels]:
+    """A blue sign at either end of the crossing, facing the traffic that keeps right, and bollards beside it."""
+    pole = SemanticClass.POLE
+    start, stop = layout.crossing_station, layout.crossing_station + layout.crossing_length
+    parts = []
+    for side, station, outward in ((-1, start - 0.5, -1.0), (1, stop + 0.5, 1.0)):
+        foot = np.array([station, _post_line(layout, side), layout.kerb_height])
+        parts.append(tube(foot + np.linspace(0, 2.9, 16)[:, None] * [0, 0, 1], 0.038, 6, pole, palette.METAL_GREY))
+        n, edge = 15, 0.66
+        grid = (np.arange(n) + 0.5) / n * 2 - 1
+        a, b = np.meshgrid(grid, grid, indexing="ij")
+        picture = np.where(((np.abs(a) < 0.62 * (0.75 - b) / 1.35) & (b > -0.6))[..., None], palette.WHITE_PAINT, palette.SIGN_BLUE)
+        walker = (np.abs(a - 0.08 * b) < 0.13) & (b > -0.45) & (b < 0.15)
+        picture = np.where(walker[..., None], palette.METAL_DARK, picture)
+        rim = np.maximum(np.abs(a), np.abs(b)) > 0.9
+        picture = np.where(rim[..., None], palette.WHITE_PAINT, picture)
+        middle = foot + [0.06 * outward, 0, 2.5]
+        centre = middle + np.stack([0 * a, outward * a * edge / 2, b * edge / 2], axis=-1)
+        step = edge / n
+        parts.append(tiles(centre, [0, outward * step, 0], [0, 0, step], pole, picture))
+        back = middle - [0.02 * outward, 0, 0]
+        grey = tiles(back + (centre - middle) * [1, -1, 1], [0, -outward * step, 0], [0, 0, step], pole, palette.METAL_GREY)
+        parts.append(grey)
+        for s in (start - 1.6, start - 3.2, stop + 1.6, stop + 3.2):
+            base = np.array([s, layout.kerb(side) + side * 0.4, layout.kerb_height])
+            parts.append(tube(base + np.linspace(0, 0.9, 10)[:, None] * [0, 0, 1], 0.05, 8, pole, _banded(10)))
+    return parts
+
+
+def _banded(n: int) -> Floats:
+    """Albedo [8, n - 1, 3] of a dark bollard with a light band near its top."""
+    colour = np.tile(palette.METAL_DARK, (8, n - 1, 1))
+    colour[:, -3:-1] = palette.WHITE_PAINT
+    return colour
+
+
+def _bin(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
+    foot = np.array([station, _post_line(layout, side), layout.kerb_height])
+    other, green = SemanticClass.OTHER, palette.BIN_GREEN
+    up = np.linspace(0.1, 0.95, 10)[:, None] * [0, 0, 1]
+    lid = np.linspace(0, 1, 4)[:, None] * [0, 0, 0.12] + [0, 0, 0.95]
+    return [
+        tube(foot + up, 0.21, 12, other, green),
+        tube(foot + lid, np.array([0.23, 0.22, 0.15, 0.02]), 12, other, 0.6 * green),
+    ]
+
+
+def _letter_box(layout: StreetLayout, station: float) -> Surfels:
+    side = -1
+    low = np.array([station, layout.front(side) + 0.35, layout.kerb_height + 0.25])
+    return box(low, low + [0.5, 0.4, 1.0], 0.1, SemanticClass.OTHER, palette.POST_YELLOW)

@@ -1,0 +1,85 @@
+"""The panorama around the street: sky, sun, clouds and a hazy skyline."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.scene.street.layout import StreetLayout
+from tasks.scene.street.light import sun_direction
+from tasks.scene.street.noise import fractal_noise, stream
+
+Floats = NDArray[np.float64]
+
+_ROWS = 1024
+_ZENITH, _HORIZON = np.array([0.135, 0.27, 0.58]), np.array([0.60, 0.71, 0.83])
+_CLOUD_LIGHT, _CLOUD_SHADE = np.array([1.05, 1.02, 0.98]), np.array([0.50, 0.55, 0.63])
+_GROUND, _FAR_HOUSES = np.array([0.16, 0.155, 0.145]), np.array([0.30, 0.34, 0.39])
+_GLOW = np.array([1.0, 0.9, 0.72])
+_SUN_RADIUS_DEG = 0.6
+_CLOUD_BASE, _CLOUD_WAVE = 1.0, 1.3
+"""Height of the cloud layer and length of its longest wave, in units of that height [1]."""
+
+
+def panorama(layout: StreetLayout, seed: int) -> NDArray[np.float32]:
+    """Equirectangular picture in linear light, as `Scene.environment` lays it out.
+
+    Parameters
+    ----------
+    layout : direction of the sun
+    seed : the street's seed [1]
+
+    Returns
+    -------
+    float32 [1024, 2048, 3] [1]
+    """
+    elevation = np.pi / 2 - (np.arange(_ROWS) + 0.5) / _ROWS * np.pi
+    azimuth = np.pi - (np.arange(2 * _ROWS) + 0.5) / _ROWS * np.pi
+    upper = elevation > 0
+    picture = np.empty((_ROWS, 2 * _ROWS, 3), dtype=np.float32)
+    picture[upper] = _sky(layout, seed, elevation[upper, None], azimuth[None, :])
+    haze = np.exp(elevation[~upper] / 0.05)[:, None, None]
+    picture[~upper] = _GROUND * (1 - haze) + 0.75 * _FAR_HOUSES * haze
+    return picture
+
+
+def _sky(layout: StreetLayout, seed: int, elevation: Floats, azimuth: Floats) -> Floats:
+    up, flat = np.sin(elevation), np.cos(elevation)
+    sun = sun_direction(layout)
+    to_sun = flat * (sun[0] * np.cos(azimuth) + sun[1] * np.sin(azimuth)) + up * sun[2]
+    clear = _HORIZON + (_ZENITH - _HORIZON) * (1 - np.exp(-3.2 * up))[..., None]
+    off = np.degrees(np.arccos(np.clip(to_sun, -1, 1)))[..., None]
+    clear = clear + _GLOW * (0.9 * np.exp(-off / 5) + 0.22 * np.exp(-off / 24))
+    light, cover = _clouds(layout, seed, up, flat, azimuth)
+    cloud = _CLOUD_SHADE + (_CLOUD_LIGHT - _CLOUD_SHADE) * light[..., None] + 0.5 * _GLOW * np.exp(-off / 12)
+    veiled = cover * np.clip((up - 0.02) / 0.10, 0, 1)
+    sky = clear * (1 - veiled[..., None]) + cloud * veiled[..., None]
+    disc = np.clip((_SUN_RADIUS_DEG - off) / 0.15 + 0.5, 0, 1)
+    sky = sky * (1 - disc) + 30 * _GLOW * disc
+    return _with_skyline(seed, sky, elevation, azimuth)
+
+
+def _clouds(layout: StreetLayout, seed: int, up: Floats, flat: Floats, azimuth: Floats) -> tuple[Floats, Floats]:
+    """How bright the clouds are (0 shade, 1 sun) and how much sky they cover, in each direction."""
+    slant = _CLOUD_BASE / (up + 0.08)
+    x, y = slant * flat * np.cos(azimuth), slant * flat * np.sin(azimuth)
+    sun = sun_direction(layout)
+    field = fractal_noise(stream(seed, "clouds"), x, y, _CLOUD_WAVE, 5)
+    towards = fractal_noise(stream(seed, "clouds"), x + 0.14 * sun[0], y + 0.14 * sun[1], _CLOUD_WAVE, 5)
+    cover = np.clip((field - 0.25) / 0.9, 0, 1)
+    cover = cover * cover * (3 - 2 * cover)
+    light = np.clip(0.75 + 0.9 * (field - towards) - 0.22 * np.maximum(field - 0.9, 0), 0, 1)
+    return light, 0.92 * cover
+
+
+def _with_skyline(seed: int, sky: Floats, elevation: Floats, azimuth: Floats) -> Floats:
+    """Rows of far houses and trees, paler the further they are."""
+    rng = stream(seed, "skyline")
+    turn = (azimuth[0] % (2 * np.pi)) / (2 * np.pi)
+    for blocks, height, pale in ((90, 0.050, 0.72), (140, 0.036, 0.45)):
+        step = np.floor(turn * blocks).astype(np.int64) % blocks
+        roof = height * (0.45 + 0.55 * rng.random(blocks)[step]) + 0.004 * rng.standard_normal(6 * blocks)[
+            np.floor(turn * 6 * blocks).astype(np.int64) % (6 * blocks)
+        ]
+        colour = _FAR_HOUSES * (1 - pale) + _HORIZON * pale * 0.9
+        cover = np.clip((roof - elevation) / 0.002, 0, 1)[..., None]
+        sky = sky * (1 - cover) + colour * cover
+    return sky

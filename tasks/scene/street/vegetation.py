@@ -1,0 +1,158 @@
+"""Street trees, and the hedges and gardens that close the gaps between houses."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import SemanticClass
+from tasks.scene.street import palette
+from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
+from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.plan import Building, Tree
+from tasks.scene.street.surfels import Surfels, join, panel, tiles, tube
+
+Floats = NDArray[np.float64]
+
+_LEAF = 6.0
+"""Length of a tuft of leaves where it is seen closest [px]."""
+_LAYERS = 1.9
+"""Tufts over each other on the crown's surface [1]."""
+
+
+def trees(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
+    """Surfels of all trees, class vegetation.
+
+    Parameters
+    ----------
+    layout : dimensions
+    planted : the trees
+    seed : the street's seed [1]
+    """
+    parts = []
+    for tree in planted:
+        rng = stream(seed, f"tree {tree.number}")
+        depth = float(nearest_depth(layout, tree.station, tree.lateral, 3.5))
+        colour = palette.FOLIAGE[rng.integers(len(palette.FOLIAGE))]
+        parts += [leaves(tree.balls, colour, _LEAF * PIXEL * depth, rng), *_wood(tree, layout.kerb_height, rng)]
+    return join(parts)
+
+
+def leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Generator) -> Surfels:
+    """Tufts of leaves over the outer skin of a heap of balls.
+
+    Parameters
+    ----------
+    balls : [K, 4] centre and radius of each ball [m]
+    colour : [3] reflectance [1]
+    size : length of a tuft [m]
+    rng : draws places, tilts and tones
+    """
+    skin = balls[:, 3] ** 2
+    n = int(_LAYERS * 4 * np.pi * skin.sum() / size**2 / 3.2)
+    which = rng.choice(len(balls), n, p=skin / skin.sum())
+    out = rng.standard_normal((n, 3))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    place = balls[which, :3] + out * (balls[which, 3] * rng.uniform(0.72, 1.08, n))[:, None]
+    inside = np.linalg.norm(place[:, None] - balls[None, :, :3], axis=2) / balls[:, 3]
+    inside[np.arange(n), which] = 1.0
+    kept = inside.min(axis=1) > 0.62
+    which, out, place = which[kept], out[kept], place[kept]
+    n = len(place)
+    normal = out + 0.65 * rng.standard_normal((n, 3)) + [0, 0, 0.25]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    turn = np.cross(normal, rng.standard_normal((n, 3)))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    length = size * rng.uniform(0.7, 1.3, (n, 1))
+    middle, top, low = balls[:, :3].mean(axis=0), balls[:, 2].max(), balls[:, 2].min()
+    rise = np.clip((place[:, 2] - low) / max(top - low, 0.1), 0, 1)
+    spread = np.linalg.norm((place - middle)[:, :2], axis=1) / np.linalg.norm((balls[:, :3] - middle)[:, :2], axis=1).max()
+    tone = np.exp(0.16 * rng.standard_normal((n, 1))) * (0.85 + 0.3 * rise[:, None])
+    tint = 1 + rng.standard_normal((n, 1)) * [0.10, 0.03, 0.05]
+    return tiles(
+        place,
+        turn * length,
+        np.cross(normal, turn) * length * 0.7,
+        SemanticClass.VEGETATION,
+        np.clip(colour * tone * tint, 0.004, 0.6),
+        openness=np.clip(0.30 + 0.35 * (out[:, 2] + 0.5) + 0.3 * np.minimum(spread, 1.2) * rise, 0.18, 1.0),
+        opacity=0.93,
+        overlap=0.42,
+    )
+
+
+def _wood(tree: Tree, ground: float, rng: np.random.Generator) -> list[Surfels]:
+    foot = np.array([tree.station, tree.lateral, ground])
+    fork = foot + np.array([rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), 2.7])
+    t = np.linspace(0, 1, 13)[:, None]
+    grain = 1 + 0.22 * rng.standard_normal((8, 12, 1))
+    girth = tree.girth * (1 + 0.35 * np.exp(-8 * t[:, 0]) - 0.2 * t[:, 0])
+    parts = [tube(foot + t * (fork - foot), girth, 8, SemanticClass.VEGETATION, palette.BARK * np.abs(grain))]
+    for ball in tree.balls[rng.choice(len(tree.balls), 6, replace=False)]:
+        t = np.linspace(0, 1, 6)[:, None]
+        path = fork + t * (ball[:3] - fork) - [0, 0, 0.3] * (t * (1 - t))
+        thin = 0.55 * tree.girth * (1 - 0.75 * t[:, 0])
+        parts.append(tube(path - [0, 0, 0.15], thin, 5, SemanticClass.VEGETATION, 0.8 * palette.BARK))
+    return parts
+
+
+def gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
+    """Low walls, hedges, lawns and shrubs in the gaps between houses, classes other, vegetation and terrain.
+
+    Parameters
+    ----------
+    layout : dimensions
+    buildings : the houses, whose gaps are filled
+    seed : the street's seed [1]
+    """
+    parts = []
+    for house, after in zip(buildings[:-1], buildings[1:], strict=True):
+        start, stop = house.start + house.width, after.start
+        if house.side == after.side and stop - start > 1.0:
+            parts += _garden(layout, seed, house.side, start, stop)
+    return join(parts)
+
+
+def _garden(layout: StreetLayout, seed: int, side: int, start: float, stop: float) -> list[Surfels]:
+    rng = stream(seed, f"garden {side} {start:.3f}")
+    front, ground, width = layout.front(side), layout.kerb_height, stop - start
+    depth = float(nearest_depth(layout, start, front))
+    size = 7.0 * PIXEL * depth
+    brick = palette.BRICK[rng.integers(len(palette.BRICK))]
+    begin = start if side > 0 else stop
+    along = np.array([side * width, 0.0, 0.0])
+
+    def corner(back: float, z: float) -> Floats:
+        return np.array([begin, front + side * back, ground + z])
+
+    other, green = SemanticClass.OTHER, SemanticClass.TERRAIN
+    wall = [
+        panel(corner(0.1, 0), along, [0, 0, 1.0], size, other, brick, rng=rng, grain=0.12),
+        panel(corner(0.05, 1.0), along, [0, side * 0.3, 0], 0.25, other, palette.TRIM[1], rng=rng, grain=0.04),
+    ]
+    lawn_u, lawn_v = (along, np.array([0, side * 12.0, 0]))
+    lawn = panel(corner(0.3, 0.05), lawn_u, lawn_v, 0.5, green, palette.GRASS, rng=rng, grain=0.15)
+    n = int(width / 0.45)
+    hedge = np.column_stack(
+        [
+            start + (np.arange(n) + 0.5) * width / n,
+            np.full(n, front + side * 0.75) + rng.uniform(-0.1, 0.1, n),
+            ground + 0.95 + 0.08 * fractal_noise(rng, np.arange(n) * 0.45, np.zeros(n), 1.5, 2),
+            np.full(n, 0.42),
+        ]
+    )
+    low = hedge.copy()
+    low[:, 2] -= 0.55
+    shrubs = np.column_stack(
+        [
+            rng.uniform(start + 0.8, stop - 0.8, 16),
+            front + side * rng.uniform(4.0, 8.0, 16),
+            ground + rng.uniform(1.4, 5.2, 16),
+            rng.uniform(0.6, 1.1, 16),
+        ]
+    )
+    foliage = palette.FOLIAGE[rng.integers(len(palette.FOLIAGE))]
+    return [
+        *wall,
+        lawn,
+        leaves(np.concatenate([hedge, low]), palette.HEDGE, size, rng),
+        leaves(shrubs, foliage, 1.4 * size, rng),
+    ]
