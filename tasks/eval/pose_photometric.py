@@ -34,7 +34,7 @@ class PhotometricSettings:
     """
 
     levels: int = 4
-    track_level: int = 1
+    track_level: int = 2
     search_advances: tuple[float, ...] = (0.0, 1.0, 2.0, 4.0)
     iterations: int = 15
     converged: float = 0.003

@@ -1,0 +1,295 @@
+"""How well a model's states follow a reference trace: the paper's Appendix A.2, case by case.
+
+Signals stay on their original time axis and keep the static pitch offset; nothing is aligned, shifted
+or left out. The model is sampled at the reference's timestamps.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.errors import InputError
+
+Floats = NDArray[np.float64]
+
+STOP_SPEED = 0.05
+"""Speed below which a vehicle stands [m/s]: the stopping rule of the paper's Appendix E."""
+SLIP_SPEED_FLOOR = 0.5
+"""Speed above which slip is scored [m/s] (Appendix A.2)."""
+AFTER_STOP, AROUND_FEATURE = 1.0, 0.5
+"""Margins of the event windows: after the stop [s], before and behind the feature [m] (Appendix A.2)."""
+
+WHEELS = {"fl": "f", "fr": "f", "rl": "r", "rr": "r"}
+REFERENCE_COLUMNS = (
+    "time", "station", "speed", "pitch", *(f"slip_{w}" for w in WHEELS), *(f"wheel_load_{w}" for w in WHEELS)
+)  # fmt: skip
+MODEL_COLUMNS = (
+    "t_ns", "station", "speed", "pitch", "braking_slip_f", "braking_slip_r", "axle_load_f", "axle_load_r"
+)  # fmt: skip
+FIGURES = ("speed_rmse_m_s", "pitch_rmse_deg", "slip_rmse", "wheel_load_rmse_n", "event_error")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseFacts:
+    """What is known about a case besides its trace.
+
+    Parameters
+    ----------
+    case : name
+    hazard_height : height of the road feature, negative for a depression, 0 for a flat road [m]
+    hazard_length : length of the feature [m]
+    hazard_center : station of its middle [m]
+    wheelbase : [m]
+    brake_onset : time of brake application [s]; or None where `brake_onset_station` is given
+    brake_onset_station : station that triggers the brake, in either trace at its own time [m]; or None
+    stopping_distance : of the reference from brake onset [m]; None to read it from the trace
+    """
+
+    case: str
+    hazard_height: float
+    hazard_length: float
+    hazard_center: float
+    wheelbase: float
+    brake_onset: float | None = None
+    brake_onset_station: float | None = None
+    stopping_distance: float | None = None
+
+    @property
+    def kind(self) -> Literal["flat", "hump", "depression"]:
+        """The group the paper's tables put the case in."""
+        if self.hazard_height == 0:
+            return "flat"
+        return "hump" if self.hazard_height > 0 else "depression"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseAgreement:
+    """One row of the paper's per-case table.
+
+    Parameters
+    ----------
+    case, kind : as in `CaseFacts`
+    speed_rmse_m_s : [m/s]
+    pitch_rmse_deg : with the static offset on both sides [deg]
+    slip_rmse : mean over the four wheels, where the reference goes faster than 0.5 m/s [1]
+    wheel_load_rmse_n : mean over the four wheels [N]
+    event_error : absolute error of the stopping distance [m] or of the speed at the feature [km/h]
+    event_unit : "m" or "km/h"
+    window : begin and end of what was scored [s]
+    note : why that is not the protocol's whole window; empty where it is
+    """
+
+    case: str
+    kind: str
+    speed_rmse_m_s: float
+    pitch_rmse_deg: float
+    slip_rmse: float
+    wheel_load_rmse_n: float
+    event_error: float
+    event_unit: str
+    window: tuple[float, float]
+    note: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class GroupAgreement:
+    """Mean and maximum over the cases of a group.
+
+    Parameters
+    ----------
+    group : "flat", "hump", "depression" or "all"
+    count : number of cases [1]
+    mean, maximum : figure by name (`FIGURES`), in the units of `CaseAgreement`; the event error is NaN
+        where the group mixes its units
+    event_unit : "m", "km/h", or empty where the group mixes both
+    """
+
+    group: str
+    count: int
+    mean: dict[str, float]
+    maximum: dict[str, float]
+    event_unit: str
+
+
+def case_agreement(
+    reference: Mapping[str, Floats], model: Mapping[str, Floats], facts: CaseFacts, static_pitch: float
+) -> CaseAgreement:
+    """Score one case as the paper's Appendix A.2 lays down.
+
+    The window of a flat case ends one second after the reference stops, that of a road case half a
+    metre behind the rear axle's exit. A reference that ends before that is scored to its end: holding
+    its last pitch, which a stopped car lets go, would score the model against an invention.
+
+    Parameters
+    ----------
+    reference : columns `REFERENCE_COLUMNS`: time [s], station [m], speed [m/s], pitch with its static offset
+        [deg], braking slip [1] and load [N] of each wheel
+    model : columns `MODEL_COLUMNS` with the names and units of `tasks.conventions.TICK_CHANNELS`
+    facts : what is known about the case
+    static_pitch : pitch of the model's vehicle at rest, which its pitch is counted from [rad]
+
+    Raises
+    ------
+    InputError
+        If a column is missing, the model's record does not cover the window, the model does not stop
+        within it, or the case has no brake onset.
+    """
+    _check_columns(reference, model, facts)
+    time = reference["time"]
+    start, end, note = _event_window(reference, facts)
+    model_time = model["t_ns"] * 1e-9
+    tick = 1e-9
+    if model_time[0] > start + tick or model_time[-1] < end - tick:
+        raise InputError(
+            f"Case {facts.case}: the model's record must cover the event window {start:.3f} to {end:.3f} s, "
+            f"got {model_time[0]:.3f} to {model_time[-1]:.3f} s; simulate that long."
+        )
+    scored = (time >= start - tick) & (time <= end + tick)
+    at = time[scored]
+
+    def rmse(reference_name: str, model_values: Floats, mask: NDArray[np.bool_] | None = None) -> float:
+        error = np.interp(at, model_time, model_values) - reference[reference_name][scored]
+        error = error if mask is None else error[mask]
+        return float(np.sqrt(np.mean(error**2))) if error.size else float("nan")
+
+    rolling = reference["speed"][scored] > SLIP_SPEED_FLOOR
+    slip = [rmse(f"slip_{wheel}", model[f"braking_slip_{axle}"], rolling) for wheel, axle in WHEELS.items()]
+    load = [rmse(f"wheel_load_{wheel}", model[f"axle_load_{axle}"] / 2) for wheel, axle in WHEELS.items()]
+    event_error, event_unit = _event_error(reference, model, model_time, facts)
+    return CaseAgreement(
+        case=facts.case,
+        kind=facts.kind,
+        speed_rmse_m_s=rmse("speed", model["speed"]),
+        pitch_rmse_deg=rmse("pitch", np.rad2deg(model["pitch"] + static_pitch)),
+        slip_rmse=float(np.mean(slip)),
+        wheel_load_rmse_n=float(np.mean(load)),
+        event_error=event_error,
+        event_unit=event_unit,
+        window=(start, end),
+        note=note,
+    )
+
+
+def aggregate(cases: Sequence[CaseAgreement]) -> dict[str, GroupAgreement]:
+    """Mean and maximum over flat, hump, depression and all cases, as the paper's tables have them.
+
+    Parameters
+    ----------
+    cases : one per case; hand in one split at a time
+
+    Returns
+    -------
+    group by name; a group without a case is left out
+    """
+    groups = {kind: [c for c in cases if c.kind == kind] for kind in ("flat", "hump", "depression")}
+    groups["all"] = list(cases)
+    return {name: _summarise(name, members) for name, members in groups.items() if members}
+
+
+def _summarise(name: str, members: Sequence[CaseAgreement]) -> GroupAgreement:
+    units = {c.event_unit for c in members}
+    figures = {f: np.array([getattr(c, f) for c in members]) for f in FIGURES}
+    if len(units) > 1:
+        figures["event_error"] = np.full(len(members), np.nan)
+    return GroupAgreement(
+        group=name,
+        count=len(members),
+        mean={f: float(v.mean()) for f, v in figures.items()},
+        maximum={f: float(v.max()) for f, v in figures.items()},
+        event_unit=units.pop() if len(units) == 1 else "",
+    )
+
+
+def _check_columns(reference: Mapping[str, Floats], model: Mapping[str, Floats], facts: CaseFacts) -> None:
+    problems = []
+    for owner, columns, needed in (("reference", reference, REFERENCE_COLUMNS), ("model", model, MODEL_COLUMNS)):
+        missing = [name for name in needed if name not in columns]
+        if missing:
+            problems.append(f"Case {facts.case}: the {owner} must have the columns {', '.join(missing)}.")
+        elif len(columns[needed[0]]) < 2:
+            problems.append(f"Case {facts.case}: the {owner} must have at least two rows.")
+    if (facts.brake_onset is None) == (facts.brake_onset_station is None) and facts.kind == "flat":
+        problems.append(f"Case {facts.case}: a flat case needs either a time or a station of brake onset.")
+    if problems:
+        raise InputError(problems)
+
+
+def _event_window(reference: Mapping[str, Floats], facts: CaseFacts) -> tuple[float, float, str]:
+    time, station = reference["time"], reference["station"]
+    if facts.kind == "flat":
+        start = _onset(time, station, facts)
+        stop = _stop_time(time, reference["speed"], start)
+        end = (time[-1] if stop is None else stop) + AFTER_STOP
+    else:
+        half = facts.hazard_length / 2
+        entry = _crossing(time, station, facts.hazard_center - half - AROUND_FEATURE)
+        if entry is None:
+            raise InputError(f"Case {facts.case}: the reference never reaches the road feature.")
+        start = entry
+        leave = _crossing(time, station, facts.hazard_center + half + facts.wheelbase + AROUND_FEATURE)
+        end = np.inf if leave is None else leave
+    if end <= time[-1] + 1e-9:
+        return start, float(end), ""
+    what = "one second after the stop" if facts.kind == "flat" else "behind the rear axle's exit"
+    note = f"The window ends {what}, the reference at {time[-1]:.3f} s; scored to there."
+    return start, float(time[-1]), note
+
+
+def _event_error(
+    reference: Mapping[str, Floats], model: Mapping[str, Floats], model_time: Floats, facts: CaseFacts
+) -> tuple[float, str]:
+    if facts.kind != "flat":
+        speeds = [
+            _speed_at(t, c["station"], c["speed"], facts.hazard_center)
+            for t, c in ((reference["time"], reference), (model_time, model))
+        ]
+        return abs(speeds[1] - speeds[0]) * 3.6, "km/h"
+    distances = []
+    for t, columns in ((reference["time"], reference), (model_time, model)):
+        onset = _onset(t, columns["station"], facts)
+        stop = _stop_time(t, columns["speed"], onset)
+        if stop is None and columns is model:
+            raise InputError(
+                f"Case {facts.case}: the model must come to a stop within its record, but goes "
+                f"{columns['speed'][-1]:.2f} m/s at {t[-1]:.3f} s; simulate longer."
+            )
+        ends = np.interp([onset, t[-1] if stop is None else stop], t, columns["station"])
+        distances.append(float(ends[1] - ends[0]))
+    if facts.stopping_distance is not None:
+        distances[0] = facts.stopping_distance
+    return abs(distances[1] - distances[0]), "m"
+
+
+def _onset(time: Floats, station: Floats, facts: CaseFacts) -> float:
+    if facts.brake_onset is not None:
+        return facts.brake_onset
+    onset = _crossing(time, station, facts.brake_onset_station or 0.0)
+    if onset is None:
+        raise InputError(
+            f"Case {facts.case}: no brake onset, station {facts.brake_onset_station} m is never reached."
+        )
+    return onset
+
+
+def _stop_time(time: Floats, speed: Floats, onset: float) -> float | None:
+    """First time from `onset` on at which the vehicle stands [s]."""
+    standing = np.flatnonzero((speed <= STOP_SPEED) & (time >= onset))
+    return float(time[standing[0]]) if standing.size else None
+
+
+def _crossing(time: Floats, station: Floats, mark: float) -> float | None:
+    """Time at which `station` first reaches `mark` [s]."""
+    beyond = np.flatnonzero(station >= mark)
+    if not beyond.size:
+        return None
+    k = int(beyond[0])
+    return float(time[0] if k == 0 else np.interp(mark, station[k - 1 : k + 1], time[k - 1 : k + 1]))
+
+
+def _speed_at(time: Floats, station: Floats, speed: Floats, mark: float) -> float:
+    """Speed at a station [m/s]; 0 for a vehicle that stops short of it."""
+    when = _crossing(time, station, mark)
+    return 0.0 if when is None else float(np.interp(when, time, speed))
