@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES
+from tasks.render.composition import encode_8bit, to_display
 from tasks.render.gbuffer import GBuffer
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
 from tasks.render.weather.particles import Shutter
-from tasks.render.weather.scene_light import to_display
-from tasks.render.weather.snow_layer import coverage_rank
+from tasks.render.weather.snow_field import coverage_rank
 
 LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
 """Bit of each layer in an attribution picture."""
@@ -35,7 +35,7 @@ def attribution(
     picture = frame.base
     for layer in frame.layers:
         after = recompose(picture, (layer,))
-        step = np.abs(to_display(np.minimum(after, 1)) - to_display(np.minimum(picture, 1))).max(axis=-1)
+        step = np.abs(to_display(after) - to_display(picture)).max(axis=-1)
         bits |= np.where(step >= 0.5 / 255, LAYER_BITS[layer.name], 0).astype(np.uint8)
         picture = after
     return bits
@@ -87,5 +87,5 @@ def paper_picture(frame: WeatherFrame) -> NDArray[np.uint8]:
 
 
 def _codes(picture: NDArray[np.float32]) -> NDArray[np.int16]:
-    """8-bit sRGB codes, rounded, as signed numbers."""
-    return np.rint(255 * np.minimum(to_display(picture), 1)).astype(np.int16)
+    """8-bit sRGB codes as signed numbers."""
+    return encode_8bit(picture).astype(np.int16)

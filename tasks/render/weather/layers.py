@@ -1,6 +1,6 @@
 """Weather over a clear clip. Call order, once for the clip and then for every frame:
 
-1. ``gaussians, weather = weather_scene(gaussians, environment, state, parameters, focal_px, seed)``
+1. ``gaussians, weather = weather_scene(gaussians, environment, state, parameters, focal_px, seed, route)``
    with the clip's road edit already in the Gaussians; rasterise the Gaussians that come back;
 2. ``picture = compose(gbuffer, clear sky)``: the clear linear picture, sky included, as in dry weather;
 3. ``frame = apply_weather(weather, picture, gbuffer, shutter)``, then encode ``frame.picture``.
@@ -24,11 +24,19 @@ from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter, visible_streaks
 from tasks.render.weather.precipitation import Population, population
 from tasks.render.weather.scene_light import appended, ground_light, without_sun
-from tasks.render.weather.sky import SkyLight, light_from, overcast_environment, sky_light
-from tasks.render.weather.snow_layer import SnowField, snow_field, snow_layer, whitened
+from tasks.render.weather.sky import (
+    SkyLight,
+    cloud_transmittance,
+    light_from,
+    overcast_environment,
+    sky_light,
+)
+from tasks.render.weather.snow_field import SnowField, snow_field
+from tasks.render.weather.snow_layer import snow_layer, whitened
 from tasks.render.weather.streaks import draw_streaks
 from tasks.render.weather.wet_road import wet_layer
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.route import Route
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +118,7 @@ def weather_scene(
     parameters: WeatherParameters,
     focal_px: float,
     seed: int,
+    route: Route | None = None,
 ) -> tuple[Gaussians, ClipWeather]:
     """Bring a clip's weather into its scene: softened shadows, and snow where it lies.
 
@@ -121,6 +130,7 @@ def weather_scene(
     parameters : the catalogue
     focal_px : focal length of the camera [px]
     seed : visual seed of the clip [1]
+    route : where wheels have left tracks in the snow; None leaves it untouched
 
     Returns
     -------
@@ -146,11 +156,13 @@ def weather_scene(
     covered = state.snow_coverage if state.kind == "snow" else 0.0
     ground = (1 - covered) * p.sky.asphalt_albedo + covered * float(np.mean(p.snow_cover.albedo))
     opened = p.sky.exposure_ev_snow if state.kind == "snow" else p.sky.exposure_ev_rain
-    sky = sky_light(white, air.extinction, ground, opened, p.sky)
+    level = cloud_transmittance(state.precipitation_mm_h, p.sky) * 2**opened
+    sky = sky_light(white, level, air.extinction, ground, p.sky)
     scene = without_sun(gaussians, p.sky.shadow_kept)
     field = None
     if state.kind == "snow":
-        field = snow_field(gaussians, p.snow_cover, seed)
+        c = p.snow_cover
+        field = snow_field(gaussians, c.patches, c.tracks, c.anchors, route, seed)
         amount = (state.snow_coverage, state.snow_depth_mm, p.snow_cover)
         layer, _ = snow_layer(scene, field, white, *amount)
         scene = appended(whitened(scene, field, white, *amount), layer)

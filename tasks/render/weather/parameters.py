@@ -17,13 +17,11 @@ class AirParameters:
     ----------
     haze_visual_range_m : meteorological optical range of the moist air between the drops or flakes [m]
     wind_m_s : velocity of the air in the world, x, y, z [m s-1]
-    exposure_ms : how long the shutter of a camera under this sky is open [ms]
     near : where particles are drawn one by one
     """
 
     haze_visual_range_m: float
     wind_m_s: tuple[float, float, float]
-    exposure_ms: float
     near: NearField
 
 

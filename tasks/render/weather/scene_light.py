@@ -9,6 +9,7 @@ from scipy.ndimage import distance_transform_edt
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
+from tasks.render.composition import to_linear
 from tasks.render.spherical_harmonics import C0
 from tasks.render.weather.ground_grid import GroundGrid, ground_grid, read_between, window_sums
 from tasks.render.weather.sky import LUMINANCE
@@ -20,6 +21,8 @@ LIGHT_CELL_M = 0.3
 ILLUMINATION_RANGE = (0.15, 1.7)
 """Relative light that can be believed; beyond it is another material."""
 
+FACADE_DIRECTIONS = 24
+
 LIT_ALIKE = {
     SemanticClass.ROAD: (SemanticClass.ROAD, SemanticClass.MARKING, SemanticClass.KERB),
     SemanticClass.SIDEWALK: (SemanticClass.SIDEWALK,),
@@ -27,23 +30,8 @@ LIT_ALIKE = {
 """Ground of nearly one reflectance, from which light and shade are read, and the classes that share its light."""
 
 
-def to_linear(display: NDArray[np.floating]) -> NDArray[np.float64]:
-    """sRGB display values to linear light (IEC 61966-2-1), straight on beyond 1.
-
-    Parameters
-    ----------
-    display : [...] display values, not negative [1]
-
-    Returns
-    -------
-    float64 [...] linear light [1]
-    """
-    x = np.maximum(np.asarray(display, dtype=np.float64), 0)
-    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
-
-
-def to_display(linear: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Linear light to sRGB display values, the inverse of `to_linear`.
+def to_display_unclipped(linear: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Linear light to sRGB-encoded values (IEC 61966-2-1), straight on beyond 1: snow in the sun is brighter.
 
     Parameters
     ----------
@@ -69,7 +57,7 @@ def mean_colours(gaussians: Gaussians) -> NDArray[np.float64]:
     float64 [N, 3] linear light [1]
     """
     colours = np.maximum(gaussians.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
-    return to_linear(colours) if gaussians.display_encoded else colours
+    return to_linear(colours).astype(np.float64) if gaussians.display_encoded else colours
 
 
 def recoloured(gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np.floating]) -> Gaussians:
@@ -88,7 +76,7 @@ def recoloured(gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np
     old = np.maximum(gaussians.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
     new = gain[:, None] * (to_linear(old) if gaussians.display_encoded else old) + add
     if gaussians.display_encoded:
-        new = to_display(new)
+        new = to_display_unclipped(new)
     sh = gaussians.sh.copy()
     sh[:, 0] = (new - 0.5) / C0
     # directional detail shrinks or grows with the colour it modulates, but light from elsewhere has none
@@ -151,8 +139,49 @@ def ground_light(gaussians: Gaussians, ground: SemanticClass) -> GroundLight:
     return GroundLight(lit=lit, grid=grid, illumination=known[tuple(nearest)])
 
 
+def facade_light(gaussians: Gaussians) -> NDArray[np.float64]:
+    """Clear light on facades by the way they face, by that on the sunny ones.
+
+    Whole streets of facades differ little in mean reflectance from one compass direction to the next, so the
+    mean colour of a direction tells its light.
+
+    Parameters
+    ----------
+    gaussians : the scene in clear weather
+
+    Returns
+    -------
+    float64 [N] relative light; 1 for all that is no facade [1]
+    """
+    light = np.ones(len(gaussians))
+    facade = np.flatnonzero(
+        (gaussians.class_id == SemanticClass.BUILDING) & (np.abs(gaussians.normals[:, 2]) < 0.5)
+    )
+    if not len(facade):
+        return light
+    x, y = gaussians.normals[facade, 0].astype(np.float64), gaussians.normals[facade, 1].astype(np.float64)
+    bins = np.arctan2(y, x) / (2 * np.pi) * FACADE_DIRECTIONS % FACADE_DIRECTIONS
+    luminance = mean_colours(gaussians)[facade] @ LUMINANCE
+    area = np.sort(gaussians.scales[facade].astype(np.float64), axis=1)[:, 1:].prod(axis=1)
+    counted = np.bincount(bins.astype(int), area, FACADE_DIRECTIONS)
+    summed = np.bincount(bins.astype(int), area * luminance, FACADE_DIRECTIONS)
+    # neighbouring directions share their facades: a rare direction is read with the common ones beside it
+    spread = [sum(w * np.roll(v, k) for k, w in ((-1, 0.25), (0, 1.0), (1, 0.25))) for v in (counted, summed)]
+    mean = np.divide(spread[1], spread[0], out=np.full(FACADE_DIRECTIONS, np.nan), where=spread[0] > 0)
+    own = np.interp(
+        bins - 0.5,
+        np.arange(FACADE_DIRECTIONS),
+        np.nan_to_num(mean, nan=np.nanmean(mean)),
+        period=FACADE_DIRECTIONS,
+    )
+    order = np.argsort(own)
+    sunny = own[order][np.searchsorted(np.cumsum(area[order]), 0.75 * area.sum())]
+    light[facade] = np.clip(own / max(sunny, 1e-9), *ILLUMINATION_RANGE)
+    return light
+
+
 def without_sun(gaussians: Gaussians, shadow_kept: float) -> Gaussians:
-    """The scene with light and shade on the ground drawn together, as under cloud.
+    """The scene with light and shade on ground and facades drawn together, as under cloud.
 
     Parameters
     ----------
@@ -162,9 +191,9 @@ def without_sun(gaussians: Gaussians, shadow_kept: float) -> Gaussians:
     Returns
     -------
     Gaussians
-        Colours of the classes in `LIT_ALIKE` multiplied by illumination^(shadow_kept - 1).
+        Colours of the classes in `LIT_ALIKE` and of facades multiplied by illumination^(shadow_kept - 1).
     """
-    gain = np.ones(len(gaussians))
+    gain = facade_light(gaussians) ** (shadow_kept - 1)
     for ground, alike in LIT_ALIKE.items():
         if not (gaussians.class_id == ground).any():
             continue

@@ -24,7 +24,9 @@ class SkyParameters:
 
     Parameters
     ----------
-    cloud_transmittance : light under full cloud by light under clear sky [1]
+    cloud_transmittance : light under full cloud by light under clear sky, where hardly anything falls [1]
+    rain_cloud_transmittance : the same under the thick cloud of heavy precipitation [1]
+    thickening_mm_h : rate over which the cloud grows from the one to the other [mm/h]
     exposure_ev_rain, exposure_ev_snow : how much further the camera opens than in clear weather, set once for
         the clip; less over snow, which fills the picture with white [EV]
     tint : colour of daylight under cloud by that of clear daylight, linear red, green, blue [1]
@@ -40,6 +42,8 @@ class SkyParameters:
     """
 
     cloud_transmittance: float
+    rain_cloud_transmittance: float
+    thickening_mm_h: float
     exposure_ev_rain: float
     exposure_ev_snow: float
     tint: tuple[float, float, float]
@@ -78,11 +82,29 @@ class SkyLight:
     ground: NDArray[np.float64]
 
 
+def cloud_transmittance(rate_mm_h: float, parameters: SkyParameters) -> float:
+    """Light under the cloud by light under a clear sky: the harder it falls, the thicker the cloud.
+
+    Parameters
+    ----------
+    rate_mm_h : water-equivalent precipitation rate [mm/h]
+    parameters : how cloud changes the light
+
+    Returns
+    -------
+    float
+        Transmittance [1].
+    """
+    p = parameters
+    thin = float(np.exp(-rate_mm_h / p.thickening_mm_h))
+    return p.rain_cloud_transmittance + (p.cloud_transmittance - p.rain_cloud_transmittance) * thin
+
+
 def sky_light(
     clear_white: NDArray[np.floating],
+    level: float,
     extinction: float,
     ground_albedo: float,
-    exposure_ev: float,
     parameters: SkyParameters,
 ) -> SkyLight:
     """The light under precipitating cloud.
@@ -94,9 +116,9 @@ def sky_light(
     Parameters
     ----------
     clear_white : [3] radiance, in clear weather, of a white surface lying on the road [1]
+    level : exposed light under cloud by exposed light in clear weather [1]
     extinction : extinction coefficient of the air [m-1]
     ground_albedo : mean reflectance of the ground: wet asphalt, or snow [1]
-    exposure_ev : how much further the camera opens than in clear weather [EV]
     parameters : how cloud changes the light
 
     Returns
@@ -104,7 +126,6 @@ def sky_light(
     SkyLight
     """
     p = parameters
-    level = p.cloud_transmittance * 2**exposure_ev
     grey = np.outer(np.ones(3), LUMINANCE)
     relight = level * np.diag(p.tint) @ (p.saturation * np.eye(3) + (1 - p.saturation) * grey)
     # light under cloud has no colour but the tint

@@ -7,12 +7,13 @@ import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
+from tasks.render.composition import encode_8bit, to_linear
 from tasks.render.rasteriser import prepare, rasterise
 from tasks.render.weather.attribution import LAYER_BITS, attribution, paper_picture, snow_on_road
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherState
-from tasks.render.weather.scene_light import appended, to_display, to_linear
+from tasks.render.weather.scene_light import appended, to_display_unclipped
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import clear_sky, road, surfels
 
@@ -135,19 +136,18 @@ def test_attribution_names_the_layers_that_changed_a_pixel(street, parameters):
 
 def test_the_paper_s_composition_adds_the_residual_of_8_bit_pictures(street, parameters):
     _, drawn, _, _ = frame(street, SNOW[2], parameters)
-    ours = np.rint(255 * np.minimum(to_display(drawn.picture), 1))
+    ours = encode_8bit(drawn.picture)
     # without a wet layer the residual is added to the very picture it was taken from
-    assert np.array_equal(paper_picture(drawn), ours.astype(np.uint8))
+    assert np.array_equal(paper_picture(drawn), ours)
     _, wet, _, _ = frame(street, RAIN[50], parameters)
-    paper = paper_picture(wet)
-    ours = np.rint(255 * np.minimum(to_display(wet.picture), 1))
-    assert np.abs(paper - ours).max() < 40
-    assert np.abs(paper - ours).mean() < 1
+    apart = np.abs(paper_picture(wet).astype(int) - encode_8bit(wet.picture))
+    assert 0 < apart.max() < 40
+    assert apart.mean() < 1
 
 
-def test_display_transfer_is_its_own_inverse():
-    display = np.linspace(0, 1, 1001)
-    assert to_display(to_linear(display)) == pytest.approx(display, abs=1e-6)
+def test_display_values_go_on_beyond_white():
+    display = np.linspace(0, 1.5, 1001)
+    assert to_display_unclipped(to_linear(display)) == pytest.approx(display, abs=1e-6)
 
 
 def test_every_rule_that_a_state_breaks_is_told_at_once(street, parameters):

@@ -9,8 +9,15 @@ from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.spherical_harmonics import C0
 from tasks.render.weather.ground_grid import ground_grid, read_between, window_sums
-from tasks.render.weather.scene_light import ground_light, mean_colours, recoloured, without_sun
-from tests.render.weather.scenes import ASPHALT, road
+from tasks.render.weather.scene_light import (
+    appended,
+    facade_light,
+    ground_light,
+    mean_colours,
+    recoloured,
+    without_sun,
+)
+from tests.render.weather.scenes import ASPHALT, road, surfels
 
 
 @pytest.fixture
@@ -55,6 +62,20 @@ def test_cloud_draws_light_and_shade_together(half_shaded):
     assert shade[deep].max() == 0.25
     assert colours[deep].mean() / colours[lit].mean() == pytest.approx(0.25**0.3, rel=0.05)
     assert mean_colours(without_sun(street, 1.0)) == pytest.approx(mean_colours(street), abs=1e-6)
+
+
+def test_cloud_lights_the_shaded_side_of_the_street_as_the_sunny_one(half_shaded):
+    y, z = np.meshgrid(np.arange(0, 20, 0.2), np.arange(0, 6, 0.2))
+    points = np.column_stack((y.ravel(), np.zeros(y.size), z.ravel()))
+    sunny = surfels(points, (0, -1, 0), 0.1, 0.4, SemanticClass.BUILDING)
+    shaded = surfels(points, (0, 1, 0), 0.1, 0.1, SemanticClass.BUILDING)
+    roof = surfels(points, (0, 0, 1), 0.1, 0.2, SemanticClass.BUILDING)
+    scene = appended(appended(sunny, shaded), roof)
+    light = facade_light(scene)
+    n = len(sunny)
+    assert light[[0, n, 2 * n]] == pytest.approx([1.0, 0.25, 1.0])
+    colours = mean_colours(without_sun(scene, 0.3)).mean(axis=1)
+    assert colours[n] / colours[0] == pytest.approx(0.25**0.3, rel=1e-3)
 
 
 def test_recolouring_scales_the_whole_colour_in_linear_light(half_shaded):

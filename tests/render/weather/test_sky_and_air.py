@@ -15,7 +15,14 @@ from tasks.render.weather.atmosphere import (
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.precipitation import population
-from tasks.render.weather.sky import LUMINANCE, light_from, overcast_environment, sample_panorama, sky_light
+from tasks.render.weather.sky import (
+    LUMINANCE,
+    cloud_transmittance,
+    light_from,
+    overcast_environment,
+    sample_panorama,
+    sky_light,
+)
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import clear_sky, flat_gbuffer
 
@@ -29,7 +36,7 @@ def air(parameters):
 
 @pytest.fixture
 def sky(parameters, air):
-    return sky_light(WHITE, air.extinction, 0.1, 1.2, parameters.sky)
+    return sky_light(WHITE, 0.6, air.extinction, 0.1, parameters.sky)
 
 
 def test_visual_range_is_where_contrast_falls_to_its_threshold():
@@ -44,19 +51,21 @@ def test_the_overcast_sky_gives_the_light_that_the_white_surface_shows(parameter
 
 
 def test_a_thin_rain_leaves_the_gradient_of_moon_and_spencer(parameters):
-    clear = sky_light(WHITE, 0.0, 0.1, 0.0, parameters.sky)
+    clear = sky_light(WHITE, 0.25, 0.0, 0.1, parameters.sky)
     assert clear.zenith / clear.airlight == pytest.approx(np.full(3, 3.0))
-    thick = sky_light(WHITE, 0.01, 0.1, 0.0, parameters.sky)
+    thick = sky_light(WHITE, 0.25, 0.01, 0.1, parameters.sky)
     assert thick.zenith / thick.airlight == pytest.approx(np.ones(3), abs=1e-3)
 
 
-def test_cloud_takes_three_quarters_of_the_light_and_the_colour_of_the_sun(parameters):
-    sky = sky_light(WHITE, 0.001, 0.1, 0.0, parameters.sky)
+def test_cloud_takes_three_quarters_of_the_light_and_more_when_it_rains_hard(parameters):
+    thin, thick = (cloud_transmittance(rate, parameters.sky) for rate in (0.0, 200.0))
+    assert (thin, thick) == pytest.approx((0.25, 0.16), abs=1e-6)
+    sky = sky_light(WHITE, thin, 0.001, 0.1, parameters.sky)
     assert LUMINANCE @ sky.white == pytest.approx(
         0.25 * LUMINANCE @ WHITE * (LUMINANCE @ parameters.sky.tint)
     )
     assert sky.white[2] > sky.white[0]
-    opened = sky_light(WHITE, 0.001, 0.1, 1.0, parameters.sky)
+    opened = sky_light(WHITE, 2 * thin, 0.001, 0.1, parameters.sky)
     assert opened.white == pytest.approx(2 * sky.white)
 
 

@@ -11,16 +11,11 @@ from tasks.conventions import SemanticClass
 from tasks.render.rasteriser import prepare, rasterise
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
 from tasks.render.weather.layers import pixel_rays
+from tasks.render.weather.road_anchors import road_anchors
 from tasks.render.weather.scene_light import appended, mean_colours
-from tasks.render.weather.snow_layer import (
-    coverage_rank,
-    hidden_share,
-    local_depth_mm,
-    road_anchors,
-    snow_field,
-    snow_layer,
-    whitened,
-)
+from tasks.render.weather.snow_field import coverage_rank, local_depth_mm, snow_field, tracks_at
+from tasks.render.weather.snow_layer import hidden_share, snow_layer, whitened
+from tasks.scene.route import Route
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import ASPHALT, road, surfels
 
@@ -33,8 +28,13 @@ def street():
     return road()
 
 
+def field_of(scene, parameters, seed=5, route=None):
+    p = parameters.snow_cover
+    return snow_field(scene, p.patches, p.tracks, p.anchors, route, seed)
+
+
 def layer_at(street, parameters, coverage, depth_mm=None, seed=5):
-    field = snow_field(street, parameters.snow_cover, seed)
+    field = field_of(street, parameters, seed)
     depth_mm = 20.0 * coverage if depth_mm is None else depth_mm
     return snow_layer(street, field, WHITE, coverage, depth_mm, parameters.snow_cover)
 
@@ -61,7 +61,7 @@ def test_fields_have_unit_variance_and_fade_under_a_wide_footprint():
 
 @pytest.mark.parametrize("coverage", COVERAGES)
 def test_as_much_of_the_road_is_covered_as_asked(street, parameters, coverage):
-    field = snow_field(street, parameters.snow_cover, 5)
+    field = field_of(street, parameters)
     xi = coverage_rank(field, street.means[:, 0], street.means[:, 1])
     assert np.mean(xi <= coverage) == pytest.approx(coverage, abs=0.005)
 
@@ -111,17 +111,21 @@ def test_what_stands_up_or_floats_is_no_anchor(street, parameters):
     floating = surfels(np.array([[6.0, 0.0, 0.3]]), (0, 0, 1), 0.04, 0.2, SemanticClass.ROAD)
     grass = surfels(np.array([[7.0, 0.0, 0.0]]), (0, 0, 1), 0.04, 0.2, SemanticClass.TERRAIN)
     scene = appended(appended(appended(street, kerb), floating), grass)
-    index, normal = road_anchors(scene, parameters.snow_cover)
-    assert set(range(len(street), len(scene))).isdisjoint(index.tolist())
-    assert len(index) == len(street)
-    assert normal[:, 2].min() > np.cos(np.deg2rad(30))
+    anchors = road_anchors(scene, parameters.snow_cover.anchors)
+    assert set(range(len(street), len(scene))).isdisjoint(anchors.index.tolist())
+    assert len(anchors.index) == len(street)
+    assert anchors.flat.all()
+    assert anchors.normal[:, 2].min() > np.cos(np.deg2rad(30))
 
 
 def test_round_gaussians_take_the_normal_of_their_neighbours(street, parameters):
     round_road = replace(street, scales=np.full_like(street.scales, 0.05))
-    index, normal = road_anchors(round_road, parameters.snow_cover)
-    assert len(index) == len(street)
-    assert normal[:, 2].min() > 0.99
+    anchors = road_anchors(round_road, parameters.snow_cover.anchors)
+    assert len(anchors.index) == len(street)
+    assert not anchors.flat.any()
+    assert anchors.normal[:, 2].min() > 0.99
+    layer, _ = layer_at(round_road, parameters, 1.0, 30.0)
+    assert layer.scales[:, 2].max() < 0.2 * layer.scales[:, 0].min()
 
 
 def test_the_picture_shows_the_coverage_asked(street, parameters):
@@ -130,7 +134,7 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
     middle = (ASPHALT * parameters.snow_cover.damp_albedo_ratio + 0.87 * WHITE[0]) / 2
     seen, expected = [], []
     for coverage in COVERAGES:
-        field = snow_field(street, parameters.snow_cover, 5)
+        field = field_of(street, parameters)
         amount = (coverage, 20.0 * coverage, parameters.snow_cover)
         layer, _ = snow_layer(street, field, WHITE, *amount)
         scene = appended(whitened(street, field, WHITE, *amount), layer)
@@ -155,10 +159,28 @@ def test_snow_settles_on_what_faces_up_and_leaves_walls_bare(street, parameters)
     flat = surfels(np.array([[5.0, 5.0, 0.1]]), (0, 0, 1), 0.1, 0.1, SemanticClass.SIDEWALK)
     wall = surfels(np.array([[5.0, 6.0, 1.0]]), (0, 1, 0), 0.1, 0.1, SemanticClass.BUILDING)
     scene = appended(appended(street, flat), wall)
-    field = snow_field(scene, parameters.snow_cover, 5)
+    field = field_of(scene, parameters)
     colours = mean_colours(whitened(scene, field, WHITE, 1.0, 30.0, parameters.snow_cover))
     assert colours[-2].mean() > 1.0
     assert colours[-1] == pytest.approx(mean_colours(scene)[-1], rel=1e-5)
+
+
+def test_wheel_tracks_are_covered_last_and_leave_the_share_as_it_is(street, parameters):
+    poses = np.tile(np.eye(4), (2, 1, 1))
+    poses[1, 0, 3] = 18.0
+    route = Route(station=np.array([0.0, 18.0]), T_world_rig=poses)
+    field = field_of(street, parameters, route=route)
+    x, y = street.means[:, 0], street.means[:, 1]
+    xi = coverage_rank(field, x, y)
+    assert np.mean(xi <= 0.5) == pytest.approx(0.5, abs=0.005)
+    track = tracks_at(field, x, y) > 0.8
+    assert 0.02 < track.mean() < 0.12
+    assert np.abs(np.abs(y[track]) - parameters.snow_cover.tracks.gauge_m / 2).max() < 0.5
+    assert np.mean(xi[track] <= 0.5) < 0.25
+    layer, anchors = snow_layer(street, field, WHITE, 1.0, 30.0, parameters.snow_cover)
+    pressed = track[anchors]
+    assert mean_colours(layer)[pressed].mean() < 0.95 * mean_colours(layer)[~pressed].mean()
+    assert tracks_at(field_of(street, parameters), x, y).max() == 0
 
 
 def test_another_seed_lays_other_patches_of_the_same_share(street, parameters):

@@ -21,7 +21,7 @@ VIEW = shutter(width=160, height=108, focal=133.0)
 
 @pytest.fixture(scope="module")
 def sky(parameters):
-    return sky_light(np.full(3, ASPHALT / 0.1), 0.002, 0.1, 2.0, parameters.sky)
+    return sky_light(np.full(3, ASPHALT / 0.1), 1.0, 0.002, 0.1, parameters.sky)
 
 
 def wet(parameters, sky, film, wall_x=12.0, seed=1):

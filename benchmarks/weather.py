@@ -1,0 +1,128 @@
+"""What weather adds to a frame, stage by stage, against the clear frame of the same run."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from catalogs.cameras import load_camera
+from catalogs.scenes import load_scene
+from catalogs.weather import load_weather
+from tasks.render.camera import viewmat
+from tasks.render.composition import compose
+from tasks.render.environment import environment_view
+from tasks.render.gbuffer import GBuffer
+from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.weather.atmosphere import air_layer, light_layer
+from tasks.render.weather.layer import recompose
+from tasks.render.weather.layers import ClipWeather, apply_weather, particle_layer, pixel_rays, weather_scene
+from tasks.render.weather.parameters import WeatherState
+from tasks.render.weather.particles import Shutter
+from tasks.render.weather.wet_road import wet_layer
+
+STATES = {
+    "rain 10": WeatherState(kind="rain", precipitation_mm_h=10, film_depth_mm=0.489),
+    "rain 50": WeatherState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263),
+    "snow 1": WeatherState(kind="snow", precipitation_mm_h=1, snow_depth_mm=10, snow_coverage=0.5),
+    "snow 3": WeatherState(kind="snow", precipitation_mm_h=3, snow_depth_mm=30, snow_coverage=1.0),
+}
+LIMIT = {"rain": 1.2, "snow": 0.6}
+"""What a weather may add, as a share of the clear frame's CPU time."""
+
+SPEED = 16.0
+STATION = 40
+REPEATS = 9
+
+
+def rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> list[dict[str, Any]]:
+    """Measure a clear frame and the same frame in four weathers.
+
+    Returns
+    -------
+    Rows of name, value, unit, peer (what the value is held against) and ratio (value over peer). A weather's
+    row "added" counts its Gaussians in the rasteriser too, and its ratio is the share of the clear frame.
+    """
+    scene, camera, parameters = load_scene(scene_name), load_camera(camera_name), load_weather()
+    pose = scene.route.T_world_rig[STATION] @ camera.T_rig_camera
+    K = np.asarray(camera.K, dtype=np.float64)
+    view = viewmat(pose)
+    size = (camera.width, camera.height)
+    shutter = Shutter(
+        T_world_camera=pose, K=K, width=camera.width, height=camera.height, velocity=SPEED * pose[:3, 2],
+        time_s=2.0, exposure_s=camera.exposure_s,
+    )  # fmt: skip
+    clear_cloud = prepare(scene.gaussians)
+    clear_sky = environment_view(scene.environment, view, K, *size)
+
+    def clear() -> None:
+        compose(rasterise(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded)
+
+    clear_ms = _cpu_ms(clear)
+    found = [{"name": "clear frame", "value": clear_ms, "unit": "CPU-ms", "peer": None, "ratio": None}]
+    for name, state in STATES.items():
+        started = time.process_time()
+        gaussians, weather = weather_scene(
+            scene.gaussians, scene.environment, state, parameters, float(K[0, 0]), 1
+        )
+        once_s = time.process_time() - started
+        cloud = prepare(gaussians)
+        gbuffer = rasterise(cloud, view, K, *size)
+        picture = compose(gbuffer, clear_sky, gaussians.display_encoded)
+        raster_ms = _cpu_ms(rasterise, cloud, view, K, *size)
+        bare_ms = _cpu_ms(rasterise, clear_cloud, view, K, *size)
+        stages = _stages(weather, picture, gbuffer, shutter)
+        whole_ms = _cpu_ms(apply_weather, weather, picture, gbuffer, shutter)
+        added = whole_ms + max(raster_ms - bare_ms, 0)
+        for stage, call in stages.items():
+            found.append(_row(f"{name}: {stage}", _cpu_ms(call), clear_ms))
+        found.append(_row(f"{name}: snow layer in the rasteriser", max(raster_ms - bare_ms, 0), clear_ms))
+        found.append(_row(f"{name}: added", added, clear_ms) | {"limit": LIMIT[state.kind]})
+        found.append(
+            {"name": f"{name}: once a clip", "value": once_s, "unit": "CPU-s", "peer": None, "ratio": None}
+        )
+    return found
+
+
+def _stages(
+    weather: ClipWeather, picture: np.ndarray, gbuffer: GBuffer, shutter: Shutter
+) -> dict[str, Callable[[], object]]:
+    """The layers of one frame, each to be called alone."""
+    falling = weather.falling
+    assert falling is not None
+    rays = pixel_rays(shutter)
+    cloudy, sky, air = falling.environment, falling.sky, falling.air
+    lit = recompose(picture, [light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays)])
+    stages: dict[str, Callable[[], object]] = {
+        "light": lambda: light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays),
+        "air": lambda: air_layer(gbuffer, cloudy, air, sky, rays),
+        "particles": lambda: particle_layer(weather, falling, gbuffer, shutter),
+    }
+    if weather.state.kind == "rain":
+        stages["wet road with reflection"] = lambda: wet_layer(
+            lit, gbuffer, cloudy, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
+            weather.state.film_depth_mm, weather.parameters.wet_road, weather.seed,
+        )  # fmt: skip
+    return stages
+
+
+def _row(name: str, value: float, clear_ms: float) -> dict[str, Any]:
+    return {"name": name, "value": value, "unit": "CPU-ms", "peer": "clear frame", "ratio": value / clear_ms}
+
+
+def _cpu_ms(call: Callable[..., object], *arguments: object) -> float:
+    """Median CPU time of a few calls after a first one that may compile [ms]."""
+    call(*arguments)
+    spent = []
+    for _ in range(REPEATS):
+        started = time.process_time()
+        call(*arguments)
+        spent.append(time.process_time() - started)
+    return 1e3 * float(np.median(spent))
+
+
+if __name__ == "__main__":
+    for row in rows():
+        ratio = "" if row["ratio"] is None else f"{row['ratio']:6.1%} of {row['peer']}"
+        limit = f" (limit {row['limit']:.0%})" if "limit" in row else ""
+        print(f"{row['name']:42} {row['value']:9.2f} {row['unit']:7} {ratio}{limit}")
