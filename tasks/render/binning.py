@@ -21,12 +21,7 @@ TILE_WIDTH, TILE_HEIGHT = 16, 16
 """Pixels of one tile [px]."""
 
 _DIGITS, _DIGIT_BITS = 3, 11
-_ZERO, _HALF, _ONE, _LOG_CUT = (
-    np.float32(0),
-    np.float32(0.5),
-    np.float32(1),
-    np.float32(LOG_CUT),
-)
+_ZERO, _HALF, _ONE, _LOG_CUT = (np.float32(c) for c in (0, 0.5, 1, LOG_CUT))
 
 
 def tile_lists(
@@ -105,10 +100,7 @@ def touched_tiles(records, width, height):  # type: ignore[no-untyped-def]
     count = 0
     for splat in range(len(records)):
         x0, y0 = records[splat, X] - _HALF, records[splat, Y] - _HALF
-        half_width, half_height = (
-            records[splat, HALF_WIDTH],
-            records[splat, HALF_HEIGHT],
-        )
+        half_width, half_height = records[splat, HALF_WIDTH], records[splat, HALF_HEIGHT]
         top = int(np.ceil(max(y0 - half_height, _ZERO))) // TILE_HEIGHT
         bottom = int(np.floor(min(y0 + half_height, np.float32(height - 1)))) // TILE_HEIGHT
         left = int(np.ceil(max(x0 - half_width, _ZERO))) // TILE_WIDTH
@@ -119,10 +111,7 @@ def touched_tiles(records, width, height):  # type: ignore[no-untyped-def]
             tiles = longer
         is_box = top == bottom or left == right
         slope, falloff = records[splat, SLOPE], records[splat, ROW_FALLOFF]
-        reach, spread = (
-            records[splat, LOG_ALPHA] - _LOG_CUT,
-            _ONE / records[splat, COLUMN_FALLOFF],
-        )
+        reach, spread = records[splat, LOG_ALPHA] - _LOG_CUT, _ONE / records[splat, COLUMN_FALLOFF]
         tip = slope * half_height * half_height / half_width
         for row in range(top, bottom + 1):
             if not is_box:

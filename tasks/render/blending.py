@@ -6,7 +6,7 @@ a pixel closes before the splat that would bring its transmittance to 1e-4 or be
 Work goes by strips, one row of a tile, as wide as the widest vector register. For a batch of splats the
 strips that each one reaches are listed first; a second loop, free of unpredictable branches, blends them.
 All state of a tile lies in one flat array, so that the compiler can see that nothing overlaps. No
-fast-math flag is set: every operation rounds as IEEE 754 says, so any processor gives the same bits.
+fast-math flag is set: every operation of the kernels rounds as IEEE 754 says, whatever the processor.
 """
 
 from typing import NamedTuple
@@ -41,30 +41,19 @@ MAX_ALPHA, STOP = 0.999, 1e-4
 _BATCH = 64
 PIXELS = TILE_WIDTH * TILE_HEIGHT
 """Pixels of one tile [px]."""
-# Planes of a tile's state, one cache line apart from a power of two, which would evict one another.
+# Planes of a tile's state; the first is the transmittance in front of the next splat. One cache line more
+# than a power of two, lest they evict one another.
 # Offsets are unsigned: a signed index may be negative, and the compiler would gather pixel by pixel.
 _PLANE = PIXELS + 16
-_LIGHT, _CLASS, _ALPHA, _DEPTH, _RED, _GREEN, _BLUE, _NX, _NY, _NZ = (
-    np.uint64(k * _PLANE) for k in range(10)
-)
+_CLASS, _ALPHA, _DEPTH, _RED, _GREEN, _BLUE, _NX, _NY, _NZ = (np.uint64(k * _PLANE) for k in range(1, 10))
 _STATE = 10 * _PLANE
 
-_MAX_ALPHA, _STOP, _LOG_CUT = (
-    np.float32(MAX_ALPHA),
-    np.float32(STOP),
-    np.float32(LOG_CUT),
-)
+_MAX_ALPHA, _STOP, _LOG_CUT = np.float32(MAX_ALPHA), np.float32(STOP), np.float32(LOG_CUT)
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _RIGHT, _BOTTOM = np.float32(TILE_WIDTH - 1), np.float32(TILE_HEIGHT - 1)
-# Minimax fit of exp(x) on [-ln(255)/16, 0] with value 1 at 0; its 16th power is exp to 3.4e-6 relative.
+# Minimax fit of exp(x) on [-ln(255)/16, 0] with value 1 at 0; its 16th power is exp to 4e-6 relative.
 _E1, _E2, _E3, _E4 = (
-    np.float32(c)
-    for c in (
-        0.9999923298856865,
-        0.499785338077005,
-        0.1647944853931433,
-        0.03514230867353842,
-    )
+    np.float32(c) for c in (0.9999923298856865, 0.499785338077005, 0.1647944853931433, 0.03514230867353842)
 )
 _SIXTEENTH = np.float32(1 / 16)
 
@@ -80,7 +69,7 @@ class _Strips(NamedTuple):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _absorb(p, before):  # type: ignore[no-untyped-def]
+def absorb(p, before):  # type: ignore[no-untyped-def]
     """Blend weight of a splat with logarithmic opacity p, and the transmittance behind it.
 
     Once a pixel's transmittance is down at the stop it stays there, so no splat behind gets a weight.
@@ -155,10 +144,7 @@ def _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, str
             p = log_alpha - falloff * dy * dy
             middle = x0 + slope * dy
             half = np.sqrt(max(p - _LOG_CUT, _ZERO) * spread)
-            left, right = (
-                np.ceil(max(middle - half, _ZERO)),
-                np.floor(min(middle + half, _RIGHT)),
-            )
+            left, right = np.ceil(max(middle - half, _ZERO)), np.floor(min(middle + half, _RIGHT))
             strips.entry[listed] = start + i
             strips.pixel[listed] = y * TILE_WIDTH
             strips.middle[listed] = middle
@@ -172,23 +158,15 @@ def _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, str
 def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untyped-def]
     for i in range(listed):
         splat, first = np.uint64(splats[strips.entry[i]]), np.uint64(strips.pixel[i])
-        middle, log_alpha, falloff = (
-            strips.middle[i],
-            strips.log_alpha[i],
-            records[splat, COLUMN_FALLOFF],
-        )
+        middle, log_alpha, falloff = strips.middle[i], strips.log_alpha[i], records[splat, COLUMN_FALLOFF]
         z, label = records[splat, DEPTH], records[splat, CLASS]
         r, g, b = records[splat, RED], records[splat, GREEN], records[splat, BLUE]
-        nx, ny, nz = (
-            records[splat, NORMAL_X],
-            records[splat, NORMAL_Y],
-            records[splat, NORMAL_Z],
-        )
+        nx, ny, nz = records[splat, NORMAL_X], records[splat, NORMAL_Y], records[splat, NORMAL_Z]
         for x in range(TILE_WIDTH):
             l = first + np.uint64(x)
             dx = np.float32(x) - middle
             before = s[l]
-            w, after = _absorb(log_alpha - falloff * dx * dx, before)
+            w, after = absorb(log_alpha - falloff * dx * dx, before)
             s[l] = after
             s[_CLASS + l] += label if (before >= _HALF) & (after < _HALF) else _ZERO
             s[_ALPHA + l] += w
@@ -214,17 +192,10 @@ def blend(records, starts, splats, rgb, depth, alpha, normal, class_id):  # type
     height, width = alpha.shape
     across = -(-width // TILE_WIDTH)
     s = np.empty(_STATE, dtype=np.float32)
-    is_open, rows, strips = (
-        np.empty(TILE_HEIGHT, np.bool_),
-        np.empty((_BATCH, 2), np.int64),
-        _new_strips(),
-    )
+    is_open, rows, strips = np.empty(TILE_HEIGHT, np.bool_), np.empty((_BATCH, 2), np.int64), _new_strips()
     for tile in range(len(starts) - 1):
         x_tile, y_tile = (tile % across) * TILE_WIDTH, (tile // across) * TILE_HEIGHT
-        row_count, column_count = (
-            min(TILE_HEIGHT, height - y_tile),
-            min(TILE_WIDTH, width - x_tile),
-        )
+        row_count, column_count = min(TILE_HEIGHT, height - y_tile), min(TILE_WIDTH, width - x_tile)
         _open_tile(s, row_count, column_count)
         start, last = starts[tile], starts[tile + 1]
         while start < last and _find_open_rows(s, is_open) > 0:
@@ -241,16 +212,8 @@ def blend(records, starts, splats, rgb, depth, alpha, normal, class_id):  # type
                 scale = _ONE / length if length > _ZERO else _ZERO
                 alpha[i, j] = s[_ALPHA + l]
                 depth[i, j] = s[_DEPTH + l] / s[_ALPHA + l]  # NaN where no splat contributes
-                rgb[i, j, 0], rgb[i, j, 1], rgb[i, j, 2] = (
-                    s[_RED + l],
-                    s[_GREEN + l],
-                    s[_BLUE + l],
-                )
-                normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = (
-                    nx * scale,
-                    ny * scale,
-                    nz * scale,
-                )
+                rgb[i, j, 0], rgb[i, j, 1], rgb[i, j, 2] = s[_RED + l], s[_GREEN + l], s[_BLUE + l]
+                normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = nx * scale, ny * scale, nz * scale
                 class_id[i, j] = np.uint8(s[_CLASS + l])
 
 
@@ -269,17 +232,10 @@ def blend_transposed(records, starts, splats, residual, sums):  # type: ignore[n
     across = -(-width // TILE_WIDTH)
     s = np.empty((1 + channels) * _PLANE, dtype=np.float32)
     weights = np.empty(TILE_WIDTH, dtype=np.float32)
-    is_open, rows, strips = (
-        np.empty(TILE_HEIGHT, np.bool_),
-        np.empty((_BATCH, 2), np.int64),
-        _new_strips(),
-    )
+    is_open, rows, strips = np.empty(TILE_HEIGHT, np.bool_), np.empty((_BATCH, 2), np.int64), _new_strips()
     for tile in range(len(starts) - 1):
         x_tile, y_tile = (tile % across) * TILE_WIDTH, (tile // across) * TILE_HEIGHT
-        row_count, column_count = (
-            min(TILE_HEIGHT, height - y_tile),
-            min(TILE_WIDTH, width - x_tile),
-        )
+        row_count, column_count = min(TILE_HEIGHT, height - y_tile), min(TILE_WIDTH, width - x_tile)
         _open_tile(s, row_count, column_count)
         for c in range(channels):
             for y in range(row_count):
@@ -297,15 +253,11 @@ def blend_transposed(records, starts, splats, residual, sums):  # type: ignore[n
 def _gather_strips(s, records, splats, listed, strips, weights, sums):  # type: ignore[no-untyped-def]
     for i in range(listed):
         splat, first = np.uint64(splats[strips.entry[i]]), np.uint64(strips.pixel[i])
-        middle, log_alpha, falloff = (
-            strips.middle[i],
-            strips.log_alpha[i],
-            records[splat, COLUMN_FALLOFF],
-        )
+        middle, log_alpha, falloff = strips.middle[i], strips.log_alpha[i], records[splat, COLUMN_FALLOFF]
         for x in range(TILE_WIDTH):
             l = first + np.uint64(x)
             dx = np.float32(x) - middle
-            weights[x], s[l] = _absorb(log_alpha - falloff * dx * dx, s[l])
+            weights[x], s[l] = absorb(log_alpha - falloff * dx * dx, s[l])
         for c in range(sums.shape[1]):
             plane = np.uint64((1 + c) * _PLANE) + first
             # Four running sums, which do not wait for one another.

@@ -128,11 +128,7 @@ def prepare(gaussians: Gaussians) -> PreparedGaussians:
     members.ravel()[:n] = order
     members.ravel()[n:] = order[-1:]
     blocks = np.empty((block_count, SH + 3 * gaussians.sh.shape[1], BLOCK), dtype=np.float32)
-    origins, radii, reach = (
-        np.empty((block_count, 3)),
-        np.empty(block_count),
-        np.empty(block_count),
-    )
+    origins, radii, reach = np.empty((block_count, 3)), np.empty(block_count), np.empty(block_count)
     for first in range(0, block_count, _BLOCKS_AT_ONCE):
         part = slice(first, first + _BLOCKS_AT_ONCE)
         origins[part], radii[part], reach[part] = _pack(gaussians, members[part], blocks[part])
@@ -165,8 +161,4 @@ def _pack(
     blocks[:, LOG_OPACITY] = np.log(gaussians.opacities[members].astype(np.float64))
     blocks[:, NORMAL:SH] = gaussians.normals[members].transpose(0, 2, 1)
     blocks[:, SH:] = gaussians.sh[members].reshape(count, BLOCK, -1).transpose(0, 2, 1)
-    return (
-        origins,
-        np.sqrt((offsets**2).sum(axis=2)).max(axis=1),
-        scales.max(axis=(1, 2)),
-    )
+    return origins, np.sqrt((offsets**2).sum(axis=2)).max(axis=1), scales.max(axis=(1, 2))

@@ -13,15 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.preparation import (
-    AXES,
-    BLOCK,
-    LOG_OPACITY,
-    NORMAL,
-    OFFSET,
-    SH,
-    PreparedGaussians,
-)
+from tasks.render.preparation import AXES, BLOCK, LOG_OPACITY, NORMAL, OFFSET, SH, PreparedGaussians
 from tasks.render.spherical_harmonics import shade_lanes
 from tasks.render.view import View
 
@@ -39,6 +31,7 @@ RECORD = 16
 
 _LOW_PASS, _LOW_PASS_DET = np.float32(LOW_PASS), np.float32(LOW_PASS**2)
 _NEAR, _LOG_CUT = np.float32(NEAR), np.float32(LOG_CUT)
+_LARGEST_DET = np.float32(1e37)
 _ZERO, _HALF, _ONE, _TWO = (np.float32(c) for c in (0, 0.5, 1, 2))
 
 # A block's geometry and the records made from it, plane after plane in one flat scratch array: with offsets
@@ -57,10 +50,7 @@ def visible_blocks(prepared: PreparedGaussians, view: View) -> NDArray[np.int64]
     extent = np.sqrt(-2 * LOG_CUT)
     blur = extent * np.sqrt(LOW_PASS) + 1.0
     limits = view.ray_limits
-    for p, f, c, size, ray in (
-        (x, 0, 0, view.width, limits[:2]),
-        (y, 1, 1, view.height, limits[2:]),
-    ):
+    for p, f, c, size, ray in ((x, 0, 0, view.width, limits[:2]), (y, 1, 1, view.height, limits[2:])):
         focal, centre = view.K[f, f], view.K[c, 2]
         inflation = extent * prepared.reach * focal * np.sqrt(1 + (ray**2).max())
         for sign, edge in ((1.0, size - centre + blur), (-1.0, centre + blur)):
@@ -85,8 +75,7 @@ def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32
     wanted = visible_blocks(prepared, view)
     rotation = view.viewmat[:3, :3].astype(np.float32)
     lens = np.array(
-        (view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2], *view.ray_limits),
-        dtype=np.float32,
+        (view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2], *view.ray_limits), dtype=np.float32
     )
     from_eye = prepared.origins[wanted] - view.eye
     room = np.empty((len(wanted) * BLOCK + 1) * RECORD, dtype=np.float32)
@@ -95,30 +84,17 @@ def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32
     slots = np.empty(len(records), dtype=np.int64)
     count = _project_blocks(
         prepared.blocks, prepared.class_id, wanted, view.to_camera(prepared.origins[wanted]).astype(np.float32),
-        from_eye.astype(np.float32), rotation, lens, np.float32(view.width), np.float32(view.height), records, slots,
+        from_eye.astype(np.float32), rotation, lens, np.float32(view.width), np.float32(view.height), records, slots
     )  # fmt: skip
     return records[:count], slots[:count]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _project_blocks(  # type: ignore[no-untyped-def]
-    blocks,
-    class_id,
-    wanted,
-    in_camera,
-    from_eye,
-    rotation,
-    lens,
-    width,
-    height,
-    records,
-    slots,
+    blocks, class_id, wanted, in_camera, from_eye, rotation, lens, width, height, records, slots
 ):
     s = np.empty((SH + RECORD) * BLOCK, dtype=np.float32)
-    directions, colours = (
-        np.empty(3 * BLOCK, dtype=np.float32),
-        s[_RECORD + RED * BLOCK :],
-    )
+    directions, colours = np.empty(3 * BLOCK, dtype=np.float32), s[_RECORD + RED * BLOCK :]
     visible = np.empty(BLOCK, dtype=np.bool_)
     written = 0
     for i in range(len(wanted)):
@@ -149,11 +125,7 @@ def _project_lanes(s, origin, rotation, lens, width, height, visible):  # type: 
     fx, fy, cx, cy, x_low, x_high, y_low, y_high = lens
     ox, oy, oz = origin
     for l in range(BLOCK):
-        dx, dy, dz = (
-            s[OFFSET * BLOCK + l],
-            s[(OFFSET + 1) * BLOCK + l],
-            s[(OFFSET + 2) * BLOCK + l],
-        )
+        dx, dy, dz = s[OFFSET * BLOCK + l], s[(OFFSET + 1) * BLOCK + l], s[(OFFSET + 2) * BLOCK + l]
         x = r00 * dx + r01 * dy + r02 * dz + ox
         y = r10 * dx + r11 * dy + r12 * dz + oy
         z = r20 * dx + r21 * dy + r22 * dz + oz
@@ -163,27 +135,15 @@ def _project_lanes(s, origin, rotation, lens, width, height, visible):  # type: 
         focal_x, focal_y = fx * inverse, fy * inverse
 
         # Rows of M = J R A, where A's columns are the scaled axes.
-        ax, ay, az = (
-            s[AXES * BLOCK + l],
-            s[(AXES + 1) * BLOCK + l],
-            s[(AXES + 2) * BLOCK + l],
-        )
+        ax, ay, az = s[AXES * BLOCK + l], s[(AXES + 1) * BLOCK + l], s[(AXES + 2) * BLOCK + l]
         w = r20 * ax + r21 * ay + r22 * az
         p0 = focal_x * (r00 * ax + r01 * ay + r02 * az - jx * w)
         q0 = focal_y * (r10 * ax + r11 * ay + r12 * az - jy * w)
-        ax, ay, az = (
-            s[(AXES + 3) * BLOCK + l],
-            s[(AXES + 4) * BLOCK + l],
-            s[(AXES + 5) * BLOCK + l],
-        )
+        ax, ay, az = s[(AXES + 3) * BLOCK + l], s[(AXES + 4) * BLOCK + l], s[(AXES + 5) * BLOCK + l]
         w = r20 * ax + r21 * ay + r22 * az
         p1 = focal_x * (r00 * ax + r01 * ay + r02 * az - jx * w)
         q1 = focal_y * (r10 * ax + r11 * ay + r12 * az - jy * w)
-        ax, ay, az = (
-            s[(AXES + 6) * BLOCK + l],
-            s[(AXES + 7) * BLOCK + l],
-            s[(AXES + 8) * BLOCK + l],
-        )
+        ax, ay, az = s[(AXES + 6) * BLOCK + l], s[(AXES + 7) * BLOCK + l], s[(AXES + 8) * BLOCK + l]
         w = r20 * ax + r21 * ay + r22 * az
         p2 = focal_x * (r00 * ax + r01 * ay + r02 * az - jx * w)
         q2 = focal_y * (r10 * ax + r11 * ay + r12 * az - jy * w)
@@ -207,15 +167,12 @@ def _project_lanes(s, origin, rotation, lens, width, height, visible):  # type: 
         s[_RECORD + HALF_WIDTH * BLOCK + l] = half_width
         s[_RECORD + HALF_HEIGHT * BLOCK + l] = half_height
         s[_RECORD + DEPTH * BLOCK + l] = z
-        # Whether the splat's box holds a pixel centre of the picture.
+        # Whether the splat's box holds a pixel centre of the picture, and single precision can hold the splat.
         left, right = np.ceil(u - half_width - _HALF), np.floor(u + half_width - _HALF)
-        top, bottom = (
-            np.ceil(v - half_height - _HALF),
-            np.floor(v + half_height - _HALF),
-        )
+        top, bottom = np.ceil(v - half_height - _HALF), np.floor(v + half_height - _HALF)
         across = max(left, _ZERO) <= min(right, width - _ONE)
         down = max(top, _ZERO) <= min(bottom, height - _ONE)
-        visible[l] = across & down & (z >= _NEAR) & (reach > _ZERO)
+        visible[l] = across & down & (z >= _NEAR) & (reach > _ZERO) & (det < _LARGEST_DET)
     count = 0
     for l in range(BLOCK):
         count += visible[l]
@@ -230,15 +187,11 @@ def _face_camera(s, from_eye, directions):  # type: ignore[no-untyped-def]
         x = s[OFFSET * BLOCK + l] + ox
         y = s[(OFFSET + 1) * BLOCK + l] + oy
         z = s[(OFFSET + 2) * BLOCK + l] + oz
-        nx, ny, nz = (
-            s[NORMAL * BLOCK + l],
-            s[(NORMAL + 1) * BLOCK + l],
-            s[(NORMAL + 2) * BLOCK + l],
-        )
+        nx, ny, nz = s[NORMAL * BLOCK + l], s[(NORMAL + 1) * BLOCK + l], s[(NORMAL + 2) * BLOCK + l]
         inverse = _ONE / np.sqrt(x * x + y * y + z * z)
         sign = -_ONE if nx * x + ny * y + nz * z > _ZERO else _ONE
-        directions[0 * BLOCK + l] = x * inverse
-        directions[1 * BLOCK + l] = y * inverse
+        directions[l] = x * inverse
+        directions[BLOCK + l] = y * inverse
         directions[2 * BLOCK + l] = z * inverse
         s[_RECORD + NORMAL_X * BLOCK + l] = sign * nx
         s[_RECORD + NORMAL_Y * BLOCK + l] = sign * ny

@@ -51,6 +51,6 @@ def rasterise(
     )
     blend(
         records, starts, splats,
-        buffers.rgb, buffers.depth, buffers.alpha, buffers.normal, buffers.class_id,
+        buffers.rgb, buffers.depth, buffers.alpha, buffers.normal, buffers.class_id
     )  # fmt: skip
     return buffers

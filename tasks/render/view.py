@@ -66,8 +66,5 @@ def view_of(viewmat: NDArray[np.floating], K: NDArray[np.floating], width: int, 
     if problems:
         raise InputError(problems)
     return View(
-        viewmat=viewmat.astype(np.float64),
-        K=K.astype(np.float64),
-        width=int(width),
-        height=int(height),
+        viewmat=viewmat.astype(np.float64), K=K.astype(np.float64), width=int(width), height=int(height)
     )

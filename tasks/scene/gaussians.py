@@ -60,8 +60,8 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
     if problems:
         raise InputError(problems)
     for name in ("means", "quats_wxyz", "scales", "opacities", "sh", "normals"):
-        values = getattr(gaussians, name).reshape(n, -1)
-        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+        finite = np.isfinite(getattr(gaussians, name))
+        bad = np.flatnonzero(~finite.all(axis=tuple(range(1, finite.ndim))))
         if len(bad):
             problems.append(
                 f"{place}: {name} must be finite; {len(bad)} of {n} Gaussians are not, the first is number {bad[0]}"

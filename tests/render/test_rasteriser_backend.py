@@ -1,0 +1,84 @@
+"""Which rasteriser is taken, and that gsplat's picture is the CPU's."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tasks.errors import InputError
+from tasks.render import backend
+from tasks.render.backend import CpuBackend, probe, select_backend
+from tasks.render.gbuffer import GBuffer
+from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
+
+
+def test_cpu_backend_passes_its_own_probe() -> None:
+    assert select_backend("cpu").name == "cpu"
+    assert probe(CpuBackend()) == ""
+
+
+def test_probe_names_what_a_wrong_backend_draws_wrong() -> None:
+    class Mirrored(CpuBackend):
+        @staticmethod
+        def rasterise(prepared: Any, viewmat: NDArray, K: NDArray, width: int, height: int) -> GBuffer:
+            drawn = CpuBackend.rasterise(prepared, viewmat, K, width, height)
+            return replace(drawn, rgb=drawn.rgb[:, ::-1], class_id=np.roll(drawn.class_id, 5))
+
+    problem = probe(Mirrored())
+    assert "rgb differs" in problem and "class differs" in problem and "depth" not in problem
+
+
+def test_auto_without_a_gpu_is_the_cpu_and_does_not_import_torch() -> None:
+    code = (
+        "import sys; from pathlib import Path; from tasks.render import backend;"
+        "backend._GPU_DEVICES = (Path('/nowhere/gpu'),);"
+        "print(backend.select_backend('auto').name, 'torch' in sys.modules)"
+    )
+    done = subprocess.run((sys.executable, "-c", code), capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["cpu", "False"]
+
+
+def test_auto_falls_back_to_the_cpu_where_gsplat_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(backend, "_GPU_DEVICES", (Path(__file__),))
+    monkeypatch.setattr(backend, "probe", lambda _: "rgb differs by up to 1 from the CPU's")
+    assert select_backend("auto").name == "cpu"
+    with pytest.raises(InputError, match="gsplat cannot be used here"):
+        select_backend("gsplat")
+
+
+def test_an_unknown_backend_lists_those_that_exist() -> None:
+    with pytest.raises(InputError, match="must be one of auto, cpu, gsplat; it is 'cuda'"):
+        select_backend("cuda")
+
+
+def test_gsplats_class_is_found_where_light_falls_below_one_half() -> None:
+    pytest.importorskip("gsplat", reason="gsplat is not installed")
+    import torch
+
+    from tasks.render.gsplat_backend import first_below_half
+
+    alpha = torch.tensor([0.3, 0.2, 0.9, 0.6, 0.9, 0.2, 0.2, 0.5, 0.1])
+    pixel = torch.tensor([0, 0, 0, 3, 3, 4, 4, 6, 6])
+    wanted = [False, False, True, True, False, False, False, False, True]
+    assert first_below_half(alpha, pixel).tolist() == wanted
+
+
+@pytest.mark.gpu
+def test_gsplat_draws_the_cpus_picture() -> None:
+    if not any(device.exists() for device in backend._GPU_DEVICES):
+        pytest.skip("no CUDA device here")
+    pytest.importorskip("gsplat", reason="gsplat is not installed; it comes with the gpu extra")
+    gpu, cpu = select_backend("gsplat"), CpuBackend()
+    for seed, sh_count in ((0, 16), (1, 4), (2, 1)):
+        gaussians, viewmat = random_cloud(1500, sh_count, seed), camera_at((0.1, 0.2, 0), rotation(seed))
+        got = gpu.rasterise(gpu.prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
+        wanted = cpu.rasterise(cpu.prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
+        assert np.mean((got.rgb - wanted.rgb) ** 2) < 1e-6
+        assert np.mean((got.alpha - wanted.alpha) ** 2) < 1e-6
+        assert np.nanmean(np.abs(got.depth / wanted.depth - 1)) < 1e-3
+        assert np.mean(got.class_id != wanted.class_id) < 0.01
