@@ -1,0 +1,264 @@
+"""One run as evidence: derivatives, nuisances and smooth disturbances, marginalised linearly.
+
+residual = A theta + S session + J d + noise, with d the run's own offsets and disturbances under a Gaussian
+prior. Integrating d out leaves inner products x' L y with L = I - J (J'J + P)^-1 J', one small Gram matrix a
+run, so that screening, bootstrap and leave-one-run-out are sums of small matrices (Woodbury, Schur).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from tasks.closure.campaign import CHANNELS, SESSION, Tolerances
+from tasks.closure.forward import RunModel, Slot, instruments, roll
+from tasks.closure.noise import whiten
+from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
+
+SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
+DISTURBED = ("longitudinal_force", "friction", "pitch_moment")
+KNOT_SPACING = (0.15, 0.25, 0.1)
+"""Spacing of the disturbance's knots at each port: finer than any disturbance seen in brake tests [s]."""
+KNOT_STEP = (30.0, 0.01, 30.0)
+N_OFFSETS = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbance:
+    """Scale and correlation time of the smooth disturbances, in the order of `DISTURBED`.
+
+    Parameters
+    ----------
+    scale : standard deviations [N, 1, N m]
+    time : correlation times [s]
+    """
+
+    scale: tuple[float, float, float] = (60.0, 0.01, 60.0)
+    time: tuple[float, float, float] = (1.0, 0.25, 0.2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunEvidence:
+    """Whitened derivatives of one run about a base point.
+
+    Parameters
+    ----------
+    model : the run
+    rho, sigma : noise of its channels
+    nuisance : float64 [M, D] derivatives by the run's offsets and disturbance knots
+    knots : number of knots at each disturbed port
+    information : float64 [D, D] nuisance' nuisance
+    session : float64 [M, 7] derivatives by the session's nuisances
+    library : float64 [M, E] derivatives by the first parameter of every library effect
+    factor : Cholesky factor (lower) of information + prior precision
+    session_q : float64 [D, 7] factor^-1 nuisance' session
+    """
+
+    model: RunModel
+    rho: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    nuisance: NDArray[np.float64]
+    knots: tuple[int, ...]
+    information: NDArray[np.float64]
+    session: NDArray[np.float64]
+    library: NDArray[np.float64]
+    factor: NDArray[np.float64]
+    session_q: NDArray[np.float64]
+
+    def residual(
+        self,
+        theta: NDArray[np.float64],
+        slots: tuple[Slot, ...] = (),
+        offsets: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Whitened measured-minus-model at ``theta`` (full vector), float64 [M].
+
+        With ``offsets`` (float64 [D]) the model is simulated with this run's own offsets and disturbances and
+        their linear part is put back: the same residual to first order, but right where the run is not linear
+        in them, as on a road feature that is reached a moment later.
+        """
+        if offsets is None:
+            out, _ = roll(self.model, theta, slots=slots)
+            return whiten(self.model.measured - instruments(self.model, theta, out), self.rho, self.sigma)
+        moved = theta.copy()
+        moved[PARAMETER_INDEX["friction"]] += offsets[1]
+        at = N_OFFSETS
+        for port, count, spacing in zip(DISTURBED, self.knots, KNOT_SPACING, strict=True):
+            slots += (Slot(port=port, variable="time", origin=0.0, spacing=spacing, values=offsets[at : at + count]),)
+            at += count
+        out, _ = roll(self.model, moved, slots=slots, initial_speed=self.model.initial_speed + offsets[0])
+        y = instruments(self.model, moved, out)
+        y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
+        y[:, CHANNELS.index("pitch")] += offsets[3]
+        return whiten(self.model.measured - y, self.rho, self.sigma) + self.nuisance @ offsets
+
+    def offsets(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Posterior mean of the run's offsets and disturbance knots given a whitened residual, float64 [D]."""
+        return solve_triangular(self.factor, self.project(residual), lower=True, trans="T", check_finite=False)
+
+    def project(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """factor^-1 nuisance' x: what the nuisances can take from x."""
+        return solve_triangular(self.factor, self.nuisance.T @ x, lower=True, check_finite=False)
+
+
+def run_evidence(
+    model: RunModel,
+    rho: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    base: NDArray[np.float64],
+    effects: tuple[Effect, ...],
+    tolerances: Tolerances,
+    disturbance: Disturbance,
+) -> RunEvidence:
+    """Simulate a run and its derivatives.
+
+    Parameters
+    ----------
+    model : the run
+    rho, sigma : channel noise
+    base : float64 full parameter vector to differentiate at
+    effects : the library
+    tolerances : priors of the run's offsets
+    disturbance : prior of the disturbances
+    """
+    out, states = roll(model, base)
+    y = instruments(model, base, out)
+
+    def slope(theta: NDArray[np.float64], step: float, **options: object) -> NDArray[np.float64]:
+        moved, _ = roll(model, theta, **options)  # type: ignore[arg-type]
+        return (instruments(model, theta, moved) - y) / step
+
+    columns = [
+        slope(base, 0.02, initial_speed=model.initial_speed + 0.02),
+        slope(_moved(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
+    ]
+    for name in ("longitudinal_acceleration", "pitch"):
+        offset = np.zeros_like(y)
+        offset[:, CHANNELS.index(name)] = 1.0
+        columns.append(offset)
+    knots = []
+    dt = model.run.interval
+    for port, spacing, step in zip(DISTURBED, KNOT_SPACING, KNOT_STEP, strict=True):
+        count = int(np.ceil(model.samples * dt / spacing)) + 1
+        knots.append(count)
+        for k in range(count):
+            first = min(max(int((k - 1) * spacing / dt), 0), model.samples - 1)
+            slot = Slot(
+                port=port, variable="time", origin=(k - 1) * spacing, spacing=spacing, values=np.array([0.0, step, 0.0])
+            )
+            columns.append(slope(base, step, slots=(slot,), start=(first, states, out)))
+    session = [slope(_moved(base, i, 0.5 * s), 0.5 * s) for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)]
+    library = []
+    for effect in effects:
+        theta = base.copy()
+        for parameter in effect.parameters[1:]:
+            theta[parameter.index] = parameter.start
+        first_parameter = effect.parameters[0]
+        library.append(slope(_moved(theta, first_parameter.index, first_parameter.step), first_parameter.step))
+    nuisance = whiten(np.stack(columns, axis=-1), rho, sigma)
+    evidence = RunEvidence(
+        model=model,
+        rho=rho,
+        sigma=sigma,
+        nuisance=nuisance,
+        knots=tuple(knots),
+        information=nuisance.T @ nuisance,
+        session=whiten(np.stack(session, axis=-1), rho, sigma),
+        library=whiten(np.stack(library, axis=-1), rho, sigma),
+        factor=np.empty(0),
+        session_q=np.empty(0),
+    )
+    return with_disturbance(evidence, tolerances, disturbance)
+
+
+def with_disturbance(evidence: RunEvidence, tolerances: Tolerances, disturbance: Disturbance) -> RunEvidence:
+    """The same run under another prior of the disturbances."""
+    precision = prior_precision(evidence.knots, tolerances, disturbance)[0]
+    factor = cholesky(evidence.information + precision, lower=True, check_finite=False)
+    changed = replace(evidence, factor=factor)
+    return replace(changed, session_q=changed.project(changed.session))
+
+
+def prior_precision(
+    knots: tuple[int, ...], tolerances: Tolerances, disturbance: Disturbance
+) -> tuple[NDArray[np.float64], float]:
+    """Precision of a run's offsets and knots (first-order Gauss-Markov processes) and its log determinant."""
+    size = N_OFFSETS + sum(knots)
+    precision = np.zeros((size, size))
+    sigmas = (tolerances.initial_speed, tolerances.friction, tolerances.acceleration_bias, tolerances.pitch_offset)
+    precision[np.arange(N_OFFSETS), np.arange(N_OFFSETS)] = 1.0 / np.square(sigmas)
+    log_det = -2.0 * float(np.sum(np.log(sigmas)))
+    at = N_OFFSETS
+    for count, spacing, scale, time in zip(knots, KNOT_SPACING, disturbance.scale, disturbance.time, strict=True):
+        r = np.exp(-spacing / time)
+        block = np.zeros((count, count))
+        i = np.arange(count)
+        block[i, i] = 1.0 + r**2
+        block[0, 0] = block[-1, -1] = 1.0
+        block[i[:-1], i[1:]] = block[i[1:], i[:-1]] = -r
+        precision[at : at + count, at : at + count] = block / (scale**2 * (1.0 - r**2))
+        log_det -= 2.0 * count * np.log(scale) + (count - 1) * np.log(1.0 - r**2)
+        at += count
+    return precision, log_det
+
+
+def fit_disturbance(
+    evidence: tuple[RunEvidence, ...],
+    residuals: list[NDArray[np.float64]],
+    tolerances: Tolerances,
+    effects: tuple[Effect, ...],
+    start: Disturbance,
+) -> Disturbance:
+    """Scales and times by marginal likelihood, with every physical library direction free so that no effect inflates them.
+
+    Parameters
+    ----------
+    evidence : training runs
+    residuals : whitened residual of each run at the base point, float64 [M]
+    tolerances : session priors
+    effects : the library, whose steps set broad priors
+    start : first guess
+    """
+    physical = [j for j, e in enumerate(effects) if e.effect_class == "effect"]
+    broad = [(30.0 * effects[j].parameters[0].step) ** -2 for j in physical]
+    prior = np.concatenate((1.0 / np.square(tolerances.session), broad))
+    blocks = []
+    for run, r in zip(evidence, residuals, strict=True):
+        b = np.column_stack((r, run.session, run.library[:, physical]))
+        blocks.append((b.T @ b, run.nuisance.T @ b))
+
+    def cost(trial: Disturbance) -> float:
+        total = np.zeros_like(blocks[0][0])
+        value = 0.0
+        for run, (gram, cross) in zip(evidence, blocks, strict=True):
+            precision, log_det = prior_precision(run.knots, tolerances, trial)
+            factor = cholesky(run.information + precision, lower=True, check_finite=False)
+            q = solve_triangular(factor, cross, lower=True, check_finite=False)
+            total += gram - q.T @ q
+            value += 2.0 * float(np.sum(np.log(np.diag(factor)))) - log_det
+        inner = cholesky(total[1:, 1:] + np.diag(prior), lower=True, check_finite=False)
+        q = solve_triangular(inner, total[1:, 0], lower=True, check_finite=False)
+        return value + float(total[0, 0] - q @ q) + 2.0 * float(np.sum(np.log(np.diag(inner))))
+
+    best, lowest = start, cost(start)
+    for factor in (2.0, 1.4):
+        for field in ("scale", "time"):
+            for port in range(3):
+                for direction in (factor, 1.0 / factor):
+                    improved = True
+                    while improved:
+                        values = list(getattr(best, field))
+                        values[port] *= direction
+                        trial = replace(best, **{field: tuple(values)})
+                        value = cost(trial) if 0.15 <= trial.time[port] <= 6.0 else np.inf
+                        improved = value < lowest - 0.5
+                        if improved:
+                            best, lowest = trial, value
+    return best
+
+
+def _moved(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
+    moved = theta.copy()
+    moved[index] += step
+    return moved
