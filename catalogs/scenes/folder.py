@@ -18,6 +18,7 @@ from tasks.scene.scene import Scene
 SCENE_FORMAT = "musync-scene/1"
 GAUSSIAN_ARRAYS = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
 SCENE_ARRAYS = (*GAUSSIAN_ARRAYS, "station", "T_world_rig", "environment")
+ARRAY_FILES = tuple(f"{name}.npy" for name in SCENE_ARRAYS)
 
 
 def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
@@ -51,7 +52,7 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
             "display_encoded": scene.gaussians.display_encoded,
             "carriageway_left": scene.carriageway_left,
             "carriageway_right": scene.carriageway_right,
-            "sha256": {f"{name}.npy": _file_hash(partial / f"{name}.npy") for name in SCENE_ARRAYS},
+            "sha256": {name: _file_hash(partial / name) for name in ARRAY_FILES},
         }
         (partial / "scene.json").write_text(json.dumps(content | facts, indent=1, sort_keys=True) + "\n")
         if folder.exists():
@@ -88,6 +89,12 @@ def read_scene(folder: Path) -> Scene:
         arrays = {name: np.load(folder / f"{name}.npy", allow_pickle=False) for name in SCENE_ARRAYS}
     except (OSError, ValueError) as error:
         raise InputError(f"{folder}: {error}") from None
+    sky = arrays["environment"]
+    if sky.ndim != 3 or sky.shape[2] != 3 or not sky.size or not np.isfinite(sky).all():
+        raise InputError(
+            f"{folder / 'environment.npy'}: must be a picture [H, W, 3] of finite numbers;"
+            f" its shape is {sky.shape}"
+        )
     gaussians = Gaussians(
         **{name: arrays[name] for name in GAUSSIAN_ARRAYS}, display_encoded=content["display_encoded"]
     )
@@ -131,6 +138,21 @@ def _read_facts(folder: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("format") != SCENE_FORMAT:
         found = content.get("format") if isinstance(content, dict) else content
         raise InputError(f"{path}: the scene must be of format {SCENE_FORMAT}; it is {found!r}")
+    hashes = content.get("sha256")
+    left, right = content.get("carriageway_left"), content.get("carriageway_right")
+    rules = {
+        "name must be a text": isinstance(content.get("name"), str),
+        "display_encoded must be true or false": isinstance(content.get("display_encoded"), bool),
+        "carriageway_left and carriageway_right must be numbers [m], positive and negative": (
+            isinstance(left, int | float) and isinstance(right, int | float) and right < 0 < left
+        ),
+        f"sha256 must name {', '.join(ARRAY_FILES)}": (
+            isinstance(hashes, dict) and set(hashes) == set(ARRAY_FILES)
+        ),
+    }
+    problems = [f"{path}: {rule}; it is not so" for rule, kept in rules.items() if not kept]
+    if problems:
+        raise InputError(problems)
     return content
 
 

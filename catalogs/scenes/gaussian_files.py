@@ -1,9 +1,11 @@
 """Gaussians trained elsewhere: .ply (INRIA), compressed .ply, .splat and .spz.
 
-gsply reads the .ply forms; GaussForge turns the others into .ply first.
+gsply reads the .ply forms and .spz; GaussForge turns .splat into .ply first.
 """
 
+import struct
 import tempfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,9 @@ import gaussforge
 import gsply
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit
+from scipy.special import expit, logit
 
+from catalogs.scenes.ply_header import check_ply
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians, check_gaussians
@@ -46,10 +49,9 @@ def read_gaussians(path: Path) -> Gaussians:
     if n == 0:
         raise InputError(f"{path}: must hold at least one Gaussian; it holds none")
     norms = np.linalg.norm(data.quats, axis=1, keepdims=True)
+    empty = norms == 0
     with np.errstate(invalid="ignore", over="ignore"):
-        quats = np.where(norms > 0, data.quats / np.where(norms > 0, norms, 1), [1, 0, 0, 0]).astype(
-            np.float32
-        )
+        quats = np.where(empty, [1, 0, 0, 0], data.quats / np.where(empty, 1, norms)).astype(np.float32)
         scales = np.exp(data.scales)
     rest = np.empty((n, 0, 3), np.float32) if data.shN is None else data.shN.reshape(n, -1, 3)
     gaussians = Gaussians(
@@ -86,27 +88,46 @@ def shortest_axis(quats_wxyz: NDArray[np.float32], scales: NDArray[np.float32]) 
     return axes[np.arange(len(scales)), np.argmin(scales, axis=1)].astype(np.float32)
 
 
+def write_gaussians(gaussians: Gaussians, path: Path) -> None:
+    """Write a cloud as an INRIA-layout .ply; normals and classes have no place there.
+
+    Parameters
+    ----------
+    gaussians : the cloud; viewers take its colours as display-encoded [m]
+    path : a file ending in .ply
+    """
+    opacity = np.clip(gaussians.opacities.astype(np.float64), SMALLEST_OPACITY, 1 - SMALLEST_OPACITY)
+    gsply.plywrite(
+        path,
+        gaussians.means,
+        np.log(gaussians.scales),
+        gaussians.quats_wxyz,
+        logit(opacity).astype(np.float32),
+        np.ascontiguousarray(gaussians.sh[:, 0]),
+        np.ascontiguousarray(gaussians.sh[:, 1:]) if gaussians.sh.shape[1] > 1 else None,
+    )
+
+
 def _decoded(path: Path, form: str) -> Any:
     """The file as gsply's arrays: logarithmic scales, logit opacities, SH by coefficient."""
-    if form.endswith("ply"):
-        return _read_ply(path, path, form)
-    answer = gaussforge.GaussForge().convert(path.read_bytes(), form, "ply")
-    if "error" in answer:
-        raise _broken(path, form)
-    with tempfile.NamedTemporaryFile(suffix=".ply") as plain:
-        plain.write(answer["data"])
-        plain.flush()
-        return _read_ply(Path(plain.name), path, form)
-
-
-def _read_ply(plain: Path, path: Path, form: str) -> Any:
     try:
-        return gsply.plyread(plain)
-    except (ValueError, OSError, IndexError, KeyError):
-        raise _broken(path, form) from None
-
-
-def _broken(path: Path, form: str) -> InputError:
-    return InputError(
-        f"{path}: must be a whole .{form} file of Gaussians; it cannot be decoded: is it truncated?"
-    )
+        if form.endswith("ply"):
+            # gsply reads on without end where a header has none
+            check_ply(path)
+            return gsply.plyread(path)
+        if form == "spz":
+            # GaussForge reads it too, but reports on standard output, where --json prints
+            return gsply.read_spz(path)
+        answer = gaussforge.GaussForge().convert(path.read_bytes(), form, "ply")
+        if "error" in answer:
+            raise ValueError(answer["error"])
+        with tempfile.NamedTemporaryFile(suffix=".ply") as plain:
+            plain.write(answer["data"])
+            plain.flush()
+            return gsply.plyread(plain.name)
+    except InputError:
+        raise
+    except (ValueError, OSError, EOFError, LookupError, struct.error, zlib.error):
+        raise InputError(
+            f"{path}: must be a whole .{form} file of Gaussians; it cannot be decoded: is it truncated?"
+        ) from None

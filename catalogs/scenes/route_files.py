@@ -2,6 +2,8 @@
 
 import csv
 import json
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,85 +19,169 @@ FORMS = (
 LOOKING_FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """OpenCV camera axes in rig axes."""
 OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0])
+PRINTED_DIGITS = 1e-3
+"""How far a rotation printed with few digits may be from an exact one [1]."""
+PROBLEMS_SHOWN = 10
 
 
-def read_route(path: Path, camera_height: float) -> tuple[Route, NDArray[np.float64]]:
+def read_route(
+    path: Path, camera_height: float, metres_per_unit: float = 1.0
+) -> tuple[Route, NDArray[np.float64]]:
     """A route, and the transform that takes the file's frame to the route's world (z up).
 
-    Road points are already in a world with z up. Camera poses are brought down to the road, and the first rig
-    pose becomes the world's origin.
+    The rows of a CSV are points on the road, or rig poses where it has qw, qx, qy, qz too, in a world that
+    already has z up. Camera poses are brought down to the road, and the first rig pose becomes the world's
+    origin.
 
     Parameters
     ----------
     path : the file
     camera_height : height of the camera above the road, for camera poses [m]
+    metres_per_unit : length of the file's unit; structure from motion has one of its own [m]
 
     Returns
     -------
-    route, T_world_source float64 [4, 4]
+    route, T_world_source float64 [4, 4] with ``metres_per_unit`` as its scale
 
     Raises
     ------
     InputError
-        If the file is missing, unreadable, of another form, or no route.
+        If the file is missing, unreadable, of another form, or no route; listing the lines at fault.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file; give {FORMS}")
+    if not metres_per_unit > 0:
+        raise InputError(f"metres_per_unit must be positive; it is {metres_per_unit}")
+    scaled = np.diag([metres_per_unit, metres_per_unit, metres_per_unit, 1.0])
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: must be {FORMS}; it is not text") from None
     try:
         if path.suffix == ".csv":
-            return route_from_positions(_points(path)), np.eye(4)
-        cameras = _nerfstudio(path) if path.suffix == ".json" else _pose_lines(path)
-    except (ValueError, KeyError, UnicodeDecodeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: must be {FORMS}; {error}") from None
-    rigs = cameras.copy()
-    rigs[:, :3, :3] = cameras[:, :3, :3] @ LOOKING_FORWARD.T
-    rigs[:, :3, 3] -= camera_height * rigs[:, :3, 2]
-    T_world_source = np.linalg.inv(rigs[0])
-    return route_from_poses(T_world_source @ rigs), T_world_source
+            return _csv_route(text, metres_per_unit), scaled
+        rigs = _camera_poses(text, path.suffix)
+        rigs[:, :3, :3] = rigs[:, :3, :3] @ LOOKING_FORWARD.T
+        rigs[:, :3, 3] = metres_per_unit * rigs[:, :3, 3] - camera_height * rigs[:, :3, 2]
+        T_world_rig0 = np.linalg.inv(rigs[0])
+        return route_from_poses(T_world_rig0 @ rigs), T_world_rig0 @ scaled
+    except InputError as error:
+        shown = error.problems[:PROBLEMS_SHOWN]
+        more = len(error.problems) - len(shown)
+        rest = [f"{path}: {more} more problems like these"] if more else []
+        raise InputError([f"{path}: {problem}" for problem in shown] + rest) from None
 
 
-def _points(path: Path) -> NDArray[np.float64]:
-    with path.open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    missing = {"x", "y", "z"} - set(rows[0] if rows else ())
+def _csv_route(text: str, metres_per_unit: float) -> Route:
+    rows = [[word.strip() for word in row] for row in csv.reader(text.splitlines())]
+    header = rows[0] if rows else []
+    missing = [name for name in "xyz" if name not in header]
     if missing:
-        raise InputError(
-            f"{path}: a route CSV needs the columns x, y, z; {', '.join(sorted(missing))} missing"
-        )
-    return np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
-
-
-def _pose_lines(path: Path) -> NDArray[np.float64]:
-    lines = [
-        line.split() for line in path.read_text().splitlines() if line.strip() and not line.startswith("#")
+        raise InputError(f"a route CSV needs the columns x, y, z; {', '.join(missing)} missing")
+    attitude = [name for name in ("qw", "qx", "qy", "qz") if name in header]
+    if 0 < len(attitude) < 4:
+        raise InputError(f"a route CSV has all of qw, qx, qy, qz or none; it has {', '.join(attitude)}")
+    names = [*"xyz", *attitude]
+    lines = [(i, row) for i, row in enumerate(rows[1:], start=2) if any(row)]
+    picked = [
+        (i, [row[header.index(n)] for n in names] if len(row) == len(header) else row) for i, row in lines
     ]
-    widths = sorted({len(line) for line in lines})
-    if widths not in ([12], [8]):
-        raise InputError(
-            f"{path}: poses need 12 (KITTI) or 8 (TUM) numbers on every line; lines here have {widths}"
-        )
-    numbers = np.array([[float(word) for word in line] for line in lines])
+    numbers = _numbers(picked, len(names))
+    positions = metres_per_unit * numbers[:, :3]
+    if not attitude:
+        return route_from_positions(positions)
+    return route_from_poses(_poses(positions, numbers[:, 3:]))
+
+
+def _camera_poses(text: str, suffix: str) -> NDArray[np.float64]:
+    """OpenCV camera poses [M, 4, 4] of a file, in its own unit and frame."""
+    if suffix == ".json":
+        return _nerfstudio(text)
+    lines = [
+        (i, line.replace(",", " ").split())
+        for i, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.startswith("#")
+    ]
+    width = len(lines[0][1]) if lines else 0
+    if width not in (8, 12):
+        raise InputError(f"poses need 12 (KITTI) or 8 (TUM) numbers on every line; the first has {width}")
+    numbers = _numbers(lines, width)
+    if width == 8:
+        # TUM writes time, position, and the quaternion's scalar last
+        return _poses(numbers[:, 1:4], numbers[:, [7, 4, 5, 6]])
     poses = np.tile(np.eye(4), (len(numbers), 1, 1))
-    if widths == [12]:
-        poses[:, :3] = numbers.reshape(-1, 3, 4)
-    else:
-        poses[:, :3, 3] = numbers[:, 1:4]
-        poses[:, :3, :3] = Rotation.from_quat(numbers[:, 4:8]).as_matrix()
+    poses[:, :3] = numbers.reshape(-1, 3, 4)
     return _orthonormal(poses)
 
 
-def _nerfstudio(path: Path) -> NDArray[np.float64]:
-    frames = sorted(json.loads(path.read_text())["frames"], key=lambda frame: frame.get("file_path", ""))
-    poses = np.array([frame["transform_matrix"] for frame in frames], float)
-    if poses.ndim != 3 or poses.shape[1:] != (4, 4):
-        raise InputError(f"{path}: every transform_matrix must be 4x4; they have shape {poses.shape[1:]}")
-    poses[:, :3, :3] = poses[:, :3, :3] @ OPENGL_TO_OPENCV
-    return _orthonormal(poses)
+def _nerfstudio(text: str) -> NDArray[np.float64]:
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"transforms.json must be valid JSON; {error}") from None
+    frames = content.get("frames") if isinstance(content, dict) else None
+    if not isinstance(frames, list) or not frames:
+        raise InputError("transforms.json must have a list of frames, at least one; it has none")
+    poses, problems = [], []
+    for i, frame in enumerate(frames):
+        try:
+            pose = np.array(frame["transform_matrix"], dtype=np.float64)
+        except (TypeError, KeyError, ValueError):
+            pose = np.empty(0)
+        if pose.shape != (4, 4) or not np.isfinite(pose).all():
+            problems.append(f"frame {i} must have a transform_matrix of 4x4 finite numbers; it has not")
+        poses.append(pose)
+    if problems:
+        raise InputError(problems)
+    # frames are stored in any order; their names count the pictures, with leading zeros or without
+    order = sorted(range(len(frames)), key=lambda i: _natural(str(frames[i].get("file_path", ""))))
+    cameras = np.stack([poses[i] for i in order])
+    cameras[:, :3, :3] = cameras[:, :3, :3] @ OPENGL_TO_OPENCV
+    return _orthonormal(cameras)
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Sorting key under which picture 2 comes before picture 10."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]
+
+
+def _numbers(lines: Sequence[tuple[int, list[str]]], width: int) -> NDArray[np.float64]:
+    """Finite numbers [M, width] of numbered lines of words; every line at fault is a problem."""
+    values = np.full((len(lines), width), np.nan)
+    problems = []
+    for row, (i, words) in enumerate(lines):
+        try:
+            values[row] = [float(word) for word in words]
+        except ValueError:
+            problems.append(f"line {i} must hold {width} numbers; it holds {' '.join(words)[:60]!r}")
+            continue
+        if not np.isfinite(values[row]).all():
+            problems.append(f"line {i} must hold finite numbers; it holds {' '.join(words)[:60]!r}")
+    if problems:
+        raise InputError(problems)
+    return values
+
+
+def _poses(positions: NDArray[np.float64], quats_wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
+    length = np.linalg.norm(quats_wxyz, axis=1)
+    if (np.abs(length - 1) > PRINTED_DIGITS).any():
+        bad = int(np.abs(length - 1).argmax())
+        raise InputError(f"pose {bad} must have a unit quaternion; its length is {length[bad]:g}")
+    poses = np.tile(np.eye(4), (len(positions), 1, 1))
+    poses[:, :3, :3] = Rotation.from_quat(quats_wxyz, scalar_first=True).as_matrix()
+    poses[:, :3, 3] = positions
+    return poses
 
 
 def _orthonormal(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Poses whose rotations, printed with few digits, are made exact."""
-    poses[:, :3, :3] = Rotation.from_matrix(poses[:, :3, :3]).as_matrix()
+    R = poses[:, :3, :3]
+    off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    wrong = np.flatnonzero((off > PRINTED_DIGITS) | (np.linalg.det(R) < 0))
+    if len(wrong):
+        raise InputError(
+            f"a pose must be a right-handed rotation and a translation; {len(wrong)} of {len(poses)} are not,"
+            f" the first is number {wrong[0]}"
+        )
+    poses[:, :3, :3] = Rotation.from_matrix(R).as_matrix()
     return poses

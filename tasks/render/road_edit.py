@@ -12,7 +12,9 @@ from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 
 STANDING_CLASSES = (SemanticClass.VEHICLE, SemanticClass.POLE, SemanticClass.OTHER)
-"""Classes that stand on the road and ride with it, inside the carriageway."""
+"""Classes that stand on the road and ride with it, inside the carriageway and below `STANDING_HEIGHT`."""
+STANDING_HEIGHT = 4.0
+"""Tallest road vehicle (Council Directive 96/53/EC, Annex I); wires, lamps and crowns hang above it [m]."""
 
 Profile = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -35,15 +37,15 @@ def apply_road_profile(
     gaussians : the street
     route : gives station, lateral position and the local normal
     elevation, slope : H_g(s) [m] and H_g'(s) [1] at stations [m]
-    carriageway_left, carriageway_right : lateral extent that the profile spans [m]
+    carriageway_left, carriageway_right : lateral extent within which things stand on the road [m]
 
     Returns
     -------
     The edited Gaussians, and bool [N] which of them moved; the others are bitwise unchanged.
     """
-    station, lateral, _ = route.project(gaussians.means)
+    station, lateral, height = route.project(gaussians.means)
     lift = elevation(station)
-    within = (lateral <= carriageway_left) & (lateral >= carriageway_right)
+    within = (lateral <= carriageway_left) & (lateral >= carriageway_right) & (height <= STANDING_HEIGHT)
     rides = np.isin(gaussians.class_id, ROAD_CLASSES) | (
         np.isin(gaussians.class_id, STANDING_CLASSES) & within
     )

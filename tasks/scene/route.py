@@ -194,6 +194,8 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
     InputError
         If fewer than two points remain, or the route stands upright somewhere.
     """
+    if not np.isfinite(positions).all():
+        raise InputError("a route's points must be finite; some are not")
     kept = positions[_moving(positions, standstill)]
     if len(kept) < 2:
         raise InputError(f"a route needs two points {standstill:g} m apart or more; it has {len(kept)}")
@@ -213,10 +215,10 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
 
 
 def _moving(positions: NDArray[np.float64], standstill: float) -> list[int]:
-    """Numbers of the positions that lie farther than ``standstill`` from the last one kept."""
-    kept = [0]
-    for i in range(1, len(positions)):
-        if np.linalg.norm(positions[i] - positions[kept[-1]]) > standstill:
+    """Numbers of the positions that lie farther than ``standstill`` from the last one kept, NaN included."""
+    kept: list[int] = []
+    for i, position in enumerate(positions):
+        if not kept or not np.linalg.norm(position - positions[kept[-1]]) <= standstill:
             kept.append(i)
     return kept
 

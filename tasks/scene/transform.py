@@ -1,4 +1,4 @@
-"""Moving a cloud of Gaussians rigidly, its view-dependent colour included."""
+"""Moving, turning and scaling a cloud of Gaussians, its view-dependent colour included."""
 
 from dataclasses import replace
 
@@ -21,14 +21,16 @@ def moved(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussian
     Parameters
     ----------
     gaussians : in the source frame
-    T_world_source : float64 [4, 4] rigid source-to-world transform [m]
+    T_world_source : float64 [4, 4] source-to-world similarity: rotation, one scale, translation [m]
     """
-    R = T_world_source[:3, :3]
+    scale = np.cbrt(np.linalg.det(T_world_source[:3, :3]))
+    R = T_world_source[:3, :3] / scale
     turn = Rotation.from_matrix(R)
     quats = (turn * Rotation.from_quat(gaussians.quats_wxyz, scalar_first=True)).as_quat(scalar_first=True)
     return replace(
         gaussians,
-        means=(gaussians.means @ R.T + T_world_source[:3, 3]).astype(np.float32),
+        means=(gaussians.means @ T_world_source[:3, :3].T + T_world_source[:3, 3]).astype(np.float32),
+        scales=(scale * gaussians.scales).astype(np.float32),
         quats_wxyz=quats.astype(np.float32),
         normals=(gaussians.normals @ R.T).astype(np.float32),
         sh=rotated_sh(gaussians.sh, R),

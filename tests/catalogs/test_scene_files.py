@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import replace
 
 import gaussforge
 import numpy as np
@@ -9,18 +10,19 @@ from scipy.spatial.transform import Rotation
 from catalogs.cameras import load_camera
 from catalogs.scenes import load_scene, write_scene
 from catalogs.scenes.folder import read_scene, scene_hash
-from catalogs.scenes.gaussian_files import read_gaussians
+from catalogs.scenes.gaussian_files import read_gaussians, write_gaussians
 from catalogs.scenes.route_files import read_route
 from flows.scenes import scene_import
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
+from tasks.scene.transform import moved
 from tests.toy_street import toy_street
 
 SCENE = toy_street()
 SH_0 = 0.28209479177387814
 
 
-def ply(path, count=50, nan_at=None):
+def ply(path, count=50, nan_at=None, column="x"):
     """An INRIA .ply written by hand: the layout is the reference, not a library."""
     draw = np.random.default_rng(3)
     names = ["x", "y", "z", "nx", "ny", "nz", *(f"f_dc_{i}" for i in range(3)), *(f"f_rest_{i}" for i in range(45)),
@@ -28,7 +30,7 @@ def ply(path, count=50, nan_at=None):
     rows = draw.normal(size=(count, len(names))).astype("<f4")
     rows[:, names.index("scale_0") : names.index("scale_2") + 1] -= 3
     if nan_at is not None:
-        rows[nan_at, 0] = np.nan
+        rows[nan_at, names.index(column)] = np.nan
     header = "ply\nformat binary_little_endian 1.0\n" + f"element vertex {count}\n"
     header += "".join(f"property float {name}\n" for name in names) + "end_header\n"
     path.write_bytes(header.encode() + rows.tobytes())
@@ -192,7 +194,14 @@ def test_a_csv_of_points_is_a_route_as_it_stands(tmp_path):
     [
         ("r.csv", "a,b\n1,2\n", "needs the columns x, y, z"),
         ("r.txt", "1 2 3\n", "12 .KITTI. or 8 .TUM."),
-        ("r.txt", "1 2 3 4 5 6 7 x\n", "could not convert"),
+        ("r.txt", "1 2 3 4 5 6 7 x\n", "line 1 must hold 8 numbers"),
+        ("r.txt", "", "the first has 0"),
+        ("r.txt", "0 0 0 0 0 0 0 0\n", "unit quaternion"),
+        ("r.txt", "2 0 0 0 0 1 0 0 0 0 1 0\n", "right-handed rotation"),
+        ("r.csv", "x,y,z\n", "two points"),
+        ("r.csv", "x,y,z,qw\n0,0,0,1\n", "all of qw, qx, qy, qz"),
+        ("r.json", "[1]", "list of frames"),
+        ("r.json", '{"frames": [7]}', "frame 0"),
         ("r.json", '{"frames": [{"file_path": "a"}]}', "transform_matrix"),
         ("r.json", "{", "must be"),
     ],
@@ -221,3 +230,126 @@ def test_cameras_look_forward_from_above_the_road(name):
     np.testing.assert_allclose(camera.T_rig_camera[:3, :3] @ [0, 0, 1], [1, 0, 0], atol=1e-12)
     assert camera.T_rig_camera[2, 3] > 1
     assert (camera.K[0, 2], camera.K[1, 2]) == (camera.width / 2, camera.height / 2)
+
+
+def test_every_faulty_line_of_a_route_is_named(tmp_path):
+    (tmp_path / "r.csv").write_text("x,y,z\n0,0,0\n1,0\n2,nan,0\n3,zero,0\n")
+    with pytest.raises(InputError) as caught:
+        read_route(tmp_path / "r.csv", 1.5)
+    assert [problem.split("r.csv: ")[1][:6] for problem in caught.value.problems] == [
+        "line 3",
+        "line 4",
+        "line 5",
+    ]
+
+
+def test_frames_are_ordered_by_the_number_in_their_names(tmp_path):
+    frames = [
+        {"file_path": f"images/{i}.png", "transform_matrix": np.diag([1, -1, -1, 1.0]).tolist()}
+        for i in range(12)
+    ]
+    for i, frame in enumerate(frames):
+        frame["transform_matrix"][2][3] = float(i)
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": frames[5:] + frames[:5]}))
+    assert read_route(tmp_path / "transforms.json", 1.5)[0].length == pytest.approx(11.0)
+
+
+def test_a_csv_with_quaternions_gives_the_rig_s_attitude(tmp_path):
+    turned = Rotation.from_euler("z", 0.3)
+    w, x, y, z = turned.as_quat(scalar_first=True)
+    rows = [f"{i},{i * np.cos(0.3)},{i * np.sin(0.3)},0,{w},{x},{y},{z}" for i in range(5)]
+    (tmp_path / "r.csv").write_text("time,x,y,z,qw,qx,qy,qz\n" + "\n".join(rows))
+    route, _ = read_route(tmp_path / "r.csv", 1.5)
+    np.testing.assert_allclose(route.T_world_rig[2, :3, :3], turned.as_matrix(), atol=1e-12)
+
+
+def test_a_unit_of_its_own_scales_route_and_cloud_alike(tmp_path):
+    write_kitti(tmp_path / "k.txt")
+    plain, _ = read_route(tmp_path / "k.txt", 1.65)
+    route, T_world_source = read_route(tmp_path / "k.txt", 1.65, metres_per_unit=2.5)
+    assert route.length == pytest.approx(2.5 * plain.length)
+    cloud = moved(SCENE.gaussians, T_world_source)
+    np.testing.assert_allclose(cloud.scales, 2.5 * SCENE.gaussians.scales, rtol=1e-6)
+    apart = np.linalg.norm(cloud.means[0] - cloud.means[9])
+    assert apart == pytest.approx(
+        2.5 * np.linalg.norm(SCENE.gaussians.means[0] - SCENE.gaussians.means[9]), rel=1e-5
+    )
+    # the first camera stays camera_height above the road, whatever the unit
+    np.testing.assert_allclose((T_world_source @ [0, 0, 0, 1])[2], 1.65, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda b: b[:150], "end_header"),
+        (lambda b: b[:-37], "50 Gaussians in 13927 bytes; the file holds 13890"),
+        (lambda b: b"solid" + b, "must begin with the word ply"),
+        (
+            lambda b: b.replace(b"binary_little_endian", b"ascii"),
+            "binary_little_endian 1.0; it is 'ascii 1.0'",
+        ),
+        (lambda b: b.replace(b" opacity", b" opaque"), "must have opacity"),
+        (lambda b: b.replace(b"f_rest_44", b"g_rest_44"), "there are 44"),
+        (lambda b: b.replace(b"float rot_3", b"uchar rot_3"), "uchar rot_3"),
+        (lambda b: b.replace(b"vertex", b"face"), "must have vertex elements"),
+    ],
+)
+def test_a_ply_with_a_wrong_header_or_missing_bytes_says_what_is_wrong(tmp_path, change, sentence):
+    ply(tmp_path / "a.ply")
+    (tmp_path / "a.ply").write_bytes(change((tmp_path / "a.ply").read_bytes()))
+    with pytest.raises(InputError, match=sentence):
+        read_gaussians(tmp_path / "a.ply")
+
+
+def test_a_quaternion_that_is_no_number_is_refused(tmp_path):
+    ply(tmp_path / "a.ply", nan_at=17, column="rot_2")
+    with pytest.raises(InputError, match=r"quats_wxyz must be finite; 1 of 50 .* number 17"):
+        read_gaussians(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize("coefficients", [1, 4, 9, 16])
+def test_a_written_ply_reads_back(tmp_path, coefficients):
+    draw = np.random.default_rng(2)
+    count = len(SCENE.gaussians)
+    cloud = replace(
+        SCENE.gaussians,
+        sh=draw.normal(size=(count, coefficients, 3)).astype(np.float32),
+        display_encoded=True,
+    )
+    write_gaussians(cloud, tmp_path / "out.ply")
+    back = read_gaussians(tmp_path / "out.ply")
+    for name in ("means", "quats_wxyz", "sh"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(cloud, name))
+    np.testing.assert_allclose(back.scales, cloud.scales, rtol=1e-5)
+    np.testing.assert_allclose(back.opacities, cloud.opacities, rtol=1e-5)
+
+
+def test_reading_prints_nothing_where_json_is_printed(tmp_path, capfd):
+    ply(tmp_path / "a.ply")
+    forge = gaussforge.GaussForge()
+    for ending in ("spz", "splat"):
+        (tmp_path / f"b.{ending}").write_bytes(
+            forge.convert((tmp_path / "a.ply").read_bytes(), "ply", ending)["data"]
+        )
+    capfd.readouterr()
+    for name in ("a.ply", "b.spz", "b.splat"):
+        read_gaussians(tmp_path / name)
+    assert capfd.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "sentence"),
+    [
+        ("name", None, "name must be"),
+        ("display_encoded", "yes", "display_encoded"),
+        ("carriageway_left", -3, "carriageway_left"),
+        ("carriageway_right", None, "carriageway_right"),
+        ("sha256", {}, "sha256 must name means.npy"),
+    ],
+)
+def test_a_scene_json_with_a_wrong_entry_is_refused_with_its_key(tmp_path, key, value, sentence):
+    write_scene(SCENE, tmp_path / "s", {})
+    facts = json.loads((tmp_path / "s" / "scene.json").read_text())
+    (tmp_path / "s" / "scene.json").write_text(json.dumps(facts | {key: value}))
+    with pytest.raises(InputError, match=sentence):
+        read_scene(tmp_path / "s")

@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.render.road_edit import apply_road_profile
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.route import route_from_positions
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tests.toy_street import toy_street
 
@@ -65,3 +68,42 @@ def test_what_stands_on_the_carriageway_rides_and_what_stands_beside_it_does_not
     assert moved[above & inside & (label == SemanticClass.VEHICLE)].all()
     assert not moved[~inside].any()
     assert not moved[label == SemanticClass.BUILDING].any()
+
+
+def test_what_hangs_above_the_tallest_vehicle_stays():
+    cloud = SCENE.gaussians
+    means = cloud.means + np.float32([0, 0, 5.0])
+    wires = replace(cloud, means=means, class_id=np.full(len(cloud), SemanticClass.OTHER, np.uint8))
+    hazard = RoadHazard(center_m=10.0, length_m=3.7, height_m=0.1)
+    _, moved = apply_road_profile(
+        wires, SCENE.route, lambda s: road_elevation(s, hazard), lambda s: road_slope(s, hazard), 4.0, -4.0
+    )
+    assert not moved.any()
+
+
+def test_on_a_climbing_bend_the_road_moves_along_the_route_s_own_normal():
+    angle = np.linspace(0, 0.8, 60)
+    route = route_from_positions(np.stack([60 * np.sin(angle), 60 * (1 - np.cos(angle)), 4 * angle], axis=1))
+    draw = np.random.default_rng(5)
+    station, lateral = draw.uniform(15, 25, 400), draw.uniform(-4, 4, 400)
+    frame = route.pose(station)
+    on_road = frame[:, :3, 3] + lateral[:, None] * frame[:, :3, 1]
+    cloud = Gaussians(
+        **{name: value[:400] for name, value in vars(SCENE.gaussians).items() if name != "display_encoded"}
+    )
+    cloud = replace(
+        cloud,
+        means=on_road.astype(np.float32),
+        normals=frame[:, :3, 2].astype(np.float32),
+        class_id=np.full(400, SemanticClass.ROAD, np.uint8),
+    )
+    hazard = RoadHazard(center_m=20.0, length_m=4.0, height_m=0.1)
+    lifted, moved = apply_road_profile(
+        cloud, route, lambda s: road_elevation(s, hazard), lambda s: road_slope(s, hazard), 4.0, -4.0
+    )
+    up, forward = frame[:, :3, 2], frame[:, :3, 0]
+    height = road_elevation(station, hazard)[:, None]
+    np.testing.assert_allclose(lifted.means, on_road + height * up, atol=1e-4)
+    slope = road_slope(station, hazard)[:, None]
+    expected = (up - slope * forward) / np.sqrt(1 + slope**2)
+    np.testing.assert_allclose(lifted.normals[moved], expected[moved], atol=5e-4)

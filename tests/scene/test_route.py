@@ -34,20 +34,37 @@ def test_a_left_bend_turns_the_rig_to_the_left():
     assert arc().T_world_rig[-1, 1, 0] > 0
 
 
-def test_projection_inverts_the_pose():
-    route = arc()
+def banked() -> Route:
+    """The bend again, climbing and leaning ever more into the curve."""
+    poses = arc().T_world_rig.copy()
+    lean = np.linspace(0, 0.15, len(poses))
+    poses[:, :3, :3] = (
+        Rotation.from_matrix(poses[:, :3, :3]) * Rotation.from_euler("x", -lean[:, None])
+    ).as_matrix()
+    poses[:, 2, 3] = 2 * np.linspace(0, 1, len(poses)) ** 2
+    return route_from_poses(poses)
+
+
+@pytest.mark.parametrize("route", [arc(), banked()], ids=["bend", "banked bend"])
+def test_projection_inverts_the_pose(route):
     draw = np.random.default_rng(1)
     station, lateral, height = (
-        draw.uniform(2, route.length - 2, 500),
-        draw.uniform(-6, 6, 500),
-        draw.uniform(0, 3, 500),
+        draw.uniform(0, route.length, 5000),
+        draw.uniform(-8, 8, 5000),
+        draw.uniform(-1, 3, 5000),
     )
     poses = route.pose(station)
     points = poses[:, :3, 3] + lateral[:, None] * poses[:, :3, 1] + height[:, None] * poses[:, :3, 2]
     found = route.project(points)
-    np.testing.assert_allclose(found[1], lateral, atol=5e-3)
-    np.testing.assert_allclose(found[2], height, atol=1e-9)
-    np.testing.assert_allclose(found[0], station, atol=0.02)
+    np.testing.assert_allclose(found, [station, lateral, height], atol=1e-3)
+
+
+def test_stations_of_neighbouring_points_do_not_jump():
+    route = arc()
+    along = np.linspace(1, route.length - 1, 20_000)
+    poses = route.pose(along)
+    station, _, _ = route.project(poses[:, :3, 3] - 6.0 * poses[:, :3, 1])
+    np.testing.assert_allclose(np.diff(station), np.diff(along), atol=1e-4)
 
 
 def test_lateral_is_positive_to_the_left():
@@ -105,3 +122,39 @@ def test_attitude_between_two_knots_is_the_shortest_turn():
     poses[1, 0, 3] = 10
     half = Route(station=np.array([0.0, 10]), T_world_rig=poses).pose(5.0)
     assert np.degrees(np.arctan2(half[1, 0], half[0, 0])) == pytest.approx(20)
+
+
+def test_a_station_that_is_no_number_is_refused():
+    with pytest.raises(InputError, match="it is nan m"):
+        arc().pose([1.0, np.nan])
+
+
+@pytest.mark.parametrize("positions", [np.zeros((5, 3)), np.zeros((0, 3))])
+def test_a_recording_that_never_moves_is_no_route(positions):
+    with pytest.raises(InputError, match="two points"):
+        route_from_positions(positions)
+
+
+def test_repeated_points_do_not_bend_a_route():
+    points = np.stack([np.arange(10.0), np.zeros(10), np.zeros(10)], axis=1)
+    np.testing.assert_array_equal(
+        route_from_positions(np.repeat(points, 4, axis=0)).T_world_rig,
+        route_from_positions(points).T_world_rig,
+    )
+
+
+def test_a_point_that_is_no_number_is_not_skipped():
+    points = np.stack([np.arange(10.0), np.zeros(10), np.zeros(10)], axis=1)
+    points[4, 1] = np.nan
+    with pytest.raises(InputError, match="finite"):
+        route_from_positions(points)
+    poses = np.tile(np.eye(4), (10, 1, 1))
+    poses[:, :3, 3] = points
+    with pytest.raises(InputError, match="finite"):
+        route_from_poses(poses)
+
+
+def test_a_route_that_stands_upright_is_refused_with_the_point():
+    points = np.stack([[0.0, 1, 2, 2, 2], np.zeros(5), [0.0, 0, 0, 1, 2]], axis=1)
+    with pytest.raises(InputError, match="point 3"):
+        route_from_positions(points)
