@@ -93,7 +93,8 @@ def validate(grid: Annotated[str, typer.Argument()], as_json: Json = False) -> N
 def sensitivity(out: Out = None, as_json: Json = False) -> None:
     """Reproduce the paper's bounded surface-parameter study (Appendix E) beside its printed figures."""
     result = _call("sensitivity", False, out=out)
-    _show(result, as_json)
+    brief = {key: result[key] for key in ("solver_cases", "cpu_s", "beside_print")}
+    _show(result if as_json else brief, as_json)
     if not all(row["agrees"] for row in result["beside_print"]):
         raise typer.Exit(CHECK_FAILED)
 
@@ -107,7 +108,11 @@ def agreement(
     as_json: Json = False,
 ) -> None:
     """Hold the vehicle model against reference traces, as the paper's Appendix A.2 does."""
-    _show(_call("agreement", False, traces, vehicle=vehicle, mode=mode, out=out), as_json)
+    result = _call("agreement", False, traces, vehicle=vehicle, mode=mode, out=out)
+    brief = result | {
+        "cases": [{k: v for k, v in row.items() if k not in {"window", "note"}} for row in result["cases"]]
+    }
+    _show(result if as_json else brief, as_json)
 
 
 @app.command()

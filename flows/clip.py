@@ -7,14 +7,13 @@ where the receipt exists, the clip is complete. Making a clip twice writes the s
 import resource
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tasks.eval.motion_agreement import pose_verdict
 
 from catalogs.cameras import load_camera
 from catalogs.gates import load_gates
@@ -29,6 +28,7 @@ from flows.store.layout import Layout, write_json
 from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
+from tasks.eval.motion_agreement import PoseThresholds, pose_verdict
 from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.render.backend import select_backend
 from tasks.render.camera import Camera, body_poses
@@ -57,7 +57,7 @@ class Catalogue:
     camera: Camera
     scene: Scene
     looks: WeatherParameters
-    gates: Mapping[str, float]
+    gates: PoseThresholds
 
 
 @lru_cache(maxsize=2)
@@ -232,7 +232,7 @@ def judge(
     return {
         "recovered_pitch": recovered.pitch,
         "recovered_progress": recovered.progress,
-        "verdict": _json_numbers(verdict.as_row()),
+        "verdict": _json_numbers(asdict(verdict) | {"reasons": list(verdict.reasons)}),
     }
 
 

@@ -63,7 +63,7 @@ def _clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
         {"clip_id": r["clip_id"], "index": r["index"], "label": r["label"], "seed": r["seed"]}
         | r["scenario"]
         | r["figures"]
-        | {f"check_{key}": value for key, value in r["verdict"].items()}
+        | {f"check_{key}": value for key, value in r["verdict"].items() if key != "reasons"}
         for r in receipts
     ]
     columns: dict[str, Any] = {}

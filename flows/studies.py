@@ -1,27 +1,70 @@
 """Studies of the vehicle model: the surface-parameter sensitivity, agreement with reference traces, speed."""
 
 import time
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from catalogs.references import read_reference
+from catalogs.studies import load_sensitivity_study
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
 from flows.store.layout import write_json
 from tasks.errors import InputError
+from tasks.eval.state_agreement import CaseAgreement, aggregate, case_agreement
+from tasks.vehicle.rollout import Mode, rollout
+from tasks.vehicle.sensitivity import beside_print, sensitivity_study
 
 BENCHMARKS = ("rasteriser", "vehicle", "pose_checks", "pipeline")
 
 
 def sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
-    from tasks.vehicle.sensitivity import sensitivity_study
-
-    from catalogs.surfaces import load_surface
-    from catalogs.vehicles import load_vehicle
-
+    protocol, printed = load_sensitivity_study()
     vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     started = time.process_time()
-    result = sensitivity_study(vehicle, surface)
-    return _written(result | {"cpu_s": time.process_time() - started}, out, "sensitivity.json")
+    result = sensitivity_study(vehicle, surface, protocol)
+    result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
+    return _written(result, out, "sensitivity.json")
+
+
+def agreement(
+    traces: str, *, vehicle: str = "paper-reference", mode: Mode = "paper", out: str | None = None
+) -> dict[str, Any]:
+    """Hold the vehicle model against reference traces by the paper's Appendix A.2 protocol.
+
+    Parameters
+    ----------
+    traces : folder with cases.json and NAME.parquet or */NAME.parquet
+    vehicle : catalogue name or file
+    mode : paper or coupled
+    out : folder for ``agreement.json``; None writes none
+
+    Raises
+    ------
+    InputError
+        Listing every case whose trace or condition is missing.
+    """
+    model = load_vehicle(vehicle)
+    rows: list[dict[str, Any]] = []
+    splits: dict[str, list[CaseAgreement]] = {}
+    for case, reference in read_reference(Path(traces)):
+        ride = rollout(
+            model, case.weather, case.surface_coefficient, case.controls(), case.hazard(),
+            mode=mode, duration_s=case.duration_s(reference),
+        )  # fmt: skip
+        scored = case_agreement(reference, ride.columns, case.facts(model.wheelbase), ride.static_pitch)
+        splits.setdefault(case.split, []).append(scored)
+        rows.append({"split": case.split} | asdict(scored) | {"window": list(scored.window)})
+    groups = [
+        {"split": split, "group": name, "count": group.count, **_plain(group.mean)}
+        for split, cases in splits.items()
+        for name, group in aggregate(cases).items()
+    ]
+    overall = aggregate([case for cases in splits.values() for case in cases])["all"].mean
+    result = {"vehicle": vehicle, "mode": mode, "cases": rows, "groups": groups, "mean": _plain(overall)}
+    return _written(result, out, "agreement.json")
 
 
 def bench(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
@@ -46,3 +89,8 @@ def _written(result: dict[str, Any], out: str | None, name: str) -> dict[str, An
     if out is not None:
         write_json(Path(out) / name, result)
     return result
+
+
+def _plain(figures: dict[str, float]) -> dict[str, float | None]:
+    """JSON has no NaN: a figure that a group cannot have is null."""
+    return {name: None if value != value else value for name, value in figures.items()}
