@@ -109,9 +109,10 @@ def agreement(
 ) -> None:
     """Hold the vehicle model against reference traces, as the paper's Appendix A.2 does."""
     result = _call("agreement", False, traces, vehicle=vehicle, mode=mode, out=out)
-    brief = result | {
-        "cases": [{k: v for k, v in row.items() if k not in {"window", "note"}} for row in result["cases"]]
-    }
+    shown = [
+        {key: value for key, value in row.items() if key not in {"window", "note"}} for row in result["cases"]
+    ]
+    brief = {"cases": shown, "groups": result["groups"]}
     _show(result if as_json else brief, as_json)
 
 
