@@ -4,6 +4,7 @@ import numpy as np
 
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene
+from tasks.scene.street.adornments import adornments, awning_boxes
 from tasks.scene.street.bend import course, route
 from tasks.scene.street.facades import facades
 from tasks.scene.street.furniture import furniture, post_boxes
@@ -48,13 +49,19 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
             pavement(layout, seed),
             facades(layout, plan.buildings, seed),
             roofs(layout, plan.buildings, seed),
+            adornments(layout, plan.buildings, seed),
             gardens(layout, plan.buildings, seed),
             trees(layout, plan.trees, seed),
             cars(layout, plan.cars, seed),
             furniture(layout, plan, seed),
         ]
     )
-    boxes = [house_boxes(layout, plan.buildings), car_boxes(plan.cars), post_boxes(layout, plan)]
+    boxes = [
+        house_boxes(layout, plan.buildings),
+        awning_boxes(layout, plan.buildings),
+        car_boxes(plan.cars),
+        post_boxes(layout, plan),
+    ]
     casters = Casters(
         boxes=np.concatenate(boxes), balls=np.stack([tree.balls for tree in plan.trees]), leaf_extinction=0.9
     )

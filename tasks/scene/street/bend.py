@@ -56,12 +56,13 @@ class Course:
 
 
 def course(layout: StreetLayout) -> Course:
-    """Integrate the curvature, which grows smoothly from zero to one over the bend's radius."""
+    """Integrate the curvature, which grows smoothly from nothing to that of the bend, and again beyond the route."""
     first, last = layout.station_range
     n = round((last - first + 2 * _MARGIN) / _STEP) + 1
     station = first - _MARGIN + _STEP * np.arange(n)
-    t = np.clip((station - layout.bend_start) / layout.bend_transition, 0.0, 1.0)
-    curvature = t * t * (3 - 2 * t) / layout.bend_radius
+    curvature = _grown(station - layout.bend_start, layout.bend_transition) / layout.bend_radius
+    beyond = _grown(station - layout.route_length, layout.bend_transition)
+    curvature += beyond * (1 / layout.end_radius - 1 / layout.bend_radius)
     heading = _integral(curvature)
     x, y = _integral(np.cos(heading)), _integral(np.sin(heading))
     return Course(station=station, x=x - np.interp(0.0, station, x), y=y, heading=heading)
@@ -78,6 +79,11 @@ def route(layout: StreetLayout, line: Course) -> Route:
     pose[:, 0, 3] = np.interp(station, line.station, line.x)
     pose[:, 1, 3] = np.interp(station, line.station, line.y)
     return Route(station=station, T_world_rig=pose)
+
+
+def _grown(distance: NDArray[np.float64], length: float) -> NDArray[np.float64]:
+    t = np.clip(distance / length, 0.0, 1.0)
+    return t * t * (3 - 2 * t)
 
 
 def _integral(rate: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -116,6 +116,8 @@ def painted(layout: StreetLayout, cells: FrontCells, looks: Sequence[Look], seed
     s, z, part = cells.station, cells.height, cells.part
     tone = 1 + 0.05 * fractal_noise(stream(seed, "stains"), s + 400.0 * (cells.house % 7), z, 2.5, 3)
     grain = np.array([look.grain for look in looks])[cells.house]
+    # a cell averages what lies within it: the thin ones beside the openings must not stand out as streaks
+    grain = grain * np.clip(cells.size.min(axis=1) / 0.3, 0.15, 1.0)
     tone += grain * rng.standard_normal(len(s)) * (part == Part.WALL)
     tone *= np.clip(0.84 + 0.06 * z, 0.0, 1.0)
     albedo = np.stack([look.colours for look in looks])[cells.house, part] * tone[:, None]

@@ -6,14 +6,13 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.scene.street.facade_paint import FrontCells, Look, look_of, painted
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
-from tasks.scene.street.noise import stream
 from tasks.scene.street.openings import BAYS, Part, Pattern, bay_patterns, simplified, storey_pattern
 from tasks.scene.street.plan import Building
 from tasks.scene.street.surfels import Surfels, graded_cells, tiles
 
 Floats = NDArray[np.float64]
 
-_CELL = (14.0, 9.0)
+_CELL = (17.0, 11.0)
 """Largest width and height of a wall cell where it is seen closest [px]."""
 _RECESS = np.array([0.0, -0.03, 0.10, 0.14, -0.06, -0.08, -0.04])
 """How far each part stands back from the wall [m]."""
@@ -32,7 +31,7 @@ def facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) ->
     grids = [
         grid
         for index, (house, look) in enumerate(zip(buildings, looks, strict=True))
-        for grid in _front(layout, house, look, index, seed)
+        for grid in _front(layout, house, look, index)
     ]
     cells = FrontCells.join(grids)
     side = np.array([house.side for house in buildings], dtype=np.float64)[cells.house]
@@ -51,12 +50,11 @@ def facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) ->
     )
 
 
-def _front(layout: StreetLayout, house: Building, look: Look, index: int, seed: int) -> list[FrontCells]:
-    door = int(stream(seed, f"door {house.number}").integers(house.bays))
+def _front(layout: StreetLayout, house: Building, look: Look, index: int) -> list[FrontCells]:
     ground = bay_patterns(layout.ground_storey_height, house.bay, look.window)
     grids = []
     for k in range(house.bays):
-        kind = "door" if k == door else "shop" if house.shop else "window"
+        kind = "door" if k == house.door else "shop" if house.shop else "window"
         grids.append(_grid(layout, house, index, (k, 1), 0, *ground[kind], kind))
     for storey in range(1, house.storeys):
         pattern = storey_pattern(layout.storey_height, house.bay, look.window, banded=look.banded or storey == 1)
@@ -76,9 +74,8 @@ def _grid(
 ) -> FrontCells:
     """The cells of some bays (first, count) of one storey."""
     bottom = layout.kerb_height + (layout.ground_storey_height + (storey - 1) * layout.storey_height) * (storey > 0)
-    station = house.start + (house.width if house.start < 0 else 0.0)
-    cell = np.array(_CELL) * PIXEL * nearest_depth(layout, station, layout.front(house.side), bottom)
-    columns, rows = simplified(columns, 0.1 * cell[0]), simplified(rows, 0.12 * cell[1])
+    cell = np.array(_CELL) * PIXEL * nearest_depth(layout, house.nearest_station, layout.front(house.side), bottom)
+    columns, rows = simplified(columns, 0.08 * cell[0]), simplified(rows, 0.11 * cell[1])
     x, width, column = _cut(columns, cell[0])
     y, height, row = _cut(rows, cell[1])
     across, up = np.array([p for _, p in columns])[column], np.array([p for _, p in rows])[row]
@@ -101,4 +98,4 @@ def _grid(
 def _cut(pattern: Pattern, cell: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Cells along one side of a grid: walls fine at their ends, panes and boards alike throughout."""
     alike = np.array([part in (Part.GLASS, Part.SIGN, Part.PLINTH) for _, part in pattern])
-    return graded_cells(np.cumsum([0.0, *(size for size, _ in pattern)]), cell, np.where(alike, 1.0, 0.4))
+    return graded_cells(np.cumsum([0.0, *(size for size, _ in pattern)]), cell, np.where(alike, 1.0, 0.45))

@@ -24,6 +24,7 @@ class StreetLayout:
     bend_start : station at which the road begins to turn left [m]
     bend_transition : length over which the curvature grows to its full value [m]
     bend_radius : radius of the bend [m]
+    end_radius : radius it tightens to beyond the route, so that houses close the view [m]
     lane_width : width of a traffic lane [m]
     parking_width : width of the parking strip on either side [m]
     marking_width : width of a longitudinal marking [m]
@@ -50,6 +51,7 @@ class StreetLayout:
     bend_start: float = 40.0
     bend_transition: float = 60.0
     bend_radius: float = 450.0
+    end_radius: float = 110.0
     lane_width: float = 3.5
     parking_width: float = 2.2
     marking_width: float = 0.15
@@ -69,9 +71,9 @@ class StreetLayout:
     tree_spacing: float = 14.0
     sun_azimuth_deg: float = 150.0
     sun_elevation_deg: float = 46.0
-    sun_rgb: tuple[float, float, float] = (1.75, 1.62, 1.42)
-    sky_rgb: tuple[float, float, float] = (0.30, 0.37, 0.47)
-    bounce_rgb: tuple[float, float, float] = (0.24, 0.21, 0.18)
+    sun_rgb: tuple[float, float, float] = (1.95, 1.80, 1.56)
+    sky_rgb: tuple[float, float, float] = (0.38, 0.46, 0.57)
+    bounce_rgb: tuple[float, float, float] = (0.21, 0.19, 0.17)
 
     @property
     def carriageway_left(self) -> float:

@@ -10,30 +10,31 @@ def _linear(*colours: str) -> NDArray[np.float64]:
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
 
 
-PLASTER = _linear("#c9b48e", "#c8bfae", "#b98a68", "#a8b0ae", "#bfa27a", "#b8a9a0", "#cfc3a0", "#9fae9f", "#c49a84")
-BRICK = _linear("#8a4f3b", "#7d4a3c", "#96604a", "#6f4a40")
+PLASTER = _linear("#cabb9e", "#cfc8bb", "#b79a84", "#b3b7b4", "#c2ae8f", "#bfb2a8", "#d6ceb8", "#a9b3a8", "#c6a894", "#d9d5cb")
+BRICK = _linear("#85584a", "#785046", "#93695a", "#6f5048", "#a07a62")
 PLINTH = _linear("#6f6a64")[0]
 TRIM = _linear("#d6cfc0", "#c7c0b4", "#ddd8cc", "#b9aa92")
 FRAMES = _linear("#e2e0da", "#dcd8ce", "#4a3a2e", "#2f3a40", "#e6e4de")
 DOORS = _linear("#5a2f22", "#24423a", "#2a3550", "#3c3a38", "#6b4a2c")
-SHOP_SIGNS = _linear("#8c2f2a", "#1f4e4a", "#23406e", "#3a3a3c", "#b07a24", "#5c2b4e")
-AWNINGS = _linear("#9c3a32", "#2f6152", "#3b5b8c", "#c08a3a")
+SHOP_SIGNS = _linear("#7d3a34", "#2a4e4a", "#33486a", "#3a3a3c", "#8a6a3a", "#54394e")
+AWNINGS = _linear("#93443c", "#3c6355", "#47608a", "#b5894c")
 CURTAIN = _linear("#c9c4b8")[0]
 DARK_ROOM = _linear("#2b2d30")[0]
-ROOF_TILES = _linear("#7f4a38", "#6d4439", "#54525a", "#4b4e55")
+ROOF_TILES = _linear("#7c5446", "#6d4d42", "#56545a", "#4d5056")
 METAL_DARK = _linear("#3b4043")[0]
 METAL_GREY = _linear("#7b8084")[0]
 """Zinc, galvanised steel."""
 BARK = _linear("#5d5145")[0]
-FOLIAGE = _linear("#5f7d33", "#557a35", "#6c8438", "#4f7238", "#788a3c")
+FOLIAGE = _linear("#566e33", "#4d6a33", "#5f7438", "#476338", "#677a3c")
+FLOWERS = _linear("#a8324a", "#c46a8c", "#c9a23a", "#b8452e")
 HEDGE = _linear("#46632e")[0]
 EARTH = _linear("#5b4a3a")[0]
 GRASS = _linear("#6a7c40")[0]
-CAR_PAINT = _linear("#d9d9d6", "#a7aaad", "#55595e", "#1c1e22", "#23406b", "#8c1f1d", "#6f7d86", "#c9c2b2", "#2f4a3f")
+CAR_PAINT = _linear("#d6d6d3", "#9fa3a7", "#55595e", "#1d1f23", "#2a4468", "#7d2422", "#6f7d86", "#bdb6a6", "#34493f", "#c9cbcb")
 TYRE = _linear("#222223")[0]
 RIM = _linear("#a3a6a8")[0]
 PLASTIC = _linear("#2a2b2d")[0]
-TAIL_LIGHT = _linear("#a81a18")[0]
+TAIL_LIGHT = _linear("#7c1416")[0]
 HEAD_LIGHT = _linear("#d8dde0")[0]
 NUMBER_PLATE = _linear("#d9d6c4")[0]
 WHITE_PAINT = _linear("#dddcd6")[0]

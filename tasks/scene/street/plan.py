@@ -1,6 +1,7 @@
 """Where things stand: buildings, trees, cars and lamps, drawn from the seed before anything is built."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -24,8 +25,10 @@ class Building:
     bay, bays : width of a window bay [m] and how many there are [1]
     storeys : including the ground floor [1]
     setback : of the front behind the building line [m]
-    shop : the ground floor is a row of shops
+    door : number of the bay with the door [1]
+    shop, awnings, balconies, flowers : what the front has
     roof : kind of roof
+    beside : height of the houses that adjoin it before and after, 0 for a gap [m]
     """
 
     number: int
@@ -35,8 +38,18 @@ class Building:
     bays: int
     storeys: int
     setback: float
+    door: int
     shop: bool
+    awnings: bool
+    balconies: bool
+    flowers: bool
     roof: Roof
+    beside: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def nearest_station(self) -> float:
+        """Station of the end that a camera on the route comes closest to [m]."""
+        return self.start + (self.width if self.start < 0 else 0.0)
 
     @property
     def width(self) -> float:
@@ -136,12 +149,19 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
                 bays=bays,
                 storeys=storeys,
                 setback=float(rng.choice([0.0, 0.0, 0.15, 0.3])),
-                shop=bool(rng.random() < 0.4),
+                door=int(rng.integers(bays)),
+                shop=bool(rng.random() < 0.45),
+                awnings=bool(rng.random() < 0.6),
+                balconies=bool(rng.random() < 0.4),
+                flowers=bool(rng.random() < 0.4),
                 roof=("flat", "pitched", "mansard")[rng.choice(3, p=[0.25, 0.45, 0.3])],
             )
         )
         station += bay * bays + (rng.uniform(3.5, 6.5) if rng.random() < 0.16 else 0.0)
-    return houses
+    touching = [0.0 if b.start - a.start - a.width > 0.5 else 1.0 for a, b in pairwise(houses)]
+    before = [0.0, *(joined * house.eaves(layout) for joined, house in zip(touching, houses, strict=False))]
+    after = [*(joined * house.eaves(layout) for joined, house in zip(touching, houses[1:], strict=True)), 0.0]
+    return [replace(house, beside=(low, high)) for house, low, high in zip(houses, before, after, strict=True)]
 
 
 def _row_of_trees(layout: StreetLayout, seed: int, side: int, lamps: tuple[tuple[float, int], ...]) -> list[Tree]:
@@ -194,5 +214,5 @@ def _parked(layout: StreetLayout, seed: int, side: int) -> list[Car]:
         crossing = -8.5 < station - layout.crossing_station < layout.crossing_length + 5.5
         if not crossing:
             cars.append(car)
-        station += rng.choice([5.6, 6.2, 6.0, 11.5, 18.0], p=[0.22, 0.2, 0.13, 0.2, 0.25]) + rng.uniform(0, 0.8)
+        station += rng.choice([5.8, 6.4, 12.0, 20.0], p=[0.27, 0.23, 0.22, 0.28]) + rng.uniform(0, 1.0)
     return cars

@@ -7,11 +7,15 @@ from tasks.conventions import SemanticClass
 from tasks.scene.street.layout import EYE_HEIGHT, PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import stream
 from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
-from tasks.scene.street.surfels import Surfels, graded_cells, tiles
+from tasks.scene.street.surfels import Surfels, graded_cells, join, tiles
 
-CELL = 6.0
+CELL = 5.6
 """Width of an asphalt cell where it is seen closest [px]."""
-_SLENDER = (2.4, 5.0)
+_STONES = 26.0
+"""Single light or dark stones where the road is seen closest [m-2]."""
+_STONE = (0.055, 0.026)
+"""Length and width of a stone with the gap around it [m]."""
+_SLENDER = (2.0, 5.0)
 """Least and greatest length of a cell over its width: the road is seen foreshortened."""
 
 
@@ -36,13 +40,37 @@ def road(layout: StreetLayout, seed: int) -> Surfels:
     zero = np.zeros(len(s))
     grain = stream(seed, "road grain").standard_normal((len(s), 2))
     marked = mark > 0.5
-    return tiles(
+    surface = tiles(
         np.stack([s, d, zero], axis=1),
         np.stack([length, zero, zero], axis=1),
         np.stack([zero, width, zero], axis=1),
         np.where(marked, SemanticClass.MARKING, SemanticClass.ROAD).astype(np.uint8),
         np.where(marked[:, None], paint_albedo(seed, s, d, grain), asphalt_albedo(layout, seed, s, d, width, grain)),
         overlap=0.74,
+    )
+    return join([surface, _stones(layout, seed)])
+
+
+def _stones(layout: StreetLayout, seed: int) -> Surfels:
+    """Stones of the surface that stand out: the sharp detail between the cells."""
+    rng = stream(seed, "stones")
+    half = 0.8 * layout.lane_width
+    n = int(_STONES * 2 * half * layout.route_length)
+    s = rng.uniform(0.0, layout.route_length + 6.0, n)
+    d = half * np.sign(rng.uniform(-1, 1, n)) * rng.random(n) ** 1.15
+    kept = ~_marked(layout, s, d)
+    s, d = s[kept], d[kept]
+    zero, grain = np.zeros(len(s)), rng.standard_normal((len(s), 2))
+    albedo = asphalt_albedo(layout, seed, s, d, np.full(len(s), 0.05), grain * [0.2, 1.0])
+    albedo = albedo * np.where(rng.random(len(s)) < 0.5, 0.42, 1.9)[:, None] * np.exp(0.2 * grain[:, :1])
+    size = rng.uniform(0.7, 1.4, len(s))
+    return tiles(
+        np.stack([s, d, zero], axis=1),
+        np.stack([_STONE[0] * size, zero, zero], axis=1),
+        np.stack([zero, _STONE[1] * size, zero], axis=1),
+        SemanticClass.ROAD,
+        albedo,
+        overlap=0.5,
     )
 
 
@@ -52,16 +80,21 @@ def _cells(layout: StreetLayout, seed: int, start: float, stop: float, *, is_cro
     breaks, kind = _cross_section(layout, is_crossing)
     nearest = nearest_depth(layout, start if start >= 0 else min(stop, 0.0) - 1e-9, (breaks[1:] + breaks[:-1]) / 2)
     columns = []
-    for d, width, k in zip(*graded_cells(breaks, CELL * PIXEL * nearest, 0.55), strict=True):
+    for j, (d, width, k) in enumerate(zip(*graded_cells(breaks, CELL * PIXEL * nearest, 0.55), strict=True)):
         cell = CELL * PIXEL * nearest[k]
         length = cell * np.clip(nearest[k] / EYE_HEIGHT, *_SLENDER) * min(cell / width, 1.8)
         if kind[k] != "asphalt":
             length = layout.dash_length / max(round(layout.dash_length / length), 1)
         n = max(round((stop - start) / length), 1)
         length = (stop - start) / n
-        s = start + (np.arange(n) + 0.5) * length
+        if kind[k] == "asphalt" and j % 2:
+            # laid in running bond: smaller gaps than a chequerboard leaves
+            s = start + np.clip(np.arange(n + 1) * length, 0.25 * length, stop - start - 0.25 * length)
+        else:
+            s = start + (np.arange(n) + 0.5) * length
+        n = len(s)
         if kind[k] == "asphalt":
-            s = np.clip(s + length * rng.uniform(-0.3, 0.3, n), start + 0.3 * length, stop - 0.3 * length)
+            s = s + 0.1 * length * rng.uniform(-1, 1, n)
         on = {"asphalt": np.zeros(n), "solid": np.ones(n), "dashed": 1.0 * _on_dash(layout, s)}[kind[k]]
         columns.append(np.stack([s, np.full(n, d), np.full(n, length), np.full(n, width), on]))
     return np.concatenate(columns, axis=1)
@@ -86,3 +119,13 @@ def _cross_section(layout: StreetLayout, is_crossing: bool) -> tuple[NDArray[np.
     cuts = np.sort(np.concatenate([breaks, [-0.875, 0.0, 0.875, 3.0, 4.2, 6.3]]))
     kinds = dict(zip(breaks[1:-1:2], ["solid", "dashed", "solid"], strict=True))
     return cuts, [kinds.get(edge, "asphalt") for edge in cuts[:-1]]
+
+
+def _marked(layout: StreetLayout, s: NDArray[np.float64], d: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which points lie on paint, or so close that they would blur its edge."""
+    margin = 0.04
+    line = np.zeros(len(s), dtype=bool)
+    for middle in (-layout.lane_width / 2, layout.lane_width / 2):
+        line |= np.abs(d - middle) < layout.marking_width / 2 + margin
+    along = s - layout.crossing_station
+    return line | (along > -margin) & (along < layout.crossing_length + margin)

@@ -38,8 +38,7 @@ def _closed(layout: StreetLayout, house: Building, seed: int) -> list[Surfels]:
     rng = stream(seed, f"roof {house.number}")
     front = layout.front(house.side) + house.side * house.setback
     eaves = house.eaves(layout)
-    station = house.start + (house.width if house.start < 0 else 0.0)
-    cell = max(9.0 * PIXEL * float(nearest_depth(layout, station, front, eaves)), 0.25)
+    cell = max(9.0 * PIXEL * float(nearest_depth(layout, house.nearest_station, front, eaves)), 0.25)
     out = float(house.side)
     along = np.array([out * house.width, 0, 0])
     start = house.start if out > 0 else house.start + house.width
@@ -51,9 +50,9 @@ def _closed(layout: StreetLayout, house: Building, seed: int) -> list[Surfels]:
     kind = SemanticClass.BUILDING
     overhang, parapet = np.array([0, out * 0.4, 0]), np.array([0, 0, 0.7])
     parts = [
-        panel(corner(-0.28, eaves - 0.1), along, np.array([0, 0, 0.3]), 0.3, kind, trim, rng=rng, grain=0.02),
+        panel(corner(-0.28, eaves - 0.1), along, np.array([0, 0, 0.3]), cell, kind, trim, rng=rng, grain=0.02),
         panel(corner(-0.28, eaves + 0.2), along, overhang, cell, kind, 0.8 * trim, rng=rng, grain=0.02),
-        panel(corner(0.0, eaves - 0.1), along, np.array([0, -out * 0.28, 0]), 0.3, kind, 0.5 * trim),
+        panel(corner(0.0, eaves - 0.1), along, np.array([0, -out * 0.28, 0]), cell, kind, 0.5 * trim),
     ]
     run, rise = _PITCH[house.roof]
     if house.roof == "flat":
@@ -61,10 +60,16 @@ def _closed(layout: StreetLayout, house: Building, seed: int) -> list[Surfels]:
     else:
         slope = np.array([0, out * run, rise])
         parts.append(panel(corner(0.0, eaves + 0.2), along, slope, cell, kind, tile, rng=rng, grain=0.09))
-    for end, outward in ((house.start, -1.0), (house.start + house.width, 1.0)):
+    ends = ((house.start, -1.0), (house.start + house.width, 1.0))
+    for (end, outward), neighbour in zip(ends, house.beside, strict=True):
         blank = {"cell": 1.6 * cell, "class_id": kind, "albedo": 0.8 * wall, "rng": rng, "grain": 0.05}
+        # where two fronts do not line up, the end wall shows for a hand's breadth
+        near, far = sorted((front, front + out * 0.35), reverse=outward < 0)
+        parts.append(panel([end, near, 0.0], [0, far - near, 0], [0, 0, eaves], **blank | {"cell": cell}))
         near, far = sorted((front, front + out * DEPTH), reverse=outward < 0)
-        parts.append(panel([end, near, layout.kerb_height], [0, far - near, 0], [0, 0, eaves], **blank))
+        if neighbour < eaves:
+            low = max(neighbour - 0.3, 0.0)
+            parts.append(panel([end, near, low], [0, far - near, 0], [0, 0, eaves + 0.2 - low], **blank))
         if house.roof != "flat":
             near, far = sorted((front + out * 0.6 * run, front + out * 0.6 * DEPTH), reverse=outward < 0)
             parts.append(panel([end, near, eaves], [0, far - near, 0], [0, 0, 0.7 * rise], **blank))

@@ -10,7 +10,7 @@ from tasks.scene.street.noise import fractal_noise, stream
 Floats = NDArray[np.float64]
 
 _ROWS = 1024
-_ZENITH, _HORIZON = np.array([0.135, 0.27, 0.58]), np.array([0.60, 0.71, 0.83])
+_ZENITH, _HORIZON = np.array([0.10, 0.225, 0.52]), np.array([0.56, 0.69, 0.84])
 _CLOUD_LIGHT, _CLOUD_SHADE = np.array([1.05, 1.02, 0.98]), np.array([0.50, 0.55, 0.63])
 _GROUND, _FAR_HOUSES = np.array([0.16, 0.155, 0.145]), np.array([0.30, 0.34, 0.39])
 _GLOW = np.array([1.0, 0.9, 0.72])
@@ -64,7 +64,7 @@ def _clouds(layout: StreetLayout, seed: int, up: Floats, flat: Floats, azimuth: 
     sun = sun_direction(layout)
     field = fractal_noise(stream(seed, "clouds"), x, y, _CLOUD_WAVE, 5)
     towards = fractal_noise(stream(seed, "clouds"), x + 0.14 * sun[0], y + 0.14 * sun[1], _CLOUD_WAVE, 5)
-    cover = np.clip((field - 0.25) / 0.9, 0, 1)
+    cover = np.clip((field - 0.75) / 0.8, 0, 1)
     cover = cover * cover * (3 - 2 * cover)
     light = np.clip(0.75 + 0.9 * (field - towards) - 0.22 * np.maximum(field - 0.9, 0), 0, 1)
     return light, 0.92 * cover

@@ -11,6 +11,8 @@ from tasks.conventions import SemanticClass
 
 OVERLAP = 0.68
 """Standard deviation over cell size: below 0.6 the sky shows through, above 0.8 the picture turns soft."""
+OPACITY = 0.985
+"""Peak opacity: where nearly opaque splats end a pixel early, they leave up to a tenth of it open."""
 THICKNESS = 0.002
 """Standard deviation along the normal [m]."""
 
@@ -58,7 +60,7 @@ def tiles(
     *,
     glow: ArrayLike = 0.0,
     openness: ArrayLike = 1.0,
-    opacity: ArrayLike = 1.0,
+    opacity: ArrayLike = OPACITY,
     overlap: float = OVERLAP,
 ) -> Surfels:
     """One surfel per cell of a surface; leading shapes broadcast and are flattened.

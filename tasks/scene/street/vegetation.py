@@ -12,9 +12,9 @@ from tasks.scene.street.surfels import Surfels, join, panel, tiles, tube
 
 Floats = NDArray[np.float64]
 
-_LEAF = 6.0
+_LEAF = 6.8
 """Length of a tuft of leaves where it is seen closest [px]."""
-_LAYERS = 1.9
+_LAYERS = 1.75
 """Tufts over each other on the crown's surface [1]."""
 
 

@@ -14,7 +14,7 @@ from tasks.scene.street.surfels import Surfels, graded_cells, join, sheet_cells,
 
 Floats = NDArray[np.float64]
 
-_CELL = (11.0, 6.5)
+_CELL = (12.5, 7.2)
 """Length and height of a cell of the body where it is seen closest [px]."""
 _SILL, _BUMPER = 0.20, 0.42
 _WHEEL = 0.315
