@@ -89,23 +89,32 @@ def shortest_axis(quats_wxyz: NDArray[np.float32], scales: NDArray[np.float32]) 
 
 
 def write_gaussians(gaussians: Gaussians, path: Path) -> None:
-    """Write a cloud as an INRIA-layout .ply; normals and classes have no place there.
+    """Write a cloud as an INRIA-layout .ply, which has no place for classes.
 
     Parameters
     ----------
-    gaussians : the cloud; viewers take its colours as display-encoded [m]
+    gaussians : the cloud; other programs take its colours as display-encoded
     path : a file ending in .ply
     """
+    n, coefficients = gaussians.sh.shape[:2]
     opacity = np.clip(gaussians.opacities.astype(np.float64), SMALLEST_OPACITY, 1 - SMALLEST_OPACITY)
-    gsply.plywrite(
-        path,
-        gaussians.means,
-        np.log(gaussians.scales),
-        gaussians.quats_wxyz,
-        logit(opacity).astype(np.float32),
-        np.ascontiguousarray(gaussians.sh[:, 0]),
-        np.ascontiguousarray(gaussians.sh[:, 1:]) if gaussians.sh.shape[1] > 1 else None,
-    )
+    columns = {
+        ("x", "y", "z"): gaussians.means,
+        ("nx", "ny", "nz"): gaussians.normals,
+        _numbered("f_dc", 3): gaussians.sh[:, 0],
+        # channel-major: all coefficients of red, then of green, then of blue
+        _numbered("f_rest", 3 * (coefficients - 1)): gaussians.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1),
+        ("opacity",): logit(opacity)[:, None],
+        _numbered("scale", 3): np.log(gaussians.scales),
+        _numbered("rot", 4): gaussians.quats_wxyz,
+    }
+    properties = "".join(f"property float {name}\n" for names in columns for name in names)
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {n}\n{properties}end_header\n"
+    path.write_bytes(header.encode() + np.concatenate(list(columns.values()), axis=1).astype("<f4").tobytes())
+
+
+def _numbered(name: str, count: int) -> tuple[str, ...]:
+    return tuple(f"{name}_{i}" for i in range(count))
 
 
 def _decoded(path: Path, form: str) -> Any:
