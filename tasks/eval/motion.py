@@ -79,7 +79,10 @@ class FrameStep:
 def failed_step(reason: str, inliers: int) -> FrameStep:
     """A step that could not be made, with the reason as the end of a sentence."""
     return FrameStep(
-        T_earlier_later=np.full((4, 4), np.nan), covariance=np.full((6, 6), np.nan), inliers=inliers, failure=reason
+        T_earlier_later=np.full((4, 4), np.nan),
+        covariance=np.full((6, 6), np.nan),
+        inliers=inliers,
+        failure=reason,
     )
 
 
@@ -174,7 +177,7 @@ def integrate_motion(
         else:
             middle = route[a] + route[k]
             path[k] = path[a] + (middle / np.linalg.norm(middle, axis=0)).T @ moved
-        tx, ty, tz = step_pose[:3, 3]
+        _, ty, tz = step_pose[:3, 3]
         by_twist = np.array([1.0, 0.0, 0.0, 0.0, tz, -ty])
         progress_var[k] = progress_var[a] + by_twist @ step_cov @ by_twist
 

@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
-from tasks.eval.motion import FrameStep, RecoveredMotion, check_clip, failed_step, integrate_motion, place_frames
+from tasks.eval.motion import (
+    FrameStep,
+    RecoveredMotion,
+    check_clip,
+    failed_step,
+    integrate_motion,
+    place_frames,
+)
 from tasks.eval.rigid import Floats, adjoint, advance_pose, invert_pose, pose_from_twist
 
 
@@ -106,7 +113,9 @@ def recover_motion_photometric(
             if not step.failure:
                 return step
         guesses = [advance_pose(way, T_rig_camera) for way in chosen.search_advances]
-        step, _ = max((_align(earlier, later, guess, chosen) for guess in guesses), key=lambda found: found[1])
+        step, _ = max(
+            (_align(earlier, later, guess, chosen) for guess in guesses), key=lambda found: found[1]
+        )
         return step
 
     return integrate_motion("photometric", place_frames(len(frames), place), T_rig_camera, route_rotations)
@@ -119,7 +128,9 @@ def _pyramid(
     K: Floats,
     settings: PhotometricSettings,
 ) -> list[_Level]:
-    grey = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32), (0, 0), settings.smoothing)
+    grey = cv2.GaussianBlur(
+        cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32), (0, 0), settings.smoothing
+    )
     seen = np.isfinite(depth) & (depth > 0)
     if sky is not None:
         seen &= ~sky
@@ -141,7 +152,8 @@ def _informative_pixels(
     gy[1:-1] = (grey[2:] - grey[:-2]) / 2
     bend = np.full_like(q, np.inf)
     bend[1:-1, 1:-1] = np.maximum(
-        np.abs(q[1:-1, 2:] + q[1:-1, :-2] - 2 * q[1:-1, 1:-1]), np.abs(q[2:, 1:-1] + q[:-2, 1:-1] - 2 * q[1:-1, 1:-1])
+        np.abs(q[1:-1, 2:] + q[1:-1, :-2] - 2 * q[1:-1, 1:-1]),
+        np.abs(q[2:, 1:-1] + q[:-2, 1:-1] - 2 * q[1:-1, 1:-1]),
     )
     useful = (gx * gx + gy * gy >= settings.least_gradient**2) & (bend <= settings.depth_kink * q) & (q > 0)
     useful[::2, ::2] = useful[1::2, 1::2] = False  # neighbours say nearly the same: a chequerboard will do
@@ -212,7 +224,13 @@ def _normal_equations(
     pixels: NDArray[np.float32], source: NDArray[np.float32], K: Floats, T: Floats, scale: float, block: int
 ) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
     return _accumulate(
-        pixels, source, K @ T[:3, :3] @ np.linalg.inv(K), K @ T[:3, 3], (K[0, 0], K[1, 1], K[0, 2], K[1, 2]), scale, block
+        pixels,
+        source,
+        K @ T[:3, :3] @ np.linalg.inv(K),
+        K @ T[:3, 3],
+        (K[0, 0], K[1, 1], K[0, 2], K[1, 2]),
+        scale,
+        block,
     )
 
 

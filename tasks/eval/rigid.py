@@ -1,5 +1,7 @@
 """Rigid motions in the small: twists, poses and how a pixel moves with them."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,6 +64,17 @@ def adjoint(pose: Floats) -> Floats:
     matrix[:3, :3] = matrix[3:, 3:] = rotation
     matrix[:3, 3:] = skew(pose[:3, 3]) @ rotation
     return matrix
+
+
+def viewing_rays(pixels: NDArray[np.number[Any]], K: Floats) -> Floats:
+    """Directions [N, 3] with z = 1 in the camera frame [1], through pixels [N, 2] [px]."""
+    return np.column_stack([pixels.astype(np.float64), np.ones(len(pixels))]) @ np.linalg.inv(K).T
+
+
+def project(points: Floats, K: Floats) -> Floats:
+    """Pixels [N, 2] [px] of camera-frame points [N, 3] [m]."""
+    homogeneous = points @ K.T
+    return homogeneous[:, :2] / homogeneous[:, 2:]
 
 
 def projection_jacobian(points: Floats, K: Floats) -> Floats:

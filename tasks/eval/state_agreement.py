@@ -43,8 +43,9 @@ class CaseFacts:
     hazard_length : length of the feature [m]
     hazard_center : station of its middle [m]
     wheelbase : [m]
-    brake_onset : time of brake application [s]; or None where `brake_onset_station` is given
-    brake_onset_station : station that triggers the brake, in either trace at its own time [m]; or None
+    brake_onset : time of brake application [s]; None where a station triggers it
+    brake_onset_station : station that triggers the brake, in either trace at its own time [m]; read only
+        where `brake_onset` is None
     stopping_distance : of the reference from brake onset [m]; None to read it from the trace
     """
 
@@ -205,14 +206,17 @@ def _summarise(name: str, members: Sequence[CaseAgreement]) -> GroupAgreement:
 
 def _check_columns(reference: Mapping[str, Floats], model: Mapping[str, Floats], facts: CaseFacts) -> None:
     problems = []
-    for owner, columns, needed in (("reference", reference, REFERENCE_COLUMNS), ("model", model, MODEL_COLUMNS)):
+    for owner, columns, needed in (
+        ("reference", reference, REFERENCE_COLUMNS),
+        ("model", model, MODEL_COLUMNS),
+    ):
         missing = [name for name in needed if name not in columns]
         if missing:
             problems.append(f"Case {facts.case}: the {owner} must have the columns {', '.join(missing)}.")
         elif len(columns[needed[0]]) < 2:
             problems.append(f"Case {facts.case}: the {owner} must have at least two rows.")
-    if (facts.brake_onset is None) == (facts.brake_onset_station is None) and facts.kind == "flat":
-        problems.append(f"Case {facts.case}: a flat case needs either a time or a station of brake onset.")
+    if facts.kind == "flat" and facts.brake_onset is None and facts.brake_onset_station is None:
+        problems.append(f"Case {facts.case}: a flat case needs a time or a station of brake onset.")
     if problems:
         raise InputError(problems)
 

@@ -44,7 +44,10 @@ def mount(x: float = -0.6, z: float = 1.4, tilt: float = np.deg2rad(3.0)) -> NDA
 
 
 def rig_poses(
-    station: NDArray[np.float64], heave: NDArray[np.float64], pitch: NDArray[np.float64], curvature: float = 0.0
+    station: NDArray[np.float64],
+    heave: NDArray[np.float64],
+    pitch: NDArray[np.float64],
+    curvature: float = 0.0,
 ) -> NDArray[np.float64]:
     """T_world_rig [F, 4, 4] on a level arc of constant `curvature` [1/m], left positive."""
     heading = curvature * station

@@ -1,0 +1,81 @@
+"""Corners spread over a picture, and their tracks from one picture to another."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+
+def corner_strength(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Smaller eigenvalue of the structure tensor at each pixel of a grey picture [H, W] [1]
+    (Shi and Tomasi 1994, DOI 10.1109/CVPR.1994.323794)."""
+    return cv2.cornerMinEigenVal(grey, blockSize=5)
+
+
+def grid_corners(
+    strength: NDArray[np.float32],
+    cell: int,
+    margin: int,
+    quality: float,
+    hidden: NDArray[np.bool_] | None = None,
+) -> NDArray[np.int64]:
+    """The strongest corner of each grid cell.
+
+    Parameters
+    ----------
+    strength : float32 [H, W] corner strength [1]
+    cell : side of the cells [px]
+    margin : least distance from the picture's edge [px]
+    quality : least strength as a share of the picture's 95th percentile [1]
+    hidden : bool [H, W] pixels that may not be chosen [1]
+
+    Returns
+    -------
+    int64 [N, 2] x, y [px]
+    """
+    allowed = strength if hidden is None else np.where(hidden, np.float32(0), strength)
+    rows, columns = (n // cell for n in strength.shape)
+    cells = allowed[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).swapaxes(1, 2)
+    best = cells.reshape(rows, columns, cell * cell).argmax(axis=-1)
+    i, j = np.indices(best.shape)
+    y, x = (i * cell + best // cell).ravel(), (j * cell + best % cell).ravel()
+    inside = (
+        (y >= margin) & (y < strength.shape[0] - margin) & (x >= margin) & (x < strength.shape[1] - margin)
+    )
+    good = inside & (allowed[y, x] > quality * np.percentile(strength, 95))
+    return np.stack([x[good], y[good]], axis=-1)
+
+
+def track_corners(
+    earlier: NDArray[np.uint8],
+    later: NDArray[np.uint8],
+    corners: NDArray[np.float32],
+    window: int,
+    levels: int,
+    forward_backward: float,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Follow corners to another picture and back (Lucas and Kanade, in pyramids; Kalal et al. 2010,
+    DOI 10.1109/ICPR.2010.675, for the way back).
+
+    Parameters
+    ----------
+    earlier, later : uint8 [H, W] grey pictures [1]
+    corners : float32 [N, 2] x, y in the earlier picture [px]
+    window : side of the patches [px]
+    levels : pyramid levels above full resolution [1]
+    forward_backward : largest distance between a corner and its track there and back [px]
+
+    Returns
+    -------
+    float32 [N, 2] places in the later picture [px], and bool [N] whether the track came back
+    """
+    options: dict[str, Any] = {
+        "winSize": (window, window),
+        "maxLevel": levels,
+        "criteria": (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.003),
+    }
+    there, found, _ = cv2.calcOpticalFlowPyrLK(earlier, later, corners, None, **options)
+    back, found_back, _ = cv2.calcOpticalFlowPyrLK(later, earlier, there, None, **options)
+    returned = np.linalg.norm(back - corners, axis=-1) < forward_backward
+    return there, (found.ravel() == 1) & (found_back.ravel() == 1) & returned

@@ -1,0 +1,59 @@
+"""Place a camera by points and their pixels."""
+
+import numpy as np
+
+from tasks.eval.motion import FrameStep, failed_step
+from tasks.eval.rigid import Floats, adjoint, invert_pose, pose_from_twist, project, projection_jacobian
+
+TUKEY = 4.685
+"""Tukey's constant: 95 % efficiency under Gaussian errors [1] (Beaton and Tukey 1974,
+DOI 10.1080/00401706.1974.10489171)."""
+
+
+def solve_pnp(
+    points: Floats, pixels: Floats, T_start: Floats, K: Floats, min_inliers: int, noise_floor: float
+) -> FrameStep:
+    """Minimise the reprojection error by Gauss-Newton with Tukey's weights, without random draws.
+
+    The scale is the median error, so that it shrinks from the first guess's error to the noise.
+
+    Parameters
+    ----------
+    points : float64 [N, 3] in the earlier camera frame [m]
+    pixels : float64 [N, 2] where the later camera sees them [px]
+    T_start : float64 [4, 4] first guess of ``T_later_earlier`` [m]
+    K : float64 [3, 3] intrinsics [px]
+    min_inliers : fewest points that must agree on the pose [1]
+    noise_floor : smallest error of a pixel believed [px]
+    """
+    T = T_start
+    for _ in range(40):
+        moved = points @ T[:3, :3].T + T[:3, 3]
+        ahead = moved[:, 2] > 1e-3
+        if ahead.sum() < min_inliers:
+            return failed_step(f"{int(ahead.sum())} points lie ahead of the camera", int(ahead.sum()))
+        moved[~ahead, 2] = 1.0
+        residual = pixels - project(moved, K)
+        size = np.linalg.norm(residual, axis=-1)
+        # the median length of a 2-D Gaussian error is 1.1774 of its standard deviation
+        scale = max(float(np.median(size[ahead])) / 1.1774, noise_floor)
+        weight = np.where(ahead, np.maximum(1 - (size / (TUKEY * scale)) ** 2, 0.0) ** 2, 0.0)
+        J = projection_jacobian(moved, K)
+        JW = J * weight[:, None, None]
+        H = np.einsum("nij,nik->jk", JW, J)
+        try:
+            twist = np.linalg.solve(H, np.einsum("nij,ni->j", JW, residual))
+        except np.linalg.LinAlgError:
+            return failed_step("the points do not fix the pose", 0)
+        T = pose_from_twist(twist) @ T
+        if np.abs(twist).max() < 1e-9:
+            break
+    inliers = int((weight > 0).sum())
+    if inliers < min_inliers:
+        return failed_step(f"{inliers} of {len(points)} tracked points agree on a pose", inliers)
+    variance = max((weight * size**2).sum() / (2 * weight.sum() - 6), noise_floor**2)
+    pose = invert_pose(T)
+    carry = adjoint(pose)  # the error of an inverse pose is the carried error, sign aside
+    return FrameStep(
+        T_earlier_later=pose, covariance=carry @ (variance * np.linalg.inv(H)) @ carry.T, inliers=inliers
+    )
