@@ -105,7 +105,9 @@ def test_snow_is_both_seen_and_felt(dataset):
 
 def test_the_hump_is_both_seen_and_felt(dataset):
     clips = {clip["label"]: clip for clip in manifest_of(dataset)["clips"]}
-    flat, hump = (read_clip(dataset.frames, clips[f"dry/{road}"]["index"], "depth")[0] for road in ("flat", "hump"))
+    flat, hump = (
+        read_clip(dataset.frames, clips[f"dry/{road}"]["index"], "depth")[0] for road in ("flat", "hump")
+    )
     nearer = np.nan_to_num(flat - hump)
     assert nearer.max() > 0.1, "the hump hides the road behind it"
     assert clips["dry/hump"]["figures"]["peak_pitch"] > np.deg2rad(0.5)
@@ -160,7 +162,7 @@ def test_another_grid_does_not_go_into_the_same_folder_and_the_difference_is_nam
     other = tmp_path / "other.yaml"
     other.write_text(Path(grid).read_text().replace("frames: 11", "frames: 12"))
     before = dataset.manifest.read_bytes()
-    with pytest.raises(InputError, match="grid.frames is 11 there and 12 here"):
+    with pytest.raises(InputError, match=r"grid\.frames is 11 there and 12 here"):
         generate(str(other), str(dataset.root), runner="threads")
     assert dataset.manifest.read_bytes() == before
 
@@ -219,5 +221,10 @@ def test_an_audit_names_the_first_channel_and_tick_that_differ(copy):
 
 def test_describe_lists_each_clip_with_its_stop_and_verdict(dataset):
     facts = describe(str(dataset.root))
-    assert [clip["label"] for clip in facts["clips"]] == ["dry/flat", "dry/hump", "snow-3/flat", "snow-3/hump"]
+    assert [clip["label"] for clip in facts["clips"]] == [
+        "dry/flat",
+        "dry/hump",
+        "snow-3/flat",
+        "snow-3/hump",
+    ]
     assert all({"stopping_distance", "peak_pitch", "passed"} <= clip.keys() for clip in facts["clips"])
