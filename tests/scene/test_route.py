@@ -23,9 +23,9 @@ def test_knots_are_met_exactly():
 
 def test_between_knots_the_pose_stays_on_the_arc_and_turns_with_it():
     route = arc()
+    distance = np.linalg.norm(route.pose(np.linspace(0, route.length, 997))[:, :2, 3] - [0, RADIUS], axis=1)
+    np.testing.assert_allclose(distance, RADIUS, atol=2e-4)
     poses = route.pose(np.linspace(5, route.length - 5, 97))
-    distance = np.linalg.norm(poses[:, :2, 3] - [0, RADIUS], axis=1)
-    np.testing.assert_allclose(distance, RADIUS, atol=2e-3)
     yaw = np.arctan2(poses[:, 1, 0], poses[:, 0, 0])
     np.testing.assert_allclose(np.diff(yaw, 2), 0, atol=2e-4)
 
@@ -77,6 +77,12 @@ def test_points_beyond_the_ends_get_stations_beyond_them():
     straight = route_from_positions(np.stack([np.arange(10.0), np.zeros(10), np.zeros(10)], axis=1))
     station, _, _ = straight.project(np.array([[-3.0, 0, 0], [14.0, 1, 0]]))
     np.testing.assert_allclose(station, [-3, 14], atol=1e-9)
+
+
+def test_a_bend_goes_straight_on_beyond_its_end():
+    route = arc()
+    point = route.T_world_rig[-1] @ [7.0, -3.0, 1.0, 1.0]
+    np.testing.assert_allclose(np.ravel(route.project(point[None, :3])), [route.length + 7, -3, 1], atol=1e-9)
 
 
 def test_an_extension_goes_on_straight_and_keeps_what_was_there():
