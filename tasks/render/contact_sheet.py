@@ -46,8 +46,9 @@ def contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz: flo
         left = len(frames) * step_x + MARGIN
         box = sheet[top + CAPTION : top + CAPTION + tile[1], left : left + CURVE_WIDTH]
         _draw_curves(box, curves, limits)
-        ends = ", ".join(_legend(name, limits[name]) for name in CURVE_COLOURS)
-        _text(sheet, ends, (left, top + CAPTION - 6))
+        for part, (name, colour) in enumerate(CURVE_COLOURS.items()):
+            origin = (left + part * CURVE_WIDTH // len(CURVE_COLOURS), top + CAPTION - 6)
+            _text(sheet, _legend(name, limits[name]), origin, colour)
     return sheet
 
 
@@ -87,5 +88,7 @@ def _draw_curves(
     box[:] = canvas
 
 
-def _text(sheet: NDArray[np.uint8], text: str, origin: tuple[int, int]) -> None:
-    cv2.putText(sheet, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.38, INK, 1, cv2.LINE_AA)
+def _text(
+    sheet: NDArray[np.uint8], text: str, origin: tuple[int, int], colour: tuple[int, int, int] = INK
+) -> None:
+    cv2.putText(sheet, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.38, colour, 1, cv2.LINE_AA)

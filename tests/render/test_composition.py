@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tasks.render.composition import compose, encode_8bit, round_depth, to_display, to_linear
-from tasks.render.contact_sheet import contact_sheet, encode_png
+from tasks.render.contact_sheet import CAPTION, CURVE_COLOURS, MARGIN, contact_sheet, encode_png
 from tasks.render.environment import environment_view, plain_sky
 from tasks.render.gbuffer import GBuffer
 
@@ -91,3 +91,12 @@ def test_a_contact_sheet_has_a_row_a_clip_and_decodes():
     assert (cv2.imdecode(np.frombuffer(encode_png(sheet), np.uint8), 1)[..., ::-1] == sheet).all()
     one = contact_sheet([("dry", pictures, curves)], [0, 8], 10.0)
     assert sheet.shape[0] > 1.8 * one.shape[0]
+
+
+def test_each_curve_is_named_in_its_own_colour():
+    pictures = [np.full((32, 48, 3), 200, np.uint8)]
+    curves = {"speed": np.linspace(16, 0, 9), "pitch": np.linspace(0, 0.03, 9)}
+    sheet = contact_sheet([("dry", pictures, curves)], [0], 10.0)
+    heading = sheet[: MARGIN + CAPTION]
+    for colour in CURVE_COLOURS.values():
+        assert (np.abs(heading.astype(int) - colour).max(axis=2) < 20).any()
