@@ -13,9 +13,14 @@ def corner_strength(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
     return cv2.cornerMinEigenVal(grey, blockSize=5)
 
 
+def cell_size(width: int, cells_across: int) -> int:
+    """Side of the grid cells over a picture of that width [px]."""
+    return max(width // cells_across, 4)
+
+
 def grid_corners(
     strength: NDArray[np.float32],
-    cell: int,
+    cells_across: int,
     margin: int,
     quality: float,
     hidden: NDArray[np.bool_] | None = None,
@@ -25,7 +30,7 @@ def grid_corners(
     Parameters
     ----------
     strength : float32 [H, W] corner strength [1]
-    cell : side of the cells [px]
+    cells_across : cells over the picture's width, none smaller than 4 px [1]
     margin : least distance from the picture's edge [px]
     quality : least strength as a share of the picture's 95th percentile [1]
     hidden : bool [H, W] pixels that may not be chosen [1]
@@ -34,6 +39,7 @@ def grid_corners(
     -------
     int64 [N, 2] x, y [px]
     """
+    cell = cell_size(strength.shape[1], cells_across)
     allowed = strength if hidden is None else np.where(hidden, np.float32(0), strength)
     rows, columns = (n // cell for n in strength.shape)
     cells = allowed[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).swapaxes(1, 2)

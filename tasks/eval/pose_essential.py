@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.corners import corner_strength, grid_corners, track_corners
+from tasks.eval.corners import cell_size, corner_strength, grid_corners, track_corners
 from tasks.eval.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
 from tasks.eval.motion import (
     MAX_GAP,
@@ -31,7 +31,7 @@ class EssentialSettings:
 
     Parameters
     ----------
-    cell : side of the grid cells that give one corner each [px]
+    cells_across : grid cells over the picture's width, which give one corner each [1]
     corner_quality : least corner strength as a share of the frame's 95th percentile [1]
     window : side of the tracked patches [px]
     track_levels : pyramid levels above full resolution where motion and depth are predicted [1]
@@ -44,7 +44,7 @@ class EssentialSettings:
     noise_floor : smallest tracking error believed [px]
     """
 
-    cell: int = 14
+    cells_across: int = 34
     corner_quality: float = 0.02
     window: int = 11
     track_levels: int = 1
@@ -136,7 +136,7 @@ def recover_motion_essential(
 def _key(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> _Key:
     grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
     corners = grid_corners(
-        corner_strength(grey), settings.cell, settings.window // 2, settings.corner_quality
+        corner_strength(grey), settings.cells_across, settings.window // 2, settings.corner_quality
     )
     unknown = np.zeros(len(corners))
     return _Key(
@@ -276,7 +276,7 @@ def _spread(
     pixels: Floats, inverse_depth: Floats, shape: tuple[int, ...], settings: EssentialSettings
 ) -> NDArray[np.float32]:
     """A smooth guess of inverse depth for every pixel, by normalised convolution over the grid cells."""
-    cell = settings.cell
+    cell = cell_size(shape[1], settings.cells_across)
     rows, columns = -(-shape[0] // cell), -(-shape[1] // cell)
     at = np.clip((pixels[:, ::-1] / cell).astype(np.int64), 0, [rows - 1, columns - 1])
     total, count = np.zeros((rows, columns)), np.zeros((rows, columns))

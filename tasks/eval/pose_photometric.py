@@ -25,7 +25,8 @@ class PhotometricSettings:
 
     Parameters
     ----------
-    levels : pyramid levels, full resolution among them [1]
+    levels : most pyramid levels, full resolution among them [1]
+    smallest_side : shorter side of the smallest picture [px]
     track_level : coarsest level where the motion is predicted [1]
     search_advances : ways ahead to try as first guesses where it is not [m]
     iterations : most Gauss-Newton steps per level [1]
@@ -41,6 +42,7 @@ class PhotometricSettings:
     """
 
     levels: int = 4
+    smallest_side: int = 32
     track_level: int = 2
     search_advances: tuple[float, ...] = (0.0, 1.0, 2.0, 4.0)
     iterations: int = 15
@@ -48,7 +50,7 @@ class PhotometricSettings:
     smoothing: float = 0.6
     least_gradient: float = 1.0
     depth_kink: float = 0.1
-    min_pixels: int = 1500
+    min_pixels: int = 1000
     min_inlier_share: float = 0.4
     min_correlation: float = 0.5
     noise_floor: float = 0.5
@@ -137,6 +139,8 @@ def _pyramid(
     q = np.divide(1.0, depth, out=np.zeros_like(depth), where=seen)
     levels = []
     for level in range(settings.levels):
+        if level and min(grey.shape) < 2 * settings.smallest_side:
+            break
         if level:
             # pixel i of the smaller picture is centred on pixel 2 i of the larger one
             grey, q, K = cv2.pyrDown(grey), q[::2, ::2], np.diag([0.5, 0.5, 1.0]) @ K

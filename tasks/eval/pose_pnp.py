@@ -31,7 +31,7 @@ class PnpSettings:
 
     Parameters
     ----------
-    cell : side of the grid cells that give one corner each [px]
+    cells_across : grid cells over the picture's width, which give one corner each [1]
     corner_quality : least corner strength as a share of the frame's 95th percentile [1]
     window : side of the tracked patches [px]
     track_levels : pyramid levels above full resolution where the motion is predicted [1]
@@ -48,7 +48,7 @@ class PnpSettings:
     noise_floor : smallest tracking error believed [px]
     """
 
-    cell: int = 14
+    cells_across: int = 34
     corner_quality: float = 0.02
     window: int = 11
     track_levels: int = 1
@@ -139,7 +139,7 @@ def _corners(
 ) -> NDArray[np.int64]:
     """Corners whose patch lies on one smooth surface, [N, 2] as x, y [px]."""
     reach, q_map = settings.window // 2, frame.inverse_depth
-    corners = grid_corners(frame.strength, settings.cell, reach, settings.corner_quality, hidden)
+    corners = grid_corners(frame.strength, settings.cells_across, reach, settings.corner_quality, hidden)
     x, y = corners.T
     q = q_map[y, x]
     # 1/z of a plane is linear in the picture, so any bend is an edge or a curve
