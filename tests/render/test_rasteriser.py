@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.gbuffer import GBuffer
+from tasks.render.projection import project
 from tasks.render.rasteriser import prepare, rasterise
 from tasks.render.reference_rasteriser import blend_steps, rasterise_reference
+from tasks.render.view import view_of
 from tasks.scene.gaussians import Gaussians
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, cloud, random_cloud, rotation
-
 
 AHEAD = np.eye(4)
 
@@ -101,6 +102,15 @@ def test_opacity_stays_between_zero_and_one() -> None:
     got = draw(replace(random_cloud(3000, 1), opacities=np.ones(3000, dtype=np.float32)))
     assert got.alpha.min() >= 0 and got.alpha.max() <= 1
     assert got.alpha.max() > 0.9998  # closed pixels
+
+
+def test_a_pixel_closes_before_the_gaussian_that_would_leave_it_no_light() -> None:
+    """Behind 0.999 a second 0.999 would leave 1e-6: it is not drawn, and nothing behind it either."""
+    means, wide = [(0, 0, 2.0), (0, 0, 3.0), (0, 0, 4.0)], (9.0, 9.0, 0.1)
+    got = draw(cloud(means, wide, (1.0, 1.0, 0.5), colours=np.eye(3)))
+    assert got.rgb[26, 35] == pytest.approx((0.999, 0, 0), abs=1e-6)
+    thinner = draw(cloud(means, wide, (1.0, 0.5, 0.5), colours=np.eye(3)))
+    assert thinner.rgb[26, 35] == pytest.approx((0.999, 0.0005, 0.00025), abs=2e-6)
 
 
 def test_an_opaque_wall_has_its_own_depth_normal_and_class() -> None:
@@ -194,7 +204,7 @@ def test_nothing_in_view_gives_an_empty_picture(place: str) -> None:
         "nowhere": replace(cloud(np.zeros((0, 3))), sh=np.zeros((0, 4, 3), np.float32)),
         "behind": cloud([(0, 0, -3.0), (1, 0, -0.2)]),
         "beside": cloud([(20.0, 0, 3.0), (0, -30.0, 3.0)]),
-        "too close": cloud([(0, 0, 0.049)]),
+        "too close": cloud([(0, 0, 0.049), (60.0, 0, 3.0)]),
         "too faint": cloud([(0, 0, 3.0)], opacities=0.99 / 255),
     }[place]
     got = draw(gaussians)
@@ -202,14 +212,22 @@ def test_nothing_in_view_gives_an_empty_picture(place: str) -> None:
     assert np.isnan(got.depth).all()
 
 
-def test_huge_and_needle_gaussians_stay_finite() -> None:
-    got = draw(cloud(
-        [(0.5, 0.2, 0.06), (0, 0, 3.0), (3.0, 0, 0.1), (0, 0, 5.0)],
-        scales=[(50, 1e-4, 1e-4), (1e18, 1e18, 1e18), (40, 40, 40), (1e3, 1e-6, 1e-6)],
-        quats_wxyz=[(0.8, 0.6, 0, 0), (1, 0, 0, 0), (1, 0, 0, 0), (0.9, 0.1, 0.3, 0.3)],
-    ))  # fmt: skip
+def test_needles_and_walls_through_the_eye_stay_finite() -> None:
+    got = draw(
+        cloud(
+            [(0.5, 0.2, 0.06), (3.0, 0, 0.1), (0, 0, 5.0)],
+            scales=[(50, 1e-4, 1e-4), (40, 40, 40), (1e3, 1e-6, 1e-6)],
+            quats_wxyz=[(0.8, 0.6, 0, 0), (1, 0, 0, 0), (0.9, 0.1, 0.3, 0.3)],
+        )
+    )
     assert np.isfinite(got.rgb).all() and np.isfinite(got.alpha).all() and np.isfinite(got.normal).all()
-    assert np.isfinite(got.depth[got.alpha > 0]).all()
+    assert (got.alpha > 0).all() and np.isfinite(got.depth).all()
+
+
+def test_a_gaussian_beyond_single_precision_is_left_out() -> None:
+    means, scales = [(0, 0, 3.0), (0, 0, 4.0)], [(1e18, 1e18, 1e18), (0.1, 0.1, 0.1)]
+    records, slots = project(prepare(cloud(means, scales)), view_of(np.eye(4), K, WIDTH, HEIGHT))
+    assert len(slots) == 1 and np.isfinite(records).all()
 
 
 def test_nan_is_refused_by_name_and_number() -> None:
