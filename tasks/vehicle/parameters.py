@@ -123,12 +123,14 @@ class SurfaceResponse:
     Parameters
     ----------
     tyre : the peak-normalised curve on this surface
+    slip_stiffness : beta_kappa [1]
     pitch_scale : gamma_theta [1]
     hold_s, release_s : tau_h and tau_r [s]
     extrapolated : the surface friction lies outside the knots, so the end values hold
     """
 
     tyre: TyreCurve
+    slip_stiffness: float
     pitch_scale: float
     hold_s: float
     release_s: float
@@ -150,10 +152,12 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
     def at(values: tuple[float, ...]) -> float:
         return float(np.interp(surface_friction, knots, values))
 
+    slip_stiffness = at(table.slip_stiffness)
     # The knots are printed with six digits, so a friction within their rounding is on the end knot.
     rounding = 5e-7
     return SurfaceResponse(
-        tyre=tyre_curve(table.burckhardt, at(table.efficiency) * surface_friction, at(table.slip_stiffness)),
+        tyre=tyre_curve(table.burckhardt, at(table.efficiency) * surface_friction, slip_stiffness),
+        slip_stiffness=slip_stiffness,
         pitch_scale=at(table.pitch_scale),
         hold_s=at(table.hold_s),
         release_s=at(table.release_s),

@@ -132,7 +132,7 @@ def rollout(
         mode=mode,
         surface_friction=surface_friction,
         tyre_peak=response.tyre.peak,
-        slip_stiffness=response.tyre.slip_stiffness,
+        slip_stiffness=response.slip_stiffness,
         target_slip=response.tyre.target_slip,
         static_pitch=vehicle.static_pitch,
         brake_onset_time=history.onset if braked else nan,

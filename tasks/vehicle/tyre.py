@@ -7,52 +7,53 @@ from numba import njit
 
 
 class TyreCurve(NamedTuple):
-    """A Burckhardt curve scaled to one surface, as the kernels take it.
+    """A Burckhardt curve scaled to one surface: mu = rise (1 - exp(-decay kappa)) - fall kappa.
 
     Parameters
     ----------
-    c1, c2, c3 : base curve [1]
+    rise, decay, fall : the base curve's c1, c2, c3 after scaling height and slip [1]
     peak : friction at the top of the curve, mu_eff [1]
-    slip_stiffness : horizontal scale, beta [1]
-    base_peak : top of the base curve on slips of 0 to 1 [1]
-    target_slip : slip at the top of the scaled curve, kappa* [1]
+    target_slip : slip at the top of the curve, kappa* [1]
     """
 
-    c1: float
-    c2: float
-    c3: float
+    rise: float
+    decay: float
+    fall: float
     peak: float
-    slip_stiffness: float
-    base_peak: float
     target_slip: float
 
 
 def tyre_curve(burckhardt: tuple[float, float, float], peak: float, slip_stiffness: float) -> TyreCurve:
-    """Scale a base curve to its peak and stiffness on a surface (paper, Appendix B).
+    """Scale a base curve to its peak and stiffness on a surface, mu_B(beta kappa; mu_eff) (paper, Appendix B).
 
     Parameters
     ----------
     burckhardt : c1, c2, c3 of a curve that rises and then falls [1]
     peak : mu_eff [1]
-    slip_stiffness : beta [1]
+    slip_stiffness : horizontal scale, beta [1]
     """
     c1, c2, c3 = burckhardt
     peak_slip = min(log(c1 * c2 / c3) / c2, 1.0)
-    base_peak = c1 * (1 - exp(-c2 * peak_slip)) - c3 * peak_slip
-    return TyreCurve(c1, c2, c3, peak, slip_stiffness, base_peak, peak_slip / slip_stiffness)
+    scale = peak / (c1 * (1 - exp(-c2 * peak_slip)) - c3 * peak_slip)
+    return TyreCurve(
+        rise=scale * c1,
+        decay=c2 * slip_stiffness,
+        fall=scale * c3 * slip_stiffness,
+        peak=peak,
+        target_slip=peak_slip / slip_stiffness,
+    )
 
 
 @njit(cache=True, nogil=True)
 def tyre_friction(braking_slip: float, tyre: TyreCurve) -> float:
-    """Braking force over load, mu_B(beta kappa; mu_eff) [1] (paper, Eq. tire_force).
+    """Braking force over load [1] (paper, Eq. tire_force).
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
     tyre : the scaled curve
     """
-    x = tyre.slip_stiffness * braking_slip
-    return tyre.peak / tyre.base_peak * (tyre.c1 * (1.0 - exp(-tyre.c2 * x)) - tyre.c3 * x)
+    return tyre.rise * (1.0 - exp(-tyre.decay * braking_slip)) - tyre.fall * braking_slip
 
 
 @njit(cache=True, nogil=True)
@@ -64,10 +65,7 @@ def tyre_slope(braking_slip: float, tyre: TyreCurve) -> float:
     braking_slip : kappa, 0 or more [1]
     tyre : the scaled curve
     """
-    x = tyre.slip_stiffness * braking_slip
-    return (
-        tyre.peak / tyre.base_peak * tyre.slip_stiffness * (tyre.c1 * tyre.c2 * exp(-tyre.c2 * x) - tyre.c3)
-    )
+    return tyre.rise * tyre.decay * exp(-tyre.decay * braking_slip) - tyre.fall
 
 
 @njit(cache=True, nogil=True)

@@ -1,0 +1,105 @@
+"""The paper's studies: the conditions it drives, its sampling, and the figures it prints."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import yaml
+from pydantic import Field
+
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, checked, read_entry
+from catalogs.scenario import Scenario
+from tasks.vehicle.sensitivity import PrintedFigure, StudyProtocol, WeatherStudy
+
+FOLDER = Path(__file__).parent
+
+Count = Annotated[Scalar, checked("1", minimum=0)]
+
+
+class ProtocolEntry(CatalogueEntry):
+    """Braking protocol; the meanings stand at ``StudyProtocol``."""
+
+    initial_speed: Annotated[Scalar, checked("km h-1", above=0)]
+    peak_pressure_mpa: Annotated[Scalar, checked("MPa", above=0)]
+    ramp_s: Annotated[Scalar, checked("s", minimum=0)]
+    coast_deceleration: Annotated[Scalar, checked("m s-2", minimum=0)]
+    step_s: Annotated[Scalar, checked("s", above=0)]
+    snow_accumulation_h: Annotated[Scalar, checked("h", minimum=0)]
+    samples: Count
+    percentiles: Annotated[Table, checked("%", minimum=0, maximum=100)]
+
+
+class WeatherStudyEntry(CatalogueEntry):
+    """What is varied; the meanings stand at ``WeatherStudy``."""
+
+    seed: Count
+    parameters: tuple[Text, ...]
+    highest_rate: Annotated[Scalar, checked("mm h-1", above=0)]
+    sampled_rates: Count
+    nominal_rates: Count
+
+
+class PrintedEntry(CatalogueEntry):
+    """One published figure."""
+
+    figure: Text
+    value: Number
+    digits: Annotated[int, Field(ge=0)]
+    unit: Text
+
+
+class SensitivityEntry(CatalogueEntry):
+    """The whole study."""
+
+    protocol: ProtocolEntry
+    rain: WeatherStudyEntry
+    snow: WeatherStudyEntry
+    printed: tuple[PrintedEntry, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Condition:
+    """One condition of the paper's Appendix C.
+
+    Parameters
+    ----------
+    name : of the condition
+    split : development or held-out
+    scenario : its controls
+    """
+
+    name: str
+    split: str
+    scenario: Scenario
+
+
+def load_sensitivity_study() -> tuple[StudyProtocol, tuple[PrintedFigure, ...]]:
+    """Protocol and printed figures of the paper's Appendix E."""
+    entry = read_entry(SensitivityEntry, FOLDER / "surface-sensitivity.yaml", "study")
+    values: dict[str, Any] = {name: quantity.value for name, quantity in entry.protocol}
+    values["initial_speed"] /= 3.6
+    values["samples"] = int(values["samples"])
+    protocol = StudyProtocol(
+        **values,
+        rain=WeatherStudy(kind="rain", **_study(entry.rain)),
+        snow=WeatherStudy(kind="snow", **_study(entry.snow)),
+    )
+    return protocol, tuple(PrintedFigure(**figure.model_dump()) for figure in entry.printed)
+
+
+def load_conditions() -> tuple[Condition, ...]:
+    """The 19 development and 12 held-out conditions of the paper's Appendix C, in its order."""
+    rows = yaml.safe_load((FOLDER / "appendix-c.yaml").read_text(encoding="utf-8"))
+    return tuple(
+        Condition(name=row.pop("name"), split=row.pop("split"), scenario=Scenario(**row)) for row in rows
+    )
+
+
+def _study(entry: WeatherStudyEntry) -> dict[str, Any]:
+    return {
+        "seed": int(entry.seed.value),
+        "parameters": entry.parameters,
+        "highest_rate": entry.highest_rate.value,
+        "sampled_rates": int(entry.sampled_rates.value),
+        "nominal_rates": int(entry.nominal_rates.value),
+    }
