@@ -16,8 +16,8 @@ from tasks.scene.street.road import road
 from tasks.scene.street.roofs import house_boxes, roofs
 from tasks.scene.street.sky import panorama
 from tasks.scene.street.surfels import THICKNESS, join
-from tasks.scene.street.vegetation import gardens, trees
-from tasks.scene.street.vehicles import car_boxes, cars
+from tasks.scene.street.vegetation import LEAF_EXTINCTION, gardens, trees
+from tasks.scene.street.vehicles import car_boxes, cars, footprints
 
 __all__ = ["StreetLayout", "build_street"]
 
@@ -63,7 +63,10 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
         post_boxes(layout, plan),
     ]
     casters = Casters(
-        boxes=np.concatenate(boxes), balls=np.stack([tree.balls for tree in plan.trees]), leaf_extinction=0.9
+        boxes=np.concatenate(boxes),
+        footprints=footprints(plan.cars),
+        balls=np.stack([tree.balls for tree in plan.trees]),
+        leaf_extinction=LEAF_EXTINCTION,
     )
     radiance = lit_radiance(surfels, layout, line, casters)
     station = surfels.centre[:, 0]

@@ -12,7 +12,7 @@ from tasks.scene.street.surfels import Surfels, graded_cells, tiles
 
 Floats = NDArray[np.float64]
 
-_CELL = (17.0, 11.0)
+_CELL = (19.0, 12.0)
 """Largest width and height of a wall cell where it is seen closest [px]."""
 _RECESS = np.array([0.0, -0.03, 0.10, 0.14, -0.06, -0.08, -0.04])
 """How far each part stands back from the wall [m]."""

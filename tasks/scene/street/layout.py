@@ -46,7 +46,7 @@ class StreetLayout:
     """
 
     route_length: float = 180.0
-    behind: float = 30.0
+    behind: float = 40.0
     beyond: float = 130.0
     bend_start: float = 40.0
     bend_transition: float = 60.0

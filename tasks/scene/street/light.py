@@ -30,9 +30,12 @@ class Casters:
     boxes : float64 [K, 2, 3] lowest and highest corner of each opaque box [m]
     balls : float64 [T, B, 4] centre and radius of the balls of leaves, one row per tree [m]
     leaf_extinction : extinction within a ball [m-1]
+    footprints : float64 [C, 2, 2] lowest and highest station and lateral position of what stands so low
+        over the road that it hides the sky around its foot [m]
     """
 
     boxes: Floats
+    footprints: Floats
     balls: Floats
     leaf_extinction: float
 
@@ -74,8 +77,9 @@ def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: 
     direct = np.zeros(len(point))
     lit = np.flatnonzero(facing > 0)
     direct[lit] = facing[lit] * _sun_share(point[lit], to_sun[lit], casters)
-    sky = sky_share(point, normal, layout) * surfels.openness[order]
-    around = (1 - sky) * (0.35 + 0.65 * surfels.openness[order])
+    openness = surfels.openness[order] * _clearance(point, casters.footprints)
+    sky = sky_share(point, normal, layout) * openness
+    around = (1 - sky) * (0.25 + 0.75 * openness)
     light = (
         direct[:, None] * np.array(layout.sun_rgb)
         + sky[:, None] * np.array(layout.sky_rgb)
@@ -114,6 +118,18 @@ def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
     across = np.clip(seen / 2, 0.0, 1.0)
     along = np.clip((np.sin(left) + 1 - np.sin(right)) / 4, 0.0, 0.5)
     return cross * across + (1 - cross) * along
+
+
+def _clearance(point: Floats, footprints: Floats) -> Floats:
+    """Share of the ambient light that gets past parked cars to ground points sorted by station; float64 [N] [1]."""
+    clear = np.ones(len(point))
+    for low, high in footprints:
+        near = _window(point[:, 0], low[0] - 1.5, high[0] + 1.5)
+        p = point[near]
+        outside = np.maximum(np.maximum(low - p[:, :2], p[:, :2] - high), 0.0)
+        shade = 1 - 0.88 * np.exp(-np.hypot(outside[:, 0], outside[:, 1]) / 0.28)
+        clear[near] = np.where(p[:, 2] < 0.25, np.minimum(clear[near], shade), clear[near])
+    return clear
 
 
 def _sun_share(point: Floats, to_sun: Floats, casters: Casters) -> Floats:

@@ -121,10 +121,12 @@ def plan_street(layout: StreetLayout, seed: int) -> Plan:
     seed : the street's seed [1]
     """
     first, last = layout.station_range
+    # a lamp stands by the crossing; those of the other side stand between
+    behind = layout.crossing_station - layout.lamp_spacing * int((layout.crossing_station - first) / layout.lamp_spacing)
     lamps = tuple(
         (float(s), side)
-        for side, offset in ((-1, 9.0), (1, 9.0 + layout.lamp_spacing / 2))
-        for s in np.arange(first + offset, last, layout.lamp_spacing)
+        for side, offset in ((-1, layout.crossing_length + 1.5), (1, layout.crossing_length + 1.5 - layout.lamp_spacing / 2))
+        for s in np.arange(behind + offset, last, layout.lamp_spacing)
     )
     buildings = tuple(b for side in (-1, 1) for b in _row_of_houses(layout, seed, side))
     trees = tuple(t for side in (-1, 1) for t in _row_of_trees(layout, seed, side, lamps))

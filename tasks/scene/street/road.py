@@ -9,13 +9,13 @@ from tasks.scene.street.noise import stream
 from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
 from tasks.scene.street.surfels import Surfels, graded_cells, join, tiles
 
-CELL = 5.6
+CELL = 6.3
 """Width of an asphalt cell where it is seen closest [px]."""
-_STONES = 26.0
+_STONES = 32.0
 """Single light or dark stones where the road is seen closest [m-2]."""
 _STONE = (0.055, 0.026)
 """Length and width of a stone with the gap around it [m]."""
-_SLENDER = (2.0, 5.0)
+_SLENDER = (2.0, 4.0)
 """Least and greatest length of a cell over its width: the road is seen foreshortened."""
 
 

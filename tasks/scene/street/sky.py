@@ -15,7 +15,7 @@ _CLOUD_LIGHT, _CLOUD_SHADE = np.array([1.05, 1.02, 0.98]), np.array([0.50, 0.55,
 _GROUND, _FAR_HOUSES = np.array([0.16, 0.155, 0.145]), np.array([0.30, 0.34, 0.39])
 _GLOW = np.array([1.0, 0.9, 0.72])
 _SUN_RADIUS_DEG = 0.6
-_CLOUD_BASE, _CLOUD_WAVE = 1.0, 1.3
+_CLOUD_BASE, _CLOUD_WAVE = 1.0, 0.8
 """Height of the cloud layer and length of its longest wave, in units of that height [1]."""
 
 
@@ -59,11 +59,14 @@ def _sky(layout: StreetLayout, seed: int, elevation: Floats, azimuth: Floats) ->
 
 def _clouds(layout: StreetLayout, seed: int, up: Floats, flat: Floats, azimuth: Floats) -> tuple[Floats, Floats]:
     """How bright the clouds are (0 shade, 1 sun) and how much sky they cover, in each direction."""
-    slant = _CLOUD_BASE / (up + 0.08)
+    slant = _CLOUD_BASE / (up + 0.10)
     x, y = slant * flat * np.cos(azimuth), slant * flat * np.sin(azimuth)
     sun = sun_direction(layout)
     field = fractal_noise(stream(seed, "clouds"), x, y, _CLOUD_WAVE, 5)
-    towards = fractal_noise(stream(seed, "clouds"), x + 0.14 * sun[0], y + 0.14 * sun[1], _CLOUD_WAVE, 5)
+    towards = fractal_noise(stream(seed, "clouds"), x + 0.10 * sun[0], y + 0.10 * sun[1], _CLOUD_WAVE, 5)
+    # the shadows in the street are sharp: no cloud stands before the sun
+    away = np.hypot(x - sun[0] / (sun[2] + 0.10), y - sun[1] / (sun[2] + 0.10))
+    field = field - 2.0 * np.exp(-((away / 0.6) ** 2))
     cover = np.clip((field - 0.75) / 0.8, 0, 1)
     cover = cover * cover * (3 - 2 * cover)
     light = np.clip(0.75 + 0.9 * (field - towards) - 0.22 * np.maximum(field - 0.9, 0), 0, 1)

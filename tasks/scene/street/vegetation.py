@@ -12,9 +12,11 @@ from tasks.scene.street.surfels import Surfels, join, panel, tiles, tube
 
 Floats = NDArray[np.float64]
 
-_LEAF = 6.8
+LEAF_EXTINCTION = 0.9
+"""Of sunlight within a crown: about a quarter passes through 1.5 m of leaves [m-1]."""
+_LEAF = 7.3
 """Length of a tuft of leaves where it is seen closest [px]."""
-_LAYERS = 1.75
+_LAYERS = 1.7
 """Tufts over each other on the crown's surface [1]."""
 
 

@@ -14,10 +14,12 @@ from tasks.scene.street.surfels import Surfels, graded_cells, join, sheet_cells,
 
 Floats = NDArray[np.float64]
 
-_CELL = (12.5, 7.2)
+_CELL = (13.5, 7.8)
 """Length and height of a cell of the body where it is seen closest [px]."""
 _SILL, _BUMPER = 0.20, 0.42
 _WHEEL = 0.315
+_LAMP, _PLATE = 0.56, 0.29
+"""Inner edge of the lamps and half width of the number plate, over half the car's width [1]."""
 _SKY, _HOUSES, _ROAD = np.array([0.42, 0.52, 0.68]), np.array([0.16, 0.15, 0.14]), np.array([0.13, 0.13, 0.125])
 
 
@@ -81,9 +83,9 @@ SHAPES = {
         length=4.9,
         width=1.92,
         roof=np.array(
-            [[0, 1.0], [0.008, 1.78], [0.04, 1.90], [0.55, 1.93], [0.66, 1.86], [0.80, 1.18], [0.84, 1.11], [0.95, 0.93], [0.985, 0.78], [1, 0.66]]
+            [[0, 1.80], [0.03, 1.90], [0.55, 1.93], [0.66, 1.86], [0.80, 1.18], [0.84, 1.11], [0.95, 0.93], [0.985, 0.78], [1, 0.66]]
         ),
-        belt=np.array([[0, 0.98], [0.008, 1.08], [0.66, 1.08], [0.84, 1.05], [0.95, 0.90], [0.985, 0.76], [1, 0.66]]),
+        belt=np.array([[0, 1.06], [0.66, 1.08], [0.84, 1.05], [0.95, 0.90], [0.985, 0.76], [1, 0.66]]),
         glass=(0.58, 0.76),
         pillar=0.60,
         axles=(0.19, 0.82),
@@ -115,6 +117,13 @@ def car_boxes(parked: tuple[Car, ...]) -> Floats:
             half = narrow * shape.width / 2
             boxes.append([[s[0], car.lateral - half, low], [s[1], car.lateral + half, high]])
     return np.array(boxes)
+
+
+def footprints(parked: tuple[Car, ...]) -> Floats:
+    """Ground under the cars [K, 2, 2]: lowest and highest station and lateral position [m]."""
+    half = np.array([[0.46 * SHAPES[car.model].length, 0.42 * SHAPES[car.model].width] for car in parked])
+    middle = np.array([[car.station, car.lateral] for car in parked])
+    return np.stack([middle - half, middle + half], axis=1)
 
 
 def _placed(layout: StreetLayout, car: Car, seed: int) -> Surfels:
@@ -194,25 +203,30 @@ def _section(shape: Shape, along: Floats) -> Floats:
 def _ends(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> list[Surfels]:
     parts = []
     for along, outward in ((0.0, -1.0), (1.0, 1.0)):
-        half_width, height = _section(shape, np.array([along]))[0, :5].T
-        nz, ny = (max(int(np.ceil(size / cell[1])), 3) for size in (np.ptp(height), shape.width))
-        z = np.linspace(height[0], height[-1], nz + 1)
-        across = np.linspace(-1, 1, ny + 1)[:, None]
+        half_width, height = _section(shape, np.array([along]))[0, :6].T
+        belt, roof = height[4], height[5]
+        plate = (0.54, 0.66) if outward < 0 else (0.40, 0.51)
+        lamp = (belt - 0.22, belt - 0.05)
+        rows = np.unique([height[0], _BUMPER, *plate, *lamp, belt, *((belt + 0.08, roof - 0.12, roof) if roof > belt + 0.3 else ())])
+        _, step, _ = graded_cells(rows, cell[1], 1.0)
+        z = height[0] + np.concatenate([[0.0], np.cumsum(step)])
+        _, step, _ = graded_cells([-1.0, -_LAMP, -_PLATE, _PLATE, _LAMP, 1.0], 2 * cell[1] / shape.width, 1.0)
+        across = np.concatenate([[0.0], np.cumsum(step)])[:, None] - 1
         y = outward * across * np.interp(z, height, half_width)
         x = along * shape.length + outward * 0.09 * (1 - across**2) + 0 * z
         centre, edge_u, edge_v = sheet_cells(np.stack([x, y, np.broadcast_to(z, y.shape)], axis=-1))
         side, z = np.abs(centre[..., 1]) / (shape.width / 2), centre[..., 2]
-        top = height[-1]
-        lamp = (side > 0.52) & (z > top - 0.24) & (z < top - 0.03)
-        plate = (side < 0.30) & (np.abs(z - (0.60 if outward < 0 else 0.46)) < 0.065)
-        grille = (outward > 0) & (side < 0.45) & (z > 0.34) & (z < 0.60) & ~plate
+        light = (side > _LAMP) & (z > lamp[0]) & (z < lamp[1])
+        number = (side < _PLATE) & (z > plate[0]) & (z < plate[1])
+        pane = (side < 0.8) & (z > belt + 0.08) & (z < roof - 0.12)
+        grille = (outward > 0) & (side < _LAMP) & (z > 0.34) & (z < 0.60) & ~number
         albedo = np.broadcast_to(paint, centre.shape)
         for chosen, colour in (
-            (z < _BUMPER - 0.02, palette.PLASTIC), (grille, palette.PLASTIC), (plate, palette.NUMBER_PLATE),
-            (lamp, palette.TAIL_LIGHT if outward < 0 else palette.HEAD_LIGHT),
+            (z < _BUMPER, palette.PLASTIC), (grille, palette.PLASTIC), (number, palette.NUMBER_PLATE),
+            (light, palette.TAIL_LIGHT if outward < 0 else palette.HEAD_LIGHT), (pane, np.full(3, 0.012)),
         ):  # fmt: skip
             albedo = np.where(chosen[..., None], colour, albedo)
-        glow = _mirrored(centre, edge_u, edge_v, np.where(z < _BUMPER, 0.0, 0.045), eye + [shape.length / 2, 0, 0])
+        glow = _mirrored(centre, edge_u, edge_v, np.where(z < _BUMPER, 0.0, np.where(pane, 0.1, 0.045)), eye + [shape.length / 2, 0, 0])
         openness = np.clip(0.2 + 1.1 * z, 0.0, 1.0)
         parts.append(tiles(centre, edge_u, edge_v, SemanticClass.VEHICLE, albedo, glow=glow, openness=openness))
     return parts
