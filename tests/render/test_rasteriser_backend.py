@@ -1,5 +1,6 @@
 """Which rasteriser is taken, and that gsplat's picture is the CPU's."""
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,14 +13,32 @@ from numpy.typing import NDArray
 
 from tasks.errors import InputError
 from tasks.render import backend
-from tasks.render.backend import CpuBackend, probe, select_backend
+from tasks.render.backend import CpuBackend, probe, probe_scene, select_backend
 from tasks.render.gbuffer import GBuffer
+from tasks.render.rasteriser import prepare, rasterise
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
+
+REFERENCE = Path(__file__).resolve().parents[1] / "reference"
 
 
 def test_cpu_backend_passes_its_own_probe() -> None:
     assert select_backend("cpu").name == "cpu"
     assert probe(CpuBackend()) == ""
+
+
+def test_cpu_draws_the_probe_as_gsplats_own_torch_code_does() -> None:
+    """Pinned pixels; how they were made stands in the file."""
+    pixels = json.loads((REFERENCE / "gsplat_probe.json").read_text())["pixels"]
+    x, y, *_ = np.array(pixels, dtype=object).T
+    wanted = np.array([pixel[2:] for pixel in pixels], dtype=np.float64)
+    gaussians, viewmat, K = probe_scene()
+    got = rasterise(prepare(gaussians), viewmat, K, 64, 48)
+    at = y.astype(int), x.astype(int)
+    assert np.abs(got.rgb[at] - wanted[:, :3]).max() < 5e-6
+    assert np.abs(got.alpha[at] - wanted[:, 3]).max() < 5e-6
+    np.testing.assert_allclose(got.depth[at], wanted[:, 4], rtol=1e-5)
+    assert np.abs(got.normal[at] - wanted[:, 5:8]).max() < 2e-5
+    assert got.class_id[at].tolist() == wanted[:, 8].tolist()
 
 
 def test_probe_names_what_a_wrong_backend_draws_wrong() -> None:
