@@ -106,7 +106,7 @@ def test_tile_lists_hold_every_splat_where_it_is_drawn_nearest_first() -> None:
             if drawn.any():
                 assert splat in mine
                 listed += 1
-    assert listed > 0.8 * len(splats)  # and few that are not
+    assert listed > 0.9 * len(splats)  # the splats' boxes alone would list a fifth too many
 
 
 def test_splat_back_sums_the_weights_that_blending_gave() -> None:
