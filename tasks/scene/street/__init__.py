@@ -46,7 +46,7 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
     surfels = join(
         [
             road(layout, seed),
-            pavement(layout, seed),
+            pavement(layout, plan.trees, seed),
             facades(layout, plan.buildings, seed),
             roofs(layout, plan.buildings, seed),
             adornments(layout, plan.buildings, seed),

@@ -42,7 +42,11 @@ def adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed: int)
         if house.shop and house.awnings:
             parts += _awnings(layout, house, front, depth, rng)
         upper = [
-            (storey, bay, layout.kerb_height + layout.ground_storey_height + (storey - 1) * layout.storey_height)
+            (
+                storey,
+                bay,
+                layout.kerb_height + layout.ground_storey_height + (storey - 1) * layout.storey_height,
+            )
             for storey in range(1, house.storeys)
             for bay in range(house.bays)
         ]
@@ -94,12 +98,16 @@ def _awnings(
         # the cloth lies face up: along the street to the left of the outward slope
         edge_u = np.array([house.side * step, 0, 0])
         parts.append(tiles(centre, edge_u, -out / rows, _KIND, colour * np.ones((1, rows, 1))))
-        hem = np.stack([s, np.full(len(s), front + out[1]), np.full(len(s), top + out[2] - _VALANCE / 2)], axis=-1)
+        hem = np.stack(
+            [s, np.full(len(s), front + out[1]), np.full(len(s), top + out[2] - _VALANCE / 2)], axis=-1
+        )
         parts.append(tiles(hem, edge_u, [0, 0, _VALANCE], _KIND, colour[:, 0] * 0.95))
     return parts
 
 
-def _balcony(house: Building, middle: float, front: float, floor: float, width: float, slab: Floats) -> list[Surfels]:
+def _balcony(
+    house: Building, middle: float, front: float, floor: float, width: float, slab: Floats
+) -> list[Surfels]:
     out = -house.side * _BALCONY_REACH
     d = sorted((front, front + out))
     half = width / 2
@@ -122,7 +130,13 @@ def _balcony(house: Building, middle: float, front: float, floor: float, width: 
 
 
 def _flower_box(
-    house: Building, middle: float, front: float, sill: float, width: float, pixel: float, rng: np.random.Generator
+    house: Building,
+    middle: float,
+    front: float,
+    sill: float,
+    width: float,
+    pixel: float,
+    rng: np.random.Generator,
 ) -> list[Surfels]:
     n = 5
     s = middle + (np.arange(n) + 0.5) / n * width - width / 2
@@ -131,7 +145,7 @@ def _flower_box(
     bloom = palette.FLOWERS[rng.integers(len(palette.FLOWERS))]
     return [
         leaves(balls, palette.HEDGE, 4.0 * pixel, rng),
-        leaves(balls + [0, 0, 0.06, -0.02], bloom, 2.6 * pixel, rng),
+        leaves(balls + np.array([0, 0, 0.06, -0.02]), bloom, 2.6 * pixel, rng),
     ]
 
 

@@ -15,7 +15,9 @@ _LEAVES = np.array([[0.20, 0.13, 0.03], [0.13, 0.14, 0.03], [0.22, 0.09, 0.02]])
 Floats = NDArray[np.float64]
 
 
-def asphalt_albedo(layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, grain: Floats) -> Floats:
+def asphalt_albedo(
+    layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, grain: Floats
+) -> Floats:
     """Reflectance of the asphalt at each cell.
 
     Parameters
@@ -52,7 +54,9 @@ def paint_albedo(seed: int, s: Floats, d: Floats, grain: Floats) -> Floats:
     return _PAINT * np.clip(0.95 + np.minimum(wear, 0.06), 0.45, 1.0)[:, None]
 
 
-def _with_repairs(layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats) -> Floats:
+def _with_repairs(
+    layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats
+) -> Floats:
     rng = stream(seed, "repairs")
     shade = np.ones(len(s))
     seam = np.zeros(len(s))
@@ -66,7 +70,9 @@ def _with_repairs(layout: StreetLayout, seed: int, s: Floats, d: Floats, size: F
     return _blend(albedo * shade[:, None], _BITUMEN, seam)
 
 
-def _with_cracks(layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats) -> Floats:
+def _with_cracks(
+    layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats
+) -> Floats:
     rng = stream(seed, "cracks")
     cover = np.zeros(len(s))
     last = layout.station_range[1]
@@ -75,14 +81,17 @@ def _with_cracks(layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Fl
         half = rng.uniform(3, 10) if along else rng.uniform(0.8, 2.5)
         run, offset = (s - middle, d - across) if along else (d - across, s - middle)
         bend = sum(
-            rng.uniform(0.03, 0.1) * np.sin(run * 2 * np.pi / wave + rng.uniform(0, 6.3)) for wave in (5.0, 1.7, 0.6)
+            rng.uniform(0.03, 0.1) * np.sin(run * 2 * np.pi / wave + rng.uniform(0, 6.3))
+            for wave in (5.0, 1.7, 0.6)
         )
         thin = np.clip(1 - (np.abs(offset - bend) - 0.012) / size, 0, 0.8)
         cover = np.maximum(cover, np.where(np.abs(run) < half, thin, 0))
     return _blend(albedo, _BITUMEN, cover)
 
 
-def _with_covers(layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats) -> Floats:
+def _with_covers(
+    layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats
+) -> Floats:
     rng = stream(seed, "covers")
     for middle in np.arange(9.0, layout.station_range[1], 31.0):
         lateral = rng.choice([0.55, -0.4, layout.lane_width])

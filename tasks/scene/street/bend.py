@@ -32,7 +32,7 @@ class Course:
 
     def heading_at(self, station: ArrayLike) -> NDArray[np.float64]:
         """Direction of the road at a station [m], in [rad]."""
-        return np.interp(station, self.station, self.heading)
+        return np.interp(np.asarray(station, dtype=np.float64), self.station, self.heading)
 
     def to_world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """World position of points [N, 3] given as station, lateral, height [m]."""
@@ -59,7 +59,7 @@ def course(layout: StreetLayout) -> Course:
     """Integrate the curvature, which grows smoothly from nothing to that of the bend, and again beyond the route."""
     first, last = layout.station_range
     n = round((last - first + 2 * _MARGIN) / _STEP) + 1
-    station = first - _MARGIN + _STEP * np.arange(n)
+    station = first - _MARGIN + _STEP * np.arange(n, dtype=np.float64)
     curvature = _grown(station - layout.bend_start, layout.bend_transition) / layout.bend_radius
     beyond = _grown(station - layout.route_length, layout.bend_transition)
     curvature += beyond * (1 / layout.end_radius - 1 / layout.bend_radius)

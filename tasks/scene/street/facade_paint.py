@@ -98,7 +98,9 @@ def look_of(house: Building, seed: int) -> Look:
     )
 
 
-def painted(layout: StreetLayout, cells: FrontCells, looks: Sequence[Look], seed: int) -> tuple[Floats, Floats]:
+def painted(
+    layout: StreetLayout, cells: FrontCells, looks: Sequence[Look], seed: int
+) -> tuple[Floats, Floats]:
     """Albedo and glow of the cells.
 
     Parameters

@@ -35,7 +35,9 @@ def facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) ->
     ]
     cells = FrontCells.join(grids)
     side = np.array([house.side for house in buildings], dtype=np.float64)[cells.house]
-    front = np.array([layout.front(house.side) + house.side * house.setback for house in buildings])[cells.house]
+    front = np.array([layout.front(house.side) + house.side * house.setback for house in buildings])[
+        cells.house
+    ]
     zero = np.zeros(len(side))
     albedo, glow = painted(layout, cells, looks, seed)
     glazed = (cells.part == Part.GLASS) | (cells.part == Part.FRAME)
@@ -57,7 +59,9 @@ def _front(layout: StreetLayout, house: Building, look: Look, index: int) -> lis
         kind = "door" if k == house.door else "shop" if house.shop else "window"
         grids.append(_grid(layout, house, index, (k, 1), 0, *ground[kind], kind))
     for storey in range(1, house.storeys):
-        pattern = storey_pattern(layout.storey_height, house.bay, look.window, banded=look.banded or storey == 1)
+        pattern = storey_pattern(
+            layout.storey_height, house.bay, look.window, banded=look.banded or storey == 1
+        )
         grids.append(_grid(layout, house, index, (0, house.bays), storey, *pattern, "window"))
     return grids
 
@@ -73,8 +77,14 @@ def _grid(
     kind: str,
 ) -> FrontCells:
     """The cells of some bays (first, count) of one storey."""
-    bottom = layout.kerb_height + (layout.ground_storey_height + (storey - 1) * layout.storey_height) * (storey > 0)
-    cell = np.array(_CELL) * PIXEL * nearest_depth(layout, house.nearest_station, layout.front(house.side), bottom)
+    bottom = layout.kerb_height + (layout.ground_storey_height + (storey - 1) * layout.storey_height) * (
+        storey > 0
+    )
+    cell = (
+        np.array(_CELL)
+        * PIXEL
+        * nearest_depth(layout, house.nearest_station, layout.front(house.side), bottom)
+    )
     columns, rows = simplified(columns, 0.08 * cell[0]), simplified(rows, 0.11 * cell[1])
     x, width, column = _cut(columns, cell[0])
     y, height, row = _cut(rows, cell[1])

@@ -51,19 +51,19 @@ def _post_line(layout: StreetLayout, side: int) -> float:
 def _lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
     foot = np.array([station, _post_line(layout, side), layout.kerb_height])
     top = layout.lamp_height
-    t = np.linspace(0, 1, 25)[:, None]
+    t, up = np.linspace(0, 1, 25)[:, None], np.array([0, 0, 1])
     pole, steel = SemanticClass.POLE, palette.METAL_DARK
     inward = np.array([0, -side, 0])
     reach = 1.5
     bend = np.linspace(0, np.pi / 2, 7)[:, None]
-    arm = foot + [0, 0, top] + 0.5 * ((1 - np.cos(bend)) * inward + np.sin(bend) * np.array([0, 0, 1]))
+    arm = foot + top * up + 0.5 * ((1 - np.cos(bend)) * inward + np.sin(bend) * up)
     out = arm[-1] + np.linspace(0, reach - 0.5, 5)[1:, None] * inward
-    head = out[-1] + 0.3 * inward
+    head, half = out[-1] + 0.3 * inward, np.array([0.13, 0.38, 0.03])
     return [
-        tube(foot + t[:4] * [0, 0, top], 0.10, 8, pole, steel),
-        tube(foot + t[3:] * [0, 0, top], 0.075 - 0.03 * t[3:, 0], 6, pole, steel),
+        tube(foot + top * t[:4] * up, 0.10, 8, pole, steel),
+        tube(foot + top * t[3:] * up, 0.075 - 0.03 * t[3:, 0], 6, pole, steel),
         tube(np.concatenate([arm, out]), 0.035, 6, pole, steel),
-        box(head - [0.13, 0.38, 0.03], head + [0.13, 0.38, 0.08], 0.13, pole, steel),
+        box(head - half, head + half + up * 0.05, 0.13, pole, steel),
         tiles(
             head + np.array([[0, y, -0.035] for y in (-0.24, -0.08, 0.08, 0.24)]),
             [0, 0.16, 0],
@@ -75,32 +75,39 @@ def _lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
 
 
 def _crossing_signs(layout: StreetLayout) -> list[Surfels]:
-    """A blue sign at either end of the crossing, facing the traffic that keeps right, and bollards beside it."""
-    pole = SemanticClass.POLE
+    """A sign at either end of the crossing, facing the traffic that keeps right, and bollards beside it."""
+    pole, up = SemanticClass.POLE, np.array([0.0, 0.0, 1.0])
     start, stop = layout.crossing_station, layout.crossing_station + layout.crossing_length
     parts = []
     for side, station, outward in ((-1, start - 0.5, -1.0), (1, stop + 0.5, 1.0)):
         foot = np.array([station, _post_line(layout, side), layout.kerb_height])
-        parts.append(tube(foot + np.linspace(0, 2.9, 16)[:, None] * [0, 0, 1], 0.038, 6, pole, palette.METAL_GREY))
-        n, edge = 15, 0.66
-        grid = (np.arange(n) + 0.5) / n * 2 - 1
-        a, b = np.meshgrid(grid, grid, indexing="ij")
-        picture = np.where(((np.abs(a) < 0.62 * (0.75 - b) / 1.35) & (b > -0.6))[..., None], palette.WHITE_PAINT, palette.SIGN_BLUE)
-        walker = (np.abs(a - 0.08 * b) < 0.13) & (b > -0.45) & (b < 0.15)
-        picture = np.where(walker[..., None], palette.METAL_DARK, picture)
-        rim = np.maximum(np.abs(a), np.abs(b)) > 0.9
-        picture = np.where(rim[..., None], palette.WHITE_PAINT, picture)
-        middle = foot + [0.06 * outward, 0, 2.5]
-        centre = middle + np.stack([0 * a, outward * a * edge / 2, b * edge / 2], axis=-1)
-        step = edge / n
-        parts.append(tiles(centre, [0, outward * step, 0], [0, 0, step], pole, picture))
-        back = middle - [0.02 * outward, 0, 0]
-        grey = tiles(back + (centre - middle) * [1, -1, 1], [0, -outward * step, 0], [0, 0, step], pole, palette.METAL_GREY)
-        parts.append(grey)
+        parts.append(tube(foot + np.linspace(0, 2.9, 16)[:, None] * up, 0.038, 6, pole, palette.METAL_GREY))
+        parts += _sign(foot + np.array([0.06 * outward, 0, 2.5]), outward)
         for s in (start - 1.6, start - 3.2, stop + 1.6, stop + 3.2):
             base = np.array([s, layout.kerb(side) + side * 0.4, layout.kerb_height])
-            parts.append(tube(base + np.linspace(0, 0.9, 10)[:, None] * [0, 0, 1], 0.05, 8, pole, _banded(10)))
+            parts.append(tube(base + np.linspace(0, 0.9, 10)[:, None] * up, 0.05, 8, pole, _banded(10)))
     return parts
+
+
+def _sign(middle: Floats, outward: float) -> list[Surfels]:
+    """A pedestrian on a white triangle on blue (Vienna Convention, sign E,12), front and back."""
+    n, edge = 15, 0.66
+    grid = (np.arange(n) + 0.5) / n * 2 - 1
+    a, b = np.meshgrid(grid, grid, indexing="ij")
+    picture = np.tile(palette.SIGN_BLUE, (n, n, 1))
+    for shape, colour in (
+        ((np.abs(a) < 0.46 * (0.75 - b)) & (b > -0.6), palette.WHITE_PAINT),
+        ((np.abs(a - 0.08 * b) < 0.13) & (b > -0.45) & (b < 0.15), palette.METAL_DARK),
+        (np.maximum(np.abs(a), np.abs(b)) > 0.9, palette.WHITE_PAINT),
+    ):
+        picture[shape] = colour
+    offset = np.stack([0 * a, outward * a * edge / 2, b * edge / 2], axis=-1)
+    across, rise = np.array([0, outward * edge / n, 0]), np.array([0, 0, edge / n])
+    back = middle - np.array([0.02 * outward, 0, 0])
+    return [
+        tiles(middle + offset, across, rise, SemanticClass.POLE, picture),
+        tiles(back + offset, -across, rise, SemanticClass.POLE, palette.METAL_GREY),
+    ]
 
 
 def _banded(n: int) -> Floats:
@@ -124,4 +131,4 @@ def _bin(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
 def _letter_box(layout: StreetLayout, station: float) -> Surfels:
     side = -1
     low = np.array([station, layout.front(side) + 0.35, layout.kerb_height + 0.25])
-    return box(low, low + [0.5, 0.4, 1.0], 0.1, SemanticClass.OTHER, palette.POST_YELLOW)
+    return box(low, low + np.array([0.5, 0.4, 1.0]), 0.1, SemanticClass.OTHER, palette.POST_YELLOW)

@@ -43,7 +43,9 @@ class Casters:
 def sun_direction(layout: StreetLayout) -> Floats:
     """Unit vector to the sun [3], world frame [1]."""
     azimuth, elevation = np.radians(layout.sun_azimuth_deg), np.radians(layout.sun_elevation_deg)
-    return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    return np.array(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    )
 
 
 def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: Casters) -> Floats:

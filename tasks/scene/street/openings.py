@@ -36,21 +36,43 @@ def window_columns(bay: float, width: float) -> Pattern:
     pane = (width - 0.18) / 2
     pier = ((bay - width) / 2 - 0.13, Part.WALL)
     surround, frame = (0.13, Part.TRIM), (0.065, Part.FRAME)
-    return [pier, surround, frame, (pane, Part.GLASS), (0.05, Part.FRAME), (pane, Part.GLASS), frame, surround, pier]
+    return [
+        pier,
+        surround,
+        frame,
+        (pane, Part.GLASS),
+        (0.05, Part.FRAME),
+        (pane, Part.GLASS),
+        frame,
+        surround,
+        pier,
+    ]
 
 
 def window_rows(storey_height: float, sill: float, height: float, *, banded: bool) -> Pattern:
     """The window [m] over its sill [m], below a wall up to the next floor [m]."""
     low, high = 0.66 * (height - 0.17), 0.34 * (height - 0.17)
     foot = (BAND_HEIGHT, Part.BAND if banded else Part.WALL)
-    rows = [foot, (sill - BAND_HEIGHT - 0.1, Part.WALL), (0.1, Part.TRIM), *_glazing(low, high), (0.17, Part.TRIM)]
+    rows = [
+        foot,
+        (sill - BAND_HEIGHT - 0.1, Part.WALL),
+        (0.1, Part.TRIM),
+        *_glazing(low, high),
+        (0.17, Part.TRIM),
+    ]
     return _filled(rows, storey_height)
 
 
 def ground_window_rows(storey_height: float, height: float) -> Pattern:
     """A ground-floor window [m] over a plinth, below a wall up to the next floor [m]."""
     low, high = 0.66 * (height - 0.17), 0.34 * (height - 0.17)
-    rows = [(_PLINTH, Part.PLINTH), (0.5, Part.WALL), (0.1, Part.TRIM), *_glazing(low, high), (0.2, Part.TRIM)]
+    rows = [
+        (_PLINTH, Part.PLINTH),
+        (0.5, Part.WALL),
+        (0.1, Part.TRIM),
+        *_glazing(low, high),
+        (0.2, Part.TRIM),
+    ]
     return _filled(rows, storey_height)
 
 
@@ -63,7 +85,13 @@ def shop_columns(bay: float) -> Pattern:
 
 def shop_rows(storey_height: float) -> Pattern:
     """A shop window over a low stall riser, a name board and wall up to the next floor [m]."""
-    rows = [(0.4, Part.PLINTH), (0.07, Part.FRAME), (2.3, Part.GLASS), (0.08, Part.FRAME), (SIGN_HEIGHT, Part.SIGN)]
+    rows = [
+        (0.4, Part.PLINTH),
+        (0.07, Part.FRAME),
+        (2.3, Part.GLASS),
+        (0.08, Part.FRAME),
+        (SIGN_HEIGHT, Part.SIGN),
+    ]
     return _filled(rows, storey_height)
 
 
@@ -76,7 +104,13 @@ def door_columns(bay: float) -> Pattern:
 
 def door_rows(storey_height: float) -> Pattern:
     """Door leaves, the light above them and wall up to the next floor [m]."""
-    rows = [(DOOR_HEIGHT, Part.GLASS), (0.07, Part.FRAME), (0.45, Part.GLASS), (0.07, Part.FRAME), (0.22, Part.TRIM)]
+    rows = [
+        (DOOR_HEIGHT, Part.GLASS),
+        (0.07, Part.FRAME),
+        (0.45, Part.GLASS),
+        (0.07, Part.FRAME),
+        (0.22, Part.TRIM),
+    ]
     return _filled(rows, storey_height)
 
 
@@ -93,7 +127,9 @@ def _filled(rows: Pattern, total: float) -> Pattern:
     return [*rows, (total - sum(height for height, _ in rows), Part.WALL)]
 
 
-def bay_patterns(height: float, bay: float, window: tuple[float, float]) -> dict[str, tuple[Pattern, Pattern]]:
+def bay_patterns(
+    height: float, bay: float, window: tuple[float, float]
+) -> dict[str, tuple[Pattern, Pattern]]:
     """Columns and rows of every kind of ground-floor bay.
 
     Parameters
@@ -112,7 +148,7 @@ def bay_patterns(height: float, bay: float, window: tuple[float, float]) -> dict
 def storey_pattern(
     height: float, bay: float, window: tuple[float, float], *, banded: bool
 ) -> tuple[Pattern, Pattern]:
-    """Columns and rows of a bay of an upper storey; parameters as `bay_patterns`, and whether a band marks the floor."""
+    """Columns and rows of a bay of an upper storey, as `bay_patterns`; ``banded``: a string course marks the floor."""
     return window_columns(bay, window[0]), window_rows(height, 0.95, window[1], banded=banded)
 
 

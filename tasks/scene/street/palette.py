@@ -10,7 +10,18 @@ def _linear(*colours: str) -> NDArray[np.float64]:
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
 
 
-PLASTER = _linear("#cabb9e", "#cfc8bb", "#b79a84", "#b3b7b4", "#c2ae8f", "#bfb2a8", "#d6ceb8", "#a9b3a8", "#c6a894", "#d9d5cb")
+PLASTER = _linear(
+    "#cabb9e",
+    "#cfc8bb",
+    "#b79a84",
+    "#b3b7b4",
+    "#c2ae8f",
+    "#bfb2a8",
+    "#d6ceb8",
+    "#a9b3a8",
+    "#c6a894",
+    "#d9d5cb",
+)
 BRICK = _linear("#85584a", "#785046", "#93695a", "#6f5048", "#a07a62")
 PLINTH = _linear("#6f6a64")[0]
 TRIM = _linear("#d6cfc0", "#c7c0b4", "#ddd8cc", "#b9aa92")
@@ -30,7 +41,18 @@ FLOWERS = _linear("#a8324a", "#c46a8c", "#c9a23a", "#b8452e")
 HEDGE = _linear("#46632e")[0]
 EARTH = _linear("#5b4a3a")[0]
 GRASS = _linear("#6a7c40")[0]
-CAR_PAINT = _linear("#c2c2c0", "#979b9f", "#55595e", "#1d1f23", "#2a4468", "#7d2422", "#6f7d86", "#bdb6a6", "#34493f", "#b4b7b8")
+CAR_PAINT = _linear(
+    "#c2c2c0",
+    "#979b9f",
+    "#55595e",
+    "#1d1f23",
+    "#2a4468",
+    "#7d2422",
+    "#6f7d86",
+    "#bdb6a6",
+    "#34493f",
+    "#b4b7b8",
+)
 TYRE = _linear("#222223")[0]
 RIM = _linear("#a3a6a8")[0]
 PLASTIC = _linear("#2a2b2d")[0]

@@ -1,10 +1,15 @@
 """Kerbs and paved footways."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 
 from tasks.conventions import SemanticClass
+from tasks.scene.street import palette
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.plan import Tree
 from tasks.scene.street.surfels import Surfels, join, tiles
 
 _CELL = 6.5
@@ -12,20 +17,37 @@ _CELL = 6.5
 _SLAB = np.array([0.23, 0.215, 0.195])
 _GRANITE = np.array([0.26, 0.255, 0.25])
 _KERBSTONE = 1.0
+_PIT = 0.58
+"""Half the side of the open earth about a tree [m]."""
 
 
-def pavement(layout: StreetLayout, seed: int) -> Surfels:
-    """Surfels of the kerbstones (class kerb) and the slabs (class sidewalk) on both sides.
+def pavement(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
+    """Surfels of the kerbstones (class kerb), the slabs (sidewalk) and the earth about the trees (terrain).
 
     Parameters
     ----------
     layout : dimensions
+    planted : the trees
     seed : the street's seed [1]
     """
     parts = []
     for side in (-1, 1):
         parts += [_kerb(layout, seed, side), *_slabs(layout, seed, side)]
-    return join(parts)
+    return _with_tree_pits(join(parts), planted, seed)
+
+
+def _with_tree_pits(paving: Surfels, planted: tuple[Tree, ...], seed: int) -> Surfels:
+    s, d = paving.centre[:, 0], paving.centre[:, 1]
+    earth = np.zeros(len(paving), dtype=bool)
+    for tree in planted:
+        earth |= (np.abs(s - tree.station) < _PIT) & (np.abs(d - tree.lateral) < _PIT)
+    earth &= paving.class_id == SemanticClass.SIDEWALK
+    tone = np.exp(0.25 * stream(seed, "earth").standard_normal((len(paving), 1)))
+    return replace(
+        paving,
+        albedo=np.where(earth[:, None], palette.EARTH * tone, paving.albedo),
+        class_id=np.where(earth, np.uint8(SemanticClass.TERRAIN), paving.class_id),
+    )
 
 
 def _kerb(layout: StreetLayout, seed: int, side: int) -> Surfels:
@@ -49,7 +71,9 @@ def _kerb(layout: StreetLayout, seed: int, side: int) -> Surfels:
         up = np.array([0.0, 0.0, high - low])
         edge_u = along if side > 0 else -along
         parts.append(
-            tiles(front, edge_u, up, SemanticClass.KERB, albedo * (0.75 + 0.25 * row), openness=0.5 + 0.3 * row)
+            tiles(
+                front, edge_u, up, SemanticClass.KERB, albedo * (0.75 + 0.25 * row), openness=0.5 + 0.3 * row
+            )
         )
         d = face + side * layout.kerb_width * (row + 0.5) / rows
         top = np.stack([s, zero + d, zero + h], axis=1)
@@ -67,7 +91,7 @@ def _slabs(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
     parts = []
     # stretches of like distance share one number of cells per slab
     stops = [first, -2.0, layout.route_length + 4.0, layout.route_length + 20.0, last]
-    for start, stop in zip(stops[:-1], stops[1:], strict=True):
+    for start, stop in pairwise(stops):
         rng = stream(seed, f"slabs {side} {start:.3f}")
         for row in range(rows):
             middle = inner + side * slab * (row + 0.5)
@@ -83,7 +107,7 @@ def _slabs(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
             tone += 0.06 * fractal_noise(stream(seed, "pavement"), s, d, 3.0, 3)
             at_joint = (a == 0) * (along > 1) | (b == 0) * (across > 2)
             tone *= np.where(at_joint, 0.80, 1.04)
-            to_wall = layout.pavement_width - slab * (row + (b + 0.5) / across if side > 0 else row + 1 - (b + 0.5) / across)
+            to_wall = layout.pavement_width - np.abs(d - inner)
             parts.append(
                 tiles(
                     np.stack([s, d, np.full(s.shape, layout.kerb_height)], axis=-1),

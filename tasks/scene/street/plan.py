@@ -122,11 +122,12 @@ def plan_street(layout: StreetLayout, seed: int) -> Plan:
     """
     first, last = layout.station_range
     # a lamp stands by the crossing; those of the other side stand between
-    behind = layout.crossing_station - layout.lamp_spacing * int((layout.crossing_station - first) / layout.lamp_spacing)
+    beside = layout.crossing_station + layout.crossing_length + 1.5
+    start = beside - layout.lamp_spacing * int((beside - first) / layout.lamp_spacing)
     lamps = tuple(
         (float(s), side)
-        for side, offset in ((-1, layout.crossing_length + 1.5), (1, layout.crossing_length + 1.5 - layout.lamp_spacing / 2))
-        for s in np.arange(behind + offset, last, layout.lamp_spacing)
+        for side, offset in ((-1, 0.0), (1, layout.lamp_spacing / 2))
+        for s in np.arange(start + offset, last, layout.lamp_spacing)
     )
     buildings = tuple(b for side in (-1, 1) for b in _row_of_houses(layout, seed, side))
     trees = tuple(t for side in (-1, 1) for t in _row_of_trees(layout, seed, side, lamps))
@@ -163,10 +164,14 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
     touching = [0.0 if b.start - a.start - a.width > 0.5 else 1.0 for a, b in pairwise(houses)]
     before = [0.0, *(joined * house.eaves(layout) for joined, house in zip(touching, houses, strict=False))]
     after = [*(joined * house.eaves(layout) for joined, house in zip(touching, houses[1:], strict=True)), 0.0]
-    return [replace(house, beside=(low, high)) for house, low, high in zip(houses, before, after, strict=True)]
+    return [
+        replace(house, beside=(low, high)) for house, low, high in zip(houses, before, after, strict=True)
+    ]
 
 
-def _row_of_trees(layout: StreetLayout, seed: int, side: int, lamps: tuple[tuple[float, int], ...]) -> list[Tree]:
+def _row_of_trees(
+    layout: StreetLayout, seed: int, side: int, lamps: tuple[tuple[float, int], ...]
+) -> list[Tree]:
     rng = stream(seed, f"trees {side}")
     first, last = layout.station_range
     posts = np.array([s for s, post_side in lamps if post_side == side])
@@ -184,7 +189,9 @@ def _row_of_trees(layout: StreetLayout, seed: int, side: int, lamps: tuple[tuple
     return trees
 
 
-def _crown(rng: np.random.Generator, station: float, lateral: float, layout: StreetLayout) -> NDArray[np.float64]:
+def _crown(
+    rng: np.random.Generator, station: float, lateral: float, layout: StreetLayout
+) -> NDArray[np.float64]:
     """Balls of leaves that fill an egg: the big ones within, smaller ones around."""
     height, radius = rng.uniform(6.3, 8.3), rng.uniform(1.7, 2.2)
     base = 2.7 + layout.kerb_height

@@ -1,12 +1,14 @@
 """The carriageway: asphalt with its wear, and the markings, all in the plane of height zero."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
+from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
 from tasks.scene.street.layout import EYE_HEIGHT, PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import stream
-from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
 from tasks.scene.street.surfels import Surfels, graded_cells, join, tiles
 
 CELL = 6.3
@@ -33,8 +35,7 @@ def road(layout: StreetLayout, seed: int) -> Surfels:
     while stops[-1] < last:
         stops.append(min(stops[-1] + 0.6 * (stops[-1] - layout.route_length) + 2.0, last))
     stretches = [
-        _cells(layout, seed, start, stop, is_crossing=start == crossing[0])
-        for start, stop in zip(stops[:-1], stops[1:], strict=True)
+        _cells(layout, seed, start, stop, is_crossing=start == crossing[0]) for start, stop in pairwise(stops)
     ]
     s, d, length, width, mark = np.concatenate(stretches, axis=1)
     zero = np.zeros(len(s))
@@ -45,7 +46,9 @@ def road(layout: StreetLayout, seed: int) -> Surfels:
         np.stack([length, zero, zero], axis=1),
         np.stack([zero, width, zero], axis=1),
         np.where(marked, SemanticClass.MARKING, SemanticClass.ROAD).astype(np.uint8),
-        np.where(marked[:, None], paint_albedo(seed, s, d, grain), asphalt_albedo(layout, seed, s, d, width, grain)),
+        np.where(
+            marked[:, None], paint_albedo(seed, s, d, grain), asphalt_albedo(layout, seed, s, d, width, grain)
+        ),
         overlap=0.74,
     )
     return join([surface, _stones(layout, seed)])
@@ -74,11 +77,15 @@ def _stones(layout: StreetLayout, seed: int) -> Surfels:
     )
 
 
-def _cells(layout: StreetLayout, seed: int, start: float, stop: float, *, is_crossing: bool) -> NDArray[np.float64]:
+def _cells(
+    layout: StreetLayout, seed: int, start: float, stop: float, *, is_crossing: bool
+) -> NDArray[np.float64]:
     """Station, lateral, length, width [m] and 1 for paint of each cell of one stretch, as rows."""
     rng = stream(seed, f"road {start:.3f}")
     breaks, kind = _cross_section(layout, is_crossing)
-    nearest = nearest_depth(layout, start if start >= 0 else min(stop, 0.0) - 1e-9, (breaks[1:] + breaks[:-1]) / 2)
+    nearest = nearest_depth(
+        layout, start if start >= 0 else min(stop, 0.0) - 1e-9, (breaks[1:] + breaks[:-1]) / 2
+    )
     columns = []
     for j, (d, width, k) in enumerate(zip(*graded_cells(breaks, CELL * PIXEL * nearest, 0.55), strict=True)):
         cell = CELL * PIXEL * nearest[k]

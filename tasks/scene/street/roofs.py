@@ -50,13 +50,17 @@ def _closed(layout: StreetLayout, house: Building, seed: int) -> list[Surfels]:
     kind = SemanticClass.BUILDING
     overhang, parapet = np.array([0, out * 0.4, 0]), np.array([0, 0, 0.7])
     parts = [
-        panel(corner(-0.28, eaves - 0.1), along, np.array([0, 0, 0.3]), cell, kind, trim, rng=rng, grain=0.02),
+        panel(
+            corner(-0.28, eaves - 0.1), along, np.array([0, 0, 0.3]), cell, kind, trim, rng=rng, grain=0.02
+        ),
         panel(corner(-0.28, eaves + 0.2), along, overhang, cell, kind, 0.8 * trim, rng=rng, grain=0.02),
         panel(corner(0.0, eaves - 0.1), along, np.array([0, -out * 0.28, 0]), cell, kind, 0.5 * trim),
     ]
     run, rise = _PITCH[house.roof]
     if house.roof == "flat":
-        parts.append(panel(corner(0.1, eaves + 0.1), along, parapet, cell, kind, wall, rng=rng, grain=look.grain))
+        parts.append(
+            panel(corner(0.1, eaves + 0.1), along, parapet, cell, kind, wall, rng=rng, grain=look.grain)
+        )
     else:
         slope = np.array([0, out * run, rise])
         parts.append(panel(corner(0.0, eaves + 0.2), along, slope, cell, kind, tile, rng=rng, grain=0.09))

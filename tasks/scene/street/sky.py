@@ -57,7 +57,9 @@ def _sky(layout: StreetLayout, seed: int, elevation: Floats, azimuth: Floats) ->
     return _with_skyline(seed, sky, elevation, azimuth)
 
 
-def _clouds(layout: StreetLayout, seed: int, up: Floats, flat: Floats, azimuth: Floats) -> tuple[Floats, Floats]:
+def _clouds(
+    layout: StreetLayout, seed: int, up: Floats, flat: Floats, azimuth: Floats
+) -> tuple[Floats, Floats]:
     """How bright the clouds are (0 shade, 1 sun) and how much sky they cover, in each direction."""
     slant = _CLOUD_BASE / (up + 0.10)
     x, y = slant * flat * np.cos(azimuth), slant * flat * np.sin(azimuth)
@@ -79,9 +81,11 @@ def _with_skyline(seed: int, sky: Floats, elevation: Floats, azimuth: Floats) ->
     turn = (azimuth[0] % (2 * np.pi)) / (2 * np.pi)
     for blocks, height, pale in ((90, 0.050, 0.72), (140, 0.036, 0.45)):
         step = np.floor(turn * blocks).astype(np.int64) % blocks
-        roof = height * (0.45 + 0.55 * rng.random(blocks)[step]) + 0.004 * rng.standard_normal(6 * blocks)[
-            np.floor(turn * 6 * blocks).astype(np.int64) % (6 * blocks)
-        ]
+        roof = (
+            height * (0.45 + 0.55 * rng.random(blocks)[step])
+            + 0.004
+            * rng.standard_normal(6 * blocks)[np.floor(turn * 6 * blocks).astype(np.int64) % (6 * blocks)]
+        )
         colour = _FAR_HOUSES * (1 - pale) + _HORIZON * pale * 0.9
         cover = np.clip((roof - elevation) / 0.002, 0, 1)[..., None]
         sky = sky * (1 - cover) + colour * cover

@@ -96,7 +96,9 @@ def tiles(
     )
 
 
-def sheet_cells(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def sheet_cells(
+    corners: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Centres and edges of the cells of a curved sheet given by its corner points.
 
     Parameters
@@ -131,7 +133,9 @@ def graded_cells(
     edges = np.asarray(breaks, dtype=np.float64)
     n = len(edges) - 1
     cuts, interval = [edges[:1]], []
-    for k, (largest, share) in enumerate(zip(np.broadcast_to(size, n), np.broadcast_to(fine, n), strict=True)):
+    for k, (largest, share) in enumerate(
+        zip(np.broadcast_to(size, n), np.broadcast_to(fine, n), strict=True)
+    ):
         length = edges[k + 1] - edges[k]
         if share >= 1:
             inner = np.arange(1, int(np.ceil(length / (1.25 * largest)))) * largest
@@ -217,7 +221,12 @@ def panel(
     a, b = np.meshgrid((np.arange(nu) + 0.5) / nu, (np.arange(nv) + 0.5) / nv, indexing="ij")
     tone = np.ones((nu, nv, 1)) if rng is None else 1 + grain * rng.standard_normal((nu, nv, 1))
     return tiles(
-        corner + a[..., None] * u + b[..., None] * v, u / nu, v / nv, class_id, np.asarray(albedo) * tone, glow=glow
+        corner + a[..., None] * u + b[..., None] * v,
+        u / nu,
+        v / nv,
+        class_id,
+        np.asarray(albedo) * tone,
+        glow=glow,
     )
 
 

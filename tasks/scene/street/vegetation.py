@@ -1,5 +1,7 @@
 """Street trees, and the hedges and gardens that close the gaps between houses."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,7 +36,10 @@ def trees(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels
         rng = stream(seed, f"tree {tree.number}")
         depth = float(nearest_depth(layout, tree.station, tree.lateral, 3.5))
         colour = palette.FOLIAGE[rng.integers(len(palette.FOLIAGE))]
-        parts += [leaves(tree.balls, colour, _LEAF * PIXEL * depth, rng), *_wood(tree, layout.kerb_height, rng)]
+        parts += [
+            leaves(tree.balls, colour, _LEAF * PIXEL * depth, rng),
+            *_wood(tree, layout.kerb_height, rng),
+        ]
     return join(parts)
 
 
@@ -66,7 +71,8 @@ def leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Generator)
     length = size * rng.uniform(0.7, 1.3, (n, 1))
     middle, top, low = balls[:, :3].mean(axis=0), balls[:, 2].max(), balls[:, 2].min()
     rise = np.clip((place[:, 2] - low) / max(top - low, 0.1), 0, 1)
-    spread = np.linalg.norm((place - middle)[:, :2], axis=1) / np.linalg.norm((balls[:, :3] - middle)[:, :2], axis=1).max()
+    reach = np.hypot(*(balls[:, :2] - middle[:2]).T).max()
+    spread = np.hypot(*(place[:, :2] - middle[:2]).T) / reach
     tone = np.exp(0.16 * rng.standard_normal((n, 1))) * (0.85 + 0.3 * rise[:, None])
     tint = 1 + rng.standard_normal((n, 1)) * [0.10, 0.03, 0.05]
     return tiles(
@@ -106,7 +112,7 @@ def gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) ->
     seed : the street's seed [1]
     """
     parts = []
-    for house, after in zip(buildings[:-1], buildings[1:], strict=True):
+    for house, after in pairwise(buildings):
         start, stop = house.start + house.width, after.start
         if house.side == after.side and stop - start > 1.0:
             parts += _garden(layout, seed, house.side, start, stop)
@@ -128,7 +134,9 @@ def _garden(layout: StreetLayout, seed: int, side: int, start: float, stop: floa
     other, green = SemanticClass.OTHER, SemanticClass.TERRAIN
     wall = [
         panel(corner(0.1, 0), along, [0, 0, 1.0], size, other, brick, rng=rng, grain=0.12),
-        panel(corner(0.05, 1.0), along, [0, side * 0.3, 0], 0.25, other, palette.TRIM[1], rng=rng, grain=0.04),
+        panel(
+            corner(0.05, 1.0), along, [0, side * 0.3, 0], 0.25, other, palette.TRIM[1], rng=rng, grain=0.04
+        ),
     ]
     lawn_u, lawn_v = (along, np.array([0, side * 12.0, 0]))
     lawn = panel(corner(0.3, 0.05), lawn_u, lawn_v, 0.5, green, palette.GRASS, rng=rng, grain=0.15)
