@@ -157,10 +157,11 @@ def scene_import(
         float, typer.Option(help="Height of the route's cameras above the road [m].")
     ] = 1.5,
     half_width: Annotated[float, typer.Option(help="Half the carriageway's width [m].")] = 3.5,
+    metres_per_unit: Annotated[float, typer.Option(help="Metres in one unit of the files.")] = 1.0,
     as_json: Json = False,
 ) -> None:
     """Make a scene of Gaussians trained elsewhere and a route through them."""
-    sizes = {"camera_height": camera_height, "half_width": half_width}
+    sizes = {"camera_height": camera_height, "half_width": half_width, "metres_per_unit": metres_per_unit}
     _show(_call("scene_import", False, gaussians, route, out, **sizes), as_json)
 
 

@@ -12,6 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -77,6 +78,9 @@ def catalogue_of(root: Path) -> Catalogue:
 def make_clip(root: str, index: int) -> dict[str, Any]:
     """Make and commit clip ``index`` of the dataset at ``root``; returns its receipt."""
     started = time.process_time(), time.perf_counter()
+    cv2.setNumThreads(
+        1
+    )  # one clip a worker, one thread a clip: threads within a frame cost more than they give
     layout = Layout(Path(root))
     plan = read_plan(layout.root)
     clip = plan.clips[index]

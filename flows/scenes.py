@@ -22,7 +22,13 @@ from tasks.scene.transform import moved
 
 
 def scene_import(
-    gaussians: str, route: str, out: str, *, camera_height: float = 1.5, half_width: float = 3.5
+    gaussians: str,
+    route: str,
+    out: str,
+    *,
+    camera_height: float = 1.5,
+    half_width: float = 3.5,
+    metres_per_unit: float = 1.0,
 ) -> dict[str, Any]:
     """Make a scene folder of Gaussians trained elsewhere and a route.
 
@@ -30,6 +36,7 @@ def scene_import(
     ----------
     camera_height : of the route's camera poses above the road [m]
     half_width : of the carriageway, to either side of the route [m]
+    metres_per_unit : scale of the files, for reconstructions without one [m]
 
     Raises
     ------
@@ -37,7 +44,7 @@ def scene_import(
         Listing the problems of the files, or if ``out`` is not empty.
     """
     must_be_new(Path(out))
-    course, T_world_source = read_route(Path(route), camera_height)
+    course, T_world_source = read_route(Path(route), camera_height, metres_per_unit)
     cloud = moved(read_gaussians(Path(gaussians)), T_world_source)
     scene = Scene(
         name=Path(out).name,

@@ -16,7 +16,7 @@ from tasks.eval.state_agreement import CaseAgreement, aggregate, case_agreement
 from tasks.vehicle.rollout import Mode, rollout
 from tasks.vehicle.sensitivity import beside_print, sensitivity_study
 
-BENCHMARKS = ("rasteriser", "vehicle", "pose_checks", "pipeline")
+BENCHMARKS = ("rasteriser", "vehicle", "weather", "pose_checks", "pipeline")
 
 
 def sensitivity(*, out: str | None = None) -> dict[str, Any]:
