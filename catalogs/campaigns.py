@@ -13,7 +13,15 @@ from tasks.closure.campaign import CHANNELS, SESSION, Campaign, Run, Tolerances
 from tasks.closure.validation import COLUMN_UNITS, run_problems
 from tasks.errors import InputError
 
-TOLERANCE_KEYS = ("pressure_gain", "mass", "pitch_gain", "wheel_radius", "suspension_damping", "suspension_stiffness", "grade")
+TOLERANCE_KEYS = (
+    "pressure_gain",
+    "mass",
+    "pitch_gain",
+    "wheel_radius",
+    "suspension_damping",
+    "suspension_stiffness",
+    "grade",
+)
 RUN_TOLERANCE_KEYS = ("initial_speed_m_s", "friction", "acceleration_bias_m_s2", "pitch_offset_deg")
 RUN_KEYS = (
     "precipitation_mm_h", "snow_accumulation_h", "direction", "disc_temperature_above_ambient_c", "hazard_center_m",
@@ -47,7 +55,9 @@ def read_campaign(folder: str | Path) -> Campaign:
     except yaml.YAMLError as error:
         raise InputError(f"{folder / 'campaign.yaml'} must be YAML; reading stopped at: {error}") from error
     if not isinstance(header, dict):
-        raise InputError(f"{folder / 'campaign.yaml'} must be a mapping with campaign, vehicle, split and tolerances_1sigma")
+        raise InputError(
+            f"{folder / 'campaign.yaml'} must be a mapping with campaign, vehicle, split and tolerances_1sigma"
+        )
     rows = list(csv.DictReader(table_bytes.decode("utf-8-sig").splitlines()))
     problems = _header_problems(header) + _table_problems(rows)
     if problems:
@@ -92,7 +102,9 @@ def _header_problems(header: dict[str, Any]) -> list[str]:
     if problems:
         return problems
     split, tolerances = header["split"], header["tolerances_1sigma"]
-    problems += [f"split needs a list {key}" for key in ("train", "held_out") if not isinstance(split.get(key), list)]
+    problems += [
+        f"split needs a list {key}" for key in ("train", "held_out") if not isinstance(split.get(key), list)
+    ]
     run = tolerances.get("run", {})
     for keys, place, where in ((TOLERANCE_KEYS, tolerances, ""), (RUN_TOLERANCE_KEYS, run, "run.")):
         for key in keys:
@@ -123,16 +135,27 @@ def _table_problems(rows: list[dict[str, str]]) -> list[str]:
 
 def _split_problems(names: list[str], train: list[str], held_out: list[str]) -> list[str]:
     problems = [f"{name}: stands in both parts of the split" for name in sorted(set(train) & set(held_out))]
-    problems += [f"{name}: is in neither part of the split" for name in names if name not in {*train, *held_out}]
-    problems += [f"{name}: the split names it, but runs.csv does not" for name in sorted({*train, *held_out} - set(names))]
-    problems += [f"split {part} needs at least 3 runs; it has {len(runs)}" for part, runs in (("train", train), ("held_out", held_out)) if len(runs) < 3]  # fmt: skip
+    problems += [
+        f"{name}: is in neither part of the split" for name in names if name not in {*train, *held_out}
+    ]
+    problems += [
+        f"{name}: the split names it, but runs.csv does not"
+        for name in sorted({*train, *held_out} - set(names))
+    ]
+    problems += [
+        f"split {part} needs at least 3 runs; it has {len(runs)}"
+        for part, runs in (("train", train), ("held_out", held_out))
+        if len(runs) < 3
+    ]
     return problems
 
 
 def _read_columns(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     table = pq.read_table(path)
     columns = {name: table.column(name).to_numpy().astype(np.float64) for name in table.column_names}
-    units = {f.name: f.metadata[b"units"].decode() for f in table.schema if f.metadata and b"units" in f.metadata}
+    units = {
+        f.name: f.metadata[b"units"].decode() for f in table.schema if f.metadata and b"units" in f.metadata
+    }
     return {name: columns[name] for name in columns if name in COLUMN_UNITS}, units
 
 

@@ -29,7 +29,9 @@ def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
     for entry in entries:
         problems += _problems(entry)
     names = [entry.get("name") for entry in entries]
-    problems += [f"effect {name} stands twice in {path}" for name in sorted({n for n in names if names.count(n) > 1})]
+    problems += [
+        f"effect {name} stands twice in {path}" for name in sorted({n for n in names if names.count(n) > 1})
+    ]
     if problems:
         raise InputError(problems)
     return tuple(_effect(entry) for entry in entries)
@@ -47,7 +49,9 @@ def _problems(entry: dict[str, Any]) -> list[str]:
         problems.append(f"{where} must have one or two parameters; it has {len(entry['parameters'])}")
     for name, p in entry["parameters"].items():
         if name not in PARAMETER_INDEX:
-            problems.append(f"{where}: no port knows the parameter {name}; there are: {', '.join(PARAMETER_INDEX)}")
+            problems.append(
+                f"{where}: no port knows the parameter {name}; there are: {', '.join(PARAMETER_INDEX)}"
+            )
         elif not (p["lower"] <= p["start"] <= p["upper"] and 0 < p["step"] < p["upper"] - p["lower"]):
             problems.append(f"{where}: {name} needs lower <= start <= upper and a step above 0; it has {p}")
     return problems
@@ -62,7 +66,9 @@ def _effect(entry: dict[str, Any]) -> Effect:
         enters=entry["enters"],
         source=entry["source"],
         parameters=tuple(
-            EffectParameter(name=name, unit=p["unit"], **{k: float(p[k]) for k in ("lower", "upper", "step", "start")})
+            EffectParameter(
+                name=name, unit=p["unit"], **{k: float(p[k]) for k in ("lower", "upper", "step", "start")}
+            )
             for name, p in entry["parameters"].items()
         ),
     )

@@ -13,7 +13,7 @@ ACCEPT_SCORE = 25.0
 RIVAL_SPAN = 10.0
 HELD_OUT_GAIN = 4.0
 WIN_SHARE = 0.6
-REFINED = 6
+REFINED = 5
 """Candidates of each screening that are refined through the simulation."""
 BOOTSTRAP = 400
 
@@ -29,7 +29,7 @@ class Candidate:
     gain : log likelihood gained
     inflation : empirical-null factor by which the gain is divided
     score : gain / inflation - parameters x log N
-    held_out_gain : fall of the held-out marginal misfit, divided by the inflation
+    held_out_gain : fall of the held-out marginal misfit, divided by the inflation; 0 where the score fails
     """
 
     hypothesis: Hypothesis
@@ -85,13 +85,15 @@ def screen(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], NDArray[np
     gram, right = np.zeros((library + n_session,) * 2), np.zeros(library + n_session)
     for run, r in zip(evidence.train, at.residuals, strict=True):
         b = np.column_stack((run.library, run.session))
-        q = np.column_stack((run.project(run.library), run.session_q))
+        q = np.column_stack((run.library_q, run.session_q))
         gram += b.T @ b - q.T @ q
         right += b.T @ r - q.T @ run.project(r)
     others = [*accepted, *range(library, library + n_session)]
     precision = np.concatenate((np.zeros(len(accepted)), 1.0 / np.square(evidence.session_sigma)))
     right[library:] -= at.session / np.square(evidence.session_sigma)
-    inner = np.linalg.inv(gram[np.ix_(others, others)] + np.diag(precision) + 1e-9 * np.diag(np.diag(gram)[others]))
+    inner = np.linalg.inv(
+        gram[np.ix_(others, others)] + np.diag(precision) + 1e-9 * np.diag(np.diag(gram)[others])
+    )
     gains, estimates = np.zeros(library), np.zeros(library)
     for j, effect in enumerate(evidence.effects):
         if j in accepted:
@@ -123,7 +125,7 @@ def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> f
     """
     z = np.full((len(evidence.train), len(evidence.effects)), np.nan)
     for i, (run, r) in enumerate(zip(evidence.train, at.residuals, strict=True)):
-        q, qr = run.project(run.library), run.project(r)
+        q, qr = run.library_q, run.project(r)
         information = np.einsum("ij,ij->j", run.library, run.library) - np.einsum("ij,ij->j", q, q)
         alive = information * np.array([e.parameters[0].step for e in evidence.effects]) ** 2 > 0.05
         z[i, alive] = ((run.library.T @ r - q.T @ qr) / np.sqrt(np.maximum(information, 1e-30)))[alive]
@@ -135,7 +137,9 @@ def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> f
     return max(level, (float(np.sum(own**2)) + 6.0 * level) / (len(own) - 1 + 6.0))
 
 
-def judge(evidence: Evidence, base: Fit, base_held_out: NDArray[np.float64], hypothesis: Hypothesis) -> Candidate:
+def judge(
+    evidence: Evidence, base: Fit, base_held_out: NDArray[np.float64], hypothesis: Hypothesis
+) -> Candidate:
     """Refine a hypothesis on top of ``base`` and judge it on training and held-out runs.
 
     Parameters
@@ -148,13 +152,16 @@ def judge(evidence: Evidence, base: Fit, base_held_out: NDArray[np.float64], hyp
     fitted = fit(
         evidence.train, (*base.parts, hypothesis), evidence.session_sigma,
         values=np.concatenate((base.values, hypothesis.start)), session=base.session, offsets=base.offsets,
+        iterations=3,
     )  # fmt: skip
     gain = 0.5 * (base.objective - fitted.objective)
     factor = inflation(evidence, fitted, _own_scores(evidence, fitted, hypothesis))
-    held_out = 0.5 * float(np.sum(base_held_out - misfit_by_run(evidence.held_out, fitted))) / factor
     score = gain / factor - len(hypothesis.names) * np.log(evidence.samples)
+    held_out = 0.0
+    if score > ACCEPT_SCORE:
+        held_out = float(np.sum(base_held_out - misfit_by_run(evidence.held_out, fitted))) / factor
     return Candidate(
-        hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=2.0 * held_out
+        hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out
     )
 
 
@@ -166,7 +173,7 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
     scores = []
     for run, r in zip(evidence.train, fitted.residuals, strict=True):
         a = run.library[:, j]
-        q = run.project(a)
+        q = run.library_q[:, j]
         information = float(a @ a - q @ q)
         if information * hypothesis.step[0] ** 2 > 0.05:
             scores.append(float(a @ r - q @ run.project(r)) / np.sqrt(information))
@@ -193,7 +200,9 @@ def ladder(evidence: Evidence, base: Fit, count: int = REFINED) -> list[Candidat
 def rivals(candidates: list[Candidate]) -> list[Candidate]:
     """Candidates that cannot be told from the first, the simpler first; the first itself included."""
     best = candidates[0]
-    near = [c for c in candidates if c.score > best.score - RIVAL_SPAN and c.gain / c.inflation > ACCEPT_SCORE]
+    near = [
+        c for c in candidates if c.score > best.score - RIVAL_SPAN and c.gain / c.inflation > ACCEPT_SCORE
+    ]
     return sorted(near, key=lambda c: (len(c.hypothesis.names), -c.score))
 
 
@@ -206,7 +215,9 @@ def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     base : the fit they were added to
     seed : of the resampling
     """
-    draws = np.random.Generator(np.random.Philox(seed)).integers(0, len(base.by_run), (BOOTSTRAP, len(base.by_run)))
+    draws = np.random.Generator(np.random.Philox(seed)).integers(
+        0, len(base.by_run), (BOOTSTRAP, len(base.by_run))
+    )
     scores = []
     for c in candidates:
         per_run = 0.5 * (base.by_run - c.fitted.by_run) / c.inflation
@@ -225,7 +236,9 @@ def simplest(candidates: list[Candidate]) -> list[Candidate]:
     """Rivals without those that only extend another rival by a parameter that earns less than it costs."""
     kept = []
     for c in candidates:
-        simpler = [o for o in candidates if nested(o.hypothesis, c.hypothesis) and o.score > c.score - RIVAL_SPAN]
+        simpler = [
+            o for o in candidates if nested(o.hypothesis, c.hypothesis) and o.score > c.score - RIVAL_SPAN
+        ]
         if not simpler:
             kept.append(c)
     return kept
@@ -248,5 +261,3 @@ def without(base: Fit, index: int, evidence: Evidence) -> Fit:
         evidence.train, parts, base.session_sigma, values=values, session=base.session, offsets=base.offsets,
         iterations=8,
     )  # fmt: skip
-
-

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 CHANNELS = (
-    "speed", "longitudinal_acceleration", "wheel_speed_front", "wheel_speed_rear", "pitch", "pitch_rate", "vertical_acceleration",
+    "speed", "longitudinal_acceleration", "wheel_speed_front", "wheel_speed_rear", "pitch", "pitch_rate",
+    "vertical_acceleration",
 )  # fmt: skip
 """Measured responses in the order of a run's matrix; angles in degrees as test benches log them."""
 CHANNEL_UNITS = ("m/s", "m/s^2", "rad/s", "rad/s", "deg", "deg/s", "m/s^2")

@@ -53,6 +53,7 @@ class RunEvidence:
     library : float64 [M, E] derivatives by the first parameter of every library effect
     factor : Cholesky factor (lower) of information + prior precision
     session_q : float64 [D, 7] factor^-1 nuisance' session
+    library_q : float64 [D, E] factor^-1 nuisance' library
     """
 
     model: RunModel
@@ -65,6 +66,7 @@ class RunEvidence:
     library: NDArray[np.float64]
     factor: NDArray[np.float64]
     session_q: NDArray[np.float64]
+    library_q: NDArray[np.float64]
 
     def residual(
         self,
@@ -85,7 +87,11 @@ class RunEvidence:
         moved[PARAMETER_INDEX["friction"]] += offsets[1]
         at = N_OFFSETS
         for port, count, spacing in zip(DISTURBED, self.knots, KNOT_SPACING, strict=True):
-            slots += (Slot(port=port, variable="time", origin=0.0, spacing=spacing, values=offsets[at : at + count]),)
+            slots += (
+                Slot(
+                    port=port, variable="time", origin=0.0, spacing=spacing, values=offsets[at : at + count]
+                ),
+            )
             at += count
         out, _ = roll(self.model, moved, slots=slots, initial_speed=self.model.initial_speed + offsets[0])
         y = instruments(self.model, moved, out)
@@ -95,7 +101,9 @@ class RunEvidence:
 
     def offsets(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
         """Posterior mean of the run's offsets and disturbance knots given a whitened residual, float64 [D]."""
-        return solve_triangular(self.factor, self.project(residual), lower=True, trans="T", check_finite=False)
+        return solve_triangular(
+            self.factor, self.project(residual), lower=True, trans="T", check_finite=False
+        )
 
     def project(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """factor^-1 nuisance' x: what the nuisances can take from x."""
@@ -118,7 +126,7 @@ def run_evidence(
     model : the run
     rho, sigma : channel noise
     base : float64 full parameter vector to differentiate at
-    effects : the library
+    effects : the library; may be empty for runs that only judge
     tolerances : priors of the run's offsets
     disturbance : prior of the disturbances
     """
@@ -145,17 +153,28 @@ def run_evidence(
         for k in range(count):
             first = min(max(int((k - 1) * spacing / dt), 0), model.samples - 1)
             slot = Slot(
-                port=port, variable="time", origin=(k - 1) * spacing, spacing=spacing, values=np.array([0.0, step, 0.0])
+                port=port,
+                variable="time",
+                origin=(k - 1) * spacing,
+                spacing=spacing,
+                values=np.array([0.0, step, 0.0]),
             )
             columns.append(slope(base, step, slots=(slot,), start=(first, states, out)))
-    session = [slope(_moved(base, i, 0.5 * s), 0.5 * s) for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)]
+    session = [
+        slope(_moved(base, i, 0.5 * s), 0.5 * s)
+        for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
+    ]
     library = []
     for effect in effects:
         theta = base.copy()
         for parameter in effect.parameters[1:]:
             theta[parameter.index] = parameter.start
         first_parameter = effect.parameters[0]
-        library.append(slope(_moved(theta, first_parameter.index, first_parameter.step), first_parameter.step))
+        library.append(
+            slope(_moved(theta, first_parameter.index, first_parameter.step), first_parameter.step)
+        )
+    if not library:
+        library = [np.zeros_like(y)]
     nuisance = whiten(np.stack(columns, axis=-1), rho, sigma)
     evidence = RunEvidence(
         model=model,
@@ -168,6 +187,7 @@ def run_evidence(
         library=whiten(np.stack(library, axis=-1), rho, sigma),
         factor=np.empty(0),
         session_q=np.empty(0),
+        library_q=np.empty(0),
     )
     return with_disturbance(evidence, tolerances, disturbance)
 
@@ -177,7 +197,9 @@ def with_disturbance(evidence: RunEvidence, tolerances: Tolerances, disturbance:
     precision = prior_precision(evidence.knots, tolerances, disturbance)[0]
     factor = cholesky(evidence.information + precision, lower=True, check_finite=False)
     changed = replace(evidence, factor=factor)
-    return replace(changed, session_q=changed.project(changed.session))
+    return replace(
+        changed, session_q=changed.project(changed.session), library_q=changed.project(changed.library)
+    )
 
 
 def prior_precision(
@@ -186,11 +208,18 @@ def prior_precision(
     """Precision of a run's offsets and knots (first-order Gauss-Markov processes) and its log determinant."""
     size = N_OFFSETS + sum(knots)
     precision = np.zeros((size, size))
-    sigmas = (tolerances.initial_speed, tolerances.friction, tolerances.acceleration_bias, tolerances.pitch_offset)
+    sigmas = (
+        tolerances.initial_speed,
+        tolerances.friction,
+        tolerances.acceleration_bias,
+        tolerances.pitch_offset,
+    )
     precision[np.arange(N_OFFSETS), np.arange(N_OFFSETS)] = 1.0 / np.square(sigmas)
     log_det = -2.0 * float(np.sum(np.log(sigmas)))
     at = N_OFFSETS
-    for count, spacing, scale, time in zip(knots, KNOT_SPACING, disturbance.scale, disturbance.time, strict=True):
+    for count, spacing, scale, time in zip(
+        knots, KNOT_SPACING, disturbance.scale, disturbance.time, strict=True
+    ):
         r = np.exp(-spacing / time)
         block = np.zeros((count, count))
         i = np.arange(count)
@@ -210,7 +239,9 @@ def fit_disturbance(
     effects: tuple[Effect, ...],
     start: Disturbance,
 ) -> Disturbance:
-    """Scales and times by marginal likelihood, with every physical library direction free so that no effect inflates them.
+    """Scales and times by marginal likelihood, every physical library direction free.
+
+    With the directions fixed at 0 an effect would inflate the disturbance that then hides it.
 
     Parameters
     ----------

@@ -75,7 +75,9 @@ class Fit:
         """Whether a parameter sits on its bound, other than at 0 for a second parameter."""
         lower = np.concatenate([p.lower for p in self.parts]) if self.parts else np.empty(0)
         upper = np.concatenate([p.upper for p in self.parts]) if self.parts else np.empty(0)
-        first = np.concatenate([np.arange(len(p.names)) == 0 for p in self.parts]) if self.parts else np.empty(0)
+        first = (
+            np.concatenate([np.arange(len(p.names)) == 0 for p in self.parts]) if self.parts else np.empty(0)
+        )
         margin = 1e-6 * (upper - lower)
         touching = (self.values <= lower + margin) | (self.values >= upper - margin)
         return bool(np.any(touching & (first.astype(bool) | (self.values != 0.0))))
@@ -147,7 +149,11 @@ def fit(
     lower = np.concatenate([p.lower for p in parts]) if parts else np.empty(0)
     upper = np.concatenate([p.upper for p in parts]) if parts else np.empty(0)
     steps = np.concatenate([p.step for p in parts]) if parts else np.empty(0)
-    x = (np.concatenate([p.start for p in parts]) if parts else np.empty(0)) if values is None else values.copy()
+    x = (
+        (np.concatenate([p.start for p in parts]) if parts else np.empty(0))
+        if values is None
+        else values.copy()
+    )
     s = np.zeros(len(SESSION_INDEX)) if session is None else session.copy()
     prior = 1.0 / np.square(session_sigma)
     k = len(x)
@@ -177,7 +183,9 @@ def fit(
         free = np.ones(k + len(s), dtype=bool)
         for _ in range(k + 1):
             move = np.zeros(k + len(s))
-            move[free] = np.linalg.solve(normal[np.ix_(free, free)] + 1e-12 * np.diag(np.diag(normal)[free] + 1e-30), right[free])
+            move[free] = np.linalg.solve(
+                normal[np.ix_(free, free)] + 1e-12 * np.diag(np.diag(normal)[free] + 1e-30), right[free]
+            )
             outside = (x + move[:k] < lower) & (x <= lower) | (x + move[:k] > upper) & (x >= upper)
             if not np.any(outside & free[:k]):
                 break
@@ -201,7 +209,7 @@ def fit(
         objective = float(by_run.sum() + np.sum(prior * s**2))
         if abs(before - objective) < 0.3 and expected < 0.5:
             break
-    covariance = np.linalg.pinv(normal)[:k, :k]
+    covariance = np.asarray(np.linalg.pinv(normal)[:k, :k], dtype=np.float64)
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective, by_run=by_run,
         covariance=covariance, residuals=tuple(residuals), offsets=offsets,
@@ -214,7 +222,10 @@ def misfit_by_run(evidence: tuple[RunEvidence, ...], fitted: Fit) -> NDArray[np.
 
 
 def _settled(
-    evidence: tuple[RunEvidence, ...], parts: tuple[Hypothesis, ...], x: NDArray[np.float64], s: NDArray[np.float64]
+    evidence: tuple[RunEvidence, ...],
+    parts: tuple[Hypothesis, ...],
+    x: NDArray[np.float64],
+    s: NDArray[np.float64],
 ) -> tuple[tuple[NDArray[np.float64], ...], NDArray[np.float64], list[NDArray[np.float64]]]:
     offsets = tuple(np.zeros(run.nuisance.shape[1]) for run in evidence)
     _, by_run, residuals = _misfit(evidence, parts, x, s, np.zeros_like(s), None)

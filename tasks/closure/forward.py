@@ -85,22 +85,46 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     mu_c = surface_friction(weather, state, surface)
     response = surface_response(vehicle, run.weather, mu_c)
     c1, c2, c3 = vehicle.families[run.weather].burckhardt
-    values = dict(
-        sprung_mass=vehicle.sprung_mass, unsprung_mass_f=vehicle.unsprung_mass_f, unsprung_mass_r=vehicle.unsprung_mass_r,
-        l_f=vehicle.cg_to_front_axle, l_r=vehicle.cg_to_rear_axle, cg_height=vehicle.cg_height,
-        pitch_inertia=vehicle.pitch_inertia, spring_f=vehicle.suspension_stiffness_f, spring_r=vehicle.suspension_stiffness_r,
-        damper_f=vehicle.suspension_damping_f, damper_r=vehicle.suspension_damping_r, tyre_stiffness_f=vehicle.tyre_stiffness_f,
-        tyre_stiffness_r=vehicle.tyre_stiffness_r, radius=vehicle.wheel_radius, wheel_inertia_f=vehicle.wheel_inertia_f,
-        wheel_inertia_r=vehicle.wheel_inertia_r,
-        torque_gain=vehicle.brake_gain, front_share=vehicle.front_brake_share, gravity=vehicle.gravity,
-        coast=vehicle.coast_deceleration, release_width=vehicle.abs_release_width, slip_floor=vehicle.slip_speed_floor,
-        friction=response.tyre.peak, slip_scale=response.tyre.decay / c2, pitch_scale=response.pitch_scale,
-        c1=c1, c2=c2, c3=c3,
-        disc_rise=run.disc_rise, disc_capacity_f=DISC_CAPACITY_F, disc_capacity_r=DISC_CAPACITY_R, disc_cooling=DISC_COOLING,
-        hazard_center=run.hazard_center, hazard_length=run.hazard_length,
-        hazard_height=run.hazard_height if run.hazard_length > 0 else 0.0,
-        direction=float(run.direction), snow_depth_mm=state.snow_depth_mm, wet=float(run.weather == "rain"),
-    )  # fmt: skip
+    values = {
+        "sprung_mass": vehicle.sprung_mass,
+        "unsprung_mass_f": vehicle.unsprung_mass_f,
+        "unsprung_mass_r": vehicle.unsprung_mass_r,
+        "l_f": vehicle.cg_to_front_axle,
+        "l_r": vehicle.cg_to_rear_axle,
+        "cg_height": vehicle.cg_height,
+        "pitch_inertia": vehicle.pitch_inertia,
+        "spring_f": vehicle.suspension_stiffness_f,
+        "spring_r": vehicle.suspension_stiffness_r,
+        "damper_f": vehicle.suspension_damping_f,
+        "damper_r": vehicle.suspension_damping_r,
+        "tyre_stiffness_f": vehicle.tyre_stiffness_f,
+        "tyre_stiffness_r": vehicle.tyre_stiffness_r,
+        "radius": vehicle.wheel_radius,
+        "wheel_inertia_f": vehicle.wheel_inertia_f,
+        "wheel_inertia_r": vehicle.wheel_inertia_r,
+        "torque_gain": vehicle.brake_gain,
+        "front_share": vehicle.front_brake_share,
+        "gravity": vehicle.gravity,
+        "coast": vehicle.coast_deceleration,
+        "release_width": vehicle.abs_release_width,
+        "slip_floor": vehicle.slip_speed_floor,
+        "friction": response.tyre.peak,
+        "slip_scale": response.tyre.decay / c2,
+        "pitch_scale": response.pitch_scale,
+        "c1": c1,
+        "c2": c2,
+        "c3": c3,
+        "disc_rise": run.disc_rise,
+        "disc_capacity_f": DISC_CAPACITY_F,
+        "disc_capacity_r": DISC_CAPACITY_R,
+        "disc_cooling": DISC_COOLING,
+        "hazard_center": run.hazard_center,
+        "hazard_length": run.hazard_length,
+        "hazard_height": run.hazard_height if run.hazard_length > 0 else 0.0,
+        "direction": float(run.direction),
+        "snow_depth_mm": state.snow_depth_mm,
+        "wet": float(run.weather == "rain"),
+    }
     speed = run.response[:, CHANNELS.index("speed")]
     slow = np.flatnonzero(speed < MASKED_SPEED)
     pressed = np.flatnonzero(run.pressure > 0.1)
@@ -141,7 +165,9 @@ def roll(
     outputs float64 [samples, len(OUTPUTS)] and states float64 [samples, N_STATES]
     """
     motion = np.ascontiguousarray(theta[: len(PARAMETERS)])
-    keys = np.array([(PORTS.index(s.port), VARIABLES.index(s.variable)) for s in slots], dtype=np.int64).reshape(-1, 2)
+    keys = np.array(
+        [(PORTS.index(s.port), VARIABLES.index(s.variable)) for s in slots], dtype=np.int64
+    ).reshape(-1, 2)
     grids = np.array([(s.origin, s.spacing) for s in slots]).reshape(-1, 2)
     width = max((len(s.values) for s in slots), default=1)
     tables = np.zeros((len(slots), width))
@@ -151,7 +177,9 @@ def roll(
     if start is None:
         first, out, states = 0, np.zeros((model.samples, len(OUTPUTS))), np.zeros((model.samples, N_STATES))
         v0 = model.initial_speed if initial_speed is None else initial_speed
-        omega = v0 / (model.constants[CONSTANTS.index("radius")] * (1.0 + motion[PARAMETER_INDEX["wheel_radius"]]))
+        omega = v0 / (
+            model.constants[CONSTANTS.index("radius")] * (1.0 + motion[PARAMETER_INDEX["wheel_radius"]])
+        )
         states[0, :4] = v0, 0.0, omega, omega
         states[0, 12] = model.run.pressure[0]
         states[0, 13:15] = model.run.disc_rise
@@ -182,7 +210,9 @@ def instruments(model: RunModel, theta: NDArray[np.float64], out: NDArray[np.flo
     felt = out[:, 1] + g * theta[PARAMETER_INDEX["slope"]] * model.run.direction
     up = out[:, 6]
     tilt = e["mount_tilt"]
-    ax = (felt - e["gravity_leak"] * g * np.sin(out[:, 4]) + tilt * (g + up)) * (1.0 + e["acceleration_scale"])
+    ax = (felt - e["gravity_leak"] * g * np.sin(out[:, 4]) + tilt * (g + up)) * (
+        1.0 + e["acceleration_scale"]
+    )
     y = np.column_stack(
         (
             out[:, 0] * (1.0 + e["speed_scale"]),
@@ -195,7 +225,12 @@ def instruments(model: RunModel, theta: NDArray[np.float64], out: NDArray[np.flo
         )
     )
     dt = model.run.interval
-    for columns, chain in ((slice(0, 1), "speed"), (slice(1, 2), "acceleration"), (slice(2, 4), "wheel_speed"), (slice(4, 6), "pitch")):
+    for columns, chain in (
+        (slice(0, 1), "speed"),
+        (slice(1, 2), "acceleration"),
+        (slice(2, 4), "wheel_speed"),
+        (slice(4, 6), "pitch"),
+    ):
         delay, lag = e[f"{chain}_delay"], e.get(f"{chain}_lag", 0.0)
         if delay:
             late = np.arange(model.samples) - delay / dt
@@ -203,7 +238,9 @@ def instruments(model: RunModel, theta: NDArray[np.float64], out: NDArray[np.flo
                 y[:, j] = np.interp(late, np.arange(model.samples), y[:, j])
         if lag > 0.0:
             keep = np.exp(-dt / lag)
-            y[:, columns] = lfilter([1.0 - keep], [1.0, -keep], y[:, columns], axis=0, zi=keep * y[:1, columns])[0]
+            y[:, columns] = lfilter(
+                [1.0 - keep], [1.0, -keep], y[:, columns], axis=0, zi=keep * y[:1, columns]
+            )[0]
     return y
 
 

@@ -4,24 +4,53 @@ Half-car by the explicit midpoint rule, wheels linearly implicit in their own sp
 any slip stiffness down to standstill, so the step follows the bandwidth of the data and not of the tyre.
 """
 
-from math import exp, log, pi, sin, cos
+from math import cos, exp, log, pi, sin
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from tasks.vehicle.effects.ports import (
-    _BIAS, _BIASP, _DAMP, _DEAD, _DIVE, _ENG, _ENGV, _AEROL, _AEROM, _GAIN, _INERTIA, _LAG, _LIFT, _MASS, _MU,
-    _PAD, _PITCH, _PUSH, _RADIUS, _RELAX, _SLIP, _SLOPE, _STIFF,
-    brake_factor, friction_factor, resistance, slot_sum, strut_force,
+    _AEROL,
+    _AEROM,
+    _BIAS,
+    _BIASP,
+    _DAMP,
+    _DEAD,
+    _DIVE,
+    _ENG,
+    _ENGV,
+    _GAIN,
+    _INERTIA,
+    _LAG,
+    _LIFT,
+    _MASS,
+    _MU,
+    _PAD,
+    _PITCH,
+    _PUSH,
+    _RADIUS,
+    _RELAX,
+    _SLIP,
+    _SLOPE,
+    _STIFF,
+    brake_factor,
+    friction_factor,
+    resistance,
+    slot_sum,
+    strut_force,
 )  # fmt: skip
 
-OUTPUTS = ("speed", "acceleration", "wheel_speed_front", "wheel_speed_rear", "pitch", "pitch_rate", "heave_acceleration", "station")
+OUTPUTS = (
+    "speed", "acceleration", "wheel_speed_front", "wheel_speed_rear", "pitch", "pitch_rate", "heave_acceleration",
+    "station",
+)  # fmt: skip
 N_STATES = 20
 CONSTANTS = (
     "sprung_mass", "unsprung_mass_f", "unsprung_mass_r", "l_f", "l_r", "cg_height", "pitch_inertia",
     "spring_f", "spring_r", "damper_f", "damper_r", "tyre_stiffness_f", "tyre_stiffness_r", "radius",
-    "wheel_inertia_f", "wheel_inertia_r", "torque_gain", "front_share", "gravity", "coast", "release_width", "slip_floor",
+    "wheel_inertia_f", "wheel_inertia_r", "torque_gain", "front_share", "gravity", "coast", "release_width",
+    "slip_floor",
     "friction", "slip_scale", "pitch_scale", "c1", "c2", "c3",
     "disc_rise", "disc_capacity_f", "disc_capacity_r", "disc_cooling",
     "hazard_center", "hazard_length", "hazard_height", "direction", "snow_depth_mm", "wet",
@@ -68,7 +97,8 @@ def drive(
     out : float64 [N, len(OUTPUTS)] rows ``first`` ... ``first + count - 1`` are filled
     """
     (ms, muf, mur, lf, lr, hcg, Iy, ksf, ksr, csf, csr, ktf, ktr, R, Iwf, Iwr, Kp, bf, g, coast, width, floor,
-     mu_peak, beta, gamma, c1, c2, c3, T0, Cf, Cr, cool, hc, hl, hh, direction, snow, wet) = constants  # fmt: skip
+     mu_peak, beta, gamma, c1, c2, c3, _, Cf, Cr, cool, hc, hl, hh,
+     direction, snow, wet) = constants  # fmt: skip
     ms = ms * (1.0 + theta[_MASS])
     R = R * (1.0 + theta[_RADIUS])
     Kp = Kp * (1.0 + theta[_GAIN])
@@ -97,13 +127,17 @@ def drive(
     p_before = p_line
     for i in range(first, first + count):
         row = states[i]
-        row[0] = v; row[1] = s; row[2] = wf; row[3] = wr; row[4] = z; row[5] = th; row[6] = zf; row[7] = zr
-        row[8] = dz; row[9] = dth; row[10] = dzf; row[11] = dzr; row[12] = p_line; row[13] = Tf; row[14] = Tr
-        row[15] = kf; row[16] = kr; row[17] = Ef; row[18] = Er; row[19] = vd  # fmt: skip
+        (row[0], row[1], row[2], row[3], row[4], row[5], row[6]) = (v, s, wf, wr, z, th, zf)
+        (row[7], row[8], row[9], row[10], row[11], row[12]) = (zr, dz, dth, dzf, dzr, p_line)
+        (row[13], row[14], row[15], row[16], row[17], row[18], row[19]) = (Tf, Tr, kf, kr, Ef, Er, vd)
         for j in range(substeps):
             u = i + (j + 1.0) / substeps - theta[_DEAD] / interval
             k = int(max(u, 0.0))
-            p = pressure[k] if k + 1 >= n else pressure[k] + (max(u, 0.0) - k) * (pressure[k + 1] - pressure[k])
+            p = (
+                pressure[k]
+                if k + 1 >= n
+                else pressure[k] + (max(u, 0.0) - k) * (pressure[k + 1] - pressure[k])
+            )
             p_line = p_line + (1.0 - exp(-dt / theta[_LAG])) * (p - p_line) if theta[_LAG] > 0.0 else p
             p_eff = max(p_line - theta[_PUSH], 0.0)
 
@@ -127,13 +161,13 @@ def drive(
                 x[2] = p_line
                 x[4] = (p_line - p_before) / dt
                 x[8] = -vd
-                x[3] = Tf; x[5] = Fzf / F0f; x[6] = df; x[7] = vf  # fmt: skip
+                x[3], x[5], x[6], x[7] = Tf, Fzf / F0f, df, vf
                 extra_x = slot_sum(0, x, keys, grids, tables)
                 tb_f = 1.0 + slot_sum(1, x, keys, grids, tables)
                 mu_f = 1.0 + slot_sum(2, x, keys, grids, tables)
                 extra_m = slot_sum(3, x, keys, grids, tables)
                 extra_sf = slot_sum(4, x, keys, grids, tables)
-                x[3] = Tr; x[5] = Fzr / F0r; x[6] = dr; x[7] = vr  # fmt: skip
+                x[3], x[5], x[6], x[7] = Tr, Fzr / F0r, dr, vr
                 tb_r = 1.0 + slot_sum(1, x, keys, grids, tables)
                 mu_r = 1.0 + slot_sum(2, x, keys, grids, tables)
                 extra_sr = slot_sum(4, x, keys, grids, tables)
@@ -147,9 +181,20 @@ def drive(
             Fxf = Fxr = 0.0
             for a in range(2):
                 if a == 0:
-                    w = wf; Fz = Fzf; kl = kf; part = share; T = Tf; E = Ef; F0 = F0f; mu_x = mu_f; tb = tb_f; Iw = Iwf  # fmt: skip
+                    w, Fz, kl, part, T, E, F0, mu_x, tb, Iw = wf, Fzf, kf, share, Tf, Ef, F0f, mu_f, tb_f, Iwf
                 else:
-                    w = wr; Fz = Fzr; kl = kr; part = 1.0 - share; T = Tr; E = Er; F0 = F0r; mu_x = mu_r; tb = tb_r; Iw = Iwr  # fmt: skip
+                    w, Fz, kl, part, T, E, F0, mu_x, tb, Iw = (
+                        wr,
+                        Fzr,
+                        kr,
+                        1.0 - share,
+                        Tr,
+                        Er,
+                        F0r,
+                        mu_r,
+                        tb_r,
+                        Iwr,
+                    )
                 mu = mu_peak * mu_x * friction_factor(theta, v, Fz / F0, E, wet)
                 Tc = Kp * p_eff * part * brake_factor(theta, p_line, v, T) * tb
                 drag = 0.0
@@ -187,10 +232,12 @@ def drive(
                 heat = q * Tc * w_new * dt
                 slip_heat = abs(Fx * k_t) * v * dt
                 if a == 0:
-                    wf = w_new; kf = k_t; Fxf = Fx; Ef += slip_heat  # fmt: skip
+                    wf, kf, Fxf = w_new, k_t, Fx
+                    Ef += slip_heat
                     Tf += (heat - cool * Tf * dt) / Cf
                 else:
-                    wr = w_new; kr = k_t; Fxr = Fx; Er += slip_heat  # fmt: skip
+                    wr, kr, Fxr = w_new, k_t, Fx
+                    Er += slip_heat
                     Tr += (heat - cool * Tr * dt) / Cr
 
             Fx_road = -Fzf * slope_f - Fzr * slope_r
@@ -200,7 +247,7 @@ def drive(
             moment = gamma * ms * hcg * max(-vd, 0.0) + extra_m + theta[_AEROM] * v * v
             jack_f = extra_sf - theta[_DIVE] * Fxf * hcg / L
             jack_r = extra_sr + theta[_LIFT] * Fxr * hcg / L
-            z0 = z; th0 = th; zf0 = zf; zr0 = zr; dz0 = dz; dth0 = dth; dzf0 = dzf; dzr0 = dzr  # fmt: skip
+            z0, th0, zf0, zr0, dz0, dth0, dzf0, dzr0 = z, th, zf, zr, dz, dth, dzf, dzr
             for stage in range(2):
                 # explicit midpoint: the body's first-order phase error would outweigh the pitch-rate noise
                 if stage == 1:
@@ -225,7 +272,16 @@ def drive(
             s += dt * (v + 0.5 * dt * vd)
             v += 0.5 * dt * (vd_start + vd)
             if v <= 0.05:
-                v = 0.0; wf = 0.0; wr = 0.0; vd = 0.0; kf = 0.0; kr = 0.0  # fmt: skip
+                v, wf, wr, vd, kf, kr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             if j == 0:
                 o = out[i]
-                o[0] = row[0]; o[1] = row[19]; o[2] = row[2]; o[3] = row[3]; o[4] = row[5]; o[5] = row[9]; o[6] = az; o[7] = row[1]  # fmt: skip
+                o[0], o[1], o[2], o[3], o[4], o[5], o[6], o[7] = (
+                    row[0],
+                    row[19],
+                    row[2],
+                    row[3],
+                    row[5],
+                    row[9],
+                    az,
+                    row[1],
+                )

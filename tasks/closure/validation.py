@@ -18,7 +18,9 @@ BRAKING = 0.5
 """Mean deceleration from which pitch must be nose-down [m/s^2]."""
 
 
-def run_problems(columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str], interval: float) -> list[str]:
+def run_problems(
+    columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str], interval: float
+) -> list[str]:
     """Every problem of one run, one sentence each; empty when it can be used.
 
     Parameters
@@ -66,7 +68,9 @@ def _magnitude_problems(columns: Mapping[str, NDArray[np.float64]]) -> list[str]
     for name, limit in PLAUSIBLE.items():
         peak = float(np.max(np.abs(columns[name])))
         if peak > limit:
-            problems.append(f"channel {name} reaches {peak:.4g} {COLUMN_UNITS[name]}, beyond {limit:g}: is the unit right?")
+            problems.append(
+                f"channel {name} reaches {peak:.4g} {COLUMN_UNITS[name]}, beyond {limit:g}: is the unit right?"
+            )
     speed, wheel = columns["speed"][:30].mean(), columns["wheel_speed_front"][:30].mean()
     if speed > 3.0 and not 0.2 < speed / max(wheel, 1e-6) < 0.6:
         problems.append(
@@ -79,7 +83,9 @@ def _magnitude_problems(columns: Mapping[str, NDArray[np.float64]]) -> list[str]
     if moving:
         ratio = float(np.dot(_smooth(slope), _smooth(rate)) / np.dot(_smooth(rate), _smooth(rate)))
         if not 0.4 < ratio < 2.5:
-            problems.append(f"the slope of pitch is {ratio:.3g} times pitch_rate: their units or signs differ")
+            problems.append(
+                f"the slope of pitch is {ratio:.3g} times pitch_rate: their units or signs differ"
+            )
     return problems
 
 
@@ -94,7 +100,9 @@ def _frozen_problems(columns: Mapping[str, NDArray[np.float64]]) -> list[str]:
             length = length + 1 if flag else 0
             longest = max(longest, length)
         if longest >= FREEZE_SAMPLES:
-            problems.append(f"channel {name} is frozen: {longest + 1} equal samples in a row while the car moves")
+            problems.append(
+                f"channel {name} is frozen: {longest + 1} equal samples in a row while the car moves"
+            )
     return problems
 
 

@@ -1,19 +1,30 @@
 """The decision: what is missing, how sure, and what it does to the error on runs that no fit has seen."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.closure.attribution import (
-    RIVAL_SPAN, WIN_SHARE, Candidate, Evidence, inflation, judge, ladder, nested, win_share, without,
+    ACCEPT_SCORE,
+    RIVAL_SPAN,
+    WIN_SHARE,
+    Candidate,
+    Evidence,
+    inflation,
+    judge,
+    ladder,
+    nested,
+    win_share,
+    without,
 )  # fmt: skip
-from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
+from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign, Run
 from tasks.closure.evidence import Disturbance, RunEvidence, fit_disturbance, run_evidence, with_disturbance
-from tasks.closure.fit import Fit, Hypothesis, compose, fit, misfit_by_run
-from tasks.closure.forward import predict, run_model
+from tasks.closure.fit import Fit, compose, fit, misfit_by_run
+from tasks.closure.forms import form_hypotheses, scan
+from tasks.closure.forward import Slot, predict, run_model
 from tasks.closure.noise import channel_noise
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
@@ -106,6 +117,7 @@ class Verdict:
     detectable : by library effect, the smallest value of its first parameter that would be named
     campaign, content_hash, split_hash : what was read
     theta : float64 full parameter vector of the effects, without session nuisances
+    slots : tables of the forms found
     reasons : sentences that say why the answer is what it is
     """
 
@@ -122,6 +134,7 @@ class Verdict:
     content_hash: str
     split_hash: str
     theta: NDArray[np.float64]
+    slots: tuple[Slot, ...]
     reasons: tuple[str, ...]
 
 
@@ -148,18 +161,33 @@ def attribute(
     """
     progress("derivatives")
     evidence, rho, sigma, disturbance = prepare(campaign, vehicle, surface, effects)
-    null = fit(evidence.train, (), evidence.session_sigma, iterations=10)
+    null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
     progress("search")
-    base, accepted, tried, reasons = _search(evidence, null)
+    base, rounds, tried, reasons = _search(evidence, null)
+    progress("left over")
+    base, rounds, near_forms = _forms(evidence, null, base, rounds, reasons)
     progress("rivals")
-    named, near = _rivals(evidence, base, accepted) if accepted else ([], [])
+    named, near = _rivals(evidence, base, rounds) if rounds else ([], [])
+    near = [*near, *near_forms]
     error = held_out_error(evidence, null, base)
     kind = _kind(named, near)
+    worse = [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
+    if named and worse:
+        # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
+        reasons.append(
+            f"{', '.join(e.name for e in named)} would fit, but predicts {', '.join(worse)} of the held-out runs"
+            " worse than the frozen model: not named"
+        )
+        kind, base = "NOTHING", null
+        tried, named, near = [r.accepted for r in rounds], [], []
+        error = held_out_error(evidence, null, null)
     if kind == "SET":
-        reasons.append(f"{len(near)} other explanation(s) lie within {RIVAL_SPAN:g} units or win too many resamples")
-    if kind == "NOTHING":
+        reasons.append(
+            f"{len(near)} other explanation(s) lie within {RIVAL_SPAN:g} units or win too many resamples"
+        )
+    if kind == "NOTHING" and not rounds:
         reasons.append("no candidate passes the score, held-out and bound gates together")
-    theta = compose(base.parts, base.values, np.zeros(len(SESSION)))[0]
+    theta, slots = compose(base.parts, base.values, np.zeros(len(SESSION)))
     pulls = {
         name: (float(a), float(b))
         for name, a, b in zip(
@@ -180,6 +208,7 @@ def attribute(
         content_hash=campaign.content_hash,
         split_hash=campaign.split_hash,
         theta=theta,
+        slots=slots,
         reasons=tuple(reasons),
     )
 
@@ -192,13 +221,15 @@ def prepare(
     plain = np.zeros(len(ALL_PARAMETERS))
     guess = Disturbance()
 
-    def derived(runs: tuple[Any, ...]) -> tuple[RunEvidence, ...]:
+    def derived(runs: tuple[Run, ...], library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
         return tuple(
-            run_evidence(run_model(run, vehicle, surface), rho, sigma, plain, effects, campaign.tolerances, guess)
+            run_evidence(
+                run_model(run, vehicle, surface), rho, sigma, plain, library, campaign.tolerances, guess
+            )
             for run in runs
         )
 
-    train, held_out = derived(campaign.train), derived(campaign.held_out)
+    train, held_out = derived(campaign.train, effects), derived(campaign.held_out, ())
     residuals = [run.residual(plain) for run in train]
     disturbance = fit_disturbance(train, residuals, campaign.tolerances, effects, guess)
     return (
@@ -223,7 +254,9 @@ def held_out_error(evidence: Evidence, null: Fit, base: Fit) -> dict[str, Channe
     null : fit without effects, where re-tuning starts
     base : fit with the accepted effects
     """
-    retuned = fit(evidence.train, (), RETUNE_WIDENING * evidence.session_sigma, session=null.session, iterations=8)
+    retuned = fit(
+        evidence.train, (), RETUNE_WIDENING * evidence.session_sigma, session=null.session, iterations=8
+    )
     square = np.zeros((3, len(evidence.held_out), len(CHANNELS)))
     for i, run in enumerate(evidence.held_out):
         for j, (theta, slots) in enumerate(
@@ -234,7 +267,9 @@ def held_out_error(evidence: Evidence, null: Fit, base: Fit) -> dict[str, Channe
             )
         ):
             square[j, i] = np.mean((run.model.measured - predict(run.model, theta, slots=slots)) ** 2, axis=0)
-    draws = np.random.Generator(np.random.Philox(0)).integers(0, square.shape[1], (ERROR_DRAWS, square.shape[1]))
+    draws = np.random.Generator(np.random.Philox(0)).integers(
+        0, square.shape[1], (ERROR_DRAWS, square.shape[1])
+    )
     errors = {}
     for c, (name, unit) in enumerate(zip(CHANNELS, CHANNEL_UNITS, strict=True)):
         frozen, tuned, after = np.sqrt(square[:, :, c].mean(axis=1))
@@ -250,8 +285,18 @@ def held_out_error(evidence: Evidence, null: Fit, base: Fit) -> dict[str, Channe
     return errors
 
 
-def _search(evidence: Evidence, null: Fit) -> tuple[Fit, list[Candidate], list[Candidate], list[str]]:
-    base, accepted, reasons = null, [], []
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """One round of the search: what was tried on top of ``base`` and which candidate was accepted."""
+
+    base: Fit
+    tried: tuple[Candidate, ...]
+    accepted: Candidate
+
+
+def _search(evidence: Evidence, null: Fit) -> tuple[Fit, list[Round], list[Candidate], list[str]]:
+    base, reasons = null, []
+    rounds: list[Round] = []
     tried: list[Candidate] = []
     for _ in range(MAX_EFFECTS):
         tried = ladder(evidence, base)
@@ -260,50 +305,90 @@ def _search(evidence: Evidence, null: Fit) -> tuple[Fit, list[Candidate], list[C
             break
         best = passing[0]
         if tried[0] is not best:
-            reasons.append(f"{tried[0].hypothesis.name} scores higher than {best.hypothesis.name} but fails a gate")
-        simpler = [c for c in passing if nested(c.hypothesis, best.hypothesis) and c.score > best.score - RIVAL_SPAN]
+            reasons.append(
+                f"{tried[0].hypothesis.name} scores higher than {best.hypothesis.name} but fails a gate"
+            )
+        simpler = [
+            c for c in passing if nested(c.hypothesis, best.hypothesis) and c.score > best.score - RIVAL_SPAN
+        ]
         best = simpler[0] if simpler else best
+        rounds.append(Round(base=base, tried=tuple(tried), accepted=best))
         base = best.fitted
-        accepted.append(best)
-    return base, accepted, tried, reasons
+    return base, rounds, tried, reasons
+
+
+def _forms(
+    evidence: Evidence, null: Fit, base: Fit, rounds: list[Round], reasons: list[str]
+) -> tuple[Fit, list[Round], list[tuple[str, NamedEffect]]]:
+    """Look for forms outside the library: alone against all that was named, and in what the named leave over."""
+    near: list[tuple[str, NamedEffect]] = []
+    if rounds:
+        alone = _best_form(evidence, null)
+        total = sum(r.accepted.score for r in rounds)
+        if alone is not None and alone.passes and alone.score > total + RIVAL_SPAN:
+            reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
+            base, rounds = alone.fitted, [Round(base=null, tried=(), accepted=alone)]
+        elif alone is not None and alone.passes and alone.score > total - RIVAL_SPAN:
+            first = rounds[0].accepted.hypothesis
+            if alone.hypothesis.port != first.port:
+                near.append((first.name, _named(alone, 0.0)))
+    if len(rounds) < MAX_EFFECTS:
+        left = _best_form(evidence, base)
+        if left is not None and left.passes:
+            reasons.append(f"something is left over: {left.hypothesis.name}")
+            rounds = [*rounds, Round(base=base, tried=(), accepted=left)]
+            base = left.fitted
+    return base, rounds, near
+
+
+def _best_form(evidence: Evidence, base: Fit) -> Candidate | None:
+    leftovers = [x for x in scan(evidence, base)[:2] if x.gain > ACCEPT_SCORE + np.log(evidence.samples)]
+    if not leftovers:
+        return None
+    held_out = misfit_by_run(evidence.held_out, base)
+    judged = [
+        judge(evidence, base, held_out, h) for x in leftovers for h in form_hypotheses(x, evidence.samples)
+    ]
+    return max(judged, key=lambda c: c.score)
 
 
 def _rivals(
-    evidence: Evidence, base: Fit, accepted: list[Candidate]
+    evidence: Evidence, base: Fit, rounds: list[Round]
 ) -> tuple[list[NamedEffect], list[tuple[str, NamedEffect]]]:
     named, near = [], []
-    for i in range(len(accepted)):
-        rest = without(base, i, evidence) if len(accepted) > 1 else None
-        if rest is None:
-            rest = fit(evidence.train, (), evidence.session_sigma, session=base.session, iterations=10)
-        held_out = misfit_by_run(evidence.held_out, rest)
-        at = sum(len(p.names) for p in base.parts[:i])
-        part = base.parts[i]
-        started = Hypothesis(**{**part.__dict__, "start": base.values[at : at + len(part.names)]})
-        own = judge(evidence, rest, held_out, started)
-        others = [c for c in ladder(evidence, rest) if c.hypothesis.name != part.name]
+    for i, found in enumerate(rounds):
+        rest, own, tried = found.base, found.accepted, found.tried
+        if i + 1 < len(rounds):
+            # what was accepted later may change how this effect compares with its rivals
+            rest = without(base, i, evidence)
+            at = sum(len(p.names) for p in base.parts[:i])
+            part = replace(base.parts[i], start=base.values[at : at + len(base.parts[i].names)])
+            own = judge(evidence, rest, misfit_by_run(evidence.held_out, rest), part)
+            tried = tuple(ladder(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
+        others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
         share = win_share([own, *others], rest)
         named.append(_named(own, share))
         for c in others:
             wins = win_share([c, own, *[o for o in others if o is not c]], rest)
             close = c.score > own.score - RIVAL_SPAN or (share < WIN_SHARE and wins > 0.5 * (1.0 - WIN_SHARE))
-            extends = nested(part, c.hypothesis) or (nested(c.hypothesis, part) and c.score < own.score - RIVAL_SPAN)
-            if close and not extends and c.score > 0.0:
-                near.append((part.name, _named(c, wins)))
+            if close and not nested(own.hypothesis, c.hypothesis) and c.score > 0.0:
+                near.append((own.hypothesis.name, _named(c, wins)))
     return named, near
 
 
 def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
     if not named:
         return "NOTHING"
+    classes = {effect.effect_class for effect in named}
+    if "form" in classes:
+        return "UNKNOWN_FORM"
     if near:
         return "SET"
-    classes = {effect.effect_class for effect in named}
     if classes == {"retune"}:
         return "RETUNE"
     if classes == {"sensor"}:
         return "SENSOR"
-    return "UNKNOWN_FORM" if "form" in classes else "FOUND"
+    return "FOUND"
 
 
 def _named(candidate: Candidate, share: float) -> NamedEffect:
@@ -339,7 +424,7 @@ def _detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
     cross = np.zeros((len(evidence.effects), len(SESSION)))
     session = np.diag(1.0 / np.square(evidence.session_sigma))
     for run in evidence.train:
-        q = run.project(run.library)
+        q = run.library_q
         library += run.library.T @ run.library - q.T @ q
         cross += run.library.T @ run.session - q.T @ run.session_q
         session += run.session.T @ run.session - run.session_q.T @ run.session_q

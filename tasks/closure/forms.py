@@ -1,0 +1,181 @@
+"""What is left over: port by variable splines, and the simple shape that a spline has."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.closure.attribution import Evidence, inflation
+from tasks.closure.evidence import RunEvidence
+from tasks.closure.fit import Fit, Hypothesis, compose
+from tasks.closure.forward import Slot, instruments, roll
+from tasks.closure.noise import whiten
+from tasks.vehicle.effects.library import ALL_PARAMETERS
+from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
+
+KNOTS = 5
+TABLE = 65
+PORT_STEP = {
+    "longitudinal_force": 30.0,
+    "brake_torque": 0.02,
+    "friction": 0.02,
+    "pitch_moment": 60.0,
+    "suspension_force": 40.0,
+}
+"""Size of a form that matters at each port, for derivatives [unit of the port]."""
+SCANNED = {
+    "longitudinal_force": ("speed", "deceleration", "pressure"),
+    "brake_torque": ("speed", "pressure", "disc_temperature", "pressure_rate"),
+    "friction": ("speed", "load_ratio", "pressure_rate"),
+    "pitch_moment": ("speed", "deceleration", "pressure_rate"),
+    "suspension_force": ("suspension_travel", "suspension_speed"),
+}
+"""Variables that each port is scanned over."""
+RANGE = {
+    "speed": (2.0, 34.0), "deceleration": (0.0, 9.0), "pressure": (0.0, 3.6), "disc_temperature": (0.0, 400.0),
+    "pressure_rate": (-12.0, 12.0), "load_ratio": (0.4, 1.6), "suspension_travel": (-0.06, 0.06),
+    "suspension_speed": (-0.6, 0.6),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leftover:
+    """A spline of one variable at one port, fitted linearly to what a fit leaves.
+
+    Parameters
+    ----------
+    port, variable : where
+    grid : float64 [K] knots [unit of the variable]
+    values : float64 [K] [unit of the port]
+    covariance : float64 [K, K]
+    gain : log likelihood gained, divided by the inflation
+    score : gain less K log N
+    """
+
+    port: str
+    variable: str
+    grid: NDArray[np.float64]
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    gain: float
+    score: float
+
+
+def scan(evidence: Evidence, at: Fit) -> list[Leftover]:
+    """Fit a spline at every scanned port and variable to the residuals of ``at``; best first.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit whose residuals are scanned
+    """
+    theta, slots = compose(at.parts, at.values, at.session)
+    keys = [(port, variable) for port, variables in SCANNED.items() for variable in variables]
+    size, n_session = KNOTS * len(keys), len(evidence.session_sigma)
+    gram, cross, right = np.zeros((size, size)), np.zeros((size, n_session)), np.zeros(size)
+    session = np.diag(1.0 / np.square(evidence.session_sigma))
+    pull = -at.session / np.square(evidence.session_sigma)
+    for run, r in zip(evidence.train, at.residuals, strict=True):
+        columns = _hats(run, theta, slots, keys)
+        q, qr = run.project(columns), run.project(r)
+        gram += columns.T @ columns - q.T @ q
+        cross += columns.T @ run.session - q.T @ run.session_q
+        session += run.session.T @ run.session - run.session_q.T @ run.session_q
+        right += columns.T @ r - q.T @ qr
+        pull = pull + run.session.T @ r - run.session_q.T @ qr
+    inverse = np.linalg.inv(session)
+    gram -= cross @ inverse @ cross.T
+    right = right - cross @ inverse @ pull
+    level = inflation(evidence, at, None)
+    found = []
+    for i, (port, variable) in enumerate(keys):
+        block = slice(KNOTS * i, KNOTS * (i + 1))
+        ridge = (20.0 * PORT_STEP[port]) ** -2
+        covariance = np.linalg.inv(gram[block, block] + ridge * np.eye(KNOTS))
+        values = covariance @ right[block]
+        gain = 0.5 * float(values @ right[block]) / level
+        found.append(
+            Leftover(
+                port=port, variable=variable, grid=np.linspace(*RANGE[variable], KNOTS), values=values,
+                covariance=np.asarray(level * covariance, dtype=np.float64), gain=gain, score=gain - KNOTS * float(np.log(evidence.samples)),
+            )
+        )  # fmt: skip
+    return sorted(found, key=lambda leftover: -leftover.score)
+
+
+def _hats(
+    run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], keys: list[tuple[str, str]]
+) -> NDArray[np.float64]:
+    y = instruments(run.model, theta, roll(run.model, theta, slots=slots)[0])
+    columns = []
+    for port, variable in keys:
+        low, high = RANGE[variable]
+        for k in range(KNOTS):
+            hat = np.zeros(KNOTS)
+            hat[k] = PORT_STEP[port]
+            extra = Slot(
+                port=port, variable=variable, origin=low, spacing=(high - low) / (KNOTS - 1), values=hat
+            )
+            moved = instruments(run.model, theta, roll(run.model, theta, slots=(*slots, extra))[0])
+            columns.append((moved - y) / PORT_STEP[port])
+    return whiten(np.stack(columns, axis=-1), run.rho, run.sigma)
+
+
+Shape = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+SHAPES: dict[str, Shape] = {
+    "a": lambda u: np.ones_like(u)[:, None],
+    "a x": lambda u: u[:, None],
+    "a x|x|": lambda u: (u * np.abs(u))[:, None],
+    "a x^3": lambda u: (u**3)[:, None],
+    "a tanh(4x)": lambda u: np.tanh(4.0 * u)[:, None],
+    "a exp(-4|x|)": lambda u: np.exp(-4.0 * np.abs(u))[:, None],
+    "a max(x - 1/3, 0)": lambda u: np.maximum(u - 1.0 / 3.0, 0.0)[:, None],
+    "a max(x - 2/3, 0)": lambda u: np.maximum(u - 2.0 / 3.0, 0.0)[:, None],
+    "a + b x": lambda u: np.column_stack((np.ones_like(u), u)),
+}
+"""The grammar, in x = variable / its largest magnitude; linear in its one or two coefficients."""
+
+
+def form_hypotheses(leftover: Leftover, samples: int, count: int = 2) -> list[Hypothesis]:
+    """The grammar's shapes that fit a spline best, as hypotheses for the simulation.
+
+    Parameters
+    ----------
+    leftover : the spline
+    samples : N of the score's penalty
+    count : how many shapes to return
+    """
+    scale = float(np.max(np.abs(leftover.grid)))
+    precision = np.linalg.inv(leftover.covariance)
+    ranked = []
+    for name, shape in SHAPES.items():
+        basis = shape(leftover.grid / scale)
+        normal = basis.T @ precision @ basis
+        coefficients = np.linalg.solve(normal, basis.T @ precision @ leftover.values)
+        miss = leftover.values - basis @ coefficients
+        cost = 0.5 * float(miss @ precision @ miss) + basis.shape[1] * np.log(samples)
+        ranked.append((cost, name, np.asarray(coefficients, dtype=np.float64)))
+    ranked.sort(key=lambda entry: entry[0])
+    return [_form(leftover, name, coefficients, scale) for _, name, coefficients in ranked[:count]]
+
+
+def _form(leftover: Leftover, name: str, start: NDArray[np.float64], scale: float) -> Hypothesis:
+    grid = np.linspace(leftover.grid[0], leftover.grid[-1], TABLE)
+    basis = SHAPES[name](grid / scale)
+    port, variable = leftover.port, leftover.variable
+
+    def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+        slot = Slot(
+            port=port, variable=variable, origin=grid[0], spacing=grid[1] - grid[0], values=basis @ values
+        )
+        return np.zeros(len(ALL_PARAMETERS)), (slot,)
+
+    k = basis.shape[1]
+    step = np.full(k, PORT_STEP[port])
+    unit = VARIABLE_UNITS[VARIABLES.index(variable)]
+    return Hypothesis(
+        name=f"{port} ~ {name}, x = {variable}/{scale:g} {unit}", effect_class="form", port=port, variable=variable,
+        names=("a", "b")[:k], units=(PORT_UNITS[PORTS.index(port)],) * k, lower=-100.0 * step, upper=100.0 * step,
+        step=step, start=start.copy(), build=build,
+    )  # fmt: skip

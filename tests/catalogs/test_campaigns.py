@@ -1,0 +1,129 @@
+"""Reading campaigns: what is right is read, what is wrong is named with its run and channel."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+from catalogs.campaigns import read_campaign
+from catalogs.effects import load_effects
+from tasks.errors import InputError
+from tasks.vehicle.effects.library import PARAMETER_INDEX
+
+TOLERANCES = {
+    "pressure_gain": 0.02, "mass": 0.01, "pitch_gain": 0.02, "wheel_radius": 0.005, "suspension_damping": 0.04,
+    "suspension_stiffness": 0.02, "grade": 0.0015,
+    "run": {"initial_speed_m_s": 0.05, "friction": 0.03, "acceleration_bias_m_s2": 0.03, "pitch_offset_deg": 0.03},
+}  # fmt: skip
+NAMES = [f"run-{i:02d}" for i in range(1, 7)]
+
+
+def braking_columns(seed: int) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    t = np.arange(300) * 0.01
+    pressure = np.clip((t - 1.0) / 0.3, 0.0, 1.0) * 1.5
+    acceleration = -2.0 * pressure
+    speed = 20.0 + np.cumsum(acceleration) * 0.01
+    pitch = 0.4 * pressure
+    columns = {
+        "brake_pressure": pressure, "speed": speed, "longitudinal_acceleration": acceleration,
+        "wheel_speed_front": speed / 0.32, "wheel_speed_rear": speed / 0.32, "pitch": pitch,
+        "pitch_rate": np.gradient(pitch, 0.01), "vertical_acceleration": np.zeros(300),
+    }  # fmt: skip
+    return {"time": t, **{name: x + 0.01 * rng.standard_normal(300) for name, x in columns.items()}}
+
+
+def write_run(folder: Path, name: str, columns: dict[str, np.ndarray]) -> None:
+    pq.write_table(pa.table(columns), folder / "runs" / f"{name}.parquet")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "runs").mkdir()
+    header = {
+        "campaign": "toy", "vehicle": "paper-reference", "sample_rate_hz": 100,
+        "split": {"train": NAMES[:3], "held_out": NAMES[3:]}, "tolerances_1sigma": TOLERANCES,
+    }  # fmt: skip
+    (tmp_path / "campaign.yaml").write_text(yaml.safe_dump(header))
+    row = {
+        "weather": "dry", "precipitation_mm_h": 0.0, "snow_accumulation_h": 0.0, "direction": 1,
+        "disc_temperature_above_ambient_c": 20.0, "hazard_center_m": 0.0, "hazard_length_m": 0.0,
+        "hazard_height_m": 0.0,
+    }  # fmt: skip
+    with open(tmp_path / "runs.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, ["run", *row])
+        writer.writeheader()
+        writer.writerows({"run": name, **row} for name in NAMES)
+    for i, name in enumerate(NAMES):
+        write_run(tmp_path, name, braking_columns(i))
+    return tmp_path
+
+
+def problems_of(folder: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        read_campaign(folder)
+    return str(caught.value)
+
+
+def test_a_sound_campaign_is_read_with_its_split_and_hashes(folder: Path) -> None:
+    campaign = read_campaign(folder)
+    assert [run.name for run in campaign.train] == NAMES[:3]
+    assert [run.name for run in campaign.held_out] == NAMES[3:]
+    assert campaign.runs[0].response.shape == (300, 7)
+    again = read_campaign(folder)
+    assert (campaign.content_hash, campaign.split_hash) == (again.content_hash, again.split_hash)
+
+
+def test_the_hash_changes_with_any_sample(folder: Path) -> None:
+    before = read_campaign(folder).content_hash
+    columns = braking_columns(0)
+    columns["speed"][5] += 1e-6
+    write_run(folder, NAMES[0], columns)
+    assert read_campaign(folder).content_hash != before
+
+
+@pytest.mark.parametrize(
+    ("channel", "damage", "words"),
+    [
+        ("pitch", lambda x: np.where(np.arange(300) == 7, np.nan, x), "channel pitch has a gap"),
+        ("speed", lambda x: x * 3.6, "another unit"),
+        ("brake_pressure", lambda x: x * 1e3, "channel brake_pressure reaches"),
+        ("time", lambda x: x + 0.5 * (np.arange(300) > 100), "channel time must advance"),
+        ("pitch_rate", lambda x: np.full(300, 0.1), "channel pitch_rate is frozen"),
+        ("pitch", lambda x: -x, "nose-down positive"),
+        ("longitudinal_acceleration", lambda x: -x, "must be negative under braking"),
+    ],
+)
+def test_what_is_wrong_is_named_with_run_and_channel(folder: Path, channel: str, damage, words: str) -> None:  # type: ignore[no-untyped-def]
+    columns = braking_columns(1)
+    columns[channel] = damage(columns[channel])
+    write_run(folder, "run-02", columns)
+    text = problems_of(folder)
+    assert "run-02" in text and words in text
+
+
+def test_a_missing_channel_and_a_missing_file_are_both_listed(folder: Path) -> None:
+    columns = braking_columns(1)
+    del columns["pitch_rate"]
+    write_run(folder, "run-02", columns)
+    (folder / "runs" / "run-05.parquet").unlink()
+    text = problems_of(folder)
+    assert "run-02: channel pitch_rate is missing" in text and "run-05" in text
+
+
+def test_a_run_in_both_parts_of_the_split_is_refused(folder: Path) -> None:
+    header = yaml.safe_load((folder / "campaign.yaml").read_text())
+    header["split"]["held_out"].append("run-01")
+    (folder / "campaign.yaml").write_text(yaml.safe_dump(header))
+    assert "run-01: stands in both parts" in problems_of(folder)
+
+
+def test_the_library_has_at_least_24_effects_and_every_parameter_has_a_port() -> None:
+    effects = load_effects()
+    assert sum(e.effect_class == "effect" for e in effects) >= 24
+    assert {e.effect_class for e in effects} == {"effect", "retune", "sensor"}
+    assert {p.name for e in effects for p in e.parameters} == set(PARAMETER_INDEX)
