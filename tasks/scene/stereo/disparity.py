@@ -1,0 +1,80 @@
+"""Sub-pixel disparity by semi-global matching, kept where both views agree."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+BLOCK = 5
+"""Side of the matching window [px]."""
+
+
+def match(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
+    """Disparity of the left picture, NaN where the match is not confirmed from the right picture.
+
+    Semi-global matching over three paths (Hirschmueller, doi:10.1109/TPAMI.2007.1166) runs once for
+    each view; a pixel stays when the two disparities differ by at most one pixel and its patch of
+    similar disparity is larger than a speckle.
+
+    Parameters
+    ----------
+    left, right : uint8 [H, W] or [H, W, 3] rectified pictures [1]
+    disparities : range searched, a multiple of 16 [px]
+
+    Returns
+    -------
+    float32 [H, W] disparity [px]
+    """
+    if left.ndim == 3:
+        left, right = (cv2.cvtColor(np.ascontiguousarray(p), cv2.COLOR_RGB2GRAY) for p in (left, right))
+    forward = _semi_global(left, right, disparities)
+    backward = _semi_global(right[:, ::-1], left[:, ::-1], disparities)[:, ::-1]
+
+    columns = np.arange(left.shape[1])
+    partner = np.rint(columns - forward).astype(np.int64)
+    seen = np.take_along_axis(backward, np.clip(partner, 0, len(columns) - 1), axis=1)
+    agreed = (forward > 0) & (partner >= 0) & (np.abs(forward - seen) <= 1.0)
+
+    speckles = np.where(agreed, forward * 16, 0).astype(np.int16)
+    cv2.filterSpeckles(speckles, 0, 60, 32)
+    return np.where(speckles > 0, forward, np.nan).astype(np.float32)
+
+
+def _semi_global(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
+    """Raw disparity [px]; the pictures are widened so that the left border is matched as well."""
+    matcher = cv2.StereoSGBM_create(
+        minDisparity=0,
+        numDisparities=disparities,
+        blockSize=BLOCK,
+        P1=8 * BLOCK * BLOCK,
+        P2=32 * BLOCK * BLOCK,
+        preFilterCap=31,
+        disp12MaxDiff=-1,
+        mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    )
+    widened = [cv2.copyMakeBorder(p, 0, 0, disparities, 0, cv2.BORDER_REPLICATE) for p in (left, right)]
+    return matcher.compute(*widened)[:, disparities:].astype(np.float32) / 16
+
+
+def filled(disparity: NDArray[np.float32], background: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Disparity with a guess where there was none: the farther of the neighbours left and right in the row.
+
+    What one camera sees and the other does not is mostly the background beside an object, so the farther
+    neighbour is the better guess; at the picture's border the only neighbour is taken.
+
+    Parameters
+    ----------
+    disparity : float32 [H, W] NaN where unknown [px]
+    background : bool [H, W] sky: neither filled nor taken as a neighbour
+    """
+    known = np.isfinite(disparity) & ~background
+    columns = np.broadcast_to(np.arange(disparity.shape[1]), disparity.shape)
+    before = np.maximum.accumulate(np.where(known, columns, -1), axis=1)
+    after = np.minimum.accumulate(np.where(known, columns, disparity.shape[1])[:, ::-1], axis=1)[:, ::-1]
+    neighbours = []
+    for at, there in ((before, before >= 0), (after, after < disparity.shape[1])):
+        value = np.take_along_axis(disparity, np.clip(at, 0, disparity.shape[1] - 1), axis=1)
+        neighbours.append(np.where(there, value, np.inf))
+    guess = np.minimum(*neighbours)
+    return np.where(background | np.isfinite(disparity) | ~np.isfinite(guess), disparity, guess).astype(
+        np.float32
+    )
