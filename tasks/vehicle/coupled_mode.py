@@ -6,7 +6,6 @@ wheels stay quiet to standstill; everywhere else (body, axles, road) the method 
 """
 
 from math import inf, isinf, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,10 +16,10 @@ from tasks.vehicle.brake import PressureProfile, brake_pressure, onset_by_positi
 from tasks.vehicle.half_car import HalfCarState, half_car_rates, moved
 from tasks.vehicle.history import History
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
-from tasks.vehicle.ports import AxlePorts, Chassis, Motion, Ports, chassis_of, lock_share, ports_at
+from tasks.vehicle.ports import Chassis, Motion, Ports, chassis_of, ports_at
 from tasks.vehicle.road import RoadFeature, road_feature
-from tasks.vehicle.tyre import TyreCurve, tyre_slope
-from tasks.vehicle.wheels import Axle
+from tasks.vehicle.slip_matrix import axle_slope, solve_slip, without_speed
+from tasks.vehicle.tyre import TyreCurve
 
 GAMMA = 1.0 - sqrt(0.5)
 REST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -53,93 +52,6 @@ def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis)
         ports.acceleration,
         (wheels.radius * ports.front.tyre_force - ports.front.brake_torque) / wheels.front.inertia,
         (wheels.radius * ports.rear.tyre_force - ports.rear.brake_torque) / wheels.rear.inertia,
-    )
-
-
-class AxleSlope(NamedTuple):
-    """How one axle's wheel and the vehicle's speed answer to each other, per wheel speed and per speed [1/s].
-
-    Parameters
-    ----------
-    speed_by_speed, speed_by_wheel : change of dv/dt
-    wheel_by_speed, wheel_by_wheel : change of domega/dt
-    """
-
-    speed_by_speed: float
-    speed_by_wheel: float
-    wheel_by_speed: float
-    wheel_by_wheel: float
-
-
-@njit(cache=True, nogil=True)
-def axle_slope(
-    ports: AxlePorts,
-    motion: Motion,
-    omega: float,
-    pressure: float,
-    axle: Axle,
-    chassis: Chassis,
-    tyre: TyreCurve,
-) -> AxleSlope:
-    """Derivatives of speed and wheel rate through the slip of one axle.
-
-    Parameters
-    ----------
-    ports : of the axle
-    motion : longitudinal state
-    omega : wheel speed of the axle [rad/s]
-    pressure : [MPa]
-    axle, chassis, tyre : the values
-    """
-    wheels = chassis.wheels
-    if abs(ports.slip) >= 1.0:
-        return AxleSlope(0.0, 0.0, 0.0, 0.0)
-    slip_per_wheel = -wheels.radius / max(motion.speed, wheels.speed_floor)
-    slip_per_speed = (
-        (1.0 - ports.slip) / motion.speed if motion.speed > wheels.speed_floor else 1.0 / wheels.speed_floor
-    )
-    force = tyre_slope(abs(ports.slip), tyre) * ports.load
-    share = lock_share(omega, chassis.lock_speed)
-    torque = 0.0
-    if 0.0 < ports.abs_scale < 1.0:
-        torque = -axle.brake_gain * pressure * share / (wheels.release_width * tyre.target_slip)
-    locking = axle.brake_gain * pressure * ports.abs_scale / chassis.lock_speed if abs(share) < 1.0 else 0.0
-    turning = wheels.radius * force - torque
-    return AxleSlope(
-        -force * slip_per_speed / wheels.mass,
-        -force * slip_per_wheel / wheels.mass,
-        turning * slip_per_speed / axle.inertia,
-        (turning * slip_per_wheel - locking) / axle.inertia,
-    )
-
-
-@njit(cache=True, nogil=True)
-def without_speed(slope: AxleSlope) -> AxleSlope:
-    """The same derivatives while the speed is held from outside."""
-    return AxleSlope(0.0, 0.0, slope.wheel_by_speed, slope.wheel_by_wheel)
-
-
-@njit(cache=True, nogil=True)
-def solve_slip(rates: Motion, front: AxleSlope, rear: AxleSlope, g: float) -> Motion:
-    """Solve (1 - g J) k = rates, where J couples only speed and wheel speeds.
-
-    Parameters
-    ----------
-    rates : right-hand side
-    front, rear : the entries of J
-    g : step times gamma [s]
-    """
-    pivot_f = 1.0 - g * front.wheel_by_wheel
-    pivot_r = 1.0 - g * rear.wheel_by_wheel
-    to_f, to_r = g * front.speed_by_wheel / pivot_f, g * rear.speed_by_wheel / pivot_r
-    pivot_v = 1.0 - g * (front.speed_by_speed + rear.speed_by_speed)
-    pivot_v -= g * (to_f * front.wheel_by_speed + to_r * rear.wheel_by_speed)
-    speed = (rates.speed + to_f * rates.omega_f + to_r * rates.omega_r) / pivot_v
-    return Motion(
-        rates.station,
-        speed,
-        (rates.omega_f + g * front.wheel_by_speed * speed) / pivot_f,
-        (rates.omega_r + g * rear.wheel_by_speed * speed) / pivot_r,
     )
 
 
@@ -197,14 +109,16 @@ def drive_coupled(
                 r.abs_scale, pressure, ports.road_force, x[0], x[1], x[2], x[3], x[4], x[5], f.road_height,
                 r.road_height,
             )  # fmt: skip
-        motion, x, scale_f, scale_r = coupled_step(
-            motion, x, ports, pressure, brake_pressure(time + step - onset, profile), scale_f, scale_r, step,
-            standing, held, chassis, tyre, road,
-        )  # fmt: skip
+        if n == steps:
+            break
+        next_pressure = brake_pressure(time + step - onset, profile)
+        motion, x = coupled_step(
+            motion, x, ports, pressure, next_pressure, step, standing, held, chassis, tyre, road
+        )
+        scale_f, scale_r = ports.front.abs_scale, ports.rear.abs_scale
         if not standing and motion.speed <= wheels.stop_speed:
             standing, stop = True, time + step
             motion = Motion(motion.station, 0.0, 0.0, 0.0)
-            scale_f, scale_r = 1.0, 1.0
     return log, onset, onset_station, stop
 
 
@@ -215,15 +129,13 @@ def coupled_step(
     ports: Ports,
     pressure: float,
     next_pressure: float,
-    scale_f: float,
-    scale_r: float,
     step: float,
     standing: bool,
     held: bool,
     chassis: Chassis,
     tyre: TyreCurve,
     road: RoadFeature,
-) -> tuple[Motion, HalfCarState, float, float]:
+) -> tuple[Motion, HalfCarState]:
     """One ROS2 step from a state whose ports are known.
 
     Parameters
@@ -231,18 +143,17 @@ def coupled_step(
     motion, x : longitudinal and half-car state
     ports : what acts in it
     pressure, next_pressure : now and after the step [MPa]
-    scale_f, scale_r : ABS scales [1]
     step : [s]
     standing, held : at rest; speed held from outside
     chassis, tyre, road : the values
 
     Returns
     -------
-    The longitudinal and half-car state and the ABS scales after the step.
+    The longitudinal and the half-car state after the step.
     """
     body, wheels = chassis.body, chassis.wheels
-    front = axle_slope(ports.front, motion, motion.omega_f, pressure, wheels.front, chassis, tyre)
-    rear = axle_slope(ports.rear, motion, motion.omega_r, pressure, wheels.rear, chassis, tyre)
+    front = axle_slope(ports.front, motion, motion.omega_f, pressure, step, wheels.front, chassis, tyre)
+    rear = axle_slope(ports.rear, motion, motion.omega_r, pressure, step, wheels.rear, chassis, tyre)
     if held:
         front, rear = without_speed(front), without_speed(rear)
     k1 = solve_slip(motion_rates(motion, ports, standing, chassis), front, rear, GAMMA * step)
@@ -258,8 +169,9 @@ def coupled_step(
     )
     x_ahead = moved(x, h1, step)
     later = ports_at(
-        ahead, x_ahead, next_pressure, scale_f, scale_r, step, standing, held, chassis, tyre, road
-    )
+        ahead, x_ahead, next_pressure, ports.front.abs_scale, ports.rear.abs_scale, step, standing, held,
+        chassis, tyre, road,
+    )  # fmt: skip
     f2 = motion_rates(ahead, later, standing, chassis)
     rest = Motion(
         f2.station - 2.0 * k1.station,
@@ -278,8 +190,7 @@ def coupled_step(
         motion.omega_f + step * (1.5 * k1.omega_f + 0.5 * k2.omega_f),
         motion.omega_r + step * (1.5 * k1.omega_r + 0.5 * k2.omega_r),
     )
-    x_after = moved(moved(x, h1, 0.5 * step), h2, 0.5 * step)
-    return after, x_after, later.front.abs_scale, later.rear.abs_scale
+    return after, moved(moved(x, h1, 0.5 * step), h2, 0.5 * step)
 
 
 def run_coupled_mode(

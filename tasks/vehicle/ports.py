@@ -166,8 +166,8 @@ def axle_ports(
     unsprung_height : [m]
     suspension_force : [N]
     pressure : brake pressure [MPa]
-    scale : ABS scale at the start of the step, from which its rate is limited [1]
-    step : over which the ABS scale may change [s]
+    scale : ABS scale one step before, from which its rate is limited [1]
+    step : [s]
     stiffness : of the tyre [N/m]
     static_load : half-car's load at rest [N]
     axle, chassis, tyre, road : the values
@@ -245,7 +245,7 @@ def ports_at(
     ----------
     motion, x : longitudinal and half-car state
     pressure : [MPa]
-    scale_f, scale_r : ABS scales at the start of the step [1]
+    scale_f, scale_r : ABS scales one step before [1]
     step : [s]
     standing : the vehicle has come to rest
     held : its speed is held from outside

@@ -249,7 +249,7 @@ def drive(
             station, speed, acceleration, f.slip, r.slip, omega_f, omega_r, f.force, r.force, load_f, load_r,
             f.torque, r.torque, f.scale, r.scale, pressure, road_force,
         )  # fmt: skip
-        if stop >= 0:
+        if stop >= 0 or n == steps:
             continue
         after = speed + step * acceleration
         station += 0.5 * step * (speed + after)

@@ -1,0 +1,77 @@
+"""Surface entries: the shipped one, and how a wrong one is refused."""
+
+import pytest
+import yaml
+
+from catalogs.surfaces import FOLDER, load_surface, surface_names
+from tasks.errors import InputError
+
+
+def broken(tmp_path, **changes):
+    content = yaml.safe_load((FOLDER / "dense-asphalt.yaml").read_text())
+    for name, change in changes.items():
+        content[name] = content.get(name, {}) | change if isinstance(change, dict) else change
+    path = tmp_path / "broken.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+@pytest.mark.parametrize("name", surface_names())
+def test_every_surface_loads_with_bounds_around_its_values(name):
+    surface = load_surface(name)
+    for field, (low, high) in surface.bounds.items():
+        assert low <= getattr(surface, field) <= high
+
+
+def test_dense_asphalt_holds_the_papers_values_and_bounds():
+    asphalt = load_surface("dense-asphalt")
+    assert (asphalt.dry_friction, asphalt.texture_depth_mm, asphalt.crossfall) == (0.82, 0.5, 0.02)
+    assert asphalt.bounds["flooded_friction"] == (0.306, 0.374)
+    assert len(asphalt.bounds) == 10
+
+
+def test_an_unknown_name_lists_what_exists():
+    with pytest.raises(InputError, match=r"surface ice: no such entry.*dense-asphalt"):
+        load_surface("ice")
+
+
+def test_all_problems_of_a_file_are_listed_at_once(tmp_path):
+    path = broken(
+        tmp_path,
+        crossfall={"unit": "%"},
+        drainage_length={"value": -1.0},
+        snow_friction={"value": float("nan")},
+        dry_friction={"bounds": [0.9, 1.0]},
+        texture_depth_mm={"source": ""},
+        grip={"value": 1},
+    )
+    with pytest.raises(InputError) as error:
+        load_surface(path)
+    said = "\n".join(error.value.problems)
+    for expected in (
+        "crossfall: unit must be m m-1; it is %",
+        "drainage_length: ",
+        "must be above 0; it is -1",
+        "snow_friction.value: must be a finite number; it is nan",
+        "dry_friction: value must lie within its bounds 0.9 to 1; it is 0.82",
+        "texture_depth_mm.source",
+        "grip is not a known key",
+    ):
+        assert expected in said
+    assert all(str(path) in problem for problem in error.value.problems)
+
+
+def test_wet_friction_above_dry_is_refused(tmp_path):
+    path = broken(tmp_path, flooded_friction={"value": 0.9, "bounds": [0.85, 0.95]})
+    with pytest.raises(
+        InputError, match="flooded_friction must not exceed dry_friction"
+    ):
+        load_surface(path)
+
+
+@pytest.mark.parametrize("text", ["[1, 2]", "a: [", "just words"])
+def test_a_file_that_is_no_table_is_refused(tmp_path, text):
+    path = tmp_path / "odd.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match="a surface must be"):
+        load_surface(path)

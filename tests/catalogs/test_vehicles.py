@@ -1,0 +1,76 @@
+"""Vehicle entries: the shipped one against the paper's tables, and how a wrong one is refused."""
+
+from math import degrees
+
+import pytest
+import yaml
+
+from catalogs.vehicles import FOLDER, load_vehicle, vehicle_names
+from tasks.errors import InputError
+
+
+@pytest.fixture
+def entry():
+    return yaml.safe_load((FOLDER / "paper-reference.yaml").read_text())
+
+
+def saved(tmp_path, entry):
+    path = tmp_path / "broken.yaml"
+    path.write_text(yaml.safe_dump(entry))
+    return path
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_every_vehicle_loads(name):
+    vehicle = load_vehicle(name)
+    assert vehicle.name == name and set(vehicle.families) == {"dry", "rain", "snow"}
+
+
+def test_the_reference_vehicle_has_the_papers_loads_and_offsets():
+    vehicle = load_vehicle("paper-reference")
+    front, rear = vehicle.static_axle_loads
+    assert (round(front, 1), round(rear, 1)) == (7069.7, 5761.7)
+    assert front + rear == pytest.approx(vehicle.mass * vehicle.gravity)
+    assert (vehicle.mass, vehicle.wheelbase) == (1308, 2.7)
+    assert degrees(vehicle.static_pitch) == pytest.approx(0.154150)
+
+
+def test_a_vehicle_file_elsewhere_loads_like_the_shipped_one(tmp_path, entry):
+    entry["sprung_mass"]["value"] = 1300
+    assert load_vehicle(saved(tmp_path, entry)).sprung_mass == 1300
+
+
+def test_an_unknown_name_lists_what_exists():
+    with pytest.raises(InputError, match=r"vehicle tractor: no such entry.*paper-reference"):
+        load_vehicle("tractor")
+
+
+def test_all_problems_of_a_file_are_listed_at_once(tmp_path, entry):
+    entry["sprung_mass"]["value"] = -1200
+    entry["cg_height"]["unit"] = "mm"
+    entry["pitch_inertia"]["value"] = float("inf")
+    entry["wheel_radius"]["value"] = "0.32"
+    entry["colour"] = {"value": 1, "unit": "1", "source": "none"}
+    del entry["gravity"]
+    del entry["brake_gain"]["source"]
+    entry["families"]["rain"]["efficiency"]["value"] = [0.9, 1.0]
+    entry["families"]["snow"]["surface_friction"]["value"] = [0.5, 0.4, 0.3]
+    entry["families"]["dry"]["burckhardt"]["value"] = [0.1, 1.0, 0.5]
+    path = saved(tmp_path, entry)
+    with pytest.raises(InputError) as error:
+        load_vehicle(path)
+    said = "\n".join(error.value.problems)
+    for expected in (
+        "sprung_mass: must be above 0; it is -1200",
+        "cg_height: unit must be m; it is mm",
+        "pitch_inertia.value: must be a finite number; it is inf",
+        "wheel_radius.value: must be a valid number; it is '0.32'",
+        "colour is not a known key",
+        "gravity is missing",
+        "brake_gain.source is missing",
+        "families.rain: efficiency must have one value per surface_friction knot (4); it has 2",
+        "families.snow: surface_friction knots must ascend; they are [0.5, 0.4, 0.3]",
+        "families.dry: burckhardt must rise from zero slip",
+    ):
+        assert expected in said
+    assert len(error.value.problems) == 10
