@@ -45,11 +45,17 @@ PIXELS = TILE_WIDTH * TILE_HEIGHT
 # than a power of two, lest they evict one another.
 # Offsets are unsigned: a signed index may be negative, and the compiler would gather pixel by pixel.
 _PLANE = PIXELS + 16
-_CLASS, _ALPHA, _DEPTH, _RED, _GREEN, _BLUE, _NX, _NY, _NZ = (np.uint64(k * _PLANE) for k in range(1, 10))
-_STATE = 10 * _PLANE
+_CLASS, _ALPHA, _DEPTH, _RED, _GREEN, _BLUE, _NX, _NY, _NZ, _DISTANCE = (
+    np.uint64(k * _PLANE) for k in range(1, 11)
+)
+_STATE = 11 * _PLANE
+
+SURFACE_RATIO = 1.25
+"""Surface and expected depth that differ by more are not of one surface; the expected depth is kept [1]."""
 
 _MAX_ALPHA, _STOP, _LOG_CUT = np.float32(MAX_ALPHA), np.float32(STOP), np.float32(LOG_CUT)
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_RATIO = np.float32(SURFACE_RATIO)
 _RIGHT, _BOTTOM = np.float32(TILE_WIDTH - 1), np.float32(TILE_HEIGHT - 1)
 # Minimax fit of exp(x) on [-ln(255)/16, 0] with value 1 at 0; its 16th power is exp to 4e-6 relative.
 _E1, _E2, _E3, _E4 = (
@@ -155,11 +161,11 @@ def _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, str
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untyped-def]
+def _blend_strips(s, records, distances, splats, listed, strips):  # type: ignore[no-untyped-def]
     for i in range(listed):
         splat, first = np.uint64(splats[strips.entry[i]]), np.uint64(strips.pixel[i])
         middle, log_alpha, falloff = strips.middle[i], strips.log_alpha[i], records[splat, COLUMN_FALLOFF]
-        z, label = records[splat, DEPTH], records[splat, CLASS]
+        z, label, distance = records[splat, DEPTH], records[splat, CLASS], distances[splat]
         r, g, b = records[splat, RED], records[splat, GREEN], records[splat, BLUE]
         nx, ny, nz = records[splat, NORMAL_X], records[splat, NORMAL_Y], records[splat, NORMAL_Z]
         for x in range(TILE_WIDTH):
@@ -177,15 +183,18 @@ def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untype
             s[_NX + l] += w * nx
             s[_NY + l] += w * ny
             s[_NZ + l] += w * nz
+            s[_DISTANCE + l] += w * distance
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def blend(records, starts, splats, rgb, depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
+def blend(records, distances, rays, starts, splats, rgb, depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
     """Blend every tile and write the finished buffers of `GBuffer`.
 
     Parameters
     ----------
     records : float32 [V, 16] splat records
+    distances : float32 [V] from the eye to each splat's plane, along its normal [m]
+    rays : float32 [3, 3] world direction of pixel (u, v) as ``rays[0] u + rays[1] v + rays[2]``, camera z 1 [1]
     starts, splats : tile lists, see `tasks.render.binning.bin_splats`
     rgb, depth, alpha, normal, class_id : the buffers, overwritten
     """
@@ -201,7 +210,7 @@ def blend(records, starts, splats, rgb, depth, alpha, normal, class_id):  # type
         while start < last and _find_open_rows(s, is_open) > 0:
             end = min(start + _BATCH, last)
             listed = _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, strips)
-            _blend_strips(s, records, splats, listed, strips)
+            _blend_strips(s, records, distances, splats, listed, strips)
             start = end
         for y in range(row_count):
             for x in range(column_count):
@@ -211,7 +220,16 @@ def blend(records, starts, splats, rgb, depth, alpha, normal, class_id):  # type
                 length = np.sqrt(nx * nx + ny * ny + nz * nz)
                 scale = _ONE / length if length > _ZERO else _ZERO
                 alpha[i, j] = s[_ALPHA + l]
-                depth[i, j] = s[_DEPTH + l] / s[_ALPHA + l]  # NaN where no splat contributes
+                expected = s[_DEPTH + l] / s[_ALPHA + l]  # NaN where no splat contributes
+                u, v = np.float32(j) + _HALF, np.float32(i) + _HALF
+                slant = (
+                    nx * (rays[0, 0] * u + rays[1, 0] * v + rays[2, 0])
+                    + ny * (rays[0, 1] * u + rays[1, 1] * v + rays[2, 1])
+                    + nz * (rays[0, 2] * u + rays[1, 2] * v + rays[2, 2])
+                )
+                surface = s[_DISTANCE + l] / slant
+                is_one = (surface < expected * _RATIO) & (expected < surface * _RATIO)
+                depth[i, j] = surface if is_one else expected
                 rgb[i, j, 0], rgb[i, j, 1], rgb[i, j, 2] = s[_RED + l], s[_GREEN + l], s[_BLUE + l]
                 normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = nx * scale, ny * scale, nz * scale
                 class_id[i, j] = np.uint8(s[_CLASS + l])

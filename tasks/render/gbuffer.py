@@ -13,7 +13,8 @@ class GBuffer:
     Parameters
     ----------
     rgb : float32 [H, W, 3] blended colour, premultiplied by alpha, in the scene's colour space [1]
-    depth : float32 [H, W] expected camera z over the blend weights [m]; NaN where alpha is 0
+    depth : float32 [H, W] camera z of the blended surface at the pixel: the discs' planes, weighted as the
+        colours are; the expected z of the centres where they make no one surface [m]; NaN where alpha is 0
     alpha : float32 [H, W] accumulated opacity [1]
     normal : float32 [H, W, 3] blended unit normal, world frame, facing the camera; 0 where alpha is 0
     class_id : uint8 [H, W] class of the Gaussian at which the transmittance falls below one half;

@@ -13,10 +13,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from tasks.render.blending import MAX_ALPHA
+from tasks.render.blending import MAX_ALPHA, SURFACE_RATIO
 from tasks.render.gbuffer import GBuffer
 from tasks.render.projection import LOW_PASS, NEAR
-from tasks.render.view import view_of
+from tasks.render.view import View, view_of
 from tasks.scene.gaussians import Gaussians, check_gaussians
 
 _EVERY_BATCH = 2**31 - 1
@@ -84,12 +84,13 @@ class GsplatBackend:
         degree = int(prepared.sh.shape[1] ** 0.5) - 1
         colours = (gsplat.spherical_harmonics(degree, direction, prepared.sh) + 0.5).clamp_min(0)
         away = (prepared.normals * direction).sum(dim=1, keepdim=True) > 0
+        facing = torch.where(away, -prepared.normals, prepared.normals)
         blended, alpha, splats = gsplat.rasterization(
             means=prepared.means,
             quats=prepared.quats,
             scales=prepared.scales,
             opacities=prepared.opacities,
-            colors=torch.cat((colours, torch.where(away, -prepared.normals, prepared.normals)), dim=1),
+            colors=torch.cat((colours, facing, (facing * direction).sum(dim=1, keepdim=True)), dim=1),
             viewmats=self._tensor(view.viewmat.astype(np.float32))[None],
             Ks=self._tensor(view.K.astype(np.float32))[None],
             width=width,
@@ -101,7 +102,10 @@ class GsplatBackend:
         )
         alpha = alpha[0, ..., 0]
         normal = torch.nn.functional.normalize(blended[0, ..., 3:6], dim=-1)
-        depth = torch.where(alpha > 0, blended[0, ..., 6], torch.nan)
+        expected = torch.where(alpha > 0, blended[0, ..., 7], torch.nan)
+        surface = blended[0, ..., 6] / (blended[0, ..., 3:6] * self._rays(view)).sum(dim=-1)
+        is_one = (surface < expected * SURFACE_RATIO) & (expected < surface * SURFACE_RATIO)
+        depth = torch.where(is_one, surface, expected)
         return GBuffer(
             rgb=blended[0, ..., :3].cpu().numpy(),
             depth=depth.cpu().numpy(),
@@ -109,6 +113,13 @@ class GsplatBackend:
             normal=normal.cpu().numpy(),
             class_id=self._class_id(splats, prepared.class_id, width, height),
         )
+
+    def _rays(self, view: View) -> torch.Tensor:
+        """World directions of the pixels, camera z 1, [height, width, 3]."""
+        u, v = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
+        x, y = (u - view.K[0, 2]) / view.K[0, 0], (v - view.K[1, 2]) / view.K[1, 1]
+        rays = np.stack((x, y, np.ones_like(x)), axis=-1) @ view.viewmat[:3, :3]
+        return self._tensor(rays.astype(np.float32))
 
     def _class_id(
         self, splats: dict[str, Any], class_id: torch.Tensor, width: int, height: int

@@ -196,3 +196,31 @@ def _face_camera(s, from_eye, directions):  # type: ignore[no-untyped-def]
         s[_RECORD + NORMAL_X * BLOCK + l] = sign * nx
         s[_RECORD + NORMAL_Y * BLOCK + l] = sign * ny
         s[_RECORD + NORMAL_Z * BLOCK + l] = sign * nz
+
+
+def plane_distances(
+    records: NDArray[np.float32], view: View
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What turns blended normals into the depth of the surface at each pixel.
+
+    A splat is a disc: the camera z of its plane at a pixel is ``distance / (normal . ray)``, and blending both
+    sides of the fraction gives the plane itself where many discs make one surface. The mean of the discs'
+    centres does not: seen at a grazing angle, the near halves hide the far ones and it comes out too near.
+
+    Parameters
+    ----------
+    records : float32 [V, 16] splat records
+    view : the camera
+
+    Returns
+    -------
+    distances : float32 [V] from the eye to each splat's plane along its normal, negative as it faces the eye [m]
+    rays : float32 [3, 3] world direction of pixel (u, v) as ``rays[0] u + rays[1] v + rays[2]``, camera z 1 [1]
+    """
+    R, K = view.viewmat[:3, :3], view.K
+    right, down = R[0] / K[0, 0], R[1] / K[1, 1]
+    rays = np.stack((right, down, R[2] - K[0, 2] * right - K[1, 2] * down)).astype(np.float32)
+    along = records[:, X, None] * rays[0] + records[:, Y, None] * rays[1] + rays[2]
+    normals = records[:, NORMAL_X : NORMAL_Z + 1]
+    slant = normals[:, 0] * along[:, 0] + normals[:, 1] * along[:, 1] + normals[:, 2] * along[:, 2]
+    return records[:, DEPTH] * slant, rays

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.blending import SURFACE_RATIO
 from tasks.render.gbuffer import GBuffer
 from tasks.render.preparation import morton_order, rotation_matrices
 from tasks.render.spherical_harmonics import sh_basis
@@ -119,12 +120,14 @@ def rasterise_reference(
     normals = np.where(away[:, None], -gaussians.normals, gaussians.normals)
 
     rgb, normal = np.zeros((height, width, 3)), np.zeros((height, width, 3))
-    depth, left = np.zeros((height, width)), np.ones((height, width))
+    depth, left, distance = np.zeros((height, width)), np.ones((height, width)), np.zeros((height, width))
+    planes = ((gaussians.means.astype(np.float64) + R.T @ t) * normals).sum(axis=1)
     class_id = np.zeros((height, width), dtype=np.uint8)
     for step in blend_steps(gaussians, viewmat, K, width, height):
         rgb[step.window] += step.weight[..., None] * colours[step.gaussian]
         normal[step.window] += step.weight[..., None] * normals[step.gaussian]
         depth[step.window] += step.weight * step.depth
+        distance[step.window] += step.weight * planes[step.gaussian]
         left[step.window] -= step.weight
         halves = (step.transmittance >= 0.5) & (step.transmittance - step.weight < 0.5)
         class_id[step.window][halves] = gaussians.class_id[step.gaussian]
@@ -132,6 +135,12 @@ def rasterise_reference(
     covered = alpha > 0
     depth[covered] /= alpha[covered]
     depth[~covered] = np.nan
+    u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    rays = np.stack(((u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)), axis=-1) @ R
+    with np.errstate(divide="ignore", invalid="ignore"):
+        surface = distance / (normal * rays).sum(axis=-1)
+        is_one = (surface < depth * SURFACE_RATIO) & (depth < surface * SURFACE_RATIO)
+    depth = np.where(is_one, surface, depth)
     normal[covered] /= np.linalg.norm(normal[covered], axis=1, keepdims=True)
     return GBuffer(
         rgb=rgb.astype(np.float32),
