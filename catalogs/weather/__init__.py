@@ -73,8 +73,8 @@ def _typed(kind: Any, entries: object, place: str, problems: list[str]) -> Any:
 
 def _leaf(hint: Any, entry: object, where: str, problems: list[str]) -> Any:
     """One value; a problem where it lacks unit or source, or is not of the field's type."""
-    if not isinstance(entry, Mapping) or not {"value", "unit", "source"} <= set(entry):
-        problems.append(f"{where} must have value, unit and source; it is {entry!r}")
+    if not isinstance(entry, Mapping) or set(entry) != {"value", "unit", "source"}:
+        problems.append(f"{where} must have value, unit and source, and nothing else; it is {entry!r}")
         return None
     value = entry["value"]
     if hint is str:

@@ -9,7 +9,7 @@ from tasks.render.gbuffer import GBuffer
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
 from tasks.render.weather.particles import Shutter
-from tasks.render.weather.snow_field import coverage_rank
+from tasks.render.weather.snow_field import coverage_rank, tracks_at
 
 LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
 """Bit of each layer in an attribution picture."""
@@ -60,8 +60,8 @@ def snow_on_road(weather: ClipWeather, gbuffer: GBuffer, shutter: Shutter) -> ND
     road = np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5)
     ray = pixel_rays(shutter)[road]
     place = shutter.T_world_camera[:3, 3] + gbuffer.depth[road, None] * ray
-    xi = coverage_rank(weather.falling.snow, place[:, 0], place[:, 1])
-    mask[road] = xi <= weather.state.snow_coverage
+    field, x, y = weather.falling.snow, place[:, 0], place[:, 1]
+    mask[road] = coverage_rank(field, x, y, tracks_at(field, x, y)) <= weather.state.snow_coverage
     return mask
 
 

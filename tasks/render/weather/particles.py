@@ -140,6 +140,30 @@ def _turn(R, vector, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
+def _sway(offset, moving, amplitude, rate, time, turn_x, turn_y, quickness, size):  # type: ignore[no-untyped-def]
+    """Move a flake sideways along its own slow ellipse, and give it the velocity of that."""
+    amplitude *= 0.3 + 0.7 * size
+    rate *= 0.6 + 0.8 * quickness
+    for i in range(2):
+        own = rate * (1 - 0.23 * i)
+        phase = 2 * pi * (turn_x if i == 0 else turn_y) + own * time
+        offset[i] += amplitude * sin(phase)
+        moving[i] += amplitude * own * cos(phase)
+
+
+@numba.njit(cache=True, nogil=True)
+def _expose(streak, place, motion, exposure, K):  # type: ignore[no-untyped-def]
+    """Where the picture shows a particle when the shutter opens and when it closes."""
+    z = place[2]
+    first = max(z - 0.5 * exposure * motion[2], NEAREST_Z_SHARE * z)
+    last = max(z + 0.5 * exposure * motion[2], NEAREST_Z_SHARE * z)
+    for i in range(2):
+        step = 0.5 * exposure * motion[i]
+        streak.begin[i] = K[i, i] * (place[i] - step) / first + K[i, 2]
+        streak.end[i] = K[i, i] * (place[i] + step) / last + K[i, 2]
+
+
+@numba.njit(cache=True, nogil=True)
 def _streaks_of_class(  # type: ignore[no-untyped-def]
     low, high, cell, mean, key, index, sizes, size_scale, velocity, flutter, flutter_rate, time,
     seat, R, planes, K, camera_velocity, exposure, nearest, reach, fade,
@@ -171,34 +195,33 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
                     diameter = size_scale * log(sizes[0] - unit(w3) * (sizes[0] - sizes[1]))
                     if flutter > 0:
                         w0, w1, w2, w3 = philox(cx, cy, cz, block + np.uint64(256), key)
-                        amplitude = flutter * (0.3 + 0.7 * unit(w3))
-                        for i in range(2):
-                            rate = flutter_rate * (0.6 + 0.8 * unit(w2)) * (1 - 0.23 * i)
-                            phase = 2 * pi * unit(w0 if i == 0 else w1) + rate * time
-                            offset[i] += amplitude * sin(phase)
-                            moving[i] += amplitude * rate * cos(phase)
+                        _sway(
+                            offset,
+                            moving,
+                            flutter,
+                            flutter_rate,
+                            time,
+                            unit(w0),
+                            unit(w1),
+                            unit(w2),
+                            unit(w3),
+                        )
                     distance = sqrt(offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2)
                     if distance < nearest or distance > reach:
                         continue
                     _turn(R, offset, place)
                     _turn(R, moving, motion)
-                    z = place[2]
-                    if z < NEAREST_Z_SHARE * nearest:
+                    if place[2] < NEAREST_Z_SHARE * nearest:
                         continue
                     if found == len(streaks):
                         longer = np.empty(2 * found, dtype=STREAK)
                         longer[:found] = streaks
                         streaks = longer
                     streak = streaks[found]
-                    for i in range(2):
-                        step = 0.5 * exposure * motion[i]
-                        z0 = max(z - 0.5 * exposure * motion[2], NEAREST_Z_SHARE * z)
-                        z1 = max(z + 0.5 * exposure * motion[2], NEAREST_Z_SHARE * z)
-                        streak.begin[i] = K[i, i] * (place[i] - step) / z0 + K[i, 2]
-                        streak.end[i] = K[i, i] * (place[i] + step) / z1 + K[i, 2]
+                    _expose(streak, place, motion, exposure, K)
                     for i in range(3):
                         streak.direction[i] = offset[i] / distance
-                    streak.z = z
+                    streak.z = place[2]
                     streak.diameter = diameter
                     streak.share = min(1.0, (reach - distance) / fade)
                     found += 1

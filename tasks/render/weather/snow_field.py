@@ -64,38 +64,16 @@ def snow_field(
     SnowField
     """
     index = road_anchors(gaussians, anchors).index
-    x, y = gaussians.means[index, 0], gaussians.means[index, 1]
     level = np.linspace(0, 1, QUANTILES)
-    unranked = SnowField(patches=patches, tracks=tracks, route=route, seed=seed, quantiles=level)
-    if not len(index):
-        return unranked
-    raw = _raw(unranked, x, y, 0.0)
-    scales = np.sort(gaussians.scales[index].astype(np.float64), axis=1)
-    ranks = rank_uniform(raw, scales[:, 1] * scales[:, 2])
-    order = np.argsort(ranks)
-    quantiles = np.interp(level, ranks[order], raw[order])
+    quantiles = level
+    if len(index):
+        x, y = gaussians.means[index, :2].T
+        raw = _unranked(x, y, track_share(x, y, route, tracks, seed), patches, tracks, seed)
+        scales = np.sort(gaussians.scales[index].astype(np.float64), axis=1)
+        ranks = rank_uniform(raw, scales[:, 1] * scales[:, 2])
+        order = np.argsort(ranks)
+        quantiles = np.interp(level, ranks[order], raw[order])
     return SnowField(patches=patches, tracks=tracks, route=route, seed=seed, quantiles=quantiles)
-
-
-def coverage_rank(
-    field: SnowField,
-    x: NDArray[np.floating],
-    y: NDArray[np.floating],
-    footprint: NDArray[np.floating] | float = 0.0,
-) -> NDArray[np.float64]:
-    """The field xi at places in the world.
-
-    Parameters
-    ----------
-    field : the scene's coverage field
-    x, y : [N] world coordinates [m]
-    footprint : [N] or one number, width of what looks at the place [m]
-
-    Returns
-    -------
-    float64 [N] xi in [0, 1]; a place is covered when xi <= c_s [1]
-    """
-    return np.interp(_raw(field, x, y, footprint), field.quantiles, np.linspace(0, 1, len(field.quantiles)))
 
 
 def tracks_at(field: SnowField, x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -110,19 +88,37 @@ def tracks_at(field: SnowField, x: NDArray[np.floating], y: NDArray[np.floating]
     -------
     float64 [N] share [1]
     """
-    return (
-        np.zeros(len(x)) if field.route is None else track_share(x, y, field.route, field.tracks, field.seed)
-    )
+    return track_share(x, y, field.route, field.tracks, field.seed)
 
 
-def _raw(
-    field: SnowField,
+def coverage_rank(
+    field: SnowField, x: NDArray[np.floating], y: NDArray[np.floating], tracks: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """The field xi at places in the world.
+
+    Parameters
+    ----------
+    field : the scene's coverage field
+    x, y : [N] world coordinates [m]
+    tracks : [N] how much of a wheel track each place is, from `tracks_at` [1]
+
+    Returns
+    -------
+    float64 [N] xi in [0, 1]; a place is covered when xi <= c_s [1]
+    """
+    level = np.linspace(0, 1, len(field.quantiles))
+    return np.interp(_unranked(x, y, tracks, field.patches, field.tracks, field.seed), field.quantiles, level)
+
+
+def _unranked(
     x: NDArray[np.floating],
     y: NDArray[np.floating],
-    footprint: NDArray[np.floating] | float,
+    on_track: NDArray[np.floating],
+    patches: FieldParameters,
+    tracks: TrackParameters,
+    seed: int,
 ) -> NDArray[np.float64]:
-    patches = height_field(x, y, field.patches, field.seed, "snow-cover", footprint)
-    return patches + field.tracks.bareness * tracks_at(field, x, y)
+    return height_field(x, y, patches, seed, "snow-cover") + tracks.bareness * np.asarray(on_track)
 
 
 def local_depth_mm(

@@ -91,7 +91,9 @@ def snow_layer(
     """
     p = parameters
     anchors = road_anchors(gaussians, p.anchors)
-    xi = coverage_rank(field, *gaussians.means[anchors.index, :2].T)
+    x, y = gaussians.means[anchors.index, :2].T
+    tracks = tracks_at(field, x, y)
+    xi = coverage_rank(field, x, y, tracks)
     depth = local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm)
     hidden = hidden_share(depth, p) * gaussians.opacities[anchors.index]
     on = (xi <= coverage) & (hidden > 1 / 255)
@@ -108,14 +110,14 @@ def snow_layer(
     wide = scales.max(axis=1)
     if coverage < 1:
         # no wider than the way to the edge of the patch
-        inside = (coverage - xi) / _steepness(field, place, wide)
+        inside = (coverage - xi) / _steepness(field, place, tracks[on], wide)
         scales *= np.clip(inside / (EDGE_WIDTHS * wide), NARROWEST, 1)[:, None]
     lumps = height_field(place[:, 0], place[:, 1], p.lumps, field.seed, "snow-lumps", wide)
     rise = 1e-3 * depth * np.clip(1 + p.lump_share * lumps, 0.2, 2)
     thin = np.argmin(scales, axis=1)
     scales[np.arange(len(index)), thin] = np.clip(0.3 * rise, 1e-3, 5e-3)
 
-    colour = _snow_colour(lumps, tracks_at(field, *place[:, :2].T), white, p)
+    colour = _snow_colour(lumps, tracks[on], white, p)
     if gaussians.display_encoded:
         colour = to_display_unclipped(colour)
     sh = np.zeros((len(index), *gaussians.sh.shape[1:]), dtype=np.float32)
@@ -166,7 +168,8 @@ def whitened(
     facing = np.clip((up - limit / 2) / (limit / 2), 0, 1)
     bears = np.flatnonzero(facing > 0)
     place = gaussians.means[bears]
-    xi = coverage_rank(field, *place[:, :2].T)
+    x, y = place[:, 0], place[:, 1]
+    xi = coverage_rank(field, x, y, tracks_at(field, x, y))
     hidden = np.zeros(len(gaussians))
     hidden[bears] = facing[bears] * hidden_share(local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm), p)
     damp = np.where(road, p.damp_albedo_ratio, 1.0)
@@ -176,12 +179,12 @@ def whitened(
 
 
 def _steepness(
-    field: SnowField, place: NDArray[np.float64], width: NDArray[np.float64]
+    field: SnowField, place: NDArray[np.float64], tracks: NDArray[np.float64], width: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Slope of the coverage field over a Gaussian's width [m-1]; where it is level the edge is far away."""
     x, y = place[:, 0], place[:, 1]
-    along = coverage_rank(field, x + width, y) - coverage_rank(field, x - width, y)
-    across = coverage_rank(field, x, y + width) - coverage_rank(field, x, y - width)
+    along = coverage_rank(field, x + width, y, tracks) - coverage_rank(field, x - width, y, tracks)
+    across = coverage_rank(field, x, y + width, tracks) - coverage_rank(field, x, y - width, tracks)
     return np.hypot(along, across) / (2 * width) + 1e-6
 
 

@@ -32,14 +32,18 @@ class TrackParameters:
 
 
 def track_share(
-    x: NDArray[np.floating], y: NDArray[np.floating], route: Route, parameters: TrackParameters, seed: int
+    x: NDArray[np.floating],
+    y: NDArray[np.floating],
+    route: Route | None,
+    parameters: TrackParameters,
+    seed: int,
 ) -> NDArray[np.float64]:
     """How much of a wheel track a place is.
 
     Parameters
     ----------
     x, y : [N] world coordinates [m]
-    route : the route that was driven
+    route : the route that was driven; None where nobody has driven
     parameters : the tracks
     seed : visual seed of the clip [1]
 
@@ -48,6 +52,8 @@ def track_share(
     float64 [N] 1 in the middle of a track, 0 away from it [1]
     """
     p = parameters
+    if route is None:
+        return np.zeros(len(x))
     # tracks are read across the road alone, so the height of the place does not matter
     station, lateral, _ = route.project(np.column_stack((x, y, np.zeros(len(x)))))
     wave = FieldParameters(coarsest_m=p.wander_length_m, octaves=2, roughness=0.5)

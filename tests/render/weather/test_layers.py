@@ -131,7 +131,7 @@ def test_attribution_names_the_layers_that_changed_a_pixel(street, parameters):
     snow = attribution(weather, drawn, gbuffer, view) & LAYER_BITS["snow"] > 0
     white = drawn.base[..., 0] > 0.6
     on_road = gbuffer.class_id == SemanticClass.ROAD
-    assert (snow == white)[on_road].mean() > 0.85
+    assert (snow == white)[on_road].mean() > 0.8
 
 
 def test_the_paper_s_composition_adds_the_residual_of_8_bit_pictures(street, parameters):

@@ -172,6 +172,19 @@ def test_one_streak_covers_its_disc_whatever_blurs_it(parameters, snow):
     assert peaks[0] > 1.5 * peaks[1] > 3 * peaks[2]
 
 
+def test_two_streaks_over_each_other_let_through_what_both_let_through(parameters, snow):
+    streak = visible_streaks(snow, parameters.air.near, shutter(), CALM, 4)[:1].copy()
+    streak["begin"], streak["end"], streak["share"] = (248.3, 137.9), (251.1, 135.2), 1.0
+    streak["z"], streak["diameter"] = 1.0, 0.012
+    depth = np.full((320, 480), np.nan, np.float32)
+    one = draw_streaks(streak, np.array([[1.0, 0, 0]]), depth, shutter().K, 0.0)
+    both = draw_streaks(np.repeat(streak, 2), np.array([[1.0, 0, 0], [0, 0, 1.0]]), depth, shutter().K, 0.0)
+    assert one.alpha.max() > 0.3
+    assert both.alpha == pytest.approx(1 - (1 - one.alpha) ** 2, abs=1e-5)
+    assert both.rgb[..., 0] == pytest.approx(both.alpha / 2, abs=1e-5)
+    assert both.rgb[..., 2] == pytest.approx(both.alpha / 2, abs=1e-5)
+
+
 def test_air_without_drawn_particles_gives_an_empty_layer(parameters, rain):
     near = replace(parameters.air.near, farthest_m=0.61)
     streaks = visible_streaks(rain, near, shutter(), CALM, 4)

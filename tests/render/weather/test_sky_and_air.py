@@ -135,6 +135,7 @@ def test_contrast_falls_with_distance_as_koschmieder_says(parameters, sky, air):
     view = shutter(width=96, height=64, focal=80.0)
     picture, gbuffer = flat_gbuffer(view)
     cloudy = np.tile(sky.airlight.astype(np.float32), (8, 16, 1))
+    air = replace(air, extinction=0.05, drawn=np.linspace(0, 0.3, len(air.drawn)))
     layer = air_layer(gbuffer, cloudy, air, sky, pixel_rays(view))
     veiled = recompose(picture, [layer])
     distance = gbuffer.depth * np.linalg.norm(pixel_rays(view), axis=-1)

@@ -33,6 +33,10 @@ def field_of(scene, parameters, seed=5, route=None):
     return snow_field(scene, p.patches, p.tracks, p.anchors, route, seed)
 
 
+def rank_at(field, x, y):
+    return coverage_rank(field, x, y, tracks_at(field, x, y))
+
+
 def layer_at(street, parameters, coverage, depth_mm=None, seed=5):
     field = field_of(street, parameters, seed)
     depth_mm = 20.0 * coverage if depth_mm is None else depth_mm
@@ -62,7 +66,7 @@ def test_fields_have_unit_variance_and_fade_under_a_wide_footprint():
 @pytest.mark.parametrize("coverage", COVERAGES)
 def test_as_much_of_the_road_is_covered_as_asked(street, parameters, coverage):
     field = field_of(street, parameters)
-    xi = coverage_rank(field, street.means[:, 0], street.means[:, 1])
+    xi = rank_at(field, street.means[:, 0], street.means[:, 1])
     assert np.mean(xi <= coverage) == pytest.approx(coverage, abs=0.005)
 
 
@@ -141,7 +145,7 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
         gbuffer = rasterise(prepare(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
         inside = gbuffer.alpha > 0.9
         place = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
-        expected.append(float((coverage_rank(field, place[inside, 0], place[inside, 1]) <= coverage).mean()))
+        expected.append(float((rank_at(field, place[inside, 0], place[inside, 1]) <= coverage).mean()))
         seen.append(float((gbuffer.rgb[inside].mean(axis=1) > middle).mean()))
     assert np.all(np.diff(seen) > 0)
     assert seen == pytest.approx(expected, abs=0.03)
@@ -171,7 +175,7 @@ def test_wheel_tracks_are_covered_last_and_leave_the_share_as_it_is(street, para
     route = Route(station=np.array([0.0, 18.0]), T_world_rig=poses)
     field = field_of(street, parameters, route=route)
     x, y = street.means[:, 0], street.means[:, 1]
-    xi = coverage_rank(field, x, y)
+    xi = rank_at(field, x, y)
     assert np.mean(xi <= 0.5) == pytest.approx(0.5, abs=0.005)
     track = tracks_at(field, x, y) > 0.8
     assert 0.02 < track.mean() < 0.12

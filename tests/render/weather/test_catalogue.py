@@ -1,0 +1,88 @@
+"""The weather catalogue: every value with unit and source, and every mistake in it told at once."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from catalogs.weather import FOLDER, load_weather
+from tasks.errors import InputError
+
+
+def leaves(entries, place=""):
+    for name, entry in entries.items():
+        if "value" in entry:
+            yield f"{place}{name}", entry
+        else:
+            yield from leaves(entry, f"{place}{name}.")
+
+
+@pytest.fixture
+def copy(tmp_path) -> Path:
+    for path in FOLDER.glob("*.yaml"):
+        shutil.copy(path, tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_value_has_unit_and_source(path):
+    for name, entry in leaves(yaml.safe_load(path.read_text())):
+        assert set(entry) == {"value", "unit", "source"}, name
+        assert len(str(entry["source"])) > 5, name
+        assert isinstance(entry["unit"], str), name
+
+
+def test_published_numbers_stand_as_published(parameters):
+    assert (parameters.rain.intercept, parameters.rain.slope, parameters.rain.slope_exponent) == (
+        8000,
+        4.1,
+        -0.21,
+    )
+    snow = parameters.snowfall
+    assert (snow.intercept, snow.intercept_exponent, snow.slope, snow.slope_exponent) == (
+        2500,
+        -0.94,
+        2.29,
+        -0.45,
+    )
+    assert parameters.rain.fall_speed == (9.65, 10.3, 0.6)
+    # mass [mg] = 0.012 (area [mm2])^1.5, the melted flake a sphere of 1 mg/mm3
+    area = (3.141592653589793 / 6 / 0.012) ** (2 / 3)
+    assert snow.visible_diameter_ratio == pytest.approx((4 * area / 3.141592653589793) ** 0.5, abs=0.005)
+
+
+def test_all_mistakes_are_told_at_once(copy):
+    rain = yaml.safe_load((copy / "rain.yaml").read_text())
+    rain["slope"]["value"] = "steep"
+    rain["classes"]["value"] = 2.5
+    rain["colour"] = {"value": 1, "unit": "1", "source": "none"}
+    del rain["flutter_m"]
+    (copy / "rain.yaml").write_text(yaml.safe_dump(rain))
+    air = yaml.safe_load((copy / "air.yaml").read_text())
+    air["wind_m_s"]["value"] = 3.0
+    del air["near"]["nearest_m"]["source"]
+    air["haze_visual_range_m"]["value"] = float("inf")
+    (copy / "air.yaml").write_text(yaml.safe_dump(air))
+    (copy / "sky.yaml").write_text("a: [")
+    (copy / "snowfall.yaml").unlink()
+    with pytest.raises(InputError) as caught:
+        load_weather(copy)
+    text = "\n".join(caught.value.problems)
+    for part in (
+        "rain.yaml: slope must be a finite number; it is 'steep'",
+        "rain.yaml: classes must be a whole number; it is 2.5",
+        "rain.yaml: colour is not a known value; known are kind, intercept",
+        "rain.yaml: flutter_m is missing",
+        "air.yaml: wind_m_s must be a list of finite numbers; it is 3.0",
+        "air.yaml: near: nearest_m must have value, unit and source",
+        "air.yaml: haze_visual_range_m must be a finite number; it is inf",
+        "sky.yaml: must be YAML",
+        "snowfall.yaml: the weather catalogue needs this file",
+    ):
+        assert part in text
+    assert len(caught.value.problems) == 9
+
+
+def test_an_unedited_copy_is_the_same_catalogue(copy, parameters):
+    assert load_weather(copy) == parameters
