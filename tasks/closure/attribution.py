@@ -1,10 +1,11 @@
 """Which effect, if any, the model lacks: screening, refinement, gates, rivals."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.closure.campaign import SESSION
 from tasks.closure.evidence import RunEvidence
 from tasks.closure.fit import Fit, Hypothesis, fit, library_hypothesis, misfit_by_run
 from tasks.vehicle.effects.library import Effect
@@ -149,11 +150,26 @@ def judge(
     base_held_out : float64 [H] held-out misfits under ``base``
     hypothesis : what may be added
     """
-    fitted = fit(
-        evidence.train, (*base.parts, hypothesis), evidence.session_sigma,
-        values=np.concatenate((base.values, hypothesis.start)), session=base.session, offsets=base.offsets,
-        iterations=3,
-    )  # fmt: skip
+    first = np.arange(len(hypothesis.names)) == 0
+    session = base.session.copy()
+    if hypothesis.names[0] in SESSION:
+        # the session already carries the same number under a prior: hand it over to the free parameter
+        place = SESSION.index(hypothesis.names[0])
+        hypothesis = replace(hypothesis, start=np.array([session[place]]))
+        session[place] = 0.0
+    # from the linear estimate; where that overshoots, from close to the accepted model, which it extends
+    for share in (1.0, 0.1):
+        fitted = fit(
+            evidence.train,
+            (*base.parts, hypothesis),
+            evidence.session_sigma,
+            values=np.concatenate((base.values, np.where(first, share * hypothesis.start, hypothesis.start))),
+            session=session,
+            offsets=base.offsets,
+            iterations=3 if share == 1.0 else 5,
+        )
+        if fitted.objective < base.objective:
+            break
     gain = 0.5 * (base.objective - fitted.objective)
     factor = inflation(evidence, fitted, _own_scores(evidence, fitted, hypothesis))
     score = gain / factor - len(hypothesis.names) * np.log(evidence.samples)

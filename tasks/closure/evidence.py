@@ -22,6 +22,8 @@ KNOT_SPACING = (0.15, 0.25, 0.1)
 """Spacing of the disturbance's knots at each port: finer than any disturbance seen in brake tests [s]."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 N_OFFSETS = 4
+FREED = 20.0
+"""Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,7 +241,7 @@ def fit_disturbance(
     effects: tuple[Effect, ...],
     start: Disturbance,
 ) -> Disturbance:
-    """Scales and times by marginal likelihood, every physical library direction free.
+    """Scales and times by marginal likelihood, every library direction and the session free.
 
     With the directions fixed at 0 an effect would inflate the disturbance that then hides it.
 
@@ -251,12 +253,11 @@ def fit_disturbance(
     effects : the library, whose steps set broad priors
     start : first guess
     """
-    physical = [j for j, e in enumerate(effects) if e.effect_class == "effect"]
-    broad = [(30.0 * effects[j].parameters[0].step) ** -2 for j in physical]
-    prior = np.concatenate((1.0 / np.square(tolerances.session), broad))
+    broad = [(30.0 * e.parameters[0].step) ** -2 for e in effects]
+    prior = np.concatenate((1.0 / np.square(FREED * np.array(tolerances.session)), broad))
     blocks = []
     for run, r in zip(evidence, residuals, strict=True):
-        b = np.column_stack((r, run.session, run.library[:, physical]))
+        b = np.column_stack((r, run.session, run.library))
         blocks.append((b.T @ b, run.nuisance.T @ b))
 
     def cost(trial: Disturbance) -> float:

@@ -92,15 +92,20 @@ def scan(evidence: Evidence, at: Fit) -> list[Leftover]:
     for i, (port, variable) in enumerate(keys):
         block = slice(KNOTS * i, KNOTS * (i + 1))
         ridge = (20.0 * PORT_STEP[port]) ** -2
-        covariance = np.linalg.inv(gram[block, block] + ridge * np.eye(KNOTS))
+        covariance = np.asarray(np.linalg.inv(gram[block, block] + ridge * np.eye(KNOTS)), dtype=np.float64)
         values = covariance @ right[block]
         gain = 0.5 * float(values @ right[block]) / level
         found.append(
             Leftover(
-                port=port, variable=variable, grid=np.linspace(*RANGE[variable], KNOTS), values=values,
-                covariance=np.asarray(level * covariance, dtype=np.float64), gain=gain, score=gain - KNOTS * float(np.log(evidence.samples)),
+                port=port,
+                variable=variable,
+                grid=np.linspace(*RANGE[variable], KNOTS),
+                values=values,
+                covariance=level * covariance,
+                gain=gain,
+                score=gain - KNOTS * float(np.log(evidence.samples)),
             )
-        )  # fmt: skip
+        )
     return sorted(found, key=lambda leftover: -leftover.score)
 
 

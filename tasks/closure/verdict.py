@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tasks.closure.attribution import (
     ACCEPT_SCORE,
+    HELD_OUT_GAIN,
     RIVAL_SPAN,
     WIN_SHARE,
     Candidate,
@@ -22,7 +23,7 @@ from tasks.closure.attribution import (
 )  # fmt: skip
 from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign, Run
 from tasks.closure.evidence import Disturbance, RunEvidence, fit_disturbance, run_evidence, with_disturbance
-from tasks.closure.fit import Fit, compose, fit, misfit_by_run
+from tasks.closure.fit import Fit, compose, fit, library_hypothesis, misfit_by_run
 from tasks.closure.forms import form_hypotheses, scan
 from tasks.closure.forward import Slot, predict, run_model
 from tasks.closure.noise import channel_noise
@@ -32,6 +33,8 @@ from tasks.vehicle.parameters import Vehicle
 
 VerdictName = Literal["FOUND", "SET", "UNKNOWN_FORM", "RETUNE", "SENSOR", "NOTHING"]
 MAX_EFFECTS = 3
+RETUNE_PULL = 4.0
+"""Pull of a session nuisance, in prior sigmas, from which it is called a wrong number of the vehicle."""
 RETUNE_WIDENING = 10.0
 """Factor on the session's tolerances when a model is re-tuned without any new effect."""
 WORSE_LIMIT = 1.05
@@ -164,6 +167,8 @@ def attribute(
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
     progress("search")
     base, rounds, tried, reasons = _search(evidence, null)
+    if not rounds:
+        base, rounds = _retuned(evidence, null, reasons)
     progress("left over")
     base, rounds, near_forms = _forms(evidence, null, base, rounds, reasons)
     progress("rivals")
@@ -317,6 +322,32 @@ def _search(evidence: Evidence, null: Fit) -> tuple[Fit, list[Round], list[Candi
     return base, rounds, tried, reasons
 
 
+def _retuned(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Fit, list[Round]]:
+    """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session."""
+    pulls = np.abs(null.session / evidence.session_sigma)
+    worst = int(np.argmax(pulls))
+    if pulls[worst] <= RETUNE_PULL:
+        return null, []
+    effect = next(
+        e for e in evidence.effects
+        if e.parameters[0].name == SESSION[worst] and len(e.parameters) == 1
+    )  # fmt: skip
+    found = judge(
+        evidence,
+        null,
+        misfit_by_run(evidence.held_out, null),
+        library_hypothesis(effect, float(null.session[worst])),
+    )
+    gained = float(
+        np.sum(misfit_by_run(evidence.held_out, null) - misfit_by_run(evidence.held_out, found.fitted))
+    )
+    found = replace(found, held_out_gain=gained / found.inflation)
+    reasons.append(f"session nuisance {SESSION[worst]} is pulled by {pulls[worst]:.1f} sigma")
+    if found.held_out_gain <= HELD_OUT_GAIN:
+        return null, []
+    return found.fitted, [Round(base=null, tried=(), accepted=found)]
+
+
 def _forms(
     evidence: Evidence, null: Fit, base: Fit, rounds: list[Round], reasons: list[str]
 ) -> tuple[Fit, list[Round], list[tuple[str, NamedEffect]]]:
@@ -324,11 +355,17 @@ def _forms(
     near: list[tuple[str, NamedEffect]] = []
     if rounds:
         alone = _best_form(evidence, null)
-        total = sum(r.accepted.score for r in rounds)
-        if alone is not None and alone.passes and alone.score > total + RIVAL_SPAN:
+        ahead = -np.inf
+        if alone is not None and alone.passes:
+            # a form has no direction of its own to be judged by, so both sides take the larger inflation
+            common = max(alone.inflation, *(r.accepted.inflation for r in rounds))
+            log_n = float(np.log(evidence.samples))
+            extra = len(alone.hypothesis.names) - sum(len(r.accepted.hypothesis.names) for r in rounds)
+            ahead = (alone.gain - sum(r.accepted.gain for r in rounds)) / common - extra * log_n
+        if alone is not None and ahead > RIVAL_SPAN:
             reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
             base, rounds = alone.fitted, [Round(base=null, tried=(), accepted=alone)]
-        elif alone is not None and alone.passes and alone.score > total - RIVAL_SPAN:
+        elif alone is not None and ahead > -RIVAL_SPAN:
             first = rounds[0].accepted.hypothesis
             if alone.hypothesis.port != first.port:
                 near.append((first.name, _named(alone, 0.0)))
