@@ -55,7 +55,7 @@ def test_each_stratum_of_the_hypercube_is_drawn_once():
 
 
 def test_the_published_coast_drag_would_miss_the_printed_distances(vehicle):
-    """Why the study's drag is 0: with the table's 0.004 m/s2 Rain-50 stops 5 cm short."""
+    """Why the study's drag is 0: with the table's 0.004 m/s2 Rain-50 stops 6 cm short."""
     protocol, printed = load_sensitivity_study()
     short = replace(
         protocol,

@@ -1,0 +1,137 @@
+"""The vehicle model on one thread: rollouts per CPU-second, beside the NumPy twin and what was asked for.
+
+``python -m benchmarks.vehicle``
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from math import ceil
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from benchmarks.vehicle_modes import drive
+from catalogs.studies import Condition, load_conditions, load_sensitivity_study
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from tasks.surface.road_profile import FLAT_ROAD
+from tasks.vehicle import reference
+from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.rollout import INTERNAL_STEP_S
+from tasks.vehicle.sensitivity import sensitivity_study
+from tasks.vehicle.wheels import stopping_run, wheels_of
+
+STOPS_PER_CPU_S = 3000.0
+COUPLED_LIMIT_MS = 6.0
+STUDY_LIMIT_S = 3.0
+FLAT_SURFACES = (
+    ("dry", 0.82), ("rain", 0.595585), ("rain", 0.43415), ("rain", 0.369279), ("rain", 0.347126),
+    ("snow", 0.51), ("snow", 0.42), ("snow", 0.24),
+)  # fmt: skip
+"""Tyre families and friction of the paper's flat development conditions."""
+LONGEST_STOP = ("snow", 0.24)
+SPEED = 60 / 3.6
+LONGEST = 100_000
+TWIN_STEPS = 200
+REPEATS = 7
+
+
+def rows() -> list[dict[str, Any]]:
+    """Measure stops, logged rollouts and the sensitivity study.
+
+    Returns
+    -------
+    Rows of name, value, unit, peer (what the value is held against) and ratio (value over peer).
+    """
+    vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+    result = _stop_rows(vehicle)
+    conditions = {condition.name: condition for condition in load_conditions()}
+    for name in ("flat-dry", "hump-dry"):
+        result += _rollout_rows(conditions[name])
+    protocol, _ = load_sensitivity_study()
+    study_s = _cpu_s(lambda: sensitivity_study(vehicle, surface, protocol), repeats=3)
+    limit = f"limit {STUDY_LIMIT_S:g} CPU-s"
+    result.append(_row("sensitivity study, 4,434 stops", study_s, "CPU-s", limit, STUDY_LIMIT_S))
+    return result
+
+
+def _stop_rows(vehicle: Vehicle) -> list[dict[str, Any]]:
+    """Stops from 60 km/h in paper mode, nothing logged: the nine flat development conditions, and one a surface."""
+    brake = BrakeCommand(
+        peak_pressure_mpa=2.3, ramp_s=0.5, onset_s=0.0, onset_station_m=None, hold_s=None, release_s=0.0
+    ).profile
+    wheels = wheels_of(vehicle)
+    tyres = {surface: surface_response(vehicle, *surface).tyre for surface in FLAT_SURFACES}
+
+    def stop_s(*surfaces: tuple[str, float]) -> float:
+        def work() -> None:
+            for _ in range(20):
+                for surface in surfaces:
+                    stopping_run(SPEED, INTERNAL_STEP_S, LONGEST, brake, wheels, tyres[surface])
+
+        return _cpu_s(work) / 20 / len(surfaces)
+
+    asked = f"asked {STOPS_PER_CPU_S:g}"
+    mean = 1 / stop_s(*FLAT_SURFACES, LONGEST_STOP)  # snow 2 and snow 3 are the same surface
+    result = [_row("stops, paper mode, nine surfaces", mean, "1/CPU-s", asked, STOPS_PER_CPU_S)]
+    for surface in (FLAT_SURFACES[0], ("rain", 0.347126), LONGEST_STOP):
+        rate = 1 / stop_s(surface)
+        result.append(
+            _row("stops, paper mode, {} {:g}".format(*surface), rate, "1/CPU-s", asked, STOPS_PER_CPU_S)
+        )
+    seconds = stopping_run(SPEED, INTERNAL_STEP_S, LONGEST, brake, wheels, tyres[LONGEST_STOP])[1]
+    twin_s = _twin_step_s(vehicle) * ceil(seconds / INTERNAL_STEP_S)
+    name = "stops, paper mode, {} {:g}".format(*LONGEST_STOP)
+    return [*result, _row(name, rate, "1/CPU-s", "NumPy twin", 1 / twin_s)]
+
+
+def _twin_step_s(vehicle: Vehicle) -> float:
+    """CPU time of one step of the NumPy twin [CPU-s]."""
+    still = replace(vehicle, coast_deceleration=0.0)
+    response = surface_response(still, *LONGEST_STOP)
+    loads = np.array(still.static_axle_loads)
+
+    def run() -> None:
+        reference.paper_drive(
+            still, LONGEST_STOP[0], response, SPEED, lambda t: 2.3 * min(t / 0.5, 1.0), lambda n, a: loads,
+            FLAT_ROAD, steps=TWIN_STEPS, step=INTERNAL_STEP_S,
+        )  # fmt: skip
+
+    return _cpu_s(run, repeats=3) / TWIN_STEPS
+
+
+def _rollout_rows(condition: Condition) -> list[dict[str, Any]]:
+    """Logged 10 s rollouts of one condition in both modes."""
+    vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+    paper_ms, coupled_ms = (
+        1000 * _cpu_s(lambda mode=mode: drive(vehicle, surface, condition.scenario, mode))
+        for mode in ("paper", "coupled")
+    )
+    limit = f"limit {COUPLED_LIMIT_MS:g} CPU-ms"
+    return [
+        _row(f"10 s rollout, coupled, {condition.name}", coupled_ms, "CPU-ms", limit, COUPLED_LIMIT_MS),
+        _row(f"10 s rollout, paper, {condition.name}", paper_ms, "CPU-ms", "coupled", coupled_ms),
+    ]
+
+
+def _row(name: str, value: float, unit: str, peer: str, peer_value: float) -> dict[str, Any]:
+    return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": value / peer_value}
+
+
+def _cpu_s(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Median CPU time of one call, after one that compiles what it needs [CPU-s]."""
+    work()
+    times = []
+    for _ in range(repeats):
+        started = time.process_time()
+        work()
+        times.append(time.process_time() - started)
+    return median(times)
+
+
+if __name__ == "__main__":
+    for row in rows():
+        print(f"{row['name']:36} {row['value']:10.4g} {row['unit']:8} {row['ratio']:8.3g} of {row['peer']}")
