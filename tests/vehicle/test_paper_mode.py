@@ -170,6 +170,25 @@ def test_the_body_response_is_that_of_road_and_brake_together(vehicle):
         np.testing.assert_allclose(np.delete(rate - without, 5), 0, atol=0.02)
 
 
+def test_steady_braking_pitches_the_body_by_the_calibrated_moment(vehicle, drive):
+    """K x = B_b gamma m_s h d, gamma 1.104778 on dry asphalt (Eq. app_brake_pitch)."""
+    columns = drive(brake=command(1.5), duration=3.9).columns
+    moment = 1.104778 * 1200 * 0.55 * -columns["longitudinal_acceleration"][3800]
+    _, _, stiffness, _, direction = reference.half_car_matrices(vehicle)
+    assert columns["pitch"][3800] == pytest.approx(
+        np.linalg.solve(stiffness, direction * moment)[1], rel=1e-3
+    )
+
+
+def test_on_a_road_feature_the_moment_has_the_coupled_scale(drive):
+    """0.98 (Table frozen_empirical_params), also before the feature is reached."""
+    far = replace(HUMP, center_m=100.0)
+    flat, feature = (
+        drive(brake=command(1.5), duration=2.0, hazard=hazard).columns for hazard in (FLAT_ROAD, far)
+    )
+    assert feature["pitch"][1800] / flat["pitch"][1800] == pytest.approx(0.98, rel=2e-3)
+
+
 def test_only_slowing_down_pitches_the_paper_body(drive):
     """d_theta = max(-dv/dt, 0): a depression's downhill side pushes the car without lifting its nose."""
     coast = command(0.0, onset=None)
