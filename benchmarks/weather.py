@@ -63,7 +63,7 @@ def rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> li
     for name, state in STATES.items():
         started = time.process_time()
         gaussians, weather = weather_scene(
-            scene.gaussians, scene.environment, state, parameters, float(K[0, 0]), 1
+            scene.gaussians, scene.environment, state, parameters, float(K[0, 0]), 1, scene.route
         )
         once_s = time.process_time() - started
         cloud = prepare(gaussians)

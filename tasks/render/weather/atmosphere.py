@@ -162,7 +162,8 @@ def _relight(picture, alpha, clear, cloudy, relight, rays, lit):  # type: ignore
             for c in range(3):
                 own[c] = picture[row, column, c]
             if open_sky:
-                sample_panorama(clear, ray[0], ray[1], ray[2], behind)
+                if left < 1:
+                    sample_panorama(clear, ray[0], ray[1], ray[2], behind)
                 for c in range(3):
                     own[c] = max(own[c] - left * behind[c], np.float32(0)) if left < 1 else np.float32(0)
                 sample_panorama(cloudy, ray[0], ray[1], ray[2], behind)

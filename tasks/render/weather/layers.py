@@ -23,7 +23,7 @@ from tasks.render.weather.layer import Layer, recompose
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter, visible_streaks
 from tasks.render.weather.precipitation import Population, population
-from tasks.render.weather.scene_light import appended, ground_light, without_sun
+from tasks.render.weather.scene_light import appended, ground_light, without, without_sun
 from tasks.render.weather.sky import (
     SkyLight,
     cloud_transmittance,
@@ -164,8 +164,8 @@ def weather_scene(
         c = p.snow_cover
         field = snow_field(gaussians, c.patches, c.tracks, c.anchors, route, seed)
         amount = (state.snow_coverage, state.snow_depth_mm, p.snow_cover)
-        layer, _ = snow_layer(scene, field, white, *amount)
-        scene = appended(whitened(scene, field, white, *amount), layer)
+        snow = snow_layer(scene, field, white, *amount)
+        scene = appended(without(whitened(scene, field, white, *amount), snow.buried), snow.gaussians)
     falling = Falling(
         population=falls,
         air=air,

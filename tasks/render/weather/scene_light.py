@@ -216,9 +216,29 @@ def appended(gaussians: Gaussians, layer: Gaussians) -> Gaussians:
     -------
     Gaussians
     """
-    arrays: dict[str, Any] = {
-        member.name: np.concatenate((getattr(gaussians, member.name), getattr(layer, member.name)))
-        for member in fields(Gaussians)
-        if isinstance(getattr(gaussians, member.name), np.ndarray)
+    own, other = _arrays(gaussians), _arrays(layer)
+    joined: dict[str, Any] = {name: np.concatenate((own[name], other[name])) for name in own}
+    return replace(gaussians, **joined)
+
+
+def without(gaussians: Gaussians, index: NDArray[np.int64]) -> Gaussians:
+    """The cloud less some of its Gaussians.
+
+    Parameters
+    ----------
+    gaussians : the cloud
+    index : int64 [B] which ones to leave out [1]
+
+    Returns
+    -------
+    Gaussians
+    """
+    kept: dict[str, Any] = {
+        name: np.delete(array, index, axis=0) for name, array in _arrays(gaussians).items()
     }
-    return replace(gaussians, **arrays)
+    return replace(gaussians, **kept)
+
+
+def _arrays(gaussians: Gaussians) -> dict[str, NDArray[Any]]:
+    members = ((member.name, getattr(gaussians, member.name)) for member in fields(Gaussians))
+    return {name: value for name, value in members if isinstance(value, np.ndarray)}

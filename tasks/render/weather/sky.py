@@ -178,35 +178,47 @@ def overcast_environment(
     float32 [H, W, 3] linear light [1]
     """
     p = parameters
-    height, width = environment.shape[:2]
+    height = len(environment)
     elevation = pi / 2 - (np.arange(height) + 0.5) / height * pi
+    far = np.asarray(environment, dtype=np.float32)
+    air = float(np.exp(-extinction * p.far_field_m))
+    # three by three by hand: a BLAS rounds as its processor likes
+    relit = [sum(np.float32(air * row[c]) * far[..., c] for c in range(3)) for row in sky.relight]
+    out = np.stack(relit, axis=-1) + ((1 - air) * sky.airlight).astype(np.float32)
+    above = elevation > 0
+    cloud = _cloud(elevation[above], environment.shape[1], sky, extinction, p, seed)
+    luminance = sum(np.float32(weight) * far[above, :, c] for c, weight in enumerate(LUMINANCE))
+    open_sky = _sky_share(np.asarray(luminance), elevation[above])[..., None]
+    out[above] += open_sky * (cloud - out[above])
+    return out
+
+
+def _cloud(
+    elevation: NDArray[np.float64], width: int, sky: SkyLight, extinction: float, p: SkyParameters, seed: int
+) -> NDArray[np.float32]:
+    """Radiance of the overcast sky on rows of elevations, with a faint pattern.
+
+    The cloud is a ceiling: its pattern shrinks towards the horizon, and the air hides it there.
+    """
     azimuth = pi - (np.arange(width) + 0.5) / width * 2 * pi
     up = np.sin(elevation)
-    profile = sky.airlight * (1 + sky.gradient * np.maximum(up, 0))[:, None]
-    # the cloud is a ceiling: its pattern shrinks towards the horizon, and the air hides it there
     slant = p.cloud_base_m / np.maximum(up, 0.03)
-    x = (slant * np.cos(elevation))[:, None] * np.cos(azimuth)
-    y = (slant * np.cos(elevation))[:, None] * np.sin(azimuth)
+    away = (slant * np.cos(elevation))[:, None]
     waves = FieldParameters(coarsest_m=p.cloud_size_m, octaves=4, roughness=0.6)
-    footprint = np.broadcast_to((slant * pi / height / np.maximum(up, 0.03))[:, None], x.shape)
-    pattern = height_field(x, y, waves, seed, "cloud", footprint)
-    seen = p.cloud_contrast * np.exp(-extinction * slant) * (up > 0)
-    cloud = profile[:, None, :] * (1 + seen[:, None] * np.clip(pattern, -2, 2))[..., None]
-
-    far = np.asarray(environment, dtype=np.float64)
-    air = float(np.exp(-extinction * p.far_field_m))
-    hidden = air * (far @ sky.relight.T) + (1 - air) * sky.airlight
-    open_sky = _sky_share(far @ LUMINANCE, elevation)[..., None]
-    return (open_sky * cloud + (1 - open_sky) * hidden).astype(np.float32)
+    footprint = (slant * (elevation[0] - elevation[1]) / np.maximum(up, 0.03))[:, None]
+    pattern = height_field(away * np.cos(azimuth), away * np.sin(azimuth), waves, seed, "cloud", footprint)
+    seen = (p.cloud_contrast * np.exp(-extinction * slant)).astype(np.float32)
+    profile = (sky.airlight * (1 + sky.gradient * up[:, None])).astype(np.float32)
+    return profile[:, None, :] * (1 + seen[:, None] * np.clip(pattern, -2, 2))[..., None]
 
 
-def _sky_share(luminance: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Which part of a clear environment is sky: what is high up, or nearly as bright as the sky above it."""
+def _sky_share(luminance: NDArray[np.float32], elevation: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Which part of a clear upper hemisphere is sky: what is high up, or nearly as bright as the sky above it."""
     ring = (elevation > 0.35) & (elevation < 1.05)
     typical = np.median(luminance[ring])
-    bright = np.clip((luminance / max(typical, 1e-6) - 0.35) / 0.35, 0, 1)
+    bright = np.clip((luminance / max(float(typical), 1e-6) - 0.35) / 0.35, 0, 1)
     high = np.clip((elevation - 0.6) / 0.3, 0, 1)[:, None]
-    return np.where((elevation > 0)[:, None], np.maximum(bright, high), 0.0)
+    return np.maximum(bright, high).astype(np.float32)
 
 
 @numba.njit(cache=True, nogil=True)

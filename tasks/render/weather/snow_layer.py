@@ -16,6 +16,8 @@ from tasks.scene.gaussians import Gaussians
 
 EDGE_WIDTHS = 1.4
 """Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
+BURIED = 0.98
+"""Share of an anchor that its snow hides from which on the anchor itself need not be drawn."""
 NARROWEST = 0.35
 """Width of the narrowest Gaussian, at the very edge, by that of its anchor."""
 
@@ -50,6 +52,22 @@ class SnowCoverParameters:
     damp_albedo_ratio: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class SnowLayer:
+    """Snow on the road.
+
+    Parameters
+    ----------
+    gaussians : to append to the scene; they keep their anchors' class
+    anchors : int64 [A] the road Gaussian under each [1]
+    buried : int64 [B] road Gaussians that nobody sees any more [1]
+    """
+
+    gaussians: Gaussians
+    anchors: NDArray[np.int64]
+    buried: NDArray[np.int64]
+
+
 def hidden_share(depth_mm: NDArray[np.floating], parameters: SnowCoverParameters) -> NDArray[np.float64]:
     """Share of the ground that snow of a depth hides.
 
@@ -72,7 +90,7 @@ def snow_layer(
     coverage: float,
     depth_mm: float,
     parameters: SnowCoverParameters,
-) -> tuple[Gaussians, NDArray[np.int64]]:
+) -> SnowLayer:
     """The Gaussians of the snow on the road.
 
     Parameters
@@ -86,8 +104,7 @@ def snow_layer(
 
     Returns
     -------
-    layer : Gaussians to append; they keep their anchors' class
-    anchors : int64 [A] the anchor of each [1]
+    SnowLayer
     """
     p = parameters
     anchors = road_anchors(gaussians, p.anchors)
@@ -108,10 +125,12 @@ def snow_layer(
     place = gaussians.means[index].astype(np.float64)
     scales, quats = _lying(gaussians, index, normal, flat)
     wide = scales.max(axis=1)
+    kept = np.ones(len(index))
     if coverage < 1:
         # no wider than the way to the edge of the patch
         inside = (coverage - xi) / _steepness(field, place, tracks[on], wide)
-        scales *= np.clip(inside / (EDGE_WIDTHS * wide), NARROWEST, 1)[:, None]
+        kept = np.clip(inside / (EDGE_WIDTHS * wide), NARROWEST, 1)
+        scales *= kept[:, None]
     lumps = height_field(place[:, 0], place[:, 1], p.lumps, field.seed, "snow-lumps", wide)
     rise = 1e-3 * depth * np.clip(1 + p.lump_share * lumps, 0.2, 2)
     thin = np.argmin(scales, axis=1)
@@ -122,7 +141,7 @@ def snow_layer(
         colour = to_display_unclipped(colour)
     sh = np.zeros((len(index), *gaussians.sh.shape[1:]), dtype=np.float32)
     sh[:, 0] = (colour - 0.5) / C0
-    return replace(
+    layer = replace(
         gaussians,
         means=(place + rise[:, None] * normal).astype(np.float32),
         quats_wxyz=quats.astype(np.float32),
@@ -131,7 +150,9 @@ def snow_layer(
         sh=sh,
         normals=normal.astype(np.float32),
         class_id=gaussians.class_id[index],
-    ), index
+    )
+    buried = index[(kept == 1) & (hidden_share(depth, p) >= BURIED)]
+    return SnowLayer(gaussians=layer, anchors=index, buried=buried)
 
 
 def whitened(
@@ -169,7 +190,10 @@ def whitened(
     bears = np.flatnonzero(facing > 0)
     place = gaussians.means[bears]
     x, y = place[:, 0], place[:, 1]
-    xi = coverage_rank(field, x, y, tracks_at(field, x, y))
+    # wheels ran on the road alone
+    tracks = np.zeros(len(bears))
+    tracks[road[bears]] = tracks_at(field, x[road[bears]], y[road[bears]])
+    xi = coverage_rank(field, x, y, tracks)
     hidden = np.zeros(len(gaussians))
     hidden[bears] = facing[bears] * hidden_share(local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm), p)
     damp = np.where(road, p.damp_albedo_ratio, 1.0)

@@ -57,10 +57,9 @@ def draw_streaks(
     if len(streaks):
         light = np.ascontiguousarray(radiance, dtype=np.float32)
         _stroke(streaks, light, depth, float(K[0, 0]), float(aperture_m), through, sums)
-    alpha = 1 - through
-    weight = sums[..., 3]
-    scale = np.divide(alpha, weight, out=np.zeros_like(alpha), where=weight > 0)
-    return ParticleLayer(rgb=sums[..., :3] * scale[..., None], alpha=alpha)
+    rgb = np.zeros((height, width, 3), dtype=np.float32)
+    _settle(sums, through, rgb)
+    return ParticleLayer(rgb=rgb, alpha=1 - through)
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
@@ -114,3 +113,14 @@ def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ign
                 sums[row, column, 3] += a
                 for c in range(3):
                     sums[row, column, c] += a * light[s, c]
+
+
+@numba.njit(cache=True, nogil=True)
+def _settle(sums, through, rgb):  # type: ignore[no-untyped-def]
+    """Light of each pixel: the mean of its particles' light, as far as they hide what is behind them."""
+    for row in range(through.shape[0]):
+        for column in range(through.shape[1]):
+            if sums[row, column, 3] > 0:
+                scale = (1 - through[row, column]) / sums[row, column, 3]
+                for c in range(3):
+                    rgb[row, column, c] = scale * sums[row, column, c]

@@ -12,7 +12,7 @@ from tasks.render.rasteriser import prepare, rasterise
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.road_anchors import road_anchors
-from tasks.render.weather.scene_light import appended, mean_colours
+from tasks.render.weather.scene_light import appended, mean_colours, without
 from tasks.render.weather.snow_field import coverage_rank, local_depth_mm, snow_field, tracks_at
 from tasks.render.weather.snow_layer import hidden_share, snow_layer, whitened
 from tasks.scene.route import Route
@@ -71,7 +71,7 @@ def test_as_much_of_the_road_is_covered_as_asked(street, parameters, coverage):
 
 
 def test_more_coverage_adds_to_what_is_there(street, parameters):
-    anchors = [set(layer_at(street, parameters, coverage)[1].tolist()) for coverage in COVERAGES]
+    anchors = [set(layer_at(street, parameters, coverage).anchors.tolist()) for coverage in COVERAGES]
     for less, more in pairwise(anchors):
         assert less < more or (not less and more)
 
@@ -87,7 +87,8 @@ def test_local_depth_keeps_the_mean_and_the_support():
 
 
 def test_snow_lies_over_its_anchors_along_their_normals(street, parameters):
-    layer, anchors = layer_at(street, parameters, 1.0, 30.0)
+    snow = layer_at(street, parameters, 1.0, 30.0)
+    layer, anchors = snow.gaussians, snow.anchors
     lift = layer.means - street.means[anchors]
     assert np.abs(lift[:, :2]).max() < 1e-5
     assert lift[:, 2].mean() == pytest.approx(0.030, rel=0.1)
@@ -103,11 +104,20 @@ def test_lifting_follows_a_tilted_road(parameters):
         level, means=turn.apply(level.means).astype(np.float32), quats_wxyz=quats,
         normals=turn.apply(level.normals).astype(np.float32),
     )  # fmt: skip
-    layer, anchors = layer_at(slope, parameters, 1.0, 30.0)
+    snow = layer_at(slope, parameters, 1.0, 30.0)
+    layer, anchors = snow.gaussians, snow.anchors
     assert len(anchors) > 0.9 * len(slope)
     lift = layer.means - slope.means[anchors]
     lift /= np.linalg.norm(lift, axis=1, keepdims=True)
     assert lift @ turn.apply([0, 0, 1]) == pytest.approx(np.ones(len(lift)), abs=1e-3)
+
+
+def test_deep_snow_buries_its_anchors_and_thin_snow_does_not(street, parameters):
+    assert len(layer_at(street, parameters, 1.0, 30.0).buried) == len(street)
+    assert len(layer_at(street, parameters, 0.02, 0.02).buried) == 0
+    half = layer_at(street, parameters, 0.5)
+    assert 0.4 * len(half.anchors) < len(half.buried) < len(half.anchors)
+    assert set(half.buried.tolist()) < set(half.anchors.tolist())
 
 
 def test_what_stands_up_or_floats_is_no_anchor(street, parameters):
@@ -128,7 +138,7 @@ def test_round_gaussians_take_the_normal_of_their_neighbours(street, parameters)
     assert len(anchors.index) == len(street)
     assert not anchors.flat.any()
     assert anchors.normal[:, 2].min() > 0.99
-    layer, _ = layer_at(round_road, parameters, 1.0, 30.0)
+    layer = layer_at(round_road, parameters, 1.0, 30.0).gaussians
     assert layer.scales[:, 2].max() < 0.2 * layer.scales[:, 0].min()
 
 
@@ -140,8 +150,8 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
     for coverage in COVERAGES:
         field = field_of(street, parameters)
         amount = (coverage, 20.0 * coverage, parameters.snow_cover)
-        layer, _ = snow_layer(street, field, WHITE, *amount)
-        scene = appended(whitened(street, field, WHITE, *amount), layer)
+        snow = snow_layer(street, field, WHITE, *amount)
+        scene = appended(without(whitened(street, field, WHITE, *amount), snow.buried), snow.gaussians)
         gbuffer = rasterise(prepare(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
         inside = gbuffer.alpha > 0.9
         place = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
@@ -152,7 +162,7 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
 
 
 def test_snow_is_as_bright_as_its_albedo_in_the_light(street, parameters):
-    layer, _ = layer_at(street, parameters, 1.0, 30.0)
+    layer = layer_at(street, parameters, 1.0, 30.0).gaussians
     assert mean_colours(layer).mean(axis=0) == pytest.approx(
         np.array(parameters.snow_cover.albedo) * WHITE, rel=0.02
     )
@@ -181,20 +191,20 @@ def test_wheel_tracks_are_covered_last_and_leave_the_share_as_it_is(street, para
     assert 0.02 < track.mean() < 0.12
     assert np.abs(np.abs(y[track]) - parameters.snow_cover.tracks.gauge_m / 2).max() < 0.5
     assert np.mean(xi[track] <= 0.5) < 0.25
-    layer, anchors = snow_layer(street, field, WHITE, 1.0, 30.0, parameters.snow_cover)
-    pressed = track[anchors]
+    snow = snow_layer(street, field, WHITE, 1.0, 30.0, parameters.snow_cover)
+    layer, pressed = snow.gaussians, track[snow.anchors]
     assert mean_colours(layer)[pressed].mean() < 0.95 * mean_colours(layer)[~pressed].mean()
     assert tracks_at(field_of(street, parameters), x, y).max() == 0
 
 
 def test_another_seed_lays_other_patches_of_the_same_share(street, parameters):
-    first, second = (set(layer_at(street, parameters, 0.5, seed=seed)[1].tolist()) for seed in (1, 2))
+    first, second = (set(layer_at(street, parameters, 0.5, seed=seed).anchors.tolist()) for seed in (1, 2))
     assert len(first) == pytest.approx(len(second), rel=0.05)
     assert len(first & second) < 0.75 * len(first)
 
 
 def test_scenes_that_blend_display_colours_get_the_same_snow(street, parameters):
     display = replace(street, display_encoded=True)
-    layer, _ = layer_at(display, parameters, 1.0, 30.0)
-    linear, _ = layer_at(street, parameters, 1.0, 30.0)
+    layer = layer_at(display, parameters, 1.0, 30.0).gaussians
+    linear = layer_at(street, parameters, 1.0, 30.0).gaussians
     assert mean_colours(layer) == pytest.approx(mean_colours(linear), rel=1e-4)
