@@ -12,7 +12,7 @@ from tasks.errors import InputError
 
 RunnerName = Literal["threads", "processes", "dask"]
 CONNECT_TIMEOUT = "10s"
-ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """One frame per worker, one thread each: measured faster than threads within a frame, and repeatable."""
 
 
