@@ -13,6 +13,9 @@ MAX_GAP = 3
 """Frames in a row that may fail before the track counts as lost: the next one is placed against the
 last good frame, and past three frames a road at speed has left too little of it in view."""
 
+LEAST_PROGRESS = 1e-3
+"""Way below which a car counts as standing [m], or in steps where the scale is unknown."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RecoveredMotion:
@@ -31,8 +34,9 @@ class RecoveredMotion:
     progress : float64 [F] way made along the heading [m]
     normalised_path : float64 [F, 3] progress, lateral and heave over the clip's whole progress [1];
         NaN where the car stood
-    pitch_std : float64 [F] standard uncertainty of `pitch`, from residuals and Jacobian [rad]
-    progress_std : float64 [F] standard uncertainty of `progress` [m]
+    pitch_std : float64 [F] standard uncertainty of `pitch`, from residuals and Jacobian, with the errors of
+        different steps taken as independent; a bias that they share is not in it [rad]
+    progress_std : float64 [F] the same of `progress` [m]
     inliers : int64 [F] points or pixels that carried the estimate; 0 in frame 0
     failed : bool [F]
     failures : one sentence per failed frame
@@ -184,7 +188,7 @@ def integrate_motion(
     failed = np.isnan(pitch)
     progress_std = np.sqrt(progress_var)
     last = np.flatnonzero(~failed)[-1]
-    moving = abs(path[last, 0]) > 5 * progress_std[last]
+    moving = abs(path[last, 0]) > max(5 * progress_std[last], LEAST_PROGRESS)
     lengths = path if metric else np.full_like(path, np.nan)
     if not metric:
         T[:, :3, 3] = progress_std[:] = np.nan

@@ -41,7 +41,7 @@ class EssentialSettings:
     min_parallax : median shift that no turn explains, below which two frames share one place [px]
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
-    noise_floor : smallest tracking error believed [px]
+    noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
     """
 
     cells_across: int = 34
@@ -55,6 +55,7 @@ class EssentialSettings:
     min_points: int = 40
     min_inlier_share: float = 0.3
     noise_floor: float = 0.01
+    noise_ceiling: float = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,13 +193,13 @@ def _solve(
     E, mask = cv2.findEssentialMat(pairs.pixels, pairs.later_pixels, K, cv2.RANSAC, 0.999, settings.epipolar)
     if E is None or E.shape != (3, 3):
         return failed_step("the points fix no essential matrix", 0), key
+    inliers = int(mask.sum())
+    if inliers < max(settings.min_points, settings.min_inlier_share * count):
+        return failed_step(f"{inliers} of {count} tracked points agree on a pose", inliers), key
     _, R, t, _ = cv2.recoverPose(E, pairs.pixels, pairs.later_pixels, K, mask=mask)
     R, t, covariance, weight = refine_essential(
         R, t.ravel(), pairs.rays, pairs.later_rays, focal, settings.noise_floor
     )
-    inliers = int((weight > 0).sum())
-    if inliers < max(settings.min_points, settings.min_inlier_share * count):
-        return failed_step(f"{inliers} of {count} tracked points agree on a pose", inliers), key
 
     depth, later_depth, precision = triangulate(pairs.rays, pairs.later_rays, R, t)
     precision = np.where((weight > 0) & (depth > 0) & (later_depth > 0), precision, 0.0)
@@ -267,7 +268,9 @@ def _standing_step(
     if known.sum() >= settings.min_points:
         points = pairs.rays[:split][known] * key.depth[pairs.kept][known, None]
         seen = pairs.later_pixels[:split][known]
-        return solve_pnp(points, seen, T, K, settings.min_points, settings.noise_floor)
+        return solve_pnp(
+            points, seen, T, K, settings.min_points, settings.noise_floor, settings.noise_ceiling
+        )
     covariance = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]) * (settings.min_parallax / K[0, 0]) ** 2
     return FrameStep(T_earlier_later=invert_pose(T), covariance=covariance, inliers=len(pairs.rays))
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
-from tasks.eval.corners import corner_strength, grid_corners, track_corners
+from tasks.eval.corners import cell_size, corner_strength, grid_corners, track_corners
 from tasks.eval.motion import (
     FrameStep,
     RecoveredMotion,
@@ -45,7 +45,7 @@ class PnpSettings:
     crowded_contrast : grey levels of 255 between it and the warped earlier frame that betray it [1]
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
-    noise_floor : smallest tracking error believed [px]
+    noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
     """
 
     cells_across: int = 34
@@ -56,12 +56,13 @@ class PnpSettings:
     search_advances: tuple[float, ...] = (0.0, 1.0, 2.0, 4.0)
     forward_backward: float = 0.3
     depth_kink: float = 0.1
-    near_prediction: float = 1.5
+    near_prediction: float = 0.2
     crowded: float = 0.4
     crowded_contrast: int = 40
     min_points: int = 30
     min_inlier_share: float = 0.3
     noise_floor: float = 0.01
+    noise_ceiling: float = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,6 +222,8 @@ def _track_and_solve(
         K,
         min_inliers=max(settings.min_points, int(settings.min_inlier_share * count)),
         noise_floor=settings.noise_floor,
+        noise_ceiling=settings.noise_ceiling,
+        overlap=max(settings.window / cell_size(frame.grey.shape[1], settings.cells_across), 1.0) ** 2,
     )
 
 

@@ -11,7 +11,14 @@ DOI 10.1080/00401706.1974.10489171)."""
 
 
 def solve_pnp(
-    points: Floats, pixels: Floats, T_start: Floats, K: Floats, min_inliers: int, noise_floor: float
+    points: Floats,
+    pixels: Floats,
+    T_start: Floats,
+    K: Floats,
+    min_inliers: int,
+    noise_floor: float,
+    noise_ceiling: float,
+    overlap: float = 1.0,
 ) -> FrameStep:
     """Minimise the reprojection error by Gauss-Newton with Tukey's weights, without random draws.
 
@@ -25,6 +32,8 @@ def solve_pnp(
     K : float64 [3, 3] intrinsics [px]
     min_inliers : fewest points that must agree on the pose [1]
     noise_floor : smallest error of a pixel believed [px]
+    noise_ceiling : largest error of a pixel that still is a track of something [px]
+    overlap : how many of the patches behind the pixels share each pixel, and so its error [1]
     """
     T = T_start
     for _ in range(40):
@@ -51,7 +60,9 @@ def solve_pnp(
     inliers = int((weight > 0).sum())
     if inliers < min_inliers:
         return failed_step(f"{inliers} of {len(points)} tracked points agree on a pose", inliers)
-    variance = max((weight * size**2).sum() / (2 * weight.sum() - 6), noise_floor**2)
+    if scale > noise_ceiling:
+        return failed_step(f"the points miss the best pose by {scale:.1f} px", inliers)
+    variance = overlap * max((weight * size**2).sum() / (2 * weight.sum() - 6), noise_floor**2)
     pose = invert_pose(T)
     carry = adjoint(pose)  # the error of an inverse pose is the carried error, sign aside
     return FrameStep(

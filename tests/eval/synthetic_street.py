@@ -63,15 +63,15 @@ def rig_poses(
 
 
 def hump_drive(
-    frames: int = 81, frame_rate: float = 16.0, speed: float = 40 / 3.6, deceleration: float = 0.0
+    frames: int = 81, frame_rate: float = 16.0, speed: float = 40 / 3.6, deceleration: float = 0.0, hump_at: float = 1.2
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Station, heave, pitch of a car that meets a hump at 1.2 s and may brake from 1 s until it stands."""
+    """Station, heave, pitch of a car that meets a hump at `hump_at` and may brake from 1 s until it stands."""
     t = np.arange(frames) / frame_rate
     braking = np.clip(t - 1.0, 0.0, speed / deceleration if deceleration > 0 else 0.0)
     station = speed * np.minimum(t, 1.0) + speed * np.maximum(t - 1.0, 0.0)
     if deceleration > 0:
         station = speed * np.minimum(t, 1.0) + speed * braking - deceleration * braking**2 / 2
-    after = np.maximum(t - 1.2, 0.0)
+    after = np.maximum(t - hump_at, 0.0)
     ring = np.exp(-1.8 * after) * (after > 0)
     pitch = np.deg2rad(-1.4) * ring * np.sin(2 * np.pi * 1.4 * after)
     heave = 0.05 * ring * np.sin(2 * np.pi * 1.2 * after)
@@ -87,13 +87,14 @@ def drive_clip(
     frame_rate: float = 16.0,
     speed: float = 40 / 3.6,
     deceleration: float = 0.0,
+    hump_at: float = 1.2,
     curvature: float = 0.0,
     width: int = 480,
     height: int = 320,
     focal: float = 400.0,
     seed: int = 1,
 ) -> Clip:
-    station, heave, pitch = hump_drive(frames, frame_rate, speed, deceleration)
+    station, heave, pitch = hump_drive(frames, frame_rate, speed, deceleration, hump_at)
     return render_clip(
         station, heave, pitch, K=camera_matrix(width, height, focal), width=width, height=height,
         curvature=curvature, seed=seed,

@@ -1,0 +1,163 @@
+"""Small rigid-body, point and two-view geometry, against other implementations."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from tasks.eval.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
+from tasks.eval.rigid import (
+    adjoint,
+    advance_pose,
+    invert_pose,
+    pose_from_twist,
+    project,
+    projection_jacobian,
+    skew,
+    viewing_rays,
+)
+from tasks.eval.solve_pnp import solve_pnp
+from tasks.eval.warp import bilinear_taps, view_from, warp_map
+from tests.eval.synthetic_street import camera_matrix, mount
+
+K = camera_matrix()
+MOTION = pose_from_twist(np.array([0.03, -0.05, -0.9, 0.01, -0.02, 0.005]))
+"""T_later_earlier of a car that goes 0.9 m ahead and nods."""
+
+
+def cloud(count: int = 400, seed: int = 2) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    z = rng.uniform(5, 40, count)
+    return np.column_stack([rng.uniform(-0.5, 0.5, count) * z, rng.uniform(-0.3, 0.3, count) * z, z])
+
+
+def seen_by_both(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return project(points, K), project(points @ MOTION[:3, :3].T + MOTION[:3, 3], K)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 0.7, 2.5])
+def test_twists_are_the_matrix_exponential(size: float) -> None:
+    twist = size * np.array([0.4, -1.0, 0.3, 0.2, 0.5, -0.6])
+    generator = np.zeros((4, 4))
+    generator[:3, :3], generator[:3, 3] = skew(twist[3:]), twist[:3]
+    np.testing.assert_allclose(pose_from_twist(twist), expm(generator), atol=1e-12)
+
+
+def test_an_inverse_undoes_and_keeps_nan() -> None:
+    np.testing.assert_allclose(invert_pose(MOTION) @ MOTION, np.eye(4), atol=1e-15)
+    stack = np.stack([MOTION, np.full((4, 4), np.nan)])
+    assert np.isnan(invert_pose(stack)[1, :3]).all()
+
+
+def test_the_adjoint_carries_a_twist_to_the_other_frame() -> None:
+    twist = 1e-3 * np.arange(1.0, 7.0)
+    carried = pose_from_twist(adjoint(MOTION) @ twist)
+    np.testing.assert_allclose(carried, MOTION @ pose_from_twist(twist) @ invert_pose(MOTION), atol=1e-12)
+
+
+def test_an_advance_is_along_the_rig_s_axis_whatever_the_mount() -> None:
+    T = mount() @ advance_pose(2.0, mount()) @ invert_pose(mount())
+    np.testing.assert_allclose(T[:3, 3], [2.0, 0.0, 0.0], atol=1e-15)
+
+
+def test_the_projection_s_jacobian_is_its_difference_quotient() -> None:
+    points, J = cloud(5), projection_jacobian(cloud(5), K)
+    for axis in range(6):
+        twist = np.zeros(6)
+        twist[axis] = 1e-6
+        quotient = []
+        for sign in (1, -1):
+            T = pose_from_twist(sign * twist)
+            quotient.append(project(points @ T[:3, :3].T + T[:3, 3], K))
+        np.testing.assert_allclose(J[:, :, axis], (quotient[0] - quotient[1]) / 2e-6, rtol=1e-5, atol=1e-4)
+
+
+def test_exact_points_place_the_camera_exactly_though_a_third_of_them_lie() -> None:
+    points = cloud()
+    _, pixels = seen_by_both(points)
+    pixels[::3] += np.random.default_rng(1).uniform(5, 40, pixels[::3].shape)
+    step = solve_pnp(points, pixels, np.eye(4), K, min_inliers=100, noise_floor=1e-6, noise_ceiling=2)
+    assert not step.failure and step.inliers == 266
+    np.testing.assert_allclose(invert_pose(step.T_earlier_later), MOTION, atol=1e-9)
+
+
+def test_the_point_solver_agrees_with_opencv_and_states_its_spread() -> None:
+    points, rng = cloud(), np.random.default_rng(7)
+    _, exact = seen_by_both(points)
+    errors, theirs = [], []
+    for _ in range(300):
+        pixels = exact + rng.normal(0, 0.3, exact.shape)
+        step = solve_pnp(points, pixels, np.eye(4), K, min_inliers=100, noise_floor=1e-6, noise_ceiling=2)
+        off = step.T_earlier_later @ MOTION
+        errors.append([*off[:3, 3], off[2, 1], off[0, 2], off[1, 0]])
+        _, r, t = cv2.solvePnP(points, pixels, K, None, flags=cv2.SOLVEPNP_ITERATIVE)
+        theirs.append(np.linalg.norm(r.ravel() - cv2.Rodrigues(invert_pose(step.T_earlier_later)[:3, :3])[0].ravel()))
+    stated = np.sqrt(np.diag(step.covariance))
+    np.testing.assert_allclose(np.std(errors, axis=0), stated, rtol=0.25)
+    assert np.median(theirs) < stated[3:].max()
+
+
+def test_points_that_do_not_agree_are_a_failure() -> None:
+    points = cloud(50)
+    pixels = np.random.default_rng(0).uniform(0, 300, (50, 2))
+    limits = {"min_inliers": 45, "noise_floor": 0.01, "noise_ceiling": 2.0}
+    assert "miss the best pose" in solve_pnp(points, pixels, np.eye(4), K, **limits).failure
+    _, exact = seen_by_both(points)
+    exact[:10] += 30.0
+    assert "40 of 50 tracked points agree" in solve_pnp(points, exact, np.eye(4), K, **limits).failure
+
+
+def test_turn_direction_depth_and_length_come_out_of_two_views_exactly() -> None:
+    points = cloud()
+    rays, later_rays = (viewing_rays(p, K) for p in seen_by_both(points))
+    later_rays[::5, 0] += 0.05
+    t = MOTION[:3, 3]
+    start = pose_from_twist(np.array([0, 0, 0, 0.005, 0.005, 0.0]))[:3, :3] @ MOTION[:3, :3]
+    R, direction, covariance, weight = refine_essential(
+        start, np.array([0.1, 0.0, -1.0]) / np.hypot(0.1, 1), rays, later_rays, 400.0, 1e-7
+    )
+    np.testing.assert_allclose(R, MOTION[:3, :3], atol=1e-8)
+    np.testing.assert_allclose(direction, t / np.linalg.norm(t), atol=1e-7)
+    honest = np.arange(len(points)) % 5 != 0
+    depth, later_depth, precision = triangulate(rays, later_rays, R, direction)
+    np.testing.assert_allclose(depth[honest] * np.linalg.norm(t), points[honest, 2], rtol=1e-4)
+    np.testing.assert_allclose(later_depth[honest] * np.linalg.norm(t), (points @ MOTION[2, :3] + t[2])[honest], rtol=1e-4)
+    length, _ = step_length(points[:, 2], precision, depth, np.where(weight > 0, precision, 0.0))
+    assert length == pytest.approx(np.linalg.norm(t), rel=1e-6)
+    step = scaled_step(R, direction, covariance, length, 0.0, 320)
+    np.testing.assert_allclose(invert_pose(step.T_earlier_later), MOTION, atol=1e-6)
+
+
+def test_a_pure_turn_leaves_no_parallax_and_a_way_does() -> None:
+    points = cloud()
+    R = MOTION[:3, :3]
+    turned, rest = fit_rotation(points / points[:, 2:], (points @ R.T) / (points @ R.T)[:, 2:], 400.0)
+    np.testing.assert_allclose(turned, R, atol=1e-9)
+    assert rest < 1e-6
+    rays, later_rays = (viewing_rays(p, K) for p in seen_by_both(points))
+    assert fit_rotation(rays, later_rays, 400.0)[1] > 1.0
+
+
+def test_no_shared_depth_is_no_length() -> None:
+    nothing = np.zeros(3)
+    assert np.isnan(step_length(np.ones(3), nothing, np.ones(3), np.ones(3))[0])
+
+
+def test_a_warp_map_says_where_the_sampler_really_looks() -> None:
+    ramp = np.tile(np.arange(0, 240, 2, dtype=np.uint8), (60, 1))
+    turn = np.eye(4)
+    turn[:3, :3] = pose_from_twist(np.array([0, 0, 0, 0.0, 0.0101, 0.0]))[:3, :3]
+    k = camera_matrix(120, 60, 100.0)
+    where = warp_map(np.zeros((60, 120), np.float32), turn, k)
+    np.testing.assert_array_equal(where * 32, np.rint(where * 32))
+    inner = (slice(5, -5), slice(5, -5))
+    np.testing.assert_allclose(view_from(ramp, where)[inner], 2 * where[inner][..., 0], atol=0.6)
+
+
+def test_bilinear_taps_are_exact_on_a_plane_and_know_the_edge() -> None:
+    v, u = np.mgrid[0:20, 0:30].astype(float)
+    plane = 3 * u - 2 * v + 1
+    at = np.array([[4.25, 7.5], [29.0, 19.0], [29.5, 3.0], [-0.1, 3.0]], np.float32)
+    taps, weights, inside = bilinear_taps(at, plane.shape)
+    assert inside.tolist() == [True, True, False, False]
+    np.testing.assert_allclose((weights * plane[taps]).sum(axis=0)[:2], [3 * 4.25 - 15 + 1, 87 - 38 + 1], atol=0.01)

@@ -1,0 +1,35 @@
+"""What weather and codecs do to finished frames, without touching the motion in them."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+
+def with_flakes(frames: NDArray[np.uint8], count: int = 150, seed: int = 0) -> NDArray[np.uint8]:
+    """Bright discs at new places in every frame."""
+    rng = np.random.default_rng(seed)
+    fallen = frames.copy()
+    for picture in fallen:
+        height, width = picture.shape[:2]
+        for x, y, r in zip(
+            rng.integers(0, width, count), rng.integers(0, height, count), rng.integers(1, 4, count), strict=True
+        ):
+            cv2.circle(picture, (int(x), int(y)), int(r), (235, 235, 240), -1)
+    return fallen
+
+
+def jpeg_coded(frames: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    """Each frame through lossy block coding."""
+    coded = [cv2.imencode(".jpg", f, [cv2.IMWRITE_JPEG_QUALITY, quality])[1] for f in frames]
+    return np.stack([cv2.imdecode(c, cv2.IMREAD_COLOR) for c in coded])
+
+
+def with_noise(frames: NDArray[np.uint8], sigma: float, seed: int = 0) -> NDArray[np.uint8]:
+    """Independent sensor noise [grey levels]."""
+    noisy = frames + np.random.default_rng(seed).normal(0, sigma, frames.shape)
+    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+
+
+def faded(frames: NDArray[np.uint8], contrast: float) -> NDArray[np.uint8]:
+    """As through fog of one density."""
+    return np.rint(190 + (frames - 190.0) * contrast).astype(np.uint8)
