@@ -8,7 +8,6 @@ from tasks.render.projection import (
     COLUMN_FALLOFF,
     DEPTH,
     HALF_HEIGHT,
-    HALF_WIDTH,
     LOG_ALPHA,
     LOG_CUT,
     ROW_FALLOFF,
@@ -100,7 +99,10 @@ def touched_tiles(records, width, height):  # type: ignore[no-untyped-def]
     count = 0
     for splat in range(len(records)):
         x0, y0 = records[splat, X] - _HALF, records[splat, Y] - _HALF
-        half_width, half_height = records[splat, HALF_WIDTH], records[splat, HALF_HEIGHT]
+        half_height, slope = records[splat, HALF_HEIGHT], records[splat, SLOPE]
+        falloff = records[splat, ROW_FALLOFF]
+        reach, spread = records[splat, LOG_ALPHA] - _LOG_CUT, _ONE / records[splat, COLUMN_FALLOFF]
+        half_width = np.sqrt(reach * (spread + slope * slope / falloff))
         top = int(np.ceil(max(y0 - half_height, _ZERO))) // TILE_HEIGHT
         bottom = int(np.floor(min(y0 + half_height, np.float32(height - 1)))) // TILE_HEIGHT
         left = int(np.ceil(max(x0 - half_width, _ZERO))) // TILE_WIDTH
@@ -110,8 +112,6 @@ def touched_tiles(records, width, height):  # type: ignore[no-untyped-def]
             longer[:count] = tiles[:count]
             tiles = longer
         is_box = top == bottom or left == right
-        slope, falloff = records[splat, SLOPE], records[splat, ROW_FALLOFF]
-        reach, spread = records[splat, LOG_ALPHA] - _LOG_CUT, _ONE / records[splat, COLUMN_FALLOFF]
         tip = slope * half_height * half_height / half_width
         for row in range(top, bottom + 1):
             if not is_box:

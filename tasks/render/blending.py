@@ -21,6 +21,7 @@ from tasks.render.projection import (
     CLASS,
     COLUMN_FALLOFF,
     DEPTH,
+    DISTANCE,
     GREEN,
     HALF_HEIGHT,
     LOG_ALPHA,
@@ -161,11 +162,11 @@ def _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, str
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _blend_strips(s, records, distances, splats, listed, strips):  # type: ignore[no-untyped-def]
+def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untyped-def]
     for i in range(listed):
         splat, first = np.uint64(splats[strips.entry[i]]), np.uint64(strips.pixel[i])
         middle, log_alpha, falloff = strips.middle[i], strips.log_alpha[i], records[splat, COLUMN_FALLOFF]
-        z, label, distance = records[splat, DEPTH], records[splat, CLASS], distances[splat]
+        z, label, distance = records[splat, DEPTH], records[splat, CLASS], records[splat, DISTANCE]
         r, g, b = records[splat, RED], records[splat, GREEN], records[splat, BLUE]
         nx, ny, nz = records[splat, NORMAL_X], records[splat, NORMAL_Y], records[splat, NORMAL_Z]
         for x in range(TILE_WIDTH):
@@ -187,14 +188,13 @@ def _blend_strips(s, records, distances, splats, listed, strips):  # type: ignor
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def blend(records, distances, rays, starts, splats, rgb, depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
+def blend(records, rays, starts, splats, rgb, depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
     """Blend every tile and write the finished buffers of `GBuffer`.
 
     Parameters
     ----------
     records : float32 [V, 16] splat records
-    distances : float32 [V] from the eye to each splat's plane, along its normal [m]
-    rays : float32 [3, 3] world direction of pixel (u, v) as ``rays[0] u + rays[1] v + rays[2]``, camera z 1 [1]
+    rays : float32 [3, 3] world directions of the picture, see `View.rays` [1]
     starts, splats : tile lists, see `tasks.render.binning.bin_splats`
     rgb, depth, alpha, normal, class_id : the buffers, overwritten
     """
@@ -210,7 +210,7 @@ def blend(records, distances, rays, starts, splats, rgb, depth, alpha, normal, c
         while start < last and _find_open_rows(s, is_open) > 0:
             end = min(start + _BATCH, last)
             listed = _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, strips)
-            _blend_strips(s, records, distances, splats, listed, strips)
+            _blend_strips(s, records, splats, listed, strips)
             start = end
         for y in range(row_count):
             for x in range(column_count):

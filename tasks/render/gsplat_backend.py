@@ -117,8 +117,7 @@ class GsplatBackend:
     def _rays(self, view: View) -> torch.Tensor:
         """World directions of the pixels, camera z 1, [height, width, 3]."""
         u, v = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
-        x, y = (u - view.K[0, 2]) / view.K[0, 0], (v - view.K[1, 2]) / view.K[1, 1]
-        rays = np.stack((x, y, np.ones_like(x)), axis=-1) @ view.viewmat[:3, :3]
+        rays = np.stack((u, v, np.ones_like(u)), axis=-1) @ view.rays
         return self._tensor(rays.astype(np.float32))
 
     def _class_id(

@@ -24,10 +24,13 @@ LOW_PASS = 0.3
 LOG_CUT = float(np.log(1 / 255))
 """Logarithm of the opacity below which a splat is not drawn [1]."""
 
-X, Y, SLOPE, COLUMN_FALLOFF, ROW_FALLOFF, LOG_ALPHA, HALF_WIDTH, HALF_HEIGHT = range(8)
+X, Y, SLOPE, COLUMN_FALLOFF, ROW_FALLOFF, LOG_ALPHA, DISTANCE, HALF_HEIGHT = range(8)
 DEPTH, RED, GREEN, BLUE, NORMAL_X, NORMAL_Y, NORMAL_Z, CLASS = range(8, 16)
 RECORD = 16
-"""Columns of a splat record: one cache line of float32."""
+"""Columns of a splat record: one cache line of float32. ``DISTANCE`` is from the eye to the splat's plane along
+its normal [m], negative as it faces the eye: at a pixel, the camera z of that plane is ``distance / (normal . ray)``.
+Blending both sides of the fraction gives the plane itself where many discs make one surface. The mean of the
+discs' centres does not: seen at a grazing angle, the near halves hide the far ones and it comes out too near."""
 
 _LOW_PASS, _LOW_PASS_DET = np.float32(LOW_PASS), np.float32(LOW_PASS**2)
 _NEAR, _LOG_CUT = np.float32(NEAR), np.float32(LOG_CUT)
@@ -164,7 +167,6 @@ def _project_lanes(s, origin, rotation, lens, width, height, visible):  # type: 
         s[_RECORD + COLUMN_FALLOFF * BLOCK + l] = _HALF * yy / det
         s[_RECORD + ROW_FALLOFF * BLOCK + l] = _HALF / yy
         s[_RECORD + LOG_ALPHA * BLOCK + l] = log_alpha
-        s[_RECORD + HALF_WIDTH * BLOCK + l] = half_width
         s[_RECORD + HALF_HEIGHT * BLOCK + l] = half_height
         s[_RECORD + DEPTH * BLOCK + l] = z
         # Whether the splat's box holds a pixel centre of the picture, and single precision can hold the splat.
@@ -181,7 +183,7 @@ def _project_lanes(s, origin, rotation, lens, width, height, visible):  # type: 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _face_camera(s, from_eye, directions):  # type: ignore[no-untyped-def]
-    """Unit viewing directions, and normals turned against them."""
+    """Unit viewing directions, and the planes of the splats turned against them."""
     ox, oy, oz = from_eye
     for l in range(BLOCK):
         x = s[OFFSET * BLOCK + l] + ox
@@ -189,38 +191,12 @@ def _face_camera(s, from_eye, directions):  # type: ignore[no-untyped-def]
         z = s[(OFFSET + 2) * BLOCK + l] + oz
         nx, ny, nz = s[NORMAL * BLOCK + l], s[(NORMAL + 1) * BLOCK + l], s[(NORMAL + 2) * BLOCK + l]
         inverse = _ONE / np.sqrt(x * x + y * y + z * z)
-        sign = -_ONE if nx * x + ny * y + nz * z > _ZERO else _ONE
+        distance = nx * x + ny * y + nz * z
+        sign = -_ONE if distance > _ZERO else _ONE
         directions[l] = x * inverse
         directions[BLOCK + l] = y * inverse
         directions[2 * BLOCK + l] = z * inverse
+        s[_RECORD + DISTANCE * BLOCK + l] = sign * distance
         s[_RECORD + NORMAL_X * BLOCK + l] = sign * nx
         s[_RECORD + NORMAL_Y * BLOCK + l] = sign * ny
         s[_RECORD + NORMAL_Z * BLOCK + l] = sign * nz
-
-
-def plane_distances(
-    records: NDArray[np.float32], view: View
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What turns blended normals into the depth of the surface at each pixel.
-
-    A splat is a disc: the camera z of its plane at a pixel is ``distance / (normal . ray)``, and blending both
-    sides of the fraction gives the plane itself where many discs make one surface. The mean of the discs'
-    centres does not: seen at a grazing angle, the near halves hide the far ones and it comes out too near.
-
-    Parameters
-    ----------
-    records : float32 [V, 16] splat records
-    view : the camera
-
-    Returns
-    -------
-    distances : float32 [V] from the eye to each splat's plane along its normal, negative as it faces the eye [m]
-    rays : float32 [3, 3] world direction of pixel (u, v) as ``rays[0] u + rays[1] v + rays[2]``, camera z 1 [1]
-    """
-    R, K = view.viewmat[:3, :3], view.K
-    right, down = R[0] / K[0, 0], R[1] / K[1, 1]
-    rays = np.stack((right, down, R[2] - K[0, 2] * right - K[1, 2] * down)).astype(np.float32)
-    along = records[:, X, None] * rays[0] + records[:, Y, None] * rays[1] + rays[2]
-    normals = records[:, NORMAL_X : NORMAL_Z + 1]
-    slant = normals[:, 0] * along[:, 0] + normals[:, 1] * along[:, 1] + normals[:, 2] * along[:, 2]
-    return records[:, DEPTH] * slant, rays

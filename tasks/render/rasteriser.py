@@ -7,7 +7,7 @@ from tasks.render.binning import tile_lists
 from tasks.render.blending import blend
 from tasks.render.gbuffer import GBuffer
 from tasks.render.preparation import PreparedGaussians, prepare
-from tasks.render.projection import plane_distances, project
+from tasks.render.projection import project
 from tasks.render.splat_back import splat_back
 from tasks.render.view import view_of
 
@@ -49,9 +49,8 @@ def rasterise(
         normal=np.empty((height, width, 3), dtype=np.float32),
         class_id=np.empty((height, width), dtype=np.uint8),
     )
-    distances, rays = plane_distances(records, view)
     blend(
-        records, distances, rays, starts, splats,
+        records, view.rays.astype(np.float32), starts, splats,
         buffers.rgb, buffers.depth, buffers.alpha, buffers.normal, buffers.class_id
     )  # fmt: skip
     return buffers

@@ -38,6 +38,13 @@ class View:
         return points[:, :1] * R[:, 0] + points[:, 1:2] * R[:, 1] + points[:, 2:] * R[:, 2] + t
 
     @property
+    def rays(self) -> NDArray[np.float64]:
+        """World direction of picture point (u, v) as ``rays[0] u + rays[1] v + rays[2]``, with camera z 1 [1]."""
+        R, K = self.viewmat[:3, :3], self.K
+        right, down = R[0] / K[0, 0], R[1] / K[1, 1]
+        return np.stack((right, down, R[2] - K[0, 2] * right - K[1, 2] * down))
+
+    @property
     def ray_limits(self) -> NDArray[np.float64]:
         """Lowest and highest x/z, then y/z, at which the Jacobian is taken [1]."""
         f, c = np.array((self.K[0, 0], self.K[1, 1])), self.K[:2, 2]
