@@ -157,19 +157,27 @@ def judge(
         place = SESSION.index(hypothesis.names[0])
         hypothesis = replace(hypothesis, start=np.array([session[place]]))
         session[place] = 0.0
-    # from the linear estimate; where that overshoots, from close to the accepted model, which it extends
-    for share in (1.0, 0.1):
-        fitted = fit(
+    # Starts: the linear estimate with the accepted fit's disturbances; the same with fresh ones, which have
+    # not yet absorbed what is sought; close to the accepted fit, which the hypothesis extends.
+    fitted = None
+    for share, offsets in ((1.0, base.offsets), (1.0, None), (0.1, base.offsets)):
+        trial = fit(
             evidence.train,
             (*base.parts, hypothesis),
             evidence.session_sigma,
             values=np.concatenate((base.values, np.where(first, share * hypothesis.start, hypothesis.start))),
             session=session,
-            offsets=base.offsets,
-            iterations=3 if share == 1.0 else 5,
+            offsets=offsets,
+            iterations=4,
         )
-        if fitted.objective < base.objective:
+        if fitted is None or trial.objective < fitted.objective:
+            fitted = trial
+        worthwhile = (
+            0.5 * (base.objective - fitted.objective) > ACCEPT_SCORE or hypothesis.names[0] in SESSION
+        )
+        if fitted.objective < base.objective and not (offsets is base.offsets and worthwhile):
             break
+    assert fitted is not None
     gain = 0.5 * (base.objective - fitted.objective)
     factor = inflation(evidence, fitted, _own_scores(evidence, fitted, hypothesis))
     score = gain / factor - len(hypothesis.names) * np.log(evidence.samples)
