@@ -55,7 +55,6 @@ def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=
 def test_dry_weather_changes_no_bit(street, parameters):
     scene, weather = weather_scene(street, SKY, WeatherState(kind="dry"), parameters, 120.0, 1)
     assert scene is street
-    _, gbuffer = None, None
     _, drawn, gbuffer, view = frame(street, WeatherState(kind="dry"), parameters)
     assert drawn.picture is drawn.base
     assert drawn.layers == ()
