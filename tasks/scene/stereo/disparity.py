@@ -6,10 +6,16 @@ from numpy.typing import NDArray
 
 BLOCK = 5
 """Side of the matching window [px]."""
+SHARPENING_WINDOW, SHARPENING_STEPS = 9, 2
+"""Side of the window [px] and number of the steps that make the disparity sub-pixel [1]."""
+SHARPENING_DAMPING = 4.0
+"""Squared slope of the picture, in pixel values of 255, below which the steps shorten [px^-2]."""
+LARGEST_LEAN = 0.5
+"""The steps stay within this of the first match [px]."""
 
 
 def match(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
-    """Disparity of the left picture, NaN where the match is not confirmed from the right picture.
+    """Sub-pixel disparity of the left picture, NaN where the match is not confirmed from the right picture.
 
     Semi-global matching over three paths (Hirschmueller, doi:10.1109/TPAMI.2007.1166) runs once for
     each view; a pixel stays when the two disparities differ by at most one pixel and its patch of
@@ -36,12 +42,13 @@ def match(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -
 
     speckles = np.where(agreed, forward * 16, 0).astype(np.int16)
     cv2.filterSpeckles(speckles, 0, 60, 32)
-    return np.where(speckles > 0, forward, np.nan).astype(np.float32)
+    confirmed = np.where(speckles > 0, forward, np.nan).astype(np.float32)
+    return _sharpened(left, right, confirmed)
 
 
 def _semi_global(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
     """Raw disparity [px]; the pictures are widened so that the left border is matched as well."""
-    matcher = cv2.StereoSGBM_create(
+    matcher = cv2.StereoSGBM.create(
         minDisparity=0,
         numDisparities=disparities,
         blockSize=BLOCK,
@@ -53,6 +60,31 @@ def _semi_global(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities:
     )
     widened = [cv2.copyMakeBorder(p, 0, 0, disparities, 0, cv2.BORDER_REPLICATE) for p in (left, right)]
     return matcher.compute(*widened)[:, disparities:].astype(np.float32) / 16
+
+
+def _sharpened(
+    left: NDArray[np.uint8], right: NDArray[np.uint8], disparity: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Disparity after Gauss-Newton steps on the local squared difference of the pictures.
+
+    Semi-global matching leans towards whole pixels by up to a fifth of one. Lucas and Kanade's step
+    (IJCAI 1981) within a window, on pictures freed of their local mean, takes that lean away.
+    """
+    columns, rows = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in left.shape[::-1]))
+    window = (SHARPENING_WINDOW, SHARPENING_WINDOW)
+    wanted, source = (p.astype(np.float32) for p in (left, right))
+    wanted, source = wanted - cv2.blur(wanted, window), source - cv2.blur(source, window)
+    slope = cv2.Sobel(source, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8)
+    start = np.nan_to_num(disparity)
+    found = start
+    for _ in range(SHARPENING_STEPS):
+        shown = cv2.remap(source, columns - found, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        gradient = cv2.remap(slope, columns - found, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        step = cv2.blur((shown - wanted) * gradient, window) / (
+            cv2.blur(gradient * gradient, window) + SHARPENING_DAMPING
+        )
+        found = np.clip(found + step, start - LARGEST_LEAN, start + LARGEST_LEAN)
+    return np.where(np.isnan(disparity), disparity, found)
 
 
 def filled(disparity: NDArray[np.float32], background: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -19,8 +19,8 @@ MATCHED = 1.0
 """Largest difference between predicted and measured disparity of one surface [px]."""
 SPREAD = 0.05
 """Log ratios that deviate by more count less and less [1]."""
-PRIOR_FALLOFF = 100.0
-"""Weight of the pull of the falloff coefficients towards 0 [1]."""
+PRIOR = 0.1
+"""Weight, against one pixel's, of the pull of every unknown towards 0 [1]."""
 ROBUST_ROUNDS = 8
 
 
@@ -99,9 +99,9 @@ def estimate_exposure(
             r1, r2 = radius2[here][usable], radius2[there][usable]
             pairs.append((n, n + gap, ratio, np.stack([r2 - r1, r2**2 - r1**2, nearing[usable]], axis=1)))
 
-    x = np.zeros(count + 3)
+    x: NDArray[np.floating] = np.zeros(count + 3)
     for _ in range(ROBUST_ROUNDS):
-        H, b = np.diag([1.0] * count + [PRIOR_FALLOFF] * 3), np.zeros(count + 3)
+        H, b = PRIOR * np.eye(count + 3), np.zeros(count + 3)
         for n, m, ratio, basis in pairs:
             J = np.concatenate([np.full((len(ratio), 1), -1.0), np.full((len(ratio), 1), 1.0), basis], axis=1)
             at = [n, m, count, count + 1, count + 2]

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES
+from tasks.render.camera import viewmat
 from tasks.render.rasteriser import prepare, rasterise
 from tasks.scene.scene import Scene
 from tasks.scene.stereo.camera import rasteriser_intrinsics
@@ -58,7 +59,7 @@ def judge(
     height, width = sequence.left.shape[1:3]
     rows = []
     for i in map(int, frames):
-        gbuffer = rasterise(prepared, np.linalg.inv(T_world_camera[i]), K, width, height)
+        gbuffer = rasterise(prepared, viewmat(T_world_camera[i]), K, width, height)
         sky = sky_view(scene.environment, (height, width), sequence.intrinsics, T_world_camera[i])
         shown = exposure.picture(gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky, i)
         wanted = sequence.left[i] / np.float32(255)

@@ -114,11 +114,29 @@ def _tracks(
     if not len(corners):
         return np.empty((0, 3)), np.empty((0, 2))
 
-    options = {"winSize": (13, 13), "maxLevel": 2, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
-    found, ok, _ = cv2.calcOpticalFlowPyrLK(first, second, corners[:, None], guess[:, None].copy(), **options)
-    back, ok_back, _ = cv2.calcOpticalFlowPyrLK(second, first, found, corners[:, None].copy(), **options)
-    good = (ok[:, 0] > 0) & (ok_back[:, 0] > 0) & (np.abs(back[:, 0] - corners).max(axis=1) < 0.5)
-    return points[good], found[good, 0].astype(np.float64)
+    found, ok = _flow(first, second, corners, guess)
+    back, ok_back = _flow(second, first, found, corners)
+    good = ok & ok_back & (np.abs(back - corners).max(axis=1) < 0.5)
+    return points[good], found[good].astype(np.float64)
+
+
+def _flow(
+    first: NDArray[np.uint8],
+    second: NDArray[np.uint8],
+    start: NDArray[np.float32],
+    guess: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Where points of the first picture are in the second, by Lucas and Kanade's method, and which were found."""
+    found, ok, _ = cv2.calcOpticalFlowPyrLK(
+        first,
+        second,
+        start[:, None],
+        guess[:, None].copy(),
+        winSize=(13, 13),
+        maxLevel=2,
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+    )
+    return found[:, 0], ok[:, 0] > 0
 
 
 def _reprojection_normal_equations(

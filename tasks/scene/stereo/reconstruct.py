@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
+from tasks.render.camera import viewmat
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene
 from tasks.scene.stereo.camera import rasteriser_intrinsics
@@ -108,7 +109,7 @@ def reconstruct(sequence: StereoSequence, settings: StereoSettings | None = None
     def training_view(n: int) -> TrainingView:
         i = int(training[n])
         return TrainingView(
-            viewmat=np.linalg.inv(poses[i]),
+            viewmat=viewmat(poses[i]),
             K=K,
             radiance=exposure.radiance(sequence.left[i], i),
             clipped=sequence.left[i].min(axis=2) >= CLIPPED,

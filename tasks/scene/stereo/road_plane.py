@@ -122,19 +122,25 @@ def settled(route: Route, points: NDArray[np.floating], depth: NDArray[np.floati
     weight = depth[road] ** -4.0
     order = np.argsort(s, kind="stable")
     s, y, h, weight = s[order], y[order], h[order], weight[order] / weight.max(initial=1e-9)
-    poses = route.T_world_rig.copy()
-    fit = np.zeros(2)
-    for k, x in enumerate(route.station):
+    stations, fits = [], []
+    for x in route.station:
         near = slice(*np.searchsorted(s, (x - BANDWIDTH / 2, x + BANDWIDTH / 2)))
-        if near.stop - near.start >= 50:
-            A = np.stack([np.ones(near.stop - near.start), y[near]], axis=1)
-            trust = weight[near]
-            for _ in range(8):
-                W = A * trust[:, None]
-                fit = np.linalg.solve(W.T @ A + 1e-9 * np.eye(2), W.T @ h[near])
-                trust = weight[near] / (1 + ((h[near] - A @ fit) / SURFACE_SPREAD) ** 2)
-        poses[k, :3, 3] += fit[0] * poses[k, :3, 2]
-        poses[k, :3, 2] -= fit[1] * poses[k, :3, 1]
+        if near.stop - near.start < 50:
+            continue
+        A = np.stack([np.ones(near.stop - near.start), y[near]], axis=1)
+        trust = weight[near]
+        for _ in range(8):
+            W = A * trust[:, None]
+            fit = np.linalg.solve(W.T @ A + 1e-9 * np.eye(2), W.T @ h[near])
+            trust = weight[near] / (1 + ((h[near] - A @ fit) / SURFACE_SPREAD) ** 2)
+        stations.append(x)
+        fits.append(fit)
+    if not fits:
+        return route
+    rise, crossfall = (np.interp(route.station, stations, values)[:, None] for values in np.transpose(fits))
+    poses = route.T_world_rig.copy()
+    poses[:, :3, 3] += rise * poses[:, :3, 2]
+    poses[:, :3, 2] -= crossfall * poses[:, :3, 1]
     direction = np.gradient(poses[:, :3, 3], route.station, axis=0)
     return route_from_poses(_facing(poses[:, :3, 3], direction, poses[:, :3, 2]))
 

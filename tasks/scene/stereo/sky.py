@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.camera import viewmat
 from tasks.render.environment import environment_view
 from tasks.scene.stereo.camera import pixel_rays, rasteriser_intrinsics
 
-BIN = np.radians(1.0)
-"""Directions are compared over time in bins of this size [rad]."""
+BIN = 12
+"""Directions are compared over time in bins of this size [px]."""
 STRIDE = 4
 """Distance between the pixels from which the sky is fitted [px]."""
 EVEN = 0.05
@@ -82,6 +83,7 @@ def fit_sky(
     Sky, or None where too little steady sky is seen
     """
     rays = pixel_rays(radiance[0].shape[:2], intrinsics)[::STRIDE, ::STRIDE]
+    bin_size = BIN / float(intrinsics[0, 0])
     keys, colours = [], []
     for picture, pose in zip(radiance, T_world_camera, strict=True):
         azimuth, elevation = azimuth_elevation(rays @ pose[:3, :3].T)
@@ -91,7 +93,9 @@ def fit_sky(
             mean, 1e-4
         )
         calm = (contrast[::STRIDE, ::STRIDE] < EVEN) & (elevation > 4 * HORIZON)
-        keys.append(np.stack([np.floor(azimuth[calm] / BIN), np.floor(elevation[calm] / BIN)], axis=-1))
+        keys.append(
+            np.stack([np.floor(azimuth[calm] / bin_size), np.floor(elevation[calm] / bin_size)], axis=-1)
+        )
         colours.append(picture[::STRIDE, ::STRIDE][calm])
     cells, cell, counts = np.unique(np.concatenate(keys), axis=0, return_inverse=True, return_counts=True)
     values = np.concatenate(colours)
@@ -103,7 +107,7 @@ def fit_sky(
     steady = (spread < STEADY) & (counts > 4 * len(radiance)) & (brightness < CLIPPED)
     if steady.sum() < ENOUGH:
         return None
-    a, e = (cells[steady] + 0.5).T * BIN
+    a, e = (cells[steady] + 0.5).T * bin_size
     A, target = _terms(a, e), median[steady].astype(np.float64)
     weight = np.ones(len(A))
     for _ in range(20):
@@ -205,5 +209,6 @@ def sky_view(
     T_world_camera: NDArray[np.float64],
 ) -> NDArray[np.float32]:
     """The panorama as one picture [H, W, 3] of the sequence sees it."""
-    viewmat = np.linalg.inv(T_world_camera)
-    return environment_view(environment, viewmat, rasteriser_intrinsics(intrinsics), shape[1], shape[0])
+    return environment_view(
+        environment, viewmat(T_world_camera), rasteriser_intrinsics(intrinsics), shape[1], shape[0]
+    )

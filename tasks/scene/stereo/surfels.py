@@ -1,6 +1,7 @@
 """From confirmed pixels to Gaussians: where, how large, how turned."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,7 +15,7 @@ EVEN = 16
 """Largest difference of smoothed pixel values within an even block, of 255 [1]."""
 ONE_SURFACE = 2.0
 """Largest difference of disparity within an even block [px]."""
-COVERAGE = 0.62
+COVERAGE = 0.72
 """Standard deviation of a Gaussian in its picture, as a share of the distance to its neighbours [1]."""
 THICKNESS = 0.2
 """Standard deviation along the normal, as a share of the smaller one across [1]."""
@@ -69,8 +70,7 @@ def sample(
     rays = pixel_rays(depth.shape, intrinsics)
     disparity = np.where(wanted, disparity_scale / depth, 0)
     smooth = cv2.blur(picture.max(axis=2), (3, 3)).astype(np.int64)
-    blocks = _blocks(wanted, COARSE)
-    even = blocks.all(axis=(1, 3))
+    even = np.logical_and.reduce(_blocks(wanted, COARSE), axis=(1, 3))
     for values, limit in ((smooth, EVEN), (disparity, ONE_SURFACE)):
         cells = _blocks(values, COARSE)
         even &= cells.max(axis=(1, 3)) - cells.min(axis=(1, 3)) <= limit
@@ -93,7 +93,7 @@ def sample(
     return joined(parts)
 
 
-def _blocks(values: NDArray, side: int) -> NDArray:  # type: ignore[type-arg]
+def _blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
     """View of [H, W, ...] as [H / side, side, W / side, side, ...], without the rest at the far edges."""
     rows, columns = (n // side for n in values.shape[:2])
     cut = values[: rows * side, : columns * side]
