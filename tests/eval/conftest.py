@@ -22,7 +22,9 @@ def hump_clip() -> Clip:
 @pytest.fixture(scope="session")
 def stop_clip() -> Clip:
     """From 20 km/h to a stand, with a dive and its release."""
-    return drive_clip(frames=26, frame_rate=10.0, speed=20 / 3.6, deceleration=6.0, hump_at=9.0, seed=5, **SMALL)
+    return drive_clip(
+        frames=26, frame_rate=10.0, speed=20 / 3.6, deceleration=6.0, hump_at=9.0, seed=5, **SMALL
+    )
 
 
 @pytest.fixture(scope="session")

@@ -63,7 +63,11 @@ def rig_poses(
 
 
 def hump_drive(
-    frames: int = 81, frame_rate: float = 16.0, speed: float = 40 / 3.6, deceleration: float = 0.0, hump_at: float = 1.2
+    frames: int = 81,
+    frame_rate: float = 16.0,
+    speed: float = 40 / 3.6,
+    deceleration: float = 0.0,
+    hump_at: float = 1.2,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Station, heave, pitch of a car that meets a hump at `hump_at` and may brake from 1 s until it stands."""
     t = np.arange(frames) / frame_rate

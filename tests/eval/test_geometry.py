@@ -90,8 +90,10 @@ def test_the_point_solver_agrees_with_opencv_and_states_its_spread() -> None:
         step = solve_pnp(points, pixels, np.eye(4), K, min_inliers=100, noise_floor=1e-6, noise_ceiling=2)
         off = step.T_earlier_later @ MOTION
         errors.append([*off[:3, 3], off[2, 1], off[0, 2], off[1, 0]])
-        _, r, t = cv2.solvePnP(points, pixels, K, None, flags=cv2.SOLVEPNP_ITERATIVE)
-        theirs.append(np.linalg.norm(r.ravel() - cv2.Rodrigues(invert_pose(step.T_earlier_later)[:3, :3])[0].ravel()))
+        _, r, _ = cv2.solvePnP(points, pixels, K, None, flags=cv2.SOLVEPNP_ITERATIVE)
+        theirs.append(
+            np.linalg.norm(r.ravel() - cv2.Rodrigues(invert_pose(step.T_earlier_later)[:3, :3])[0].ravel())
+        )
     stated = np.sqrt(np.diag(step.covariance))
     np.testing.assert_allclose(np.std(errors, axis=0), stated, rtol=0.25)
     assert np.median(theirs) < stated[3:].max()
@@ -121,7 +123,9 @@ def test_turn_direction_depth_and_length_come_out_of_two_views_exactly() -> None
     honest = np.arange(len(points)) % 5 != 0
     depth, later_depth, precision = triangulate(rays, later_rays, R, direction)
     np.testing.assert_allclose(depth[honest] * np.linalg.norm(t), points[honest, 2], rtol=1e-4)
-    np.testing.assert_allclose(later_depth[honest] * np.linalg.norm(t), (points @ MOTION[2, :3] + t[2])[honest], rtol=1e-4)
+    np.testing.assert_allclose(
+        later_depth[honest] * np.linalg.norm(t), (points @ MOTION[2, :3] + t[2])[honest], rtol=1e-4
+    )
     length, _ = step_length(points[:, 2], precision, depth, np.where(weight > 0, precision, 0.0))
     assert length == pytest.approx(np.linalg.norm(t), rel=1e-6)
     step = scaled_step(R, direction, covariance, length, 0.0, 320)
@@ -160,4 +164,6 @@ def test_bilinear_taps_are_exact_on_a_plane_and_know_the_edge() -> None:
     at = np.array([[4.25, 7.5], [29.0, 19.0], [29.5, 3.0], [-0.1, 3.0]], np.float32)
     taps, weights, inside = bilinear_taps(at, plane.shape)
     assert inside.tolist() == [True, True, False, False]
-    np.testing.assert_allclose((weights * plane[taps]).sum(axis=0)[:2], [3 * 4.25 - 15 + 1, 87 - 38 + 1], atol=0.01)
+    np.testing.assert_allclose(
+        (weights * plane[taps]).sum(axis=0)[:2], [3 * 4.25 - 15 + 1, 87 - 38 + 1], atol=0.01
+    )

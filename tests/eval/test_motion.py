@@ -9,13 +9,17 @@ from tasks.eval.rigid import invert_pose
 from tests.eval.synthetic_street import hump_drive, mount, rig_poses
 
 
-def exact_steps(T_world_rig: NDArray[np.float64], anchors: list[int], variance: float = 0.0) -> list[Placement]:
+def exact_steps(
+    T_world_rig: NDArray[np.float64], anchors: list[int], variance: float = 0.0
+) -> list[Placement]:
     cameras = T_world_rig @ mount()
     return [
         Placement(
             anchor=a,
             step=FrameStep(
-                T_earlier_later=invert_pose(cameras[a]) @ cameras[k], covariance=variance * np.eye(6), inliers=9
+                T_earlier_later=invert_pose(cameras[a]) @ cameras[k],
+                covariance=variance * np.eye(6),
+                inliers=9,
             ),
         )
         for k, a in enumerate(anchors, start=1)
@@ -89,7 +93,9 @@ def test_uncertainty_grows_with_the_root_of_the_number_of_equal_steps() -> None:
     poses = rig_poses(np.arange(17.0), np.zeros(17), np.zeros(17))
     level_camera = np.eye(4)
     level_camera[:3, :3] = mount(tilt=0.0)[:3, :3]
-    seen = integrate_motion("test", exact_steps(poses @ level_camera @ invert_pose(mount()), list(range(16)), 1e-6), level_camera)
+    seen = integrate_motion(
+        "test", exact_steps(poses @ level_camera @ invert_pose(mount()), list(range(16)), 1e-6), level_camera
+    )
     np.testing.assert_allclose(seen.pitch_std, 1e-3 * np.sqrt(np.arange(17)), rtol=1e-9)
     np.testing.assert_allclose(seen.progress_std, 1e-3 * np.sqrt(np.arange(17)), rtol=1e-9)
 

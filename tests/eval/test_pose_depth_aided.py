@@ -39,7 +39,9 @@ def watch(check: Check, clip: Clip, upto: int | None = None, **others: object) -
     return check(**(arguments | others))
 
 
-def test_pitch_heave_and_progress_over_a_hump_are_recovered(full_clip: Clip, check: Check, method: str) -> None:
+def test_pitch_heave_and_progress_over_a_hump_are_recovered(
+    full_clip: Clip, check: Check, method: str
+) -> None:
     seen = watch(check, full_clip)
     assert not seen.failed.any() and seen.method == method
     assert pitch_rmse_deg(seen, full_clip) < CLEAR_DEG[method]
@@ -59,7 +61,9 @@ def test_a_braking_car_dives_stops_and_then_stays(stop_clip: Clip, check: Check,
     assert np.ptp(np.rad2deg(seen.pitch[standing])) < 2e-3
 
 
-def test_progress_follows_a_bend_without_being_told_the_route(bend_clip: Clip, check: Check, method: str) -> None:
+def test_progress_follows_a_bend_without_being_told_the_route(
+    bend_clip: Clip, check: Check, method: str
+) -> None:
     seen = watch(check, bend_clip)
     assert pitch_rmse_deg(seen, bend_clip) < SMALL_DEG[method]
     assert progress_rmse(seen, bend_clip) < 0.01
@@ -89,7 +93,9 @@ def test_weather_and_codec_at_most_double_the_allowance(
     assert progress_rmse(seen, hump_clip) < 0.02
 
 
-def test_one_picture_repeated_is_a_car_that_stands_with_particles_or_without(hump_clip: Clip, check: Check) -> None:
+def test_one_picture_repeated_is_a_car_that_stands_with_particles_or_without(
+    hump_clip: Clip, check: Check
+) -> None:
     still = np.repeat(hump_clip.frames[:1], 5, axis=0)
     depth, classes = (np.repeat(a[:1], 5, axis=0) for a in (hump_clip.depth, hump_clip.class_id))
     bare = watch(check, hump_clip, frames=still, depth=depth, class_id=classes)
@@ -101,13 +107,22 @@ def test_one_picture_repeated_is_a_car_that_stands_with_particles_or_without(hum
     assert np.rad2deg(np.abs(snowing.pitch)).max() < 0.02
 
 
-def test_a_black_frame_fails_and_the_track_goes_on_behind_it(hump_clip: Clip, check: Check, method: str) -> None:
+def test_a_black_frame_fails_and_the_track_goes_on_behind_it(
+    hump_clip: Clip, check: Check, method: str
+) -> None:
     frames = hump_clip.frames[:16].copy()
     frames[6:8] = 0
     seen = watch(check, hump_clip, upto=16, frames=frames)
     assert np.flatnonzero(seen.failed).tolist() == [6, 7]
     assert len(seen.failures) == 2 and seen.failures[0].startswith(f"{method}: frame 6 has no pose: ")
-    for numbers in (seen.pitch, seen.progress, seen.heave, seen.lateral, seen.pitch_std, seen.T_rig0_rig[:, 0, 0]):
+    for numbers in (
+        seen.pitch,
+        seen.progress,
+        seen.heave,
+        seen.lateral,
+        seen.pitch_std,
+        seen.T_rig0_rig[:, 0, 0],
+    ):
         assert np.isnan(numbers[6:8]).all() and np.isfinite(numbers[[5, 8, 15]]).all()
     cut = replace(hump_clip, pitch=hump_clip.pitch[:16], station=hump_clip.station[:16])
     assert pitch_rmse_deg(seen, cut) < 2 * SMALL_DEG[method]

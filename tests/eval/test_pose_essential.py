@@ -84,7 +84,9 @@ def test_depth_is_never_asked_for_and_wrong_frames_are_refused(hump_clip: Clip) 
 
 
 def test_a_bend_turns_the_heading_and_not_the_pitch() -> None:
-    clip = drive_clip(frames=12, frame_rate=16.0, curvature=1 / 80, hump_at=9.0, width=240, height=160, focal=200.0)
+    clip = drive_clip(
+        frames=12, frame_rate=16.0, curvature=1 / 80, hump_at=9.0, width=240, height=160, focal=200.0
+    )
     seen = watch(clip)
     heading = np.arctan2(seen.T_rig0_rig[:, 1, 0], seen.T_rig0_rig[:, 0, 0])
     np.testing.assert_allclose(heading, clip.station / 80, atol=np.deg2rad(0.1))

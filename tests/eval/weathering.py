@@ -12,7 +12,10 @@ def with_flakes(frames: NDArray[np.uint8], count: int = 150, seed: int = 0) -> N
     for picture in fallen:
         height, width = picture.shape[:2]
         for x, y, r in zip(
-            rng.integers(0, width, count), rng.integers(0, height, count), rng.integers(1, 4, count), strict=True
+            rng.integers(0, width, count),
+            rng.integers(0, height, count),
+            rng.integers(1, 4, count),
+            strict=True,
         ):
             cv2.circle(picture, (int(x), int(y)), int(r), (235, 235, 240), -1)
     return fallen

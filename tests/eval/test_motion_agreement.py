@@ -1,0 +1,155 @@
+"""The verdict on a clip: the true telemetry passes, and each way of being out of step fails."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tasks.errors import InputError
+from tasks.eval.motion import RecoveredMotion
+from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
+from tasks.eval.pose_essential import recover_motion_essential
+from tasks.eval.pose_photometric import recover_motion_photometric
+from tasks.eval.pose_pnp import recover_motion_pnp
+from tests.eval.synthetic_street import Clip
+
+THRESHOLDS = PoseThresholds(
+    pitch_rmse_deg=0.08, pitch_relative_error=0.10, pitch_correlation=0.98, response_deg=0.2,
+    progress_rmse_m=0.3, normalised_progress_rmse=0.01,
+)  # fmt: skip
+CAMERA_ONLY = replace(THRESHOLDS, pitch_relative_error=0.20, progress_rmse_m=None)
+
+
+@pytest.fixture(scope="module")
+def recovered(full_clip: Clip) -> dict[str, RecoveredMotion]:
+    with_depth = (full_clip.frames, full_clip.depth, full_clip.K, full_clip.T_rig_camera, full_clip.class_id)
+    return {
+        "pnp": recover_motion_pnp(*with_depth),
+        "photometric": recover_motion_photometric(*with_depth),
+        "essential": recover_motion_essential(full_clip.frames, full_clip.K, full_clip.T_rig_camera),
+    }
+
+
+def delayed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([values[:1], values[:-1]])
+
+
+CONTROLS = {
+    "no response": lambda pitch: 0 * pitch,
+    "one frame late": delayed,
+    "amplitude x 0.8": lambda pitch: 0.8 * pitch,
+    "sign flipped": lambda pitch: -pitch,
+}
+
+
+@pytest.mark.parametrize("method", ["pnp", "photometric", "essential"])
+class TestVerdictOnFrames:
+    def judge(
+        self, recovered: dict[str, RecoveredMotion], method: str, clip: Clip, pitch: NDArray[np.float64]
+    ) -> PoseVerdict:
+        limits = CAMERA_ONLY if method == "essential" else THRESHOLDS
+        return pose_verdict(recovered[method], pitch, clip.station, limits)
+
+    def test_the_true_telemetry_passes(self, recovered, method, full_clip) -> None:
+        verdict = self.judge(recovered, method, full_clip, full_clip.pitch)
+        assert verdict.passed, verdict.reasons
+        assert verdict.pitch_relative_error < 0.05 and verdict.pitch_correlation > 0.999
+        assert verdict.claimed_pitch_rms_deg > 0.4
+        assert np.isnan(verdict.progress_rmse_m) == (method == "essential")
+
+    @pytest.mark.parametrize("control", CONTROLS)
+    def test_telemetry_out_of_step_with_the_pictures_fails(
+        self, recovered, method, full_clip, control
+    ) -> None:
+        verdict = self.judge(recovered, method, full_clip, CONTROLS[control](full_clip.pitch))
+        assert not verdict.passed and verdict.reasons
+
+
+def motion_with(clip: Clip, pitch: NDArray[np.float64], **others: object) -> RecoveredMotion:
+    """A perfect recovery of a clip whose camera pitched so."""
+    n = len(pitch)
+    path = np.column_stack([clip.station - clip.station[0], np.zeros((n, 2))])
+    exact = RecoveredMotion(
+        method="exact", T_rig0_rig=clip.T_world_rig, pitch=pitch - pitch[0], heave=clip.heave, lateral=np.zeros(n),
+        progress=path[:, 0], normalised_path=path / path[-1, 0], pitch_std=np.zeros(n), progress_std=np.zeros(n),
+        inliers=np.ones(n, np.int64), failed=np.zeros(n, bool), failures=(),
+    )  # fmt: skip
+    return replace(exact, **others)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_pictures_out_of_step_with_true_telemetry_fail(full_clip: Clip, control: str) -> None:
+    assert pose_verdict(
+        motion_with(full_clip, full_clip.pitch), full_clip.pitch, full_clip.station, THRESHOLDS
+    ).passed
+    shown = motion_with(full_clip, CONTROLS[control](full_clip.pitch))
+    assert not pose_verdict(shown, full_clip.pitch, full_clip.station, THRESHOLDS).passed
+
+
+def test_the_controls_score_as_their_algebra_says(full_clip: Clip) -> None:
+    def relative(name: str) -> float:
+        shown = motion_with(full_clip, CONTROLS[name](full_clip.pitch))
+        return pose_verdict(shown, full_clip.pitch, full_clip.station, THRESHOLDS).pitch_relative_error
+
+    assert relative("no response") == pytest.approx(1.0)
+    assert relative("amplitude x 0.8") == pytest.approx(0.2)
+    assert relative("sign flipped") == pytest.approx(2.0)
+    assert relative("one frame late") > 0.2
+
+
+def test_a_wrong_speed_fails_by_progress_alone(full_clip: Clip) -> None:
+    verdict = pose_verdict(
+        motion_with(full_clip, full_clip.pitch), full_clip.pitch, 1.05 * full_clip.station, THRESHOLDS
+    )
+    assert [reason.split(" is ")[0] for reason in verdict.reasons] == ["progress RMSE"]
+
+
+def test_pitch_counts_from_frame_0_so_a_constant_offset_does_not_matter(full_clip: Clip) -> None:
+    verdict = pose_verdict(
+        motion_with(full_clip, full_clip.pitch), full_clip.pitch + 0.1, full_clip.station + 50, THRESHOLDS
+    )
+    assert verdict.passed and verdict.pitch_rmse_deg < 1e-9 and verdict.progress_rmse_m < 1e-9
+
+
+def test_without_response_the_relative_figures_are_not_judged(full_clip: Clip) -> None:
+    noise = np.deg2rad(0.01) * np.random.default_rng(0).standard_normal(len(full_clip.pitch))
+    quiet = motion_with(full_clip, noise)
+    verdict = pose_verdict(quiet, 0 * full_clip.pitch, full_clip.station, THRESHOLDS)
+    assert verdict.passed and np.isnan(verdict.pitch_relative_error) and np.isnan(verdict.pitch_correlation)
+
+
+def test_a_car_that_stands_has_no_normalised_progress(full_clip: Clip) -> None:
+    n = len(full_clip.pitch)
+    still = motion_with(
+        full_clip, 0 * full_clip.pitch, progress=np.zeros(n), normalised_path=np.full((n, 3), np.nan)
+    )
+    verdict = pose_verdict(still, np.zeros(n), np.full(n, 7.0), THRESHOLDS)
+    assert verdict.passed and np.isnan(verdict.normalised_progress_rmse)
+    # but a car that should have moved and was seen standing fails, though its figure is NaN
+    moved = pose_verdict(still, np.zeros(n), full_clip.station, replace(THRESHOLDS, progress_rmse_m=None))
+    assert not moved.passed
+
+
+def test_a_frame_without_a_pose_fails_the_clip_unless_a_share_of_them_is_allowed(full_clip: Clip) -> None:
+    n = len(full_clip.pitch)
+    failed = np.arange(n) == 5
+    gap = motion_with(
+        full_clip,
+        np.where(failed, np.nan, full_clip.pitch),
+        failed=failed,
+        failures=("exact: frame 5 has no pose: dark.",),
+    )
+    verdict = pose_verdict(gap, full_clip.pitch, full_clip.station, THRESHOLDS)
+    assert not verdict.passed and verdict.failed_frames == 1 and "frame 5" in verdict.reasons[0]
+    assert np.isfinite(verdict.pitch_rmse_deg)
+    lenient = replace(THRESHOLDS, failed_share=0.1)
+    assert pose_verdict(gap, full_clip.pitch, full_clip.station, lenient).passed
+
+
+def test_telemetry_that_does_not_fit_the_frames_is_refused(full_clip: Clip) -> None:
+    holed = full_clip.station.copy()
+    holed[3] = np.nan
+    with pytest.raises(InputError) as caught:
+        pose_verdict(motion_with(full_clip, full_clip.pitch), full_clip.pitch[:-1], holed, THRESHOLDS)
+    assert len(caught.value.problems) == 2
