@@ -36,8 +36,8 @@ def test_after_the_stop_the_held_value_fades_linearly():
 
 def test_the_reference_is_the_median_of_positive_values_before_the_hold():
     acceleration = stop_with(1.0)
-    acceleration[2300:2400] = 3.0  # speeding up does not count
-    acceleration[2400:2450] = -50.0  # a short peak does not move a median
+    acceleration[2200:2550] = 3.0  # speeding up does not count, however long
+    acceleration[2600:2650] = -50.0  # a short peak does not move a median
     assert brake_pitch_input(acceleration, STEP, 1.0, 3000, **RULE)[2900] == 5.0
 
 

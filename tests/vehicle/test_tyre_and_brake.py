@@ -79,8 +79,8 @@ def test_pressure_ramps_holds_and_falls():
     profile = BrakeCommand(
         peak_pressure_mpa=2.0, ramp_s=0.5, onset_s=1.0, onset_station_m=None, hold_s=1.0, release_s=0.25
     ).profile
-    times = [-0.1, 0.0, 0.25, 0.5, 1.5, 1.625, 1.75, 9.0]
-    assert [brake_pressure(t, profile) for t in times] == [0, 0, 1, 2, 2, 1, 0, 0]
+    times = [-0.1, 0.0, 0.25, 0.5, 1.5, 1.5625, 1.75, 9.0]
+    assert [brake_pressure(t, profile) for t in times] == [0, 0, 1, 2, 2, 1.5, 0, 0]
 
 
 @pytest.mark.parametrize("hold", [None, 1.0])
