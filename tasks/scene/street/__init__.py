@@ -11,7 +11,7 @@ from tasks.scene.street.furniture import furniture, post_boxes
 from tasks.scene.street.layout import StreetLayout
 from tasks.scene.street.light import Casters, lit_radiance
 from tasks.scene.street.pavement import pavement
-from tasks.scene.street.plan import plan_street
+from tasks.scene.street.plan import CROWN_BALLS, plan_street
 from tasks.scene.street.road import road
 from tasks.scene.street.roofs import house_boxes, roofs
 from tasks.scene.street.sky import panorama
@@ -65,12 +65,13 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
     casters = Casters(
         boxes=np.concatenate(boxes),
         footprints=footprints(plan.cars),
-        balls=np.stack([tree.balls for tree in plan.trees]),
+        balls=np.array([tree.balls for tree in plan.trees]).reshape(-1, CROWN_BALLS, 4),
         leaf_extinction=LEAF_EXTINCTION,
     )
     radiance = lit_radiance(surfels, layout, line, casters)
     station = surfels.centre[:, 0]
-    thickness = np.full((len(surfels), 1), THICKNESS)
+    # a disc stays thinner than it is wide, so that its shortest axis is its normal
+    thickness = np.minimum(THICKNESS, 0.5 * surfels.scale.min(axis=1, keepdims=True))
     return Scene(
         name="street",
         gaussians=Gaussians(

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tasks.errors import InputError
+
 EYE_HEIGHT = 1.4
 """Height of the camera the street is sampled for [m]."""
 VIEW_SLOPE = (0.6, 0.4)
@@ -74,6 +76,13 @@ class StreetLayout:
     sun_rgb: tuple[float, float, float] = (1.95, 1.80, 1.56)
     sky_rgb: tuple[float, float, float] = (0.38, 0.46, 0.57)
     bounce_rgb: tuple[float, float, float] = (0.21, 0.19, 0.17)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.crossing_station < self.route_length - self.crossing_length:
+            raise InputError(
+                f"the crossing must lie on the route of {self.route_length:g} m; it is {self.crossing_length:g} m"
+                f" long and begins at crossing_station {self.crossing_station:g} m"
+            )
 
     @property
     def carriageway_left(self) -> float:

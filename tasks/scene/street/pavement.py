@@ -90,15 +90,15 @@ def _slabs(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
     slab = width / rows
     parts = []
     # stretches of like distance share one number of cells per slab
-    stops = [first, -2.0, layout.route_length + 4.0, layout.route_length + 20.0, last]
-    for start, stop in pairwise(stops):
+    end = layout.route_length
+    for start, stop in pairwise(np.unique(np.clip([first, -2.0, end + 4.0, end + 20.0, last], first, last))):
         rng = stream(seed, f"slabs {side} {start:.3f}")
         for row in range(rows):
             middle = inner + side * slab * (row + 0.5)
             depth = float(nearest_depth(layout, start if start >= 0 else min(stop, 0.0) - 1e-9, middle))
             across = int(np.clip(round(slab / (_CELL * PIXEL * depth)), 1, 6))
             along = int(np.clip(round(slab / (3.0 * _CELL * PIXEL * depth)), 1, 3))
-            n = round((stop - start) / slab)
+            n = max(round((stop - start) / slab), 1)
             length = (stop - start) / n
             i, a, b = np.meshgrid(np.arange(n), np.arange(along), np.arange(across), indexing="ij")
             s = start + (i + 0.5 * (row % 2) + (a + 0.5) / along) * length

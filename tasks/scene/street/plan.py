@@ -109,7 +109,10 @@ class Plan:
     lamps: tuple[tuple[float, int], ...]
 
 
+CROWN_BALLS = 26
+"""Balls of leaves of a crown."""
 MODELS = ("hatchback", "saloon", "estate", "van")
+"""Shapes of car."""
 
 
 def plan_street(layout: StreetLayout, seed: int) -> Plan:
@@ -182,7 +185,7 @@ def _row_of_trees(
         crown = _crown(rng, station, lateral, layout)
         girth = float(rng.uniform(0.11, 0.17))
         near_crossing = -9.0 < station - layout.crossing_station < layout.crossing_length + 2.0
-        if rng.random() < 0.12 or near_crossing or np.abs(posts - station).min() < 2.0:
+        if rng.random() < 0.12 or near_crossing or np.abs(posts - station).min(initial=np.inf) < 2.0:
             continue
         number = 2 * len(trees) + (side > 0)
         trees.append(Tree(number=number, station=station, lateral=lateral, girth=girth, balls=crown))
@@ -197,11 +200,10 @@ def _crown(
     base = 2.7 + layout.kerb_height
     middle = np.array([station, lateral, (base + height) / 2 + 0.2])
     half = np.array([radius, radius, (height - base) / 2])
-    n = 26
-    direction = rng.standard_normal((n, 3))
+    direction = rng.standard_normal((CROWN_BALLS, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    reach = rng.uniform(0.25, 1.0, n) ** 0.5
-    size = rng.uniform(0.36, 0.62, n) * (1.25 - 0.45 * reach)
+    reach = rng.uniform(0.25, 1.0, CROWN_BALLS) ** 0.5
+    size = rng.uniform(0.36, 0.62, CROWN_BALLS) * (1.25 - 0.45 * reach)
     centre = middle + direction * half * (reach * 0.78)[:, None]
     return np.concatenate([centre, size[:, None] * radius / 1.5], axis=1)
 

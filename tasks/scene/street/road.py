@@ -13,6 +13,9 @@ from tasks.scene.street.surfels import Surfels, graded_cells, join, tiles
 
 CELL = 6.3
 """Width of an asphalt cell where it is seen closest [px]."""
+_OVERLAP, _OPACITY = 0.8, 0.9
+"""Standard deviation over cell size and peak opacity: wide and a little clear. Where cells are smaller than a
+pixel, opaque ones hide all behind them and the road seems to slide under a moving camera."""
 _STONES = 32.0
 """Single light or dark stones where the road is seen closest [m-2]."""
 _STONE = (0.055, 0.026)
@@ -49,7 +52,8 @@ def road(layout: StreetLayout, seed: int) -> Surfels:
         np.where(
             marked[:, None], paint_albedo(seed, s, d, grain), asphalt_albedo(layout, seed, s, d, width, grain)
         ),
-        overlap=0.74,
+        overlap=_OVERLAP,
+        opacity=_OPACITY,
     )
     return join([surface, _stones(layout, seed)])
 

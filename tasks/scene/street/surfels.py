@@ -47,7 +47,9 @@ class Surfels:
 
 
 def join(parts: Sequence[Surfels]) -> Surfels:
-    """All surfels of the parts, in order."""
+    """All surfels of the parts, in order; none where there are no parts."""
+    nothing = np.empty((0, 3))
+    parts = parts or [tiles(nothing, nothing, nothing, SemanticClass.OTHER, nothing)]
     return Surfels(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Surfels)})
 
 

@@ -47,14 +47,16 @@ def car_boxes(parked: tuple[Car, ...]) -> Floats:
             s = sorted(car.station + car.facing * shape.length * (end - 0.5) for end in (tail, nose))
             half = narrow * shape.width / 2
             boxes.append([[s[0], car.lateral - half, low], [s[1], car.lateral + half, high]])
-    return np.array(boxes)
+    return np.array(boxes).reshape(-1, 2, 3)
 
 
 def footprints(parked: tuple[Car, ...]) -> Floats:
     """Ground under the cars [K, 2, 2]: lowest and highest station and lateral position [m]."""
-    half = np.array([[0.46 * SHAPES[car.model].length, 0.42 * SHAPES[car.model].width] for car in parked])
-    middle = np.array([[car.station, car.lateral] for car in parked])
-    return np.stack([middle - half, middle + half], axis=1)
+    rectangles = []
+    for car in parked:
+        length, width = 0.46 * SHAPES[car.model].length, 0.42 * SHAPES[car.model].width
+        rectangles.append([[car.station + k * length, car.lateral + k * width] for k in (-1, 1)])
+    return np.array(rectangles).reshape(-1, 2, 2)
 
 
 def _placed(layout: StreetLayout, car: Car, seed: int) -> Surfels:

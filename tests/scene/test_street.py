@@ -1,0 +1,173 @@
+"""The built-in street: the same from the same seed, sound as a scene, and whole in the picture."""
+
+from dataclasses import fields
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from catalogs.scenes.street import load_street_layout
+from tasks.conventions import ROAD_CLASSES, SemanticClass
+from tasks.render.gbuffer import GBuffer
+from tasks.render.preparation import PreparedGaussians, rotation_matrices
+from tasks.render.rasteriser import prepare, rasterise
+from tasks.scene.gaussians import check_gaussians
+from tasks.scene.scene import Scene
+from tasks.scene.street import StreetLayout, build_street
+
+WIDTH, HEIGHT = 480, 320
+K = np.array([[400.0, 0, WIDTH / 2], [0, 400.0, HEIGHT / 2], [0, 0, 1]])
+STATIONS = (0.0, 20.0, 60.0, 120.0, 180.0)
+SHORT = StreetLayout(route_length=12.0, behind=5.0, beyond=20.0, crossing_station=4.0)
+
+
+@pytest.fixture(scope="module")
+def street() -> Scene:
+    return build_street()
+
+
+@pytest.fixture(scope="module")
+def prepared(street: Scene) -> PreparedGaussians:
+    return prepare(street.gaussians)
+
+
+def viewmat_at(street: Scene, station: float) -> NDArray[np.float64]:
+    """World to camera, 1.4 m above the road and level."""
+    camera = np.eye(4)
+    camera[:3, :3] = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
+    camera[2, 3] = 1.4
+    rig = street.route.T_world_rig[np.argmin(np.abs(street.route.station - station))]
+    return np.linalg.inv(rig @ camera)
+
+
+def seen(street: Scene, prepared: PreparedGaussians, station: float) -> GBuffer:
+    return rasterise(prepared, viewmat_at(street, station), K, WIDTH, HEIGHT)
+
+
+def every_byte(scene: Scene) -> list[bytes]:
+    arrays = [
+        getattr(scene.gaussians, f.name) for f in fields(scene.gaussians) if f.name != "display_encoded"
+    ]
+    return [a.tobytes() for a in (*arrays, scene.environment, scene.route.station, scene.route.T_world_rig)]
+
+
+def road_coordinates(
+    scene: Scene, points: NDArray[np.floating]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Station and lateral offset of points by the nearest route pose; only for points beside the route."""
+    poses = scene.route.T_world_rig
+    nearest = np.argmin(np.hypot(*(points[:, None, :2] - poses[None, :, :2, 3]).transpose(2, 0, 1)), axis=1)
+    offset = points - poses[nearest, :3, 3]
+    along = np.einsum("ij,ij->i", offset, poses[nearest, :3, 0])
+    return scene.route.station[nearest] + along, np.einsum("ij,ij->i", offset, poses[nearest, :3, 1])
+
+
+def test_bytes_follow_the_seed_alone_whatever_the_global_random_state() -> None:
+    np.random.seed(1)  # noqa: NPY002
+    first = every_byte(build_street(7, SHORT))
+    np.random.seed(2)  # noqa: NPY002
+    again, other = every_byte(build_street(7, SHORT)), every_byte(build_street(8, SHORT))
+    assert first == again
+    means, colours = 0, 4
+    assert first[means] != other[means]
+    assert first[colours] != other[colours]
+
+
+def test_cloud_is_sound_and_of_the_promised_size(street: Scene) -> None:
+    check_gaussians(street.gaussians)
+    assert 200_000 <= len(street.gaussians) <= 500_000
+    assert not street.gaussians.display_encoded
+    assert street.gaussians.sh.shape[1] == 1
+
+
+def test_every_class_is_present(street: Scene) -> None:
+    share = np.bincount(street.gaussians.class_id, minlength=len(SemanticClass)) / len(street.gaussians)
+    assert share[SemanticClass.SKY] == 0
+    assert (share[1:] > 0.001).all()
+    assert 0.25 < share[list(ROAD_CLASSES)].sum() < 0.6
+
+
+def test_road_is_the_plane_of_height_zero_facing_up(street: Scene) -> None:
+    road = np.isin(street.gaussians.class_id, ROAD_CLASSES)
+    assert (street.gaussians.means[road, 2] == 0).all()
+    assert np.allclose(street.gaussians.normals[road], [0, 0, 1], atol=1e-6)
+
+
+def test_normal_is_the_shortest_axis_everywhere(street: Scene) -> None:
+    g = street.gaussians
+    axis = rotation_matrices(g.quats_wxyz)[np.arange(len(g)), :, np.argmin(g.scales, axis=1)]
+    assert np.abs(np.einsum("ij,ij->i", axis, g.normals)).min() > 1 - 1e-5
+
+
+def test_route_lies_inside_the_carriageway_and_nothing_else_is_road(street: Scene) -> None:
+    assert street.carriageway_right < 0 < street.carriageway_left
+    assert street.route.length >= 180
+    assert (np.diff(street.route.station) > 0).all()
+    road = np.isin(street.gaussians.class_id, ROAD_CLASSES)
+    sample = street.gaussians.means[road][::37].astype(np.float64)
+    station, lateral = road_coordinates(street, sample)
+    beside = (station > 0) & (station < street.route.length)
+    assert beside.sum() > 1000
+    assert lateral[beside].min() > street.carriageway_right
+    assert lateral[beside].max() < street.carriageway_left
+    # the asphalt reaches both kerbs
+    assert lateral[beside].min() < street.carriageway_right + 0.3
+    assert lateral[beside].max() > street.carriageway_left - 0.6
+
+
+def test_centre_line_is_dashed_one_third(street: Scene) -> None:
+    layout = StreetLayout()
+    marking = street.gaussians.class_id == SemanticClass.MARKING
+    station, lateral = road_coordinates(street, street.gaussians.means[marking].astype(np.float64))
+    clear = (station > layout.crossing_station + 8) & (station < 170)
+    centre = clear & (np.abs(lateral - layout.lane_width / 2) < layout.marking_width / 2)
+    bins = np.unique(np.floor(station[centre] / 0.5))
+    phase = (station[centre] % (layout.dash_length + layout.dash_gap)) < layout.dash_length + 0.01
+    assert phase.mean() > 0.99
+    cells = (170 - layout.crossing_station - 8) / 0.5
+    assert len(bins) / cells == pytest.approx(1 / 3, abs=0.04)
+
+
+@pytest.mark.parametrize("station", STATIONS)
+def test_frame_has_no_holes(street: Scene, prepared: PreparedGaussians, station: float) -> None:
+    frame = seen(street, prepared, station)
+    road = np.isin(frame.class_id, ROAD_CLASSES)
+    assert road.mean() > 0.25
+    assert frame.alpha[road].min() > 0.97
+    assert (frame.alpha[road] > 0.98).mean() > 0.9995
+    below = frame.class_id[HEIGHT // 2 + 6 :]
+    assert (below == SemanticClass.SKY).mean() < 0.001
+
+
+@pytest.mark.parametrize("station", STATIONS)
+def test_exposure_is_balanced(street: Scene, prepared: PreparedGaussians, station: float) -> None:
+    frame = seen(street, prepared, station)
+    assert (frame.rgb > 1).any(axis=-1).mean() < 0.01
+    assert 0.08 < frame.rgb[frame.alpha > 0.5].mean() < 0.35
+    road = frame.class_id == SemanticClass.ROAD
+    assert 0.03 < np.median(frame.rgb[road]) < 0.25
+
+
+def test_seen_road_lies_where_the_plane_is(street: Scene, prepared: PreparedGaussians) -> None:
+    frame = seen(street, prepared, 40.0)
+    rows = np.arange(HEIGHT) + 0.5
+    near = np.isin(frame.class_id, ROAD_CLASSES) & (rows > HEIGHT / 2 + 30)[:, None]
+    plane = 1.4 * 400 / (rows - HEIGHT / 2)
+    error = np.abs(frame.depth / plane[:, None] - 1)[near]
+    assert np.median(error) < 0.01
+    assert np.percentile(error, 99) < 0.05
+
+
+def test_road_has_corners_to_track(street: Scene, prepared: PreparedGaussians) -> None:
+    frame = seen(street, prepared, 100.0)
+    grey = np.clip(255 * np.clip(frame.rgb.mean(axis=-1), 0, 1) ** (1 / 2.2), 0, 255).astype(np.uint8)
+    asphalt = np.where(frame.class_id == SemanticClass.ROAD, 255, 0).astype(np.uint8)
+    asphalt = cv2.erode(asphalt, np.ones((9, 9), np.uint8))
+    corners = cv2.goodFeaturesToTrack(grey, 500, 0.05, 8, mask=asphalt)
+    assert corners is not None
+    assert len(corners) > 60
+
+
+def test_catalogue_holds_the_default_layout() -> None:
+    assert load_street_layout() == StreetLayout()

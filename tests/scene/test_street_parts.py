@@ -1,0 +1,169 @@
+"""The street's parts one by one: course, cells, light, sky and the reach of the view."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tasks.conventions import SemanticClass
+from tasks.errors import InputError
+from tasks.scene.street.bend import course, route
+from tasks.scene.street.layout import StreetLayout, nearest_depth
+from tasks.scene.street.light import Casters, lit_radiance, sky_share, sun_direction
+from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.plan import plan_street
+from tasks.scene.street.sky import panorama
+from tasks.scene.street.surfels import Surfels, box, graded_cells, panel, tube
+
+LAYOUT = StreetLayout()
+OPEN = Casters(
+    boxes=np.zeros((0, 2, 3)), balls=np.zeros((0, 1, 4)), footprints=np.zeros((0, 2, 2)), leaf_extinction=0.9
+)
+
+
+def white_floor() -> Surfels:
+    """A white square metre on the lane's middle, facing up."""
+    return panel([0, -0.5, 0], [1, 0, 0], [0, 1, 0], 1.0, SemanticClass.ROAD, [1.0, 1.0, 1.0])
+
+
+def test_course_has_unit_speed_and_the_bend_its_radius() -> None:
+    poses, station = route(LAYOUT, course(LAYOUT)).T_world_rig, route(LAYOUT, course(LAYOUT)).station
+    step = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+    assert np.allclose(step, np.diff(station), rtol=1e-6)
+    assert np.allclose(poses[station <= LAYOUT.bend_start, :3, :3], np.eye(3), atol=1e-12)
+    heading = np.unwrap(np.arctan2(poses[:, 1, 0], poses[:, 0, 0]))
+    curvature = np.gradient(heading, station)
+    bent = (station > LAYOUT.bend_start + LAYOUT.bend_transition + 1) & (station < LAYOUT.route_length - 1)
+    assert np.allclose(1 / curvature[bent], LAYOUT.bend_radius, rtol=1e-4)
+
+
+def test_world_position_keeps_the_lateral_offset() -> None:
+    line = course(LAYOUT)
+    s = np.linspace(0, LAYOUT.route_length, 50)
+    left = line.to_world(np.stack([s, np.full(50, 3.0), np.full(50, 0.7)], axis=1))
+    middle = line.to_world(np.stack([s, np.zeros(50), np.zeros(50)], axis=1))
+    assert np.allclose(np.linalg.norm((left - middle)[:, :2], axis=1), 3.0)
+    assert np.allclose(left[:, 2], 0.7)
+    across = np.cross(line.directions(s, np.tile([1.0, 0, 0], (50, 1))), left - middle)
+    assert (across[:, 2] > 0).all()
+
+
+@pytest.mark.parametrize("fine", [0.4, 1.0])
+def test_cells_tile_each_interval_and_keep_its_edges(fine: float) -> None:
+    breaks = [-1.0, 0.0, 0.15, 2.0]
+    centre, width, interval = graded_cells(breaks, [0.3, 0.1, 0.25], fine)
+    edges = np.concatenate([[breaks[0]], breaks[0] + np.cumsum(width)])
+    assert np.allclose((edges[1:] + edges[:-1]) / 2, centre)
+    assert np.abs(edges[:, None] - breaks).min(axis=0).max() < 1e-12
+    assert (width <= 1.2501 * np.array([0.3, 0.1, 0.25])[interval]).all()
+    assert (np.diff(interval) >= 0).all()
+
+
+def test_cells_are_finer_beside_an_edge() -> None:
+    _, width, _ = graded_cells([0.0, 4.0], 0.8, 0.25)
+    assert width[0] == width[-1] == width.min() <= 1.25 * 0.25 * 0.8
+    assert width.max() > 2 * width.min()
+
+
+def test_box_and_tube_face_outward() -> None:
+    block = box([0, 0, 0], [1, 2, 3], 0.5, SemanticClass.OTHER, [0.5, 0.5, 0.5])
+    assert (np.einsum("ij,ij->i", block.axes[:, 2], block.centre - [0.5, 1.0, 1.5]) > 0).all()
+    pole = tube(np.linspace(0, 1, 5)[:, None] * [0, 0, 3.0], 0.1, 8, SemanticClass.POLE, [0.5, 0.5, 0.5])
+    outward = pole.centre * [1, 1, 0]
+    assert (np.einsum("ij,ij->i", pole.axes[:, 2], outward) > 0).all()
+
+
+def test_sky_share_in_mid_street_is_the_closed_form() -> None:
+    # Oke 1987, Boundary Layer Climates: the floor's middle sees cos(arctan(2 H / W)) of the sky
+    width = LAYOUT.front(1) - LAYOUT.front(-1)
+    middle = np.array([[50.0, (LAYOUT.front(1) + LAYOUT.front(-1)) / 2, 0.0]])
+    share = sky_share(middle, np.array([[0.0, 0.0, 1.0]]), LAYOUT)
+    assert share[0] == pytest.approx(np.cos(np.arctan(2 * 12.0 / width)), rel=1e-9)
+
+
+def test_sky_share_above_the_roofs_is_whole_and_half() -> None:
+    high = np.array([[50.0, 0.0, 30.0]] * 3)
+    normals = np.array([[0.0, 0, 1], [0, 1, 0], [0, 0, -1]])
+    assert np.allclose(sky_share(high, normals, LAYOUT), [1.0, 0.5, 0.0], atol=1e-9)
+
+
+def test_open_floor_is_lit_by_lamberts_law_and_loses_the_sun_under_a_roof() -> None:
+    line, floor = course(LAYOUT), white_floor()
+    lit = lit_radiance(floor, LAYOUT, line, OPEN)[0]
+    roof = np.array([[[-30.0, -30.0, 8.0], [30.0, 30.0, 9.0]]])
+    shaded = lit_radiance(floor, LAYOUT, line, replace(OPEN, boxes=roof))[0]
+    sun = sun_direction(LAYOUT)[2] * np.array(LAYOUT.sun_rgb)
+    assert np.allclose(lit - shaded, sun, rtol=1e-12)
+    assert (shaded > 0.1).all()
+
+
+def test_leaves_dim_the_sun_by_the_length_of_the_path_through_them() -> None:
+    line, floor = course(LAYOUT), white_floor()
+    on_the_way = floor.centre[0] + 10 * sun_direction(LAYOUT)
+    ball = np.array([[[*on_the_way, 1.5]]])
+    sunless = lit_radiance(floor, replace(LAYOUT, sun_rgb=(0.0, 0.0, 0.0)), line, OPEN)
+    full = lit_radiance(floor, LAYOUT, line, OPEN) - sunless
+    dimmed = lit_radiance(floor, LAYOUT, line, replace(OPEN, balls=ball)) - sunless
+    assert np.allclose(dimmed / full, np.exp(-0.9 * 3.0), rtol=1e-3)
+
+
+def test_parked_car_darkens_the_ground_beside_it() -> None:
+    line, floor = course(LAYOUT), white_floor()
+    beside = replace(OPEN, footprints=np.array([[[-2.0, 0.6], [3.0, 2.4]]]))
+    assert (lit_radiance(floor, LAYOUT, line, beside) < lit_radiance(floor, LAYOUT, line, OPEN)).all()
+
+
+def test_crossing_beyond_the_route_is_refused() -> None:
+    with pytest.raises(InputError, match="crossing must lie on the route of 30 m"):
+        StreetLayout(route_length=30.0)
+
+
+def test_nearest_depth_is_where_the_point_enters_the_picture() -> None:
+    # half the picture is 0.6 wide and 0.4 high at unit depth; the eye is 1.4 m above the road
+    assert nearest_depth(LAYOUT, 50.0, 0.0) == pytest.approx(3.5)
+    assert nearest_depth(LAYOUT, 50.0, -6.0) == pytest.approx(10.0)
+    assert nearest_depth(LAYOUT, 50.0, 0.0, 9.4) == pytest.approx(20.0)
+    assert nearest_depth(LAYOUT, LAYOUT.route_length + 40, 1.0) == pytest.approx(40.0)
+
+
+def test_brightest_sky_is_where_the_sun_stands() -> None:
+    picture = panorama(LAYOUT, 2025)
+    height, width = picture.shape[:2]
+    row, column = np.unravel_index(np.argmax(picture.sum(axis=2)), (height, width))
+    elevation = 90 - (row + 0.5) / height * 180
+    azimuth = 180 - (column + 0.5) / width * 360
+    assert elevation == pytest.approx(LAYOUT.sun_elevation_deg, abs=1)
+    assert azimuth == pytest.approx(LAYOUT.sun_azimuth_deg, abs=1)
+
+
+def test_panorama_closes_on_itself() -> None:
+    picture = panorama(LAYOUT, 2025)
+    seam = np.abs(picture[:500, 0] - picture[:500, -1]).mean()
+    beside = np.abs(picture[:500, 1] - picture[:500, 0]).mean()
+    assert seam < 3 * beside + 1e-3
+
+
+def test_named_streams_are_independent_and_noise_is_smooth() -> None:
+    assert not np.array_equal(stream(1, "a").random(4), stream(1, "b").random(4))
+    assert np.array_equal(stream(1, "a").random(4), stream(1, "a").random(4))
+    x = np.linspace(0, 500, 40_001)
+    noise = fractal_noise(stream(1, "a"), x, 0.3 * x, 2.0, 3)
+    assert abs(noise.mean()) < 0.2
+    assert noise.std() == pytest.approx(1.0, abs=0.25)
+    assert np.abs(np.diff(noise)).max() < 0.2
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2025])
+def test_nothing_that_stands_is_on_the_lanes(seed: int) -> None:
+    plan = plan_street(LAYOUT, seed)
+    for tree in plan.trees:
+        assert tree.lateral > LAYOUT.carriageway_left or tree.lateral < LAYOUT.carriageway_right
+    for car in plan.cars:
+        assert car.lateral - 1.0 > 1.5 * LAYOUT.lane_width or car.lateral + 1.0 < -LAYOUT.lane_width / 2
+        reach = (car.station - 2.5, car.station + 2.5)
+        assert (
+            reach[1] < LAYOUT.crossing_station or reach[0] > LAYOUT.crossing_station + LAYOUT.crossing_length
+        )
+    for side in (-1, 1):
+        on_side = sorted(car.station for car in plan.cars if car.lateral * side > 0)
+        assert np.diff(on_side).min() > 5.0
