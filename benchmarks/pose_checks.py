@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.synthetic_street import Clip, drive_clip
 from tasks.eval.motion import RecoveredMotion
 from tasks.eval.pose_essential import recover_motion_essential
 from tasks.eval.pose_photometric import recover_motion_photometric
 from tasks.eval.pose_pnp import recover_motion_pnp
-from tests.eval.synthetic_street import Clip, drive_clip
 
 PITCH_LIMITS_DEG = {"pnp": 0.04, "photometric": 0.02, "essential": 0.06}
 """Pitch RMSE allowed in clear weather [deg]."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from benchmarks.synthetic_street import Clip
 from tasks.eval.motion import RecoveredMotion
-from tests.eval.synthetic_street import Clip
 
 
 def pitch_rmse_deg(recovered: RecoveredMotion, clip: Clip) -> float:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from benchmarks.synthetic_street import camera_matrix, mount
 from tasks.eval.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
 from tasks.eval.rigid import (
     adjoint,
@@ -18,7 +19,6 @@ from tasks.eval.rigid import (
 )
 from tasks.eval.solve_pnp import solve_pnp
 from tasks.eval.warp import bilinear_taps, view_from, warp_map
-from tests.eval.synthetic_street import camera_matrix, mount
 
 K = camera_matrix()
 MOTION = pose_from_twist(np.array([0.03, -0.05, -0.9, 0.01, -0.02, 0.005]))

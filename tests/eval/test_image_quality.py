@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.synthetic_street import Clip
 from tasks.errors import InputError
 from tasks.eval.image_quality import psnr, ssim
-from tests.eval.synthetic_street import Clip
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.synthetic_street import hump_drive, mount, rig_poses
 from tasks.eval.motion import MAX_GAP, FrameStep, Placement, failed_step, integrate_motion, place_frames
 from tasks.eval.rigid import invert_pose
-from tests.eval.synthetic_street import hump_drive, mount, rig_poses
 
 
 def exact_steps(

@@ -6,12 +6,12 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from benchmarks.synthetic_street import Clip
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
 from tasks.eval.pose_photometric import recover_motion_photometric
 from tasks.eval.pose_pnp import recover_motion_pnp
 from tests.eval.scoring import pitch_rmse_deg, progress_rmse
-from tests.eval.synthetic_street import Clip
 from tests.eval.weathering import faded, jpeg_coded, with_flakes, with_noise
 
 Check = Callable[..., RecoveredMotion]

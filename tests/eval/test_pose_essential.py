@@ -5,11 +5,11 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from benchmarks.synthetic_street import Clip, drive_clip
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
 from tasks.eval.pose_essential import recover_motion_essential
 from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg
-from tests.eval.synthetic_street import Clip, drive_clip
 from tests.eval.weathering import faded, jpeg_coded, with_flakes
 
 

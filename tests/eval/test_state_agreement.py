@@ -222,7 +222,7 @@ def test_every_reference_trace_agrees_with_itself_over_the_window_it_has(outside
             stopping_distance=case["stopping_distance_m"],
         )  # fmt: skip
         scored = case_agreement(reference, model, facts, 0.0)
-        assert scored.speed_rmse_m_s < 1e-9 and scored.pitch_rmse_deg < 1e-9
+        assert scored.speed_rmse_m_s < 1e-9 and scored.pitch_rmse_deg < 1e-6
         assert scored.event_error < 1e-3, case["case"]
         assert scored.kind == case["case"].split("-")[0]
         assert bool(scored.note) == (
