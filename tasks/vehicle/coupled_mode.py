@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.brake import PressureProfile, brake_pressure, onset_by_position
-from tasks.vehicle.half_car import HalfCarState, half_car_rates, moved
+from tasks.vehicle.half_car import HalfCar, HalfCarState, half_car_rates, moved
 from tasks.vehicle.history import History
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 from tasks.vehicle.ports import Chassis, Motion, Ports, chassis_of, ports_at
@@ -52,6 +52,27 @@ def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis)
         ports.acceleration,
         (wheels.radius * ports.front.tyre_force - ports.front.brake_torque) / wheels.front.inertia,
         (wheels.radius * ports.rear.tyre_force - ports.rear.brake_torque) / wheels.rear.inertia,
+    )
+
+
+@njit(cache=True, nogil=True)
+def body_rates(x: HalfCarState, ports: Ports, body: HalfCar) -> HalfCarState:
+    """Rate of the half-car state under the ports (paper, Eq. app_half_car_complete).
+
+    Parameters
+    ----------
+    x : half-car state [m, rad, m/s, rad/s]
+    ports : what acts in it
+    body : the half-car
+    """
+    return half_car_rates(
+        x,
+        ports.front.ground.load,
+        ports.rear.ground.load,
+        ports.front.suspension_force,
+        ports.rear.suspension_force,
+        ports.pitch_moment,
+        body,
     )
 
 
@@ -105,9 +126,9 @@ def drive_coupled(
             f, r = ports.front, ports.rear
             log[n // per_tick] = (
                 motion.station, motion.speed, ports.acceleration, f.slip, r.slip, motion.omega_f, motion.omega_r,
-                f.tyre_force, r.tyre_force, f.load, r.load, f.brake_torque, r.brake_torque, f.abs_scale,
-                r.abs_scale, pressure, ports.road_force, x[0], x[1], x[2], x[3], x[4], x[5], f.road_height,
-                r.road_height,
+                f.tyre_force, r.tyre_force, f.ground.load, r.ground.load, f.brake_torque, r.brake_torque, f.abs_scale,
+                r.abs_scale, pressure, ports.road_force, x[0], x[1], x[2], x[3], x[4], x[5], f.ground.height,
+                r.ground.height,
             )  # fmt: skip
         if n == steps:
             break
@@ -157,10 +178,7 @@ def coupled_step(
     if held:
         front, rear = without_speed(front), without_speed(rear)
     k1 = solve_slip(motion_rates(motion, ports, standing, chassis), front, rear, GAMMA * step)
-    h1 = half_car_rates(
-        x, ports.front.load, ports.rear.load, ports.front.suspension_force, ports.rear.suspension_force,
-        ports.pitch_moment, body,
-    )  # fmt: skip
+    h1 = body_rates(x, ports, body)
     ahead = Motion(
         motion.station + step * k1.station,
         motion.speed + step * k1.speed,
@@ -180,10 +198,7 @@ def coupled_step(
         f2.omega_r - 2.0 * k1.omega_r,
     )
     k2 = solve_slip(rest, front, rear, GAMMA * step)
-    h2 = half_car_rates(
-        x_ahead, later.front.load, later.rear.load, later.front.suspension_force, later.rear.suspension_force,
-        later.pitch_moment, body,
-    )  # fmt: skip
+    h2 = body_rates(x_ahead, later, body)
     after = Motion(
         motion.station + step * (1.5 * k1.station + 0.5 * k2.station),
         motion.speed + step * (1.5 * k1.speed + 0.5 * k2.speed),

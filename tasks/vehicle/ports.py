@@ -57,14 +57,20 @@ class Motion(NamedTuple):
     omega_r: float
 
 
+class Ground(NamedTuple):
+    """Road height [m] and slope [m/m] under an axle, and its contact load, never negative [N]."""
+
+    height: float
+    slope: float
+    load: float
+
+
 class AxlePorts(NamedTuple):
     """What acts at one axle.
 
     Parameters
     ----------
-    road_height : under the axle [m]
-    road_slope : under the axle [m/m]
-    load : contact load, never negative [N]
+    ground : road and load
     slip : signed braking slip; negative where the tyre drives the vehicle [1]
     tyre_force : braking force at the contact, rearward positive [N]
     abs_scale : share of the brake torque let through [1]
@@ -72,9 +78,7 @@ class AxlePorts(NamedTuple):
     suspension_force : spring and damper [N]
     """
 
-    road_height: float
-    road_slope: float
-    load: float
+    ground: Ground
     slip: float
     tyre_force: float
     abs_scale: float
@@ -140,85 +144,72 @@ def lock_share(omega: float, lock_speed: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def axle_ports(
-    station: float,
-    speed: float,
-    omega: float,
-    unsprung_height: float,
-    suspension_force: float,
-    pressure: float,
-    scale: float,
-    step: float,
-    stiffness: float,
-    static_load: float,
-    axle: Axle,
-    chassis: Chassis,
-    tyre: TyreCurve,
-    road: RoadFeature,
-) -> AxlePorts:
-    """Road, load, slip, tyre force and brake torque of one axle.
+def ground_at(
+    station: float, unsprung_height: float, stiffness: float, static_load: float, road: RoadFeature
+) -> Ground:
+    """Road and load under one axle.
 
     Parameters
     ----------
     station : of the axle [m]
-    speed : [m/s]
-    omega : wheel speed [rad/s]
     unsprung_height : [m]
-    suspension_force : [N]
-    pressure : brake pressure [MPa]
-    scale : ABS scale one step before, from which its rate is limited [1]
-    step : [s]
     stiffness : of the tyre [N/m]
     static_load : half-car's load at rest [N]
-    axle, chassis, tyre, road : the values
+    road : the feature
     """
-    wheels = chassis.wheels
-    road_height = height_at(station, road)
-    load = contact_load(road_height, unsprung_height, stiffness, static_load)
-    slip = signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
-    tyre_force = signed_friction(slip, tyre) * load
-    wanted = abs_command(slip, tyre.target_slip, wheels.release_width)
-    abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
-    brake_torque = axle.brake_gain * pressure * abs_scale * lock_share(omega, chassis.lock_speed)
-    return AxlePorts(
-        road_height,
-        slope_at(station, road),
-        load,
-        slip,
-        tyre_force,
-        abs_scale,
-        brake_torque,
-        suspension_force,
+    height = height_at(station, road)
+    return Ground(
+        height, slope_at(station, road), contact_load(height, unsprung_height, stiffness, static_load)
     )
 
 
 @njit(cache=True, nogil=True)
-def standing_axle(
-    station: float,
-    unsprung_height: float,
+def rolling_axle(
+    ground: Ground,
+    speed: float,
+    omega: float,
     suspension_force: float,
-    stiffness: float,
-    static_load: float,
-    wheels: Wheels,
-    road: RoadFeature,
+    pressure: float,
+    scale: float,
+    step: float,
+    axle: Axle,
+    chassis: Chassis,
+    tyre: TyreCurve,
 ) -> AxlePorts:
+    """Slip, tyre force and brake torque of one axle.
+
+    Parameters
+    ----------
+    ground : road and load under it
+    speed : [m/s]
+    omega : wheel speed [rad/s]
+    suspension_force : [N]
+    pressure : brake pressure [MPa]
+    scale : ABS scale one step before, from which its rate is limited [1]
+    step : [s]
+    axle, chassis, tyre : the values
+    """
+    wheels = chassis.wheels
+    slip = signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
+    tyre_force = signed_friction(slip, tyre) * ground.load
+    wanted = abs_command(slip, tyre.target_slip, wheels.release_width)
+    abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
+    brake_torque = axle.brake_gain * pressure * abs_scale * lock_share(omega, chassis.lock_speed)
+    return AxlePorts(ground, slip, tyre_force, abs_scale, brake_torque, suspension_force)
+
+
+@njit(cache=True, nogil=True)
+def standing_axle(ground: Ground, suspension_force: float, wheels: Wheels) -> AxlePorts:
     """The ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 
     Parameters
     ----------
-    station : of the axle [m]
-    unsprung_height : [m]
+    ground : road and load under it
     suspension_force : [N]
-    stiffness : of the tyre [N/m]
-    static_load : half-car's load at rest [N]
-    wheels, road : the values
+    wheels : the values
     """
-    road_height, slope = height_at(station, road), slope_at(station, road)
-    load = contact_load(road_height, unsprung_height, stiffness, static_load)
-    tyre_force = -load * slope
-    return AxlePorts(
-        road_height, slope, load, 0.0, tyre_force, 1.0, wheels.radius * tyre_force, suspension_force
-    )
+    tyre_force = -ground.load * ground.slope
+    return AxlePorts(ground, 0.0, tyre_force, 1.0, wheels.radius * tyre_force, suspension_force)
 
 
 @njit(cache=True, nogil=True)
@@ -252,21 +243,22 @@ def ports_at(
     chassis, tyre, road : the values
     """
     body, wheels = chassis.body, chassis.wheels
-    rear_station = motion.station - wheels.wheelbase
+    ground_f = ground_at(motion.station, x[2], body.tyre_f, body.static_f, road)
+    ground_r = ground_at(motion.station - wheels.wheelbase, x[3], body.tyre_r, body.static_r, road)
     suspension_f, suspension_r = suspension_forces(x, body)
     if standing:
-        front = standing_axle(motion.station, x[2], suspension_f, body.tyre_f, body.static_f, wheels, road)
-        rear = standing_axle(rear_station, x[3], suspension_r, body.tyre_r, body.static_r, wheels, road)
+        front = standing_axle(ground_f, suspension_f, wheels)
+        rear = standing_axle(ground_r, suspension_r, wheels)
     else:
-        front = axle_ports(
-            motion.station, motion.speed, motion.omega_f, x[2], suspension_f, pressure, scale_f, step,
-            body.tyre_f, body.static_f, wheels.front, chassis, tyre, road,
+        front = rolling_axle(
+            ground_f, motion.speed, motion.omega_f, suspension_f, pressure, scale_f, step,
+            wheels.front, chassis, tyre,
         )  # fmt: skip
-        rear = axle_ports(
-            rear_station, motion.speed, motion.omega_r, x[3], suspension_r, pressure, scale_r, step,
-            body.tyre_r, body.static_r, wheels.rear, chassis, tyre, road,
+        rear = rolling_axle(
+            ground_r, motion.speed, motion.omega_r, suspension_r, pressure, scale_r, step,
+            wheels.rear, chassis, tyre,
         )  # fmt: skip
-    slope_f, slope_r = front.load * front.road_slope, rear.load * rear.road_slope
+    slope_f, slope_r = ground_f.load * ground_f.slope, ground_r.load * ground_r.slope
     drag = wheels.mass * wheels.coast
     acceleration = 0.0
     if not (standing or held):

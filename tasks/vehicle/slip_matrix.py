@@ -56,7 +56,7 @@ def axle_slope(
     full_torque = axle.brake_gain * pressure
     force, torque, locking = 0.0, 0.0, 0.0
     if abs(ports.slip) < 1.0:
-        force = tyre_slope(abs(ports.slip), tyre) * ports.load
+        force = tyre_slope(abs(ports.slip), tyre) * ports.ground.load
         if 0.0 < ports.abs_scale < 1.0:
             share = lock_share(omega, chassis.lock_speed)
             torque = -full_torque * share / (wheels.release_width * tyre.target_slip)

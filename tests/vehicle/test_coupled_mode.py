@@ -9,8 +9,7 @@ from scipy.integrate import solve_ivp
 
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle import reference
-from tasks.vehicle.coupled_mode import motion_rates
-from tasks.vehicle.half_car import half_car_rates
+from tasks.vehicle.coupled_mode import body_rates, motion_rates
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.ports import Motion, chassis_of, ports_at
 from tasks.vehicle.road import road_feature
@@ -52,10 +51,7 @@ def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
             road_feature(HUMP),
         )
         rates = motion_rates(motion, ports, False, chassis)
-        body = half_car_rates(
-            tuple(x), ports.front.load, ports.rear.load, ports.front.suspension_force,
-            ports.rear.suspension_force, ports.pitch_moment, chassis.body,
-        )  # fmt: skip
+        body = body_rates(tuple(x), ports, chassis.body)
         twin = reference.coupled_rates(
             np.array([speed, station, *omega, *x]), pressure, vehicle, "rain", response, HUMP
         )
