@@ -138,6 +138,18 @@ def bench(
     _show(_call("bench", False, name, out=out), as_json)
 
 
+@app.command("import-measurements")
+def import_measurements(
+    source: Annotated[str, typer.Argument(help="CSV, Parquet or MDF4 file, or a folder of them.")],
+    map: Annotated[str, typer.Option(help="Channel map: YAML file, or the name of one that ships.")],
+    out: Annotated[str, typer.Option(help="Campaign folder to make.")],
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Make a campaign folder of measured recordings, or say what is wrong in which run and channel."""
+    _show(_call("import_measurements", prefect, source, map=map, out=out), as_json)
+
+
 @scene_app.command("from-stereo")
 def scene_from_stereo(
     folder: Annotated[str, typer.Argument(help="calib.txt, poses.txt, image_l/, image_r/.")],
@@ -183,6 +195,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
     module = {
         "generate": "generate", "audit": "audit", "describe": "describe", "validate": "describe",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
+        "import_measurements": "importing",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

@@ -27,6 +27,7 @@ from prefect import flow  # noqa: E402  (reads the environment when it is import
 from flows import audit as _audit  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import generate as _generate  # noqa: E402
+from flows import importing as _importing  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
 from flows import scenes as _scenes  # noqa: E402
 from flows import studies as _studies  # noqa: E402
@@ -47,3 +48,4 @@ sensitivity = as_flow(_studies.sensitivity)
 agreement = as_flow(_studies.agreement)
 scene_from_stereo = as_flow(_reconstruction.scene_from_stereo)
 scene_import = as_flow(_scenes.scene_import)
+import_measurements = as_flow(_importing.import_measurements)

@@ -1,0 +1,221 @@
+"""Measured recordings become a campaign folder: campaign.yaml, runs.csv and runs/*.parquet."""
+
+import csv
+import io
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import yaml
+
+from catalogs.channel_maps import ChannelMap, Conditions, SegmentEntry, load_channel_map
+from catalogs.recordings import read_signals, recording_files
+from flows.store.layout import write_atomically, write_json
+from flows.store.telemetry import write_parquet
+from manifests.canonical import sha256_of_file
+from tasks.errors import InputError
+from tasks.recordings.assembly import Assembled, assemble_run
+from tasks.recordings.channels import CHANNELS_BY_NAME
+from tasks.recordings.episodes import pressure_episodes
+from tasks.recordings.signals import Signal, as_channel
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedRun:
+    """A stretch of one file that becomes a run; infinite times mean all there is [s]."""
+
+    name: str
+    file: Path
+    start: float
+    end: float
+    part: str
+    conditions: Conditions
+
+
+def import_measurements(source: str, *, map: str, out: str) -> dict[str, Any]:
+    """Read recordings through a channel map and write a campaign folder.
+
+    Parameters
+    ----------
+    source : a CSV, Parquet or MDF4 file, or a folder of them
+    map : channel map by name or YAML file
+    out : campaign folder to make; new or empty
+
+    Returns
+    -------
+    What was made: ``campaign``, ``runs[]``, ``train``, ``held_out``, ``channels``, ``not_measured``, ``sources``.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of every run and channel; then nothing is written.
+    """
+    folder = Path(out)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(
+            f"{folder}: a campaign is made in a new or empty folder; this one holds other things"
+        )
+    channel_map, map_file = load_channel_map(map)
+    recordings = _read_all(recording_files(Path(source), channel_map), channel_map)
+    planned = planned_runs(channel_map, recordings)
+    made = [
+        (
+            run,
+            assemble_run(
+                recordings[run.file], channel_map.rules, run.start, run.end, channel_map.sample_rate_hz
+            ),
+        )
+        for run in planned
+    ]
+    problems = [
+        f"{run.name} ({run.file.name}): {problem}" for run, found in made for problem in found.problems
+    ]
+    if problems:
+        raise InputError(problems)
+    sources = {file.name: sha256_of_file(file) for file in recordings}
+    return write_campaign(folder, channel_map, made, sources, sha256_of_file(map_file))
+
+
+def planned_runs(channel_map: ChannelMap, recordings: dict[Path, dict[str, Signal]]) -> list[PlannedRun]:
+    """The runs that a map asks for: as it lists them, one per brake application, or one per file.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    by_name = {file.name: file for file in recordings}
+    runs = [
+        PlannedRun(
+            name=run.name,
+            file=by_name[Path(run.file).name],
+            start=-inf if run.from_s is None else run.from_s,
+            end=inf if run.to_s is None else run.to_s,
+            part=run.part,
+            conditions=channel_map.conditions_of(run),
+        )
+        for run in channel_map.runs
+    ]
+    if not runs and channel_map.segment is None:
+        runs = [
+            PlannedRun(
+                name=file.stem,
+                file=file,
+                start=-inf,
+                end=inf,
+                part="train",
+                conditions=channel_map.conditions,
+            )
+            for file in recordings
+        ]
+    if channel_map.segment is not None:
+        runs = _segmented(channel_map, channel_map.segment, recordings)
+    if not runs:
+        raise InputError("the map's segment finds no brake application: lower above_mpa or minimum_s")
+    return runs
+
+
+def write_campaign(
+    folder: Path,
+    channel_map: ChannelMap,
+    made: list[tuple[PlannedRun, Assembled]],
+    sources: dict[str, str],
+    map_hash: str,
+) -> dict[str, Any]:
+    """Write the folder and say what is in it; campaign.yaml comes last, so that it marks a whole campaign."""
+    rate = channel_map.sample_rate_hz
+    split = {part: [run.name for run, _ in made if run.part == part] for part in ("train", "held_out")}
+    table = io.StringIO()
+    writer = csv.DictWriter(table, ["run", *Conditions.model_fields, "drive", "start_s"], lineterminator="\n")
+    writer.writeheader()
+    for run, found in made:
+        row = {"run": run.name, "drive": run.file.stem, "start_s": f"{found.start:.6f}"}
+        writer.writerow(row | run.conditions.model_dump())
+        write_parquet(run_table(found.columns, rate), folder / "runs" / f"{run.name}.parquet")
+    write_atomically(folder / "runs.csv", table.getvalue().encode())
+    header = {
+        "campaign": channel_map.campaign,
+        "vehicle": channel_map.vehicle,
+        "sample_rate_hz": rate,
+        "split": split,
+        "tolerances_1sigma": channel_map.tolerances_1sigma.model_dump(),
+        "source": channel_map.source,
+        "notes": channel_map.notes,
+        "not_measured": list(channel_map.not_measured),
+        "made_from": {"channel_map_sha256": map_hash, "files_sha256": sources},
+    }
+    text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True)
+    write_atomically(folder / "campaign.yaml", text.encode())
+    report = {
+        "campaign": str(folder),
+        "runs": [
+            {
+                "run": run.name,
+                "part": run.part,
+                "file": run.file.name,
+                "start_s": found.start,
+                "duration_s": (len(next(iter(found.columns.values()))) - 1) / rate,
+            }
+            for run, found in made
+        ],
+        "channels": list(channel_map.channels),
+        "not_measured": list(channel_map.not_measured),
+        "sources": sources,
+    }
+    write_json(folder / "import.json", report)
+    return report
+
+
+def run_table(columns: dict[str, np.ndarray], rate: float) -> pa.Table:
+    """A run's Parquet table: time from 0 and its channels, units in the field metadata."""
+    count = len(next(iter(columns.values())))
+    fields = [pa.field("time", pa.float64(), metadata={"units": "s"})] + [
+        pa.field(name, pa.float64(), metadata={"units": CHANNELS_BY_NAME[name].unit}) for name in columns
+    ]
+    arrays = [pa.array(np.arange(count) / rate)] + [pa.array(values) for values in columns.values()]
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+
+
+def _read_all(files: tuple[Path, ...], channel_map: ChannelMap) -> dict[Path, dict[str, Signal]]:
+    recordings: dict[Path, dict[str, Signal]] = {}
+    problems: list[str] = []
+    for file in files:
+        try:
+            recordings[file] = read_signals(file, channel_map)
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return recordings
+
+
+def _segmented(
+    channel_map: ChannelMap, segment: SegmentEntry, recordings: dict[Path, dict[str, Signal]]
+) -> list[PlannedRun]:
+    rule = next((rule for rule in channel_map.rules if rule.channel == "brake_pressure"), None)
+    if rule is None:
+        raise InputError("a map with segment needs the channel brake_pressure")
+    runs: list[PlannedRun] = []
+    for file, signals in recordings.items():
+        pressure = as_channel(signals[rule.sources[0]], rule)
+        episodes = pressure_episodes(
+            pressure.time, pressure.values, threshold=segment.above_mpa, merge_gap=segment.merge_gap_s
+        )
+        for episode in episodes:
+            if episode.duration < segment.minimum_s:
+                continue
+            number = len(runs) + 1
+            runs.append(
+                PlannedRun(
+                    name=f"run-{number:02d}",
+                    file=file,
+                    start=max(episode.onset_time - segment.before_s, float(pressure.time[0])),
+                    end=min(episode.end_time + segment.after_s, float(pressure.time[-1])),
+                    part="held_out" if number % segment.held_out_every == 0 else "train",
+                    conditions=channel_map.conditions,
+                )
+            )
+    return runs

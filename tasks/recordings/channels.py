@@ -1,0 +1,103 @@
+"""The channels a measured run may have, and the units a logger may give them in."""
+
+from dataclasses import dataclass
+from math import pi
+
+from tasks.errors import InputError
+
+UNITS: dict[str, tuple[str, float]] = {
+    "s": ("time", 1.0), "ms": ("time", 1e-3), "us": ("time", 1e-6), "ns": ("time", 1e-9),
+    "m/s": ("speed", 1.0), "km/h": ("speed", 1 / 3.6), "mph": ("speed", 0.44704), "kn": ("speed", 1852 / 3600),
+    "m/s^2": ("acceleration", 1.0), "g": ("acceleration", 9.80665),
+    "rad": ("angle", 1.0), "deg": ("angle", pi / 180),
+    "rad/s": ("angular speed", 1.0), "deg/s": ("angular speed", pi / 180), "rpm": ("angular speed", pi / 30),
+    "MPa": ("pressure", 1e6), "bar": ("pressure", 1e5), "kPa": ("pressure", 1e3), "Pa": ("pressure", 1.0),
+    "psi": ("pressure", 6894.757293168),
+    "N m": ("torque", 1.0), "kN m": ("torque", 1e3),
+    "1": ("ratio", 1.0), "%": ("ratio", 1e-2),
+}  # fmt: skip
+"""Unit to its dimension and its size in the dimension's SI unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredChannel:
+    """One column of a campaign's runs.
+
+    Parameters
+    ----------
+    name, unit : as in the run's file
+    limit : magnitude that no road car exceeds [the channel's unit]
+    moves : a moving car's sensor never holds one value for long
+    description : for people
+    """
+
+    name: str
+    unit: str
+    limit: float
+    moves: bool
+    description: str
+
+
+def _channel(name: str, unit: str, limit: float, description: str, moves: bool = True) -> MeasuredChannel:
+    return MeasuredChannel(name=name, unit=unit, limit=limit, moves=moves, description=description)
+
+
+MAIN_CHANNELS = (
+    _channel("brake_pressure", "MPa", 25.0, "brake pressure at the caliper line", moves=False),
+    _channel("speed", "m/s", 90.0, "speed over ground"),
+    _channel("longitudinal_acceleration", "m/s^2", 20.0, "accelerometer, forward positive"),
+    _channel("wheel_speed_front", "rad/s", 400.0, "mean of the front wheels"),
+    _channel("wheel_speed_rear", "rad/s", 400.0, "mean of the rear wheels"),
+    _channel("pitch", "deg", 25.0, "nose-down positive"),
+    _channel("pitch_rate", "deg/s", 150.0, "nose-down positive"),
+    _channel("vertical_acceleration", "m/s^2", 60.0, "of the body, up positive, without gravity"),
+)
+"""What closing the loop compares; a map must say of each where it is or that it was not measured."""
+
+SIDE_CHANNELS = (
+    _channel("steering_angle", "deg", 900.0, "at the steering wheel, left positive", moves=False),
+    _channel("yaw_rate", "deg/s", 150.0, "left positive", moves=False),
+    _channel("roll_rate", "deg/s", 150.0, "right side down positive", moves=False),
+    _channel("lateral_acceleration", "m/s^2", 20.0, "left positive", moves=False),
+    _channel("brake_torque", "N m", 40000.0, "all wheels together, braking positive", moves=False),
+    _channel("engine_torque", "N m", 40000.0, "at the wheels, driving positive", moves=False),
+)
+"""What selection rules and residual plots use."""
+
+CHANNELS_BY_NAME = {channel.name: channel for channel in (*MAIN_CHANNELS, *SIDE_CHANNELS)}
+
+
+def unit_factor(unit: str, target: str) -> float:
+    """What a value in ``unit`` is multiplied with to be in ``target``.
+
+    Raises
+    ------
+    InputError
+        If a unit is unknown, or the two measure different things.
+    """
+    for name in (unit, target):
+        if name not in UNITS:
+            raise InputError(f"unit {name}: no such unit; there are: {', '.join(UNITS)}")
+    (dimension, size), (wanted, wanted_size) = UNITS[unit], UNITS[target]
+    if dimension != wanted:
+        raise InputError(
+            f"unit {unit} is of {dimension}, {target} of {wanted}: give the source's true unit, or a gain"
+        )
+    return size / wanted_size
+
+
+def likely_unit(taken: str, ratio: float) -> str | None:
+    """The unit of values that come out ``ratio`` times too large when taken to be in another; None if none fits.
+
+    Parameters
+    ----------
+    taken : the unit that they were taken to be in
+    ratio : size found over size expected [1]
+    """
+    dimension, size = UNITS[taken]
+    near = [
+        unit
+        for unit, (kind, other) in UNITS.items()
+        if kind == dimension and unit != taken and 0.8 < ratio * other / size < 1.25
+    ]
+    return near[0] if near else None

@@ -1,0 +1,255 @@
+"""Recordings in, a campaign out; and every fault named with its run and channel."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+from catalogs.campaigns import read_campaign
+from catalogs.channel_maps import FOLDER, load_channel_map
+from flows.importing import import_measurements
+from tasks.closure.campaign import CHANNELS
+from tasks.errors import InputError
+from tests.recordings.recorded import MAP, braking_columns, logged
+
+Columns = dict[str, np.ndarray]
+
+
+def write_map(folder: Path, **changes: object) -> str:
+    content = yaml.safe_load(MAP) | changes
+    (folder / "map.yaml").write_text(yaml.safe_dump(content))
+    return str(folder / "map.yaml")
+
+
+def write_csv(path: Path, columns: Columns) -> str:
+    pd.DataFrame(columns).to_csv(path, index=False)
+    return str(path)
+
+
+def problems_of(tmp_path: Path, columns: Columns, **changes: object) -> str:
+    source = write_csv(tmp_path / "log.csv", columns)
+    with pytest.raises(InputError) as caught:
+        import_measurements(source, map=write_map(tmp_path, **changes), out=str(tmp_path / "campaign"))
+    assert not (tmp_path / "campaign").exists()
+    return str(caught.value)
+
+
+def imported(tmp_path: Path, source: str, **changes: object) -> Columns:
+    import_measurements(source, map=write_map(tmp_path, **changes), out=str(tmp_path / "campaign"))
+    (run,) = (tmp_path / "campaign" / "runs").iterdir()
+    table = pq.read_table(run)
+    return {name: table.column(name).to_numpy() for name in table.column_names}
+
+
+def assert_same_motion(found: Columns, start: int) -> None:
+    truth = braking_columns()
+    for name in ("speed", "brake_pressure", "longitudinal_acceleration", "pitch", "wheel_speed_front"):
+        n = len(found[name])
+        np.testing.assert_allclose(found[name], truth[name][start : start + n], atol=2e-6, err_msg=name)
+    n = len(found["pitch_rate"]) - 6
+    np.testing.assert_allclose(
+        found["pitch_rate"][6 : 6 + n], truth["pitch_rate"][6 + start : 6 + start + n], atol=1e-6
+    )
+
+
+def test_a_csv_becomes_the_motion_in_campaign_units(tmp_path: Path) -> None:
+    found = imported(tmp_path, write_csv(tmp_path / "log.csv", logged(braking_columns())))
+    assert_same_motion(found, 0)
+
+
+def test_parquet_and_mdf4_give_what_the_csv_gives(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf", reason="reading MDF4 needs asammdf")
+    log = logged(braking_columns())
+    t = log["t_ms"] / 1e3
+    with asammdf.MDF(version="4.10") as recording:
+        for name, values in log.items():
+            if name != "t_ms":
+                # a group per signal, of its own rate: the file's own clocks are used
+                step = 2 if name == "az" else 1
+                recording.append(asammdf.Signal(values[::step], t[::step], name=name, unit=""))
+        recording.save(tmp_path / "log.mf4")
+    pd.DataFrame(log).to_parquet(tmp_path / "log.parquet")
+    folders = {}
+    for kind in ("mf4", "parquet"):
+        (tmp_path / kind).mkdir()
+        folders[kind] = imported(tmp_path / kind, str(tmp_path / f"log.{kind}"))
+        assert_same_motion(folders[kind], 0)
+
+
+def test_a_unit_that_the_mdf4_file_states_must_be_the_maps(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf", reason="reading MDF4 needs asammdf")
+    log = logged(braking_columns())
+    with asammdf.MDF(version="4.10") as recording:
+        for name, values in log.items():
+            unit = "m/s" if name == "v_kmh" else ""
+            recording.append(asammdf.Signal(values, log["t_ms"] / 1e3, name=name, unit=unit))
+        recording.save(tmp_path / "log.mf4")
+    with pytest.raises(InputError, match="speed: is in m/s by its file, in km/h by the map"):
+        import_measurements(str(tmp_path / "log.mf4"), map=write_map(tmp_path), out=str(tmp_path / "out"))
+
+
+def test_without_asammdf_the_reader_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "log.mf4").write_bytes(b"")
+    monkeypatch.setitem(sys.modules, "asammdf", None)
+    with pytest.raises(InputError, match=r'pip install "musync\[mdf\]"'):
+        import_measurements(str(tmp_path / "log.mf4"), map=write_map(tmp_path), out=str(tmp_path / "out"))
+
+
+def test_the_campaign_is_the_one_that_closing_the_loop_reads(tmp_path: Path) -> None:
+    write_csv(tmp_path / "log.csv", logged(braking_columns(seconds=14.0)))
+    runs = [
+        {"name": f"r{i}", "file": "log.csv", "from_s": 0.2 * i, "to_s": 0.2 * i + 3.0,
+         "part": "held_out" if i % 2 else "train", "conditions": {"disc_temperature_above_ambient_c": 10.0 * i}}
+        for i in range(6)
+    ]  # fmt: skip
+    import_measurements(
+        str(tmp_path / "log.csv"), map=write_map(tmp_path, runs=runs), out=str(tmp_path / "campaign")
+    )
+    campaign = read_campaign(tmp_path / "campaign")
+    assert [run.name for run in campaign.held_out] == ["r1", "r3", "r5"]
+    assert campaign.runs[4].disc_rise == 40.0
+    speed = campaign.runs[2].response[:, CHANNELS.index("speed")]
+    np.testing.assert_allclose(speed, braking_columns(14.0)["speed"][40 : 40 + len(speed)], atol=1e-9)
+
+
+def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> None:
+    columns = braking_columns(seconds=12.0)
+    t = columns["time"]
+    pulses = sum(np.clip((t - s) / 0.1, 0, 1) * np.clip((s + 0.8 - t) / 0.1, 0, 1) for s in (2.0, 5.0, 8.0))
+    columns["brake_pressure"] = 0.9 * pulses + 0.001 * np.sin(40 * t)
+    columns["longitudinal_acceleration"] = -1.5 * columns["brake_pressure"] + 1e-3 * np.cos(50 * t)
+    columns["speed"] = 20.0 + np.cumsum(columns["longitudinal_acceleration"]) / 100
+    for name in ("wheel_speed_front", "wheel_speed_rear"):
+        columns[name] = columns["speed"] / 0.32
+    columns["pitch"] = 0.5 * columns["brake_pressure"]
+    columns["pitch_rate"] = np.gradient(columns["pitch"], t)
+    segment = {
+        "above_mpa": 0.12, "merge_gap_s": 0.08, "minimum_s": 0.5, "before_s": 1.0, "after_s": 0.8, "held_out_every": 3,
+    }  # fmt: skip
+    report = import_measurements(
+        write_csv(tmp_path / "log.csv", logged(columns)),
+        map=write_map(tmp_path, segment=segment), out=str(tmp_path / "campaign"),
+    )  # fmt: skip
+    assert [(run["run"], run["part"]) for run in report["runs"]] == [
+        ("run-01", "train"), ("run-02", "train"), ("run-03", "held_out"),
+    ]  # fmt: skip
+    assert [run["start_s"] for run in report["runs"]] == pytest.approx([1.02, 4.02, 7.02], abs=0.02)
+
+
+def test_the_same_recording_gives_the_same_bytes(tmp_path: Path) -> None:
+    source = write_csv(tmp_path / "log.csv", logged(braking_columns()))
+    for name in ("a", "b"):
+        import_measurements(source, map=write_map(tmp_path), out=str(tmp_path / name))
+    for file in sorted((tmp_path / "a").rglob("*.*")):
+        twin = tmp_path / "b" / file.relative_to(tmp_path / "a")
+        if file.name != "import.json":  # it names its own folder
+            assert file.read_bytes() == twin.read_bytes(), file.name
+
+
+def _held(x: np.ndarray) -> np.ndarray:
+    return np.where((np.arange(len(x)) > 200) & (np.arange(len(x)) < 300), x[200], x)
+
+
+@pytest.mark.parametrize(
+    ("signal", "damage", "words"),
+    [
+        ("v_kmh", lambda x: x / 3.6, "wheel_speed_front give a rolling radius"),
+        ("v_kmh", lambda x: x * 10, "channel speed reaches"),
+        ("ax_g", lambda x: x * 9.81, "the map says g, it looks like m/s^2"),
+        ("ax_g", lambda x: -x, "longitudinal_acceleration runs against the rate of speed"),
+        ("p_bar", lambda x: x * 100, "channel brake_pressure reaches"),
+        ("p_bar", lambda x: x / 10, "brake_pressure gives 15"),
+        ("pitch_up", lambda x: -x, "channel pitch runs against the deceleration"),
+        ("pitch_up", lambda x: np.degrees(x), "channel pitch reaches"),
+        ("pitch_rate_up", lambda x: -x, "channel pitch_rate runs against the slope of pitch"),
+        ("pitch_rate_up", lambda x: np.degrees(x), "pitch_rate"),
+        ("az", lambda x: x - 9.81, "must exclude gravity"),
+        ("w_r", lambda x: -x, "wheel_speed_rear is negative"),
+        ("pitch_up", _held, "pitch: is frozen: it holds"),
+        ("v_kmh", _held, "speed: is frozen: it holds"),
+        ("az", lambda x: np.where(np.arange(len(x)) == 90, np.inf, x), "vertical_acceleration: has 1 samples"),
+        ("t_ms", lambda x: x + 700.0 * (np.arange(len(x)) > 100), "gaps or forward jumps of its clock"),
+        ("t_ms", lambda x: x - 300.0 * (np.arange(len(x)) > 100), "clock that does not advance"),
+        ("w_fl", lambda x: np.where((np.arange(len(x)) // 80) == 1, np.nan, x), "wheel_speed_front: has 1 gap"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named_with_run_and_channel(
+    tmp_path: Path, signal: str, damage: Callable[[np.ndarray], np.ndarray], words: str
+) -> None:
+    log = logged(braking_columns())
+    log[signal] = damage(log[signal])
+    text = problems_of(tmp_path, log)
+    assert words in text
+    assert all(line.startswith("log (log.csv): ") for line in text.splitlines())
+
+
+def test_all_problems_come_at_once(tmp_path: Path) -> None:
+    log = logged(braking_columns())
+    log["pitch_up"] = -log["pitch_up"]
+    log["az"][90] = np.inf
+    log["p_bar"] *= 100
+    text = problems_of(tmp_path, log)
+    assert "pitch runs against" in text and "not numbers" in text and "brake_pressure reaches" in text
+
+
+def test_a_missing_signal_is_named_with_those_that_come_near(tmp_path: Path) -> None:
+    log = logged(braking_columns())
+    log["v_kmph"] = log.pop("v_kmh")
+    assert "signal v_kmh is missing; there are: v_kmph" in problems_of(tmp_path, log)
+
+
+def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
+    columns = braking_columns()
+    for name in columns:
+        columns[name][:120] = columns[name][:120] if name == "time" else 0.0
+    assert "is frozen" not in problems_of(
+        tmp_path, logged(columns) | {"az": np.full(len(columns["time"]), 99.0)}
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"channels": {"sped": {"source": "v", "unit": "m/s"}}}, "channel sped: no such channel"),
+        ({"not_measured": ["pitch"]}, "channel pitch must stand either in channels or in not_measured"),
+        ({"time": {"source": "t", "unit": "bar"}}, "time unit must be one of"),
+        ({"runs": [{"name": "a", "file": "log.csv"}] * 2}, "run a stands twice"),
+        ({"runs": [{"name": "a", "file": "gone.csv"}]}, "gone.csv: the map's runs name it"),
+        (
+            {"runs": [{"name": "a", "file": "log.csv", "conditions": {"weather": "hail"}}]},
+            "run a: conditions",
+        ),
+        ({"colour": "red"}, "colour is not a known key"),
+    ],
+)
+def test_a_faulty_map_is_named_by_its_key(tmp_path: Path, changes: dict[str, object], words: str) -> None:
+    assert words in problems_of(tmp_path, logged(braking_columns()), **changes)
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
+    source = write_csv(tmp_path / "log.csv", logged(braking_columns()))
+    with pytest.raises(InputError, match="new or empty folder"):
+        import_measurements(source, map=write_map(tmp_path), out=str(tmp_path))
+
+
+def test_every_map_that_ships_can_be_read() -> None:
+    names = sorted(path.stem for path in FOLDER.glob("*.yaml"))
+    assert names and all(load_channel_map(name)[0].channels for name in names)
+
+
+def test_the_measured_sets_come_in_through_their_maps(tmp_path: Path, outside_data: Path) -> None:
+    measured = outside_data / "measured"
+    if not (measured / "bmw_m8").is_dir():
+        pytest.skip(f"no measured sets at {measured}")
+    m8 = import_measurements(str(measured / "bmw_m8"), map="bmw-m8", out=str(tmp_path / "m8"))
+    assert {run["run"]: run["part"] for run in m8["runs"]}["abs-stop"] == "held_out"
+    comma = measured / "comma2k19" / "comma2k19_example1_100hz.parquet"
+    report = import_measurements(str(comma), map="comma2k19", out=str(tmp_path / "comma"))
+    assert report["not_measured"] == ["brake_pressure", "wheel_speed_front", "wheel_speed_rear"]
