@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from tasks.errors import InputError
 from tasks.eval.state_agreement import REFERENCE_COLUMNS, CaseFacts
@@ -20,6 +21,9 @@ AFTER_STOP_S = 12.0
 """How long past the reference's end the model may still roll before it counts as not stopping [s]."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
+Traces = dict[str, NDArray[np.float64]]
+PRESSURE = "brake_pressure"
+"""Column that a trace may hold beside those that are scored [MPa]."""
 
 
 class ReferenceCase(BaseModel):
@@ -35,11 +39,19 @@ class ReferenceCase(BaseModel):
     peak_pressure_mpa: Annotated[float, Field(ge=0)] | None = None
     ramp_s: Annotated[float, Field(ge=0)] = 0.5
     brake_onset_s: Number | None = None
-    brake_onset_m: Number | None = None
+    brake_onset_m: Number | None = Field(
+        None,
+        validation_alias=AliasChoices("brake_onset_m", "brake_onset_station_m", "brake_onset_position_m"),
+    )
     hazard_center_m: Number = 0.0
     hazard_height_m: Number = 0.0
     hazard_length_m: Number = 0.0
     stopping_distance_m: Number | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _null_is_left_out(cls, row: Any) -> Any:
+        return {k: v for k, v in row.items() if v is not None} if isinstance(row, dict) else row
 
     @property
     def braked(self) -> bool:
@@ -84,13 +96,18 @@ class ReferenceCase(BaseModel):
         return float(np.ceil(reference["time"][-1] + AFTER_STOP_S))
 
 
-def read_reference(folder: Path) -> list[tuple[ReferenceCase, dict[str, NDArray[np.float64]]]]:
+def read_reference(folder: Path, split: str | None = None) -> list[tuple[ReferenceCase, Traces]]:
     """Every case of a folder of traces, with its columns as float64.
+
+    Parameters
+    ----------
+    folder : with cases.json and the traces
+    split : read the cases of this split only; None for all
 
     Raises
     ------
     InputError
-        Listing every case whose condition or trace is missing or faulty.
+        Listing every case whose condition or trace is missing or faulty, or the splits that exist.
     """
     path = folder / "cases.json"
     try:
@@ -101,12 +118,17 @@ def read_reference(folder: Path) -> list[tuple[ReferenceCase, dict[str, NDArray[
         ) from None
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: must be valid JSON; {error}") from None
+    if not isinstance(rows, list) or not rows:
+        raise InputError(f"{path}: must be a list of at least one case; it is {str(rows)[:60]}")
     problems: list[str] = []
     cases = []
+    splits: set[str] = set()
     for row in rows:
         try:
             case = ReferenceCase.model_validate(row)
-            cases.append((case, _trace(folder, case)))
+            splits.add(case.split)
+            if split in (None, case.split):
+                cases.append(_with_trace(folder, case))
         except ValidationError as error:
             name = row.get("case", "?") if isinstance(row, dict) else row
             problems += [
@@ -115,19 +137,58 @@ def read_reference(folder: Path) -> list[tuple[ReferenceCase, dict[str, NDArray[
             ]
         except InputError as error:
             problems += error.problems
+    if not problems and not cases:
+        problems.append(f"{path}: no case has the split {split}; there are: {', '.join(sorted(splits))}")
     if problems:
         raise InputError(problems)
     return cases
 
 
-def _trace(folder: Path, case: ReferenceCase) -> dict[str, NDArray[np.float64]]:
-    found = sorted([*folder.glob(f"{case.case}.parquet"), *folder.glob(f"*/{case.case}.parquet")])
+def trace_file(folder: Path, case: str) -> Path:
+    """The Parquet file of a case.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    found = sorted([*folder.glob(f"{case}.parquet"), *folder.glob(f"*/{case}.parquet")])
     if not found:
-        raise InputError(
-            f"{folder}: case {case.case} needs {case.case}.parquet here or one folder down; there is none"
-        )
-    table = pq.read_table(found[0])
+        raise InputError(f"{folder}: case {case} needs {case}.parquet here or one folder down; there is none")
+    return found[0]
+
+
+def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Traces]:
+    """A case and its columns; a brake onset that the conditions leave open is read from the trace's pressure."""
+    path = trace_file(folder, case.case)
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise InputError(f"{path}: a trace must be readable Parquet; {error}") from None
     missing = [name for name in REFERENCE_COLUMNS if name not in table.column_names]
     if missing:
-        raise InputError(f"{found[0]}: a trace needs the columns {', '.join(missing)}; they are missing")
-    return {name: table[name].to_numpy().astype(np.float64) for name in REFERENCE_COLUMNS}
+        raise InputError(f"{path}: a trace needs the columns {', '.join(missing)}; they are missing")
+    columns = {name: table[name].to_numpy().astype(np.float64) for name in REFERENCE_COLUMNS}
+    problems = [
+        f"{path}: column {name} must hold numbers throughout; {int(np.sum(~np.isfinite(values)))} are not"
+        for name, values in columns.items()
+        if not np.isfinite(values).all()
+    ]
+    if not problems and not (len(columns["time"]) > 1 and (np.diff(columns["time"]) > 0).all()):
+        problems.append(f"{path}: column time must hold at least two ascending times")
+    if problems:
+        raise InputError(problems)
+    if case.peak_pressure_mpa and case.brake_onset_s is None and case.brake_onset_m is None:
+        case = case.model_copy(update={"brake_onset_s": _onset(path, case.case, table, columns["time"])})
+    return case, columns
+
+
+def _onset(path: Path, case: str, table: pa.Table, time: NDArray[np.float64]) -> float:
+    pressure = table[PRESSURE].to_numpy() if PRESSURE in table.column_names else np.zeros(1)
+    braking = np.flatnonzero(pressure > 0)
+    if len(braking) == 0:
+        raise InputError(
+            f"{path}: case {case} brakes, but neither brake_onset_s nor brake_onset_m says when and no {PRESSURE}"
+            " in the trace does: add one of them"
+        )
+    return float(time[max(int(braking[0]) - 1, 0)])

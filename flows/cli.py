@@ -103,7 +103,10 @@ def sensitivity(out: Out = None, as_json: Json = False) -> None:
 def agreement(
     traces: Annotated[str, typer.Argument(help="Folder with cases.json and the traces as Parquet.")],
     vehicle: Annotated[str, typer.Option(help="Vehicle name or file.")] = "paper-reference",
-    mode: Annotated[str, typer.Option(help="paper or coupled.")] = "paper",
+    mode: Annotated[
+        str | None,
+        typer.Option(help="paper or coupled; by default what a frozen vehicle was fitted in, or paper."),
+    ] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -113,6 +116,24 @@ def agreement(
         {key: value for key, value in row.items() if key not in {"window", "note"}} for row in result["cases"]
     ]
     brief = {"cases": shown, "groups": result["groups"]}
+    _show(result if as_json else brief, as_json)
+
+
+@app.command()
+def calibrate(
+    traces: Annotated[str, typer.Argument(help="Folder with cases.json and the traces as Parquet.")],
+    out: Annotated[str, typer.Option(help="Folder for the frozen vehicle and calibration.json.")],
+    vehicle: Annotated[str, typer.Option(help="Vehicle name or file to start from.")] = "paper-reference",
+    procedure: Annotated[str, typer.Option(help="Procedure name or file.")] = "paper-staged",
+    split: Annotated[str, typer.Option(help="The split to fit; no other is looked at.")] = "development",
+    name: Annotated[str, typer.Option(help="Name of the frozen vehicle.")] = "calibrated",
+    as_json: Json = False,
+) -> None:
+    """Calibrate a vehicle in stages on reference traces, freeze it, and say how well each scalar is known."""
+    result = _call(
+        "calibrate", False, traces, out=out, vehicle=vehicle, procedure=procedure, split=split, name=name
+    )
+    brief = {key: result[key] for key in ("vehicle_file", "vehicle_sha256", "stages", "before", "after")}
     _show(result if as_json else brief, as_json)
 
 
@@ -177,7 +198,7 @@ def scene_import(
     _show(_call("scene_import", False, gaussians, route, out, **sizes), as_json)
 
 
-def _call(name: str, prefect: bool, *args: Any, **kwargs: Any) -> Any:
+def _call(name: str, prefect: bool, /, *args: Any, **kwargs: Any) -> Any:
     """Call a pipeline function, as a Prefect flow where one is asked for."""
     return _function(name, prefect or "PREFECT_API_URL" in os.environ)(*args, **kwargs)
 
@@ -195,6 +216,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
     module = {
         "generate": "generate", "audit": "audit", "describe": "describe", "validate": "describe",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
+        "calibrate": "calibration",
         "import_measurements": "importing",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip

@@ -25,6 +25,7 @@ Path(os.environ["PREFECT_HOME"]).mkdir(parents=True, exist_ok=True)
 from prefect import flow  # noqa: E402  (reads the environment when it is imported)
 
 from flows import audit as _audit  # noqa: E402
+from flows import calibration as _calibration  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import generate as _generate  # noqa: E402
 from flows import importing as _importing  # noqa: E402
@@ -46,6 +47,7 @@ describe = as_flow(_describe.describe)
 validate = as_flow(_describe.validate)
 sensitivity = as_flow(_studies.sensitivity)
 agreement = as_flow(_studies.agreement)
+calibrate = as_flow(_calibration.calibrate)
 scene_from_stereo = as_flow(_reconstruction.scene_from_stereo)
 scene_import = as_flow(_scenes.scene_import)
 import_measurements = as_flow(_importing.import_measurements)

@@ -6,13 +6,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from catalogs.references import read_reference
+from catalogs.references import ReferenceCase, Traces, read_reference
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.store.layout import write_json
 from tasks.errors import InputError
 from tasks.eval.state_agreement import CaseAgreement, aggregate, case_agreement
+from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, rollout
 from tasks.vehicle.sensitivity import beside_print, sensitivity_study
 
@@ -30,7 +31,7 @@ def sensitivity(*, out: str | None = None) -> dict[str, Any]:
 
 
 def agreement(
-    traces: str, *, vehicle: str = "paper-reference", mode: Mode = "paper", out: str | None = None
+    traces: str, *, vehicle: str = "paper-reference", mode: Mode | None = None, out: str | None = None
 ) -> dict[str, Any]:
     """Hold the vehicle model against reference traces by the paper's Appendix A.2 protocol.
 
@@ -38,7 +39,7 @@ def agreement(
     ----------
     traces : folder with cases.json and NAME.parquet or */NAME.parquet
     vehicle : catalogue name or file
-    mode : paper or coupled
+    mode : paper or coupled; None takes the one a frozen vehicle was fitted in, and paper for any other
     out : folder for ``agreement.json``; None writes none
 
     Raises
@@ -46,15 +47,29 @@ def agreement(
     InputError
         Listing every case whose trace or condition is missing.
     """
-    model = load_vehicle(vehicle)
+    model, provenance = load_vehicle(vehicle), vehicle_provenance(vehicle)
+    chosen = mode or (provenance.mode if provenance else "paper")
+    result = {"vehicle": vehicle, "mode": chosen} | agreement_of(model, read_reference(Path(traces)), chosen)
+    return _written(result, out, "agreement.json")
+
+
+def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], mode: Mode) -> dict[str, Any]:
+    """Agreement of a vehicle with reference cases: a row a case, the groups of each split, the mean over all.
+
+    Parameters
+    ----------
+    model : the vehicle
+    reference : cases and their traces
+    mode : paper or coupled
+    """
     rows: list[dict[str, Any]] = []
     splits: dict[str, list[CaseAgreement]] = {}
-    for case, reference in read_reference(Path(traces)):
+    for case, columns in reference:
         ride = rollout(
             model, case.weather, case.surface_coefficient, case.controls(), case.hazard(),
-            mode=mode, duration_s=case.duration_s(reference),
+            mode=mode, duration_s=case.duration_s(columns),
         )  # fmt: skip
-        scored = case_agreement(reference, ride.columns, case.facts(model.wheelbase), ride.static_pitch)
+        scored = case_agreement(columns, ride.columns, case.facts(model.wheelbase), ride.static_pitch)
         splits.setdefault(case.split, []).append(scored)
         rows.append({"split": case.split} | asdict(scored) | {"window": list(scored.window)})
     groups = [
@@ -63,8 +78,7 @@ def agreement(
         for name, group in aggregate(cases).items()
     ]
     overall = aggregate([case for cases in splits.values() for case in cases])["all"].mean
-    result = {"vehicle": vehicle, "mode": mode, "cases": rows, "groups": groups, "mean": _plain(overall)}
-    return _written(result, out, "agreement.json")
+    return {"cases": rows, "groups": groups, "mean": _plain(overall)}
 
 
 def bench(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:

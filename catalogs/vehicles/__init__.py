@@ -9,6 +9,7 @@ from pydantic import model_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
+from catalogs.vehicles.frozen import Provenance, check_seal
 from tasks.vehicle.parameters import TyreFamily, Vehicle
 
 FOLDER = Path(__file__).parent
@@ -96,6 +97,7 @@ class VehicleEntry(CatalogueEntry):
     lock_speed: Annotated[Scalar, checked("rad s-1", above=0)]
     gravity: Annotated[Scalar, checked("m s-2", above=0)]
     families: FamiliesEntry
+    provenance: Provenance | None = None
 
 
 def vehicle_names() -> tuple[str, ...]:
@@ -114,6 +116,17 @@ def vehicle_source(name_or_path: str | Path) -> Path:
     return find_entry(FOLDER, name_or_path, "vehicle")
 
 
+def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
+    """Where a vehicle's numbers come from, if it is a frozen one.
+
+    Raises
+    ------
+    InputError
+        As ``load_vehicle``.
+    """
+    return _read(vehicle_source(name_or_path)).provenance
+
+
 def load_vehicle(name_or_path: str | Path) -> Vehicle:
     """Read a vehicle by its name in the catalogue or from a YAML file.
 
@@ -127,7 +140,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
         Listing every problem of the file, or the names that exist.
     """
     source = vehicle_source(name_or_path)
-    entry = read_entry(VehicleEntry, source, "vehicle")
+    entry = _read(source)
     values = {
         name: quantity.value
         for name in VehicleEntry.model_fields
@@ -139,3 +152,8 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     }
     values["static_pitch"] = radians(values["static_pitch"])
     return Vehicle(name=source.stem, families=families, **values)
+
+
+def _read(source: Path) -> VehicleEntry:
+    check_seal(source)
+    return read_entry(VehicleEntry, source, "vehicle")

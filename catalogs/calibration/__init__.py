@@ -1,0 +1,128 @@
+"""Calibration procedures: stages, bounds and scales, as YAML."""
+
+from math import radians
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from catalogs.entries import find_entry
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, checked, read_entry
+from tasks.calibration.residual import Phase, Response, Yardstick
+from tasks.calibration.staged import Bounds, Procedure, Stage
+
+FOLDER = Path(__file__).parent
+
+Count = Annotated[Scalar, checked("1", minimum=1)]
+
+
+class ScalesEntry(CatalogueEntry):
+    """Size of one unit of each response; the meanings stand at ``Yardstick``."""
+
+    speed: Annotated[Scalar, checked("m s-1", above=0)]
+    pitch: Annotated[Scalar, checked("deg", above=0)]
+    slip: Annotated[Scalar, checked("1", above=0)]
+    wheel_load: Annotated[Scalar, checked("N", above=0)]
+    stop: Annotated[Scalar, checked("m", above=0)]
+
+
+class BoundsEntry(CatalogueEntry):
+    """Limits and difference step of a group; the meanings stand at ``Bounds``."""
+
+    unit: Text
+    lower: Number
+    upper: Number
+    step: Number
+    source: Text
+
+    @model_validator(mode="after")
+    def _limits_leave_room(self) -> "BoundsEntry":
+        if not (self.lower < self.upper and 0 < self.step < (self.upper - self.lower) / 2):
+            raise ValueError(
+                "lower must be below upper, and step above 0 and below half their distance; they are"
+                f" {self.lower:g}, {self.upper:g} and {self.step:g}"
+            )
+        return self
+
+
+class StageEntry(CatalogueEntry):
+    """One stage; the meanings stand at ``Stage``."""
+
+    name: Text
+    groups: tuple[Text, ...]
+    responses: tuple[Response, ...]
+    kinds: tuple[Literal["flat", "hump", "depression"], ...]
+    phase: Phase
+
+
+class ProcedureEntry(CatalogueEntry):
+    """A whole procedure; the meanings stand at ``Procedure``."""
+
+    mode: Literal["paper", "coupled"]
+    passes: Count
+    evaluations: Count
+    start: Annotated[Scalar, checked("s", above=0)]
+    tail_speed: Annotated[Scalar, checked("m s-1", above=0)]
+    slip_speed: Annotated[Scalar, checked("m s-1", minimum=0)]
+    interval: Annotated[Scalar, checked("s", above=0)]
+    margin: Annotated[Scalar, checked("s", above=0)]
+    scales: ScalesEntry
+    bounds: dict[Text, BoundsEntry]
+    stages: tuple[StageEntry, ...]
+
+    @model_validator(mode="after")
+    def _every_group_has_bounds(self) -> "ProcedureEntry":
+        wanted = {group for stage in self.stages for group in stage.groups}
+        if missing := sorted(wanted - set(self.bounds)):
+            raise ValueError(f"every group of a stage needs bounds; {', '.join(missing)} has none")
+        return self
+
+
+def procedure_source(name_or_path: str | Path) -> Path:
+    """The YAML file of a procedure.
+
+    Raises
+    ------
+    InputError
+        If there is none; the sentence lists those that exist.
+    """
+    return find_entry(FOLDER, name_or_path, "calibration procedure")
+
+
+def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
+    """Read a procedure, and the spacing of the samples that count [s].
+
+    Parameters
+    ----------
+    name_or_path : name, or path ending in .yaml
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file.
+    """
+    entry = read_entry(ProcedureEntry, procedure_source(name_or_path), "calibration procedure")
+    procedure = Procedure(
+        mode=entry.mode,
+        stages=tuple(Stage(**dict(stage)) for stage in entry.stages),
+        passes=int(entry.passes.value),
+        evaluations=int(entry.evaluations.value),
+        bounds={group: _inside(bounds) for group, bounds in entry.bounds.items()},
+        yardstick=Yardstick(
+            scales={name: scale.value for name, scale in entry.scales},
+            start_s=entry.start.value,
+            tail_speed=entry.tail_speed.value,
+            slip_speed=entry.slip_speed.value,
+            margin_s=entry.margin.value,
+        ),
+    )
+    return procedure, entry.interval.value
+
+
+def _inside(entry: BoundsEntry) -> Bounds:
+    """SI inside: an angle comes in degrees and is handed on in radians."""
+    if entry.unit == "deg":
+        return Bounds(
+            unit="rad", lower=radians(entry.lower), upper=radians(entry.upper), step=radians(entry.step)
+        )
+    return Bounds(unit=entry.unit, lower=entry.lower, upper=entry.upper, step=entry.step)

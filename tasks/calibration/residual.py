@@ -1,0 +1,133 @@
+"""What a calibration holds against what: model less reference, response by response, in sizes that compare."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.surface.road_profile import RoadHazard
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
+
+Floats = NDArray[np.float64]
+Response = Literal["speed", "pitch", "slip", "wheel_load", "stop"]
+Phase = Literal["start", "braking", "tail", "event"]
+WHEELS = {"fl": "f", "fr": "f", "rl": "r", "rr": "r"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationCase:
+    """One reference run with its conditions and the samples that count.
+
+    Parameters
+    ----------
+    name : of the case
+    kind : flat, hump or depression
+    family : tyre family: dry, rain or snow
+    surface_friction : mu_c [1]
+    controls : initial speed and brake
+    hazard : road feature
+    time : of the samples that count, ascending [s]
+    speed, pitch : there [m/s, deg]; pitch with its static offset
+    slip, wheel_load : by wheel fl, fr, rl, rr, shape (4, n) [1, N]
+    stopping_distance : of the reference; None where it is not scored [m]
+    """
+
+    name: str
+    kind: str
+    family: str
+    surface_friction: float
+    controls: Controls
+    hazard: RoadHazard
+    time: Floats
+    speed: Floats
+    pitch: Floats
+    slip: Floats
+    wheel_load: Floats
+    stopping_distance: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Yardstick:
+    """What makes residuals comparable.
+
+    Parameters
+    ----------
+    scales : size of one unit of each response [m/s, deg, 1, N, m]
+    start_s : length of the start of an event [s]
+    tail_speed : the tail of a stop begins below it [m/s]
+    slip_speed : slip counts above it [m/s]
+    margin_s : how long the model rolls past the last sample [s]
+    """
+
+    scales: Mapping[str, float]
+    start_s: float
+    tail_speed: float
+    slip_speed: float
+    margin_s: float
+
+
+def driven(vehicle: Vehicle, case: CalibrationCase, mode: Mode, margin_s: float) -> Rollout:
+    """The model's run of a case, to a little past its last sample.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    case : the conditions
+    mode : paper or coupled
+    margin_s : time past the last sample [s]
+    """
+    duration = float(np.ceil((case.time[-1] + margin_s) * 1000) / 1000)
+    return rollout(
+        vehicle, case.family, case.surface_friction, case.controls, case.hazard, mode=mode, duration_s=duration
+    )  # fmt: skip
+
+
+def residuals(
+    ride: Rollout, case: CalibrationCase, responses: Sequence[Response], phase: Phase, yardstick: Yardstick
+) -> Floats:
+    """Model less reference of some responses, so scaled that its square sum is the sum of (RMSE / scale)^2.
+
+    Parameters
+    ----------
+    ride : the model's run
+    case : the reference
+    responses : which
+    phase : the start of the event, braking above the tail speed, tail below it, or the whole event
+    yardstick : scales and speeds
+    """
+    model = ride.columns
+    counts = {
+        "start": case.time <= case.time[0] + yardstick.start_s,
+        "braking": case.speed > yardstick.tail_speed,
+        "tail": case.speed <= yardstick.tail_speed,
+        "event": np.ones(len(case.time), bool),
+    }[phase]
+    time = model["t_ns"] * 1e-9
+    parts = [np.empty(0)]
+
+    def add(
+        name: str, values: Floats, reference: Floats, mask: NDArray[np.bool_], share: float = 1.0
+    ) -> None:
+        if mask.any():
+            error = np.interp(case.time[mask], time, values) - reference[mask]
+            parts.append(error * np.sqrt(share / mask.sum()) / yardstick.scales[name])
+
+    for response in responses:
+        if response == "speed":
+            add("speed", model["speed"], case.speed, counts)
+        elif response == "pitch":
+            add("pitch", np.rad2deg(model["pitch"] + ride.static_pitch), case.pitch, counts)
+        elif response == "slip":
+            for row, axle in zip(case.slip, WHEELS.values(), strict=True):
+                rolling = counts & (case.speed > yardstick.slip_speed)
+                add("slip", model[f"braking_slip_{axle}"], row, rolling, 0.25)
+        elif response == "wheel_load":
+            for row, axle in zip(case.wheel_load, WHEELS.values(), strict=True):
+                add("wheel_load", model[f"axle_load_{axle}"] / 2, row, counts, 0.25)
+        elif case.stopping_distance is not None and phase == "event":
+            distance = model["station"][-1] - np.interp(ride.brake_onset_time, time, model["station"])
+            parts.append(np.array([distance - case.stopping_distance]) / yardstick.scales["stop"])
+    return np.concatenate(parts)

@@ -1,0 +1,109 @@
+"""The scalars a calibration may move: each a name, and the places of the vehicle that hold its one value."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from tasks.errors import InputError
+from tasks.vehicle.parameters import Vehicle
+
+KNOT_GROUPS = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release_s")
+"""Groups with a value at each surface knot of each tyre family."""
+SHARED_HOLD = ("dry", "rain")
+"""Families whose hold times are one scalar (paper, note under Table frozen_empirical_params)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationScalar:
+    """One number of the vehicle that a calibration may move.
+
+    Parameters
+    ----------
+    name : unique; a knot's name holds its family and surface friction
+    group : the name its stage and bounds go by
+    places : (family, knot) pairs that share the value; empty for a field of the vehicle itself
+    """
+
+    name: str
+    group: str
+    places: tuple[tuple[str, int], ...] = ()
+
+
+def calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[CalibrationScalar, ...]:
+    """The scalars of some groups, in their order; all of the paper's groups together hold its 40.
+
+    Parameters
+    ----------
+    vehicle : whose families and knots are counted
+    groups : `KNOT_GROUPS`, fields of the vehicle that hold a number, or names of its effects' parameters
+
+    Raises
+    ------
+    InputError
+        Listing every group that the vehicle does not have.
+    """
+    unknown = [
+        g for g in groups if g not in KNOT_GROUPS and not isinstance(getattr(vehicle, g, None), float | int)
+    ]
+    if unknown:
+        raise InputError(
+            [f"calibration group {g}: the vehicle has no such number; name a field or one of {', '.join(KNOT_GROUPS)}"
+             for g in unknown]
+        )  # fmt: skip
+    scalars: list[CalibrationScalar] = []
+    for group in groups:
+        scalars += (
+            _knots(vehicle, group) if group in KNOT_GROUPS else [CalibrationScalar(name=group, group=group)]
+        )
+    return tuple(scalars)
+
+
+def scalar_value(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
+    """The scalar's value in a vehicle, in the unit of its field.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    scalar : one of its scalars
+    """
+    if not scalar.places:
+        return float(getattr(vehicle, scalar.group))
+    family, knot = scalar.places[0]
+    return float(getattr(vehicle.families[family], scalar.group)[knot])
+
+
+def with_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> Vehicle:
+    """The vehicle with other values of some scalars.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    values : by scalar, in the unit of its field
+    """
+    families = dict(vehicle.families)
+    fields: dict[str, float] = {}
+    for scalar, value in values.items():
+        if not scalar.places:
+            fields[scalar.group] = value
+        for family, knot in scalar.places:
+            table = list(getattr(families[family], scalar.group))
+            table[knot] = value
+            families[family] = replace(families[family], **{scalar.group: tuple(table)})
+    return replace(vehicle, families=families, **fields)  # type: ignore[arg-type]
+
+
+def _knots(vehicle: Vehicle, group: str) -> list[CalibrationScalar]:
+    scalars = []
+    shared: list[tuple[str, int]] = []
+    for family, table in vehicle.families.items():
+        for knot, friction in enumerate(table.surface_friction):
+            if group == "hold_s" and family in SHARED_HOLD:
+                shared.append((family, knot))
+            else:
+                name = f"{group} {family} {friction:g}"
+                scalars.append(CalibrationScalar(name=name, group=group, places=((family, knot),)))
+    if shared:
+        scalars.insert(
+            0,
+            CalibrationScalar(name=f"{group} {' and '.join(SHARED_HOLD)}", group=group, places=tuple(shared)),
+        )
+    return scalars
