@@ -1,5 +1,6 @@
-"""Logged signals from files: CSV, Parquet and MDF4, each as its own samples on its own clock."""
+"""Logged signals from files: CSV, Parquet, MDF4 and bus JSON, each as its own samples on its own clock."""
 
+import json
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -16,7 +17,7 @@ from tasks.errors import InputError
 from tasks.recordings.channels import unit_factor
 from tasks.recordings.signals import Signal
 
-SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf")
+SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".json")
 
 
 def recording_files(source: Path, channel_map: ChannelMap) -> tuple[Path, ...]:
@@ -49,7 +50,7 @@ def read_signals(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
 
     Parameters
     ----------
-    path : .csv, .parquet, .mf4 or .mdf
+    path : .csv, .parquet, .mf4, .mdf or .json
     channel_map : names the signals and the clock
 
     Raises
@@ -65,6 +66,8 @@ def read_signals(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
         raise InputError(
             f"{path}: measurements must be of {', '.join(SUFFIXES)}; it is {suffix or 'without suffix'}"
         )
+    if suffix == ".json":
+        return _read_bus(path, names, channel_map.time.unit if channel_map.time else "s")
     if channel_map.time is None:
         raise InputError(f"{path}: a file without its own clock needs time: {{source: COLUMN}} in the map")
     columns, units = _read_parquet(path) if suffix == ".parquet" else _read_csv(path, channel_map)
@@ -113,6 +116,34 @@ def _read_csv(path: Path, channel_map: ChannelMap) -> tuple[dict[str, Any], dict
         raise InputError(f"{path}: must be a table of text; {' '.join(str(error).split())}") from None
     frame.columns = [str(name).strip() for name in frame.columns]
     return {name: frame[name].to_numpy() for name in frame.columns}, {}
+
+
+def _read_bus(path: Path, names: tuple[str, ...], time_unit: str) -> dict[str, Signal]:
+    """Signals as A2D2 stores its bus: per name a unit and [time, value] pairs."""
+    try:
+        content = json.loads(path.read_text())
+    except (ValueError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: must be JSON; {error}") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: must be a table of signals, each with values of [time, value]")
+    problems = _missing(path, names, content)
+    signals = {}
+    for name in names:
+        if name not in content:
+            continue
+        try:
+            pairs = np.asarray(content[name]["values"], dtype=np.float64).reshape(-1, 2)
+        except (KeyError, TypeError, ValueError):
+            problems.append(f"{path.name}: signal {name} must have values of [time, value]")
+            continue
+        signals[name] = Signal(
+            time=pairs[:, 0] * unit_factor(time_unit, "s"),
+            values=pairs[:, 1],
+            unit=content[name].get("unit") or "",
+        )
+    if problems:
+        raise InputError(problems)
+    return signals
 
 
 def _read_mdf(path: Path, names: tuple[str, ...]) -> dict[str, Signal]:

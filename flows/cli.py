@@ -171,6 +171,41 @@ def import_measurements(
     _show(_call("import_measurements", prefect, source, map=map, out=out), as_json)
 
 
+@app.command("brake-protocol")
+def brake_protocol(
+    campaign: Annotated[str, typer.Argument(help="Campaign folder with brake pressure and pitch.")],
+    protocol: Annotated[str, typer.Option(help="Protocol: YAML file, or the name of one.")] = "brake-dive",
+    vehicle: Annotated[
+        str | None, typer.Option(help="Vehicle to start from; by default the campaign's.")
+    ] = None,
+    all_events: Annotated[
+        bool, typer.Option("--all-events", help="Use every candidate, whatever rules it breaks.")
+    ] = False,
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Select braking events by the paper's rules and predict each drive from the others (Appendix C.5)."""
+    result = _call(
+        "brake_protocol", prefect, campaign, protocol=protocol, vehicle=vehicle, all_events=all_events, out=out
+    )
+    folds = [{k: v for k, v in fold.items() if k != "mean_trajectory"} for fold in result["folds"]]
+    brief = {key: value for key, value in result.items() if key != "events"} | {"folds": folds}
+    _show(result if as_json else brief, as_json)
+
+
+@app.command("synthetic-drives")
+def synthetic_drives(
+    out: Annotated[str, typer.Option(help="Folder for one bus log a drive.")],
+    drives: Annotated[int, typer.Option(help="How many drives.")] = 3,
+    events: Annotated[int, typer.Option(help="Brake applications in each.")] = 46,
+    seed: Annotated[int, typer.Option(help="Of the whole set.")] = 2020,
+    as_json: Json = False,
+) -> None:
+    """Emit drives as a car's bus logs them, with known truth, to try the brake protocol on."""
+    _show(_call("synthetic_drives", False, out, drives=drives, events=events, seed=seed), as_json)
+
+
 @scene_app.command("from-stereo")
 def scene_from_stereo(
     folder: Annotated[str, typer.Argument(help="calib.txt, poses.txt, image_l/, image_r/.")],
@@ -217,7 +252,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "generate": "generate", "audit": "audit", "describe": "describe", "validate": "describe",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
         "calibrate": "calibration",
-        "import_measurements": "importing",
+        "import_measurements": "importing", "brake_protocol": "protocol", "synthetic_drives": "bus_drives",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

@@ -29,6 +29,7 @@ from flows import calibration as _calibration  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import generate as _generate  # noqa: E402
 from flows import importing as _importing  # noqa: E402
+from flows import protocol as _protocol  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
 from flows import scenes as _scenes  # noqa: E402
 from flows import studies as _studies  # noqa: E402
@@ -51,3 +52,4 @@ calibrate = as_flow(_calibration.calibrate)
 scene_from_stereo = as_flow(_reconstruction.scene_from_stereo)
 scene_import = as_flow(_scenes.scene_import)
 import_measurements = as_flow(_importing.import_measurements)
+brake_protocol = as_flow(_protocol.brake_protocol)

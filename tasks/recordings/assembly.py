@@ -15,6 +15,8 @@ MINIMUM_SAMPLES = 100
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
     "°": "deg", "°/s": "deg/s", "1/min": "rpm", "-": "1",
+    "Unit_Bar": "bar", "Unit_KiloMeterPerHour": "km/h", "Unit_DegreOfArc": "deg", "Unit_DegreOfArcPerSecon": "deg/s",
+    "Unit_MeterPerSeconSquar": "m/s^2",
 }  # fmt: skip
 """Ways in which files write the units that this project knows."""
 

@@ -1,0 +1,106 @@
+"""Vehicle buses to emit: signals with rate, resolution and noise, and the drives that they carry."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from catalogs.entries import find_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, Text, checked, read_entry
+from tasks.recordings.brake_dive import DiveModel
+from tasks.recordings.bus_drive import Bus, BusSignal, DriveStyle
+from tasks.recordings.channels import CHANNELS_BY_NAME, unit_factor
+
+FOLDER = Path(__file__).parent
+Positive = Annotated[float, Field(gt=0)]
+Share = Annotated[Scalar, checked("1", minimum=0, maximum=1)]
+Ratio = Annotated[Scalar, checked("1", above=0)]
+Seconds = Annotated[Table, checked("s", above=0)]
+
+
+class TruthEntry(CatalogueEntry):
+    """The car that drives; the meanings stand at ``DiveModel``."""
+
+    brake_gain: Annotated[Scalar, checked("N m MPa-1", above=0)]
+    stiffness: Ratio
+    damping_ratio: Ratio
+
+
+class EventsEntry(CatalogueEntry):
+    """How it brakes; the meanings stand at ``DriveStyle``."""
+
+    start_speed: Annotated[Table, checked("km h-1", above=0)]
+    peak_pressure: Annotated[Table, checked("bar", above=0)]
+    ramp: Seconds
+    hold: Seconds
+    curve_share: Share
+    rough_share: Share
+    dragging_share: Share
+    slope: Annotated[Scalar, checked("deg", minimum=0)]
+
+    @field_validator("start_speed", "peak_pressure", "ramp", "hold")
+    @classmethod
+    def _is_a_range(cls, table: Table) -> Table:
+        if len(table.value) != 2 or table.value[0] > table.value[1]:
+            raise ValueError(f"must be the smallest and the largest value; it is {list(table.value)}")
+        return table
+
+
+class SignalEntry(CatalogueEntry):
+    """One signal; the meanings stand at ``BusSignal``."""
+
+    name: Text
+    channel: Text
+    unit: Text
+    rate_hz: Positive
+    resolution: Positive
+    noise: Annotated[float, Field(ge=0)]
+
+    @field_validator("channel")
+    @classmethod
+    def _is_known(cls, channel: str) -> str:
+        if channel not in CHANNELS_BY_NAME:
+            raise ValueError(f"no such channel; there are: {', '.join(CHANNELS_BY_NAME)}; it is {channel}")
+        return channel
+
+
+class BusEntry(CatalogueEntry):
+    """What a bus file must hold."""
+
+    truth: TruthEntry
+    events: EventsEntry
+    signals: Annotated[tuple[SignalEntry, ...], Field(min_length=1)]
+
+
+def load_bus(name_or_path: str | Path = "a2d2-like") -> Bus:
+    """Read a bus by its name in the catalogue or from a YAML file.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file, or the buses that exist.
+    """
+    entry = read_entry(BusEntry, find_entry(FOLDER, name_or_path, "bus"), "bus")
+    events = entry.events
+
+    def pair(table: Table, factor: float = 1.0) -> tuple[float, float]:
+        return table.value[0] * factor, table.value[1] * factor
+
+    return Bus(
+        truth=DiveModel(
+            # the rollout makes its own pitch moment, so the car has no such gain
+            pitch_gain=1.0,
+            **{name: getattr(entry.truth, name).value for name in TruthEntry.model_fields},
+        ),
+        style=DriveStyle(
+            start_speed=pair(events.start_speed, unit_factor("km/h", "m/s")),
+            peak_pressure=pair(events.peak_pressure, unit_factor("bar", "MPa")),
+            ramp=pair(events.ramp),
+            hold=pair(events.hold),
+            curve_share=events.curve_share.value,
+            rough_share=events.rough_share.value,
+            dragging_share=events.dragging_share.value,
+            slope=events.slope.value,
+        ),
+        signals=tuple(BusSignal(**signal.model_dump()) for signal in entry.signals),
+    )

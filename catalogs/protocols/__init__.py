@@ -1,0 +1,100 @@
+"""Evaluation protocols as data: windows, thresholds and selection rules with their sources."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from catalogs.entries import find_entry
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, checked, read_entry
+from tasks.recordings.selection import QUANTITIES, Protocol, Rule
+
+FOLDER = Path(__file__).parent
+Window = Annotated[Table, checked("s")]
+Count = Annotated[Scalar, checked("1", minimum=0)]
+
+
+class RuleEntry(CatalogueEntry):
+    """One selection rule; the meanings stand at ``Rule``."""
+
+    name: Text
+    criterion: Text
+    at_least: Number | None = None
+    at_most: Number | None = None
+    unit: Text
+    paper_fails: Annotated[int, Field(ge=0)] | None = None
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _is_one_rule(self) -> "RuleEntry":
+        problems = []
+        if (self.at_least is None) == (self.at_most is None):
+            problems.append("needs exactly one of at_least and at_most")
+        if self.name not in QUANTITIES:
+            problems.append(f"measures {self.name}, which is unknown; there are: {', '.join(QUANTITIES)}")
+        elif self.unit != QUANTITIES[self.name].unit:
+            problems.append(f"must be in {QUANTITIES[self.name].unit}; it is in {self.unit}")
+        if problems:
+            raise ValueError("; ".join(f"rule {self.name} {problem}" for problem in problems))
+        return self
+
+
+class ProtocolEntry(CatalogueEntry):
+    """What a protocol file must hold; the meanings stand at ``Protocol``."""
+
+    onset_pressure: Annotated[Scalar, checked("MPa", above=0)]
+    merge_gap: Annotated[Scalar, checked("s", minimum=0)]
+    analysis_window: Window
+    baseline_window: Window
+    evaluation_window: Window
+    quality_window: Window
+    fixed_damping_ratio: Annotated[Scalar, checked("1", above=0)]
+    paper_candidates: Count | None = None
+    paper_retained: Count | None = None
+    rules: Annotated[tuple[RuleEntry, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _windows_are_intervals(self) -> "ProtocolEntry":
+        problems = []
+        for name in ("analysis_window", "baseline_window", "evaluation_window", "quality_window"):
+            window = getattr(self, name).value
+            if len(window) != 2 or window[0] >= window[1]:
+                problems.append(f"{name} must be its start and its later end; it is {list(window)}")
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+
+def load_protocol(name_or_path: str | Path = "brake-dive") -> Protocol:
+    """Read a protocol by its name in the catalogue or from a YAML file.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file, or the protocols that exist.
+    """
+    path = find_entry(FOLDER, name_or_path, "protocol")
+    entry = read_entry(ProtocolEntry, path, "protocol")
+
+    def pair(window: Table) -> tuple[float, float]:
+        return window.value[0], window.value[1]
+
+    return Protocol(
+        onset_pressure=entry.onset_pressure.value,
+        merge_gap=entry.merge_gap.value,
+        analysis=pair(entry.analysis_window),
+        baseline=pair(entry.baseline_window),
+        evaluation=pair(entry.evaluation_window),
+        quality=pair(entry.quality_window),
+        fixed_damping_ratio=entry.fixed_damping_ratio.value,
+        rules=tuple(
+            Rule(
+                name=rule.name,
+                criterion=rule.criterion,
+                limit=rule.at_least if rule.at_least is not None else rule.at_most or 0.0,
+                is_minimum=rule.at_least is not None,
+                paper_fails=rule.paper_fails,
+            )
+            for rule in entry.rules
+        ),
+    )

@@ -1,0 +1,130 @@
+"""The brake-dive protocol on a campaign: selection with attrition, leave-one-drive-out, scores."""
+
+import csv
+import io
+from dataclasses import asdict
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+from catalogs.drives import read_drives
+from catalogs.protocols import load_protocol
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from flows.store.layout import write_atomically, write_json
+from tasks.recordings.attrition import attrition_table
+from tasks.recordings.brake_dive import pitch_mode, with_model
+from tasks.recordings.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
+from tasks.recordings.selection import Judged, select_events
+from tasks.vehicle.parameters import Vehicle
+
+SCORE_UNITS = {
+    "pitch_rmse": "deg", "pitch_correlation": "1", "rate_rmse": "deg/s", "rate_correlation": "1", "no_dive_rmse": "deg",
+}  # fmt: skip
+
+
+def brake_protocol(
+    campaign: str,
+    *,
+    protocol: str = "brake-dive",
+    vehicle: str | None = None,
+    all_events: bool = False,
+    out: str | None = None,
+) -> dict[str, Any]:
+    """Select braking events by rule and predict each drive from a calibration on the others.
+
+    Parameters
+    ----------
+    campaign : campaign folder with brake pressure, speed, acceleration and pitch
+    protocol : protocol by name or YAML file
+    vehicle : to start from, by name or YAML file; None takes the campaign's
+    all_events : go on with every candidate, whatever rules it breaks; the table stays as it is
+    out : folder for ``brake_protocol.json`` and ``attrition.csv``; None writes none
+
+    Returns
+    -------
+    ``episodes``, ``candidates``, ``retained``, ``used``, ``unassessed``, ``attrition[]``, ``events[]``, ``folds[]``,
+    ``macro[]`` and ``units``; a figure that cannot be had is null.
+
+    Raises
+    ------
+    InputError
+        If the campaign lacks what the protocol needs.
+    """
+    rules = load_protocol(protocol)
+    recorded = read_drives(campaign)
+    base = load_vehicle(vehicle or recorded.vehicle)
+    selection = select_events(recorded.drives, rules)
+    used = tuple(judged.event for judged in selection.judged) if all_events else selection.retained
+    folds = leave_one_drive_out(used, base, load_surface("dense-asphalt"))
+    table = [asdict(row) for row in attrition_table(selection, rules)]
+    result: dict[str, Any] = {
+        "campaign": recorded.name,
+        "vehicle": base.name,
+        "drives": len({drive.drive for drive in recorded.drives}),
+        "episodes": selection.episodes,
+        "candidates": len(selection.judged),
+        "retained": len(selection.retained),
+        "used": len(used),
+        "unassessed": list(selection.unassessed),
+        "attrition": table,
+        "events": [_event_row(judged) for judged in selection.judged],
+        "folds": [_fold_row(fold, base) for fold in folds],
+        "macro": [
+            {"variant": variant, **_score_row(macro_mean(folds, variant))}
+            for variant in VARIANTS
+            if any(fold.variant == variant for fold in folds)
+        ],
+        "units": SCORE_UNITS,
+    }
+    if not folds:
+        result["note"] = "leaving a drive out needs events in at least two drives"
+    if out is not None:
+        write_json(Path(out) / "brake_protocol.json", result)
+        text = io.StringIO()
+        writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
+        write_atomically(Path(out) / "attrition.csv", text.getvalue().encode())
+    return result
+
+
+def _event_row(judged: Judged) -> dict[str, Any]:
+    event = judged.event
+    return {
+        "drive": event.drive,
+        "run": event.run,
+        "at_s": event.at,
+        "start_speed_km_h": event.start_speed * 3.6,
+        "failed": list(judged.failed),
+        "values": {name: _number(value) for name, value in judged.values.items()},
+    }
+
+
+def _fold_row(fold: Fold, base: Vehicle) -> dict[str, Any]:
+    frequency, _ = pitch_mode(with_model(base, fold.model))
+    return {
+        "variant": fold.variant,
+        "drive": fold.drive,
+        "events": len(fold.scores),
+        "trained_on": fold.trained_on,
+        **_score_row(fold.mean),
+        "peak_ratio": _number(fold.peak_ratio),
+        "brake_gain_n_m_per_mpa": fold.model.brake_gain,
+        "pitch_gain": fold.model.pitch_gain,
+        "pitch_frequency_hz": frequency,
+        "damping_ratio": fold.model.damping_ratio,
+        "mean_trajectory": {
+            "time_s": fold.time.round(6).tolist(),
+            "dive_deg": fold.dive.tolist(),
+            "predicted_dive_deg": fold.predicted_dive.tolist(),
+        },
+    }
+
+
+def _score_row(score: Score) -> dict[str, float | None]:
+    return {name: _number(value) for name, value in asdict(score).items()}
+
+
+def _number(value: float) -> float | None:
+    return None if isnan(value) else value
