@@ -31,6 +31,7 @@ from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.eval.motion_agreement import PoseThresholds, pose_verdict
 from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.unusable import unusable_pixels
 from tasks.render.backend import select_backend
 from tasks.render.camera import Camera, body_poses
 from tasks.render.clip import render_clip
@@ -78,9 +79,7 @@ def catalogue_of(root: Path) -> Catalogue:
 def make_clip(root: str, index: int) -> dict[str, Any]:
     """Make and commit clip ``index`` of the dataset at ``root``; returns its receipt."""
     started = time.process_time(), time.perf_counter()
-    cv2.setNumThreads(
-        1
-    )  # one clip a worker, one thread a clip: threads within a frame cost more than they give
+    cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
     layout = Layout(Path(root))
     plan = read_plan(layout.root)
     clip = plan.clips[index]
@@ -89,7 +88,7 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
     facts, ride = drive(clip.scenario, catalogue, plan.settings.vehicle_mode, plan.duration_s)
     frames = frame_rows(ride, plan, catalogue)
     buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed))
-    frames |= judge(buffers, frames, catalogue)
+    frames |= judge(buffers, frames, facts["film_depth_mm"], catalogue)
     verdict = frames.pop("verdict")
 
     write_clip(layout.frames, index, buffers)
@@ -215,14 +214,17 @@ def picture(
             scene.carriageway_left, scene.carriageway_right,
         )  # fmt: skip
     return render_clip(
-        gaussians, scene.environment, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
+        gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
         frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
         backend=select_backend(plan.backend),
     )  # fmt: skip
 
 
 def judge(
-    buffers: Mapping[str, NDArray[Any]], frames: Mapping[str, NDArray[Any]], catalogue: Catalogue
+    buffers: Mapping[str, NDArray[Any]],
+    frames: Mapping[str, NDArray[Any]],
+    film_depth_mm: float,
+    catalogue: Catalogue,
 ) -> dict[str, Any]:
     """Motion recovered from the finished frames, held against the telemetry."""
     recovered = recover_motion_pnp(
@@ -230,7 +232,7 @@ def judge(
         buffers["depth"],
         catalogue.camera.K - PIXEL_CENTRE,
         catalogue.camera.T_rig_camera,
-        class_id=buffers["class"],
+        unusable=unusable_pixels(buffers["class"], film_depth_mm),
     )
     verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)
     return {

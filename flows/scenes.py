@@ -82,7 +82,8 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
     folder.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(folder / "rgb.png"), picture[..., ::-1])
     buffers: dict[str, Any] = {
-        "depth": gbuffer.depth,
+        "depth": gbuffer.expected_depth,
+        "surface_depth": gbuffer.depth,
         "alpha": gbuffer.alpha,
         "normal": gbuffer.normal,
         "class": gbuffer.class_id,

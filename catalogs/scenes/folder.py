@@ -17,6 +17,7 @@ from tasks.scene.scene import Scene
 
 SCENE_FORMAT = "musync-scene/1"
 GAUSSIAN_ARRAYS = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
+BLENDING_RULES = ("antialiased", "display_encoded")
 SCENE_ARRAYS = (*GAUSSIAN_ARRAYS, "station", "T_world_rig", "environment")
 ARRAY_FILES = tuple(f"{name}.npy" for name in SCENE_ARRAYS)
 
@@ -49,7 +50,7 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
             "route_length_m": scene.route.length,
             "road_share": float(np.isin(scene.gaussians.class_id, ROAD_CLASSES).mean()),
             "held_out_psnr_db": None,
-            "display_encoded": scene.gaussians.display_encoded,
+            **{name: getattr(scene.gaussians, name) for name in BLENDING_RULES},
             "carriageway_left": scene.carriageway_left,
             "carriageway_right": scene.carriageway_right,
             "sha256": {name: _file_hash(partial / name) for name in ARRAY_FILES},
@@ -96,7 +97,7 @@ def read_scene(folder: Path) -> Scene:
             f" its shape is {sky.shape}"
         )
     gaussians = Gaussians(
-        **{name: arrays[name] for name in GAUSSIAN_ARRAYS}, display_encoded=content["display_encoded"]
+        **{name: arrays[name] for name in GAUSSIAN_ARRAYS}, **{name: content[name] for name in BLENDING_RULES}
     )
     check_gaussians(gaussians, str(folder))
     return Scene(
@@ -113,7 +114,7 @@ def scene_hash(folder: Path) -> str:
     """SHA-256 over the hashes of the scene's arrays and the facts that change its picture."""
     content = _read_facts(folder)
     decisive = {
-        key: content[key] for key in ("sha256", "display_encoded", "carriageway_left", "carriageway_right")
+        key: content[key] for key in ("sha256", *BLENDING_RULES, "carriageway_left", "carriageway_right")
     }
     return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
@@ -142,7 +143,9 @@ def _read_facts(folder: Path) -> dict[str, Any]:
     left, right = content.get("carriageway_left"), content.get("carriageway_right")
     rules = {
         "name must be a text": isinstance(content.get("name"), str),
-        "display_encoded must be true or false": isinstance(content.get("display_encoded"), bool),
+        f"{' and '.join(BLENDING_RULES)} must be true or false": all(
+            isinstance(content.get(name), bool) for name in BLENDING_RULES
+        ),
         "carriageway_left and carriageway_right must be numbers [m], positive and negative": (
             isinstance(left, int | float) and isinstance(right, int | float) and right < 0 < left
         ),

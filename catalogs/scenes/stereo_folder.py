@@ -119,7 +119,8 @@ def _calibration_problems(path: Path, P: NDArray[np.float64]) -> list[str]:
         problems.append(f"{path}: rectified cameras share one camera matrix; rows 1 and 2 differ")
     if not P[1, 0, 3] < P[0, 0, 3]:
         problems.append(
-            f"{path}: the second camera must lie to the right, so that its fourth number is negative; it is {P[1, 0, 3]:g}"
+            f"{path}: the second camera must lie to the right, so that its fourth number is negative;"
+            f" it is {P[1, 0, 3]:g}"
         )
     return problems
 
@@ -131,7 +132,8 @@ def _pose_problems(path: Path, poses: NDArray[np.float64]) -> list[str]:
     if not len(wrong):
         return []
     return [
-        f"{path}: every pose must be a rotation and a translation; {len(wrong)} are not, the first is row {wrong[0] + 1}"
+        f"{path}: every pose must be a rotation and a translation; {len(wrong)} are not,"
+        f" the first is row {wrong[0] + 1}"
     ]
 
 

@@ -217,7 +217,7 @@ def check_clip(
     K: Floats,
     T_rig_camera: Floats,
     depth: NDArray[np.float32] | None = None,
-    class_id: NDArray[np.uint8] | None = None,
+    unusable: NDArray[np.bool_] | None = None,
     route_rotations: Floats | None = None,
 ) -> None:
     """Refuse a clip that no pose check can read.
@@ -228,7 +228,7 @@ def check_clip(
     K : float64 [3, 3] intrinsics [px]
     T_rig_camera : float64 [4, 4] camera mount [m]
     depth : float32 [F, H, W] camera z, NaN where there is nothing [m]
-    class_id : uint8 [F, H, W] semantic classes [1]
+    unusable : bool [F, H, W] pixels to leave out [1]
     route_rotations : float64 [F, 3, 3] route-to-world rotations [1]
 
     Raises
@@ -241,7 +241,7 @@ def check_clip(
         raise InputError(
             f"A clip's frames must be uint8 [F, H, W, 3] with at least one frame, got {frames.dtype} {frames.shape}."
         )
-    for name, array in (("depth", depth), ("class_id", class_id)):
+    for name, array in (("depth", depth), ("unusable", unusable)):
         if array is not None and array.shape != frames.shape[:3]:
             problems.append(f"{name} must match the frames' [F, H, W] {frames.shape[:3]}, got {array.shape}.")
     if K.shape != (3, 3) or not np.isfinite(K).all() or K[0, 0] <= 0 or K[1, 1] <= 0:

@@ -7,7 +7,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.conventions import SemanticClass
 from tasks.eval.motion import (
     FrameStep,
     RecoveredMotion,
@@ -71,7 +70,7 @@ def recover_motion_photometric(
     depth: NDArray[np.float32],
     K: Floats,
     T_rig_camera: Floats,
-    class_id: NDArray[np.uint8] | None = None,
+    unusable: NDArray[np.bool_] | None = None,
     route_rotations: Floats | None = None,
     settings: PhotometricSettings | None = None,
 ) -> RecoveredMotion:
@@ -86,7 +85,7 @@ def recover_motion_photometric(
     depth : float32 [F, H, W] camera z, NaN where there is nothing [m]
     K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
     T_rig_camera : float64 [4, 4] camera mount [m]
-    class_id : uint8 [F, H, W] semantic classes; the sky's pixels are left out [1]
+    unusable : bool [F, H, W] pixels to leave out, see `tasks.eval.unusable` [1]
     route_rotations : float64 [F, 3, 3] route-to-world rotations of the undisturbed rig, for a route that
         is not level [1]
     settings : thresholds of the check
@@ -96,7 +95,7 @@ def recover_motion_photometric(
     InputError
         If an array has the wrong shape, type or values.
     """
-    check_clip(frames, K, T_rig_camera, depth, class_id, route_rotations)
+    check_clip(frames, K, T_rig_camera, depth, unusable, route_rotations)
     chosen = settings or PhotometricSettings()
     prepared: dict[int, list[_Level]] = {}
 
@@ -104,8 +103,8 @@ def recover_motion_photometric(
         if k not in prepared:
             for old in [i for i in prepared if i < k - 8]:
                 del prepared[old]
-            sky = None if class_id is None else class_id[k] == SemanticClass.SKY
-            prepared[k] = _pyramid(frames[k], depth[k], sky, K, chosen)
+            hidden = None if unusable is None else unusable[k]
+            prepared[k] = _pyramid(frames[k], depth[k], hidden, K, chosen)
         return prepared[k]
 
     def place(anchor: int, frame: int, predicted: Floats) -> FrameStep:
@@ -126,7 +125,7 @@ def recover_motion_photometric(
 def _pyramid(
     rgb: NDArray[np.uint8],
     depth: NDArray[np.float32],
-    sky: NDArray[np.bool_] | None,
+    hidden: NDArray[np.bool_] | None,
     K: Floats,
     settings: PhotometricSettings,
 ) -> list[_Level]:
@@ -134,8 +133,8 @@ def _pyramid(
         cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32), (0, 0), settings.smoothing
     )
     seen = np.isfinite(depth) & (depth > 0)
-    if sky is not None:
-        seen &= ~sky
+    if hidden is not None:
+        seen &= ~hidden
     q = np.divide(1.0, depth, out=np.zeros_like(depth), where=seen)
     levels = []
     for level in range(settings.levels):

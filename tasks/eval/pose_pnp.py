@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.conventions import SemanticClass
 from tasks.eval.corners import cell_size, corner_strength, grid_corners, track_corners
 from tasks.eval.motion import (
     FrameStep,
@@ -48,7 +47,7 @@ class PnpSettings:
     noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
     """
 
-    cells_across: int = 34
+    cells_across: int = 60
     corner_quality: float = 0.02
     window: int = 11
     track_levels: int = 1
@@ -77,7 +76,7 @@ def recover_motion_pnp(
     depth: NDArray[np.float32],
     K: Floats,
     T_rig_camera: Floats,
-    class_id: NDArray[np.uint8] | None = None,
+    unusable: NDArray[np.bool_] | None = None,
     route_rotations: Floats | None = None,
     settings: PnpSettings | None = None,
 ) -> RecoveredMotion:
@@ -89,7 +88,7 @@ def recover_motion_pnp(
     depth : float32 [F, H, W] camera z, NaN where there is nothing [m]
     K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
     T_rig_camera : float64 [4, 4] camera mount [m]
-    class_id : uint8 [F, H, W] semantic classes; the sky's pixels are left out [1]
+    unusable : bool [F, H, W] pixels to leave out, see `tasks.eval.unusable` [1]
     route_rotations : float64 [F, 3, 3] route-to-world rotations of the undisturbed rig, for a route that
         is not level [1]
     settings : thresholds of the check
@@ -99,7 +98,7 @@ def recover_motion_pnp(
     InputError
         If an array has the wrong shape, type or values.
     """
-    check_clip(frames, K, T_rig_camera, depth, class_id, route_rotations)
+    check_clip(frames, K, T_rig_camera, depth, unusable, route_rotations)
     chosen = settings or PnpSettings()
     prepared: dict[int, _Frame] = {}
 
@@ -107,8 +106,8 @@ def recover_motion_pnp(
         if k not in prepared:
             for old in [i for i in prepared if i < k - 8]:
                 del prepared[old]
-            sky = None if class_id is None else class_id[k] == SemanticClass.SKY
-            prepared[k] = _prepare(frames[k], depth[k], sky, chosen)
+            hidden = None if unusable is None else unusable[k]
+            prepared[k] = _prepare(frames[k], depth[k], hidden, chosen)
         return prepared[k]
 
     def place(anchor: int, frame: int, predicted: Floats) -> FrameStep:
@@ -125,12 +124,15 @@ def recover_motion_pnp(
 
 
 def _prepare(
-    rgb: NDArray[np.uint8], depth: NDArray[np.float32], sky: NDArray[np.bool_] | None, settings: PnpSettings
+    rgb: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    hidden: NDArray[np.bool_] | None,
+    settings: PnpSettings,
 ) -> _Frame:
     grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
     seen = np.isfinite(depth) & (depth > 0)
-    if sky is not None:
-        seen &= ~sky
+    if hidden is not None:
+        seen &= ~hidden
     inverse_depth = np.divide(1.0, depth, out=np.zeros_like(depth), where=seen)
     return _Frame(grey=grey, inverse_depth=inverse_depth, strength=corner_strength(grey))
 

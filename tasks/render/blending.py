@@ -46,13 +46,13 @@ PIXELS = TILE_WIDTH * TILE_HEIGHT
 # than a power of two, lest they evict one another.
 # Offsets are unsigned: a signed index may be negative, and the compiler would gather pixel by pixel.
 _PLANE = PIXELS + 16
-_CLASS, _ALPHA, _DEPTH, _RED, _GREEN, _BLUE, _NX, _NY, _NZ, _DISTANCE = (
-    np.uint64(k * _PLANE) for k in range(1, 11)
-)
-_STATE = 11 * _PLANE
+_FRONT, _ALPHA, _DEPTH, _RED, _GREEN, _BLUE, _NX, _NY, _NZ = (np.uint64(k * _PLANE) for k in range(1, 10))
+_STATE = 10 * _PLANE
+_FIRST = np.uint64(1)  # splats are counted from 1 in the plane _FRONT, exact in single precision up to 2^24
 
 SURFACE_RATIO = 1.25
-"""Surface and expected depth that differ by more are not of one surface; the expected depth is kept [1]."""
+"""Where a splat's plane is nearer or further than its centre by more than this, the disc is nearly edge-on,
+and its centre's depth counts [1]."""
 
 _MAX_ALPHA, _STOP, _LOG_CUT = np.float32(MAX_ALPHA), np.float32(STOP), np.float32(LOG_CUT)
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
@@ -166,7 +166,7 @@ def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untype
     for i in range(listed):
         splat, first = np.uint64(splats[strips.entry[i]]), np.uint64(strips.pixel[i])
         middle, log_alpha, falloff = strips.middle[i], strips.log_alpha[i], records[splat, COLUMN_FALLOFF]
-        z, label, distance = records[splat, DEPTH], records[splat, CLASS], records[splat, DISTANCE]
+        z, number = records[splat, DEPTH], np.float32(splat + _FIRST)
         r, g, b = records[splat, RED], records[splat, GREEN], records[splat, BLUE]
         nx, ny, nz = records[splat, NORMAL_X], records[splat, NORMAL_Y], records[splat, NORMAL_Z]
         for x in range(TILE_WIDTH):
@@ -175,7 +175,7 @@ def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untype
             before = s[l]
             w, after = absorb(log_alpha - falloff * dx * dx, before)
             s[l] = after
-            s[_CLASS + l] += label if (before >= _HALF) & (after < _HALF) else _ZERO
+            s[_FRONT + l] += number if (before >= _HALF) & (after < _HALF) else _ZERO
             s[_ALPHA + l] += w
             s[_DEPTH + l] += w * z
             s[_RED + l] += w * r
@@ -184,11 +184,22 @@ def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untype
             s[_NX + l] += w * nx
             s[_NY + l] += w * ny
             s[_NZ + l] += w * nz
-            s[_DISTANCE + l] += w * distance
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def blend(records, rays, starts, splats, rgb, depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
+def _plane_depth(record, rays, u, v):  # type: ignore[no-untyped-def]
+    """Camera z of a splat's plane at picture point (u, v); of its centre where the plane is nearly edge-on."""
+    slant = (
+        record[NORMAL_X] * (rays[0, 0] * u + rays[1, 0] * v + rays[2, 0])
+        + record[NORMAL_Y] * (rays[0, 1] * u + rays[1, 1] * v + rays[2, 1])
+        + record[NORMAL_Z] * (rays[0, 2] * u + rays[1, 2] * v + rays[2, 2])
+    )
+    plane, centre = record[DISTANCE] / slant, record[DEPTH]
+    return plane if (plane < centre * _RATIO) & (centre < plane * _RATIO) else centre
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def blend(records, rays, starts, splats, rgb, depth, expected_depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
     """Blend every tile and write the finished buffers of `GBuffer`.
 
     Parameters
@@ -196,7 +207,7 @@ def blend(records, rays, starts, splats, rgb, depth, alpha, normal, class_id):  
     records : float32 [V, 16] splat records
     rays : float32 [3, 3] world directions of the picture, see `View.rays` [1]
     starts, splats : tile lists, see `tasks.render.binning.bin_splats`
-    rgb, depth, alpha, normal, class_id : the buffers, overwritten
+    rgb, depth, expected_depth, alpha, normal, class_id : the buffers, overwritten
     """
     height, width = alpha.shape
     across = -(-width // TILE_WIDTH)
@@ -220,19 +231,16 @@ def blend(records, rays, starts, splats, rgb, depth, alpha, normal, class_id):  
                 length = np.sqrt(nx * nx + ny * ny + nz * nz)
                 scale = _ONE / length if length > _ZERO else _ZERO
                 alpha[i, j] = s[_ALPHA + l]
-                expected = s[_DEPTH + l] / s[_ALPHA + l]  # NaN where no splat contributes
-                u, v = np.float32(j) + _HALF, np.float32(i) + _HALF
-                slant = (
-                    nx * (rays[0, 0] * u + rays[1, 0] * v + rays[2, 0])
-                    + ny * (rays[0, 1] * u + rays[1, 1] * v + rays[2, 1])
-                    + nz * (rays[0, 2] * u + rays[1, 2] * v + rays[2, 2])
-                )
-                surface = s[_DISTANCE + l] / slant
-                is_one = (surface < expected * _RATIO) & (expected < surface * _RATIO)
-                depth[i, j] = surface if is_one else expected
+                z = s[_DEPTH + l] / s[_ALPHA + l]  # NaN where no splat contributes
+                expected_depth[i, j] = z
+                class_id[i, j] = 0
+                front = np.int64(s[_FRONT + l]) - 1
+                if front >= 0:
+                    class_id[i, j] = np.uint8(records[front, CLASS])
+                    z = _plane_depth(records[front], rays, np.float32(j) + _HALF, np.float32(i) + _HALF)
+                depth[i, j] = z
                 rgb[i, j, 0], rgb[i, j, 1], rgb[i, j, 2] = s[_RED + l], s[_GREEN + l], s[_BLUE + l]
                 normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = nx * scale, ny * scale, nz * scale
-                class_id[i, j] = np.uint8(s[_CLASS + l])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -11,11 +11,13 @@ from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.route import Route
 
 
 def render_clip(
     gaussians: Gaussians,
     environment: NDArray[np.float32],
+    route: Route,
     camera: Camera,
     T_world_rig: NDArray[np.float64],
     *,
@@ -31,6 +33,7 @@ def render_clip(
     ----------
     gaussians : the street with the clip's road edit in it
     environment : float32 [He, We, 3] clear sky and far field, as in `Scene.environment` [1]
+    route : along which wheels have left tracks in the snow
     camera : intrinsics, mount and exposure
     T_world_rig : float64 [F, 4, 4] rig poses with heave and pitch
     frame_rate_hz : frames per second [Hz]
@@ -44,7 +47,8 @@ def render_clip(
     ``rgb`` uint8 [F, H, W, 3] sRGB, ``depth`` float32 [F, H, W] camera z [m] (NaN where nothing is seen),
     ``class`` uint8 [F, H, W] `SemanticClass`
     """
-    scene, clip_weather = weather_scene(gaussians, environment, weather, looks, float(camera.K[0, 0]), seed)
+    focal_px = float(camera.K[0, 0])
+    scene, clip_weather = weather_scene(gaussians, environment, weather, looks, focal_px, seed, route)
     prepared = backend.prepare(scene)
     T_world_camera = T_world_rig @ camera.T_rig_camera
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / frame_rate_hz, axis=0)

@@ -13,8 +13,10 @@ class GBuffer:
     Parameters
     ----------
     rgb : float32 [H, W, 3] blended colour, premultiplied by alpha, in the scene's colour space [1]
-    depth : float32 [H, W] camera z of the blended surface at the pixel: the discs' planes, weighted as the
-        colours are; the expected z of the centres where they make no one surface [m]; NaN where alpha is 0
+    depth : float32 [H, W] camera z of the surface at the pixel: of the plane of the Gaussian at which the
+        transmittance falls below one half; the expected depth where it never does [m]; NaN where alpha is 0
+    expected_depth : float32 [H, W] camera z of the Gaussians' centres, weighted as the colours are [m]; NaN
+        where alpha is 0. Where many discs make one surface it comes out too near, as the near ones hide the far
     alpha : float32 [H, W] accumulated opacity [1]
     normal : float32 [H, W, 3] blended unit normal, world frame, facing the camera; 0 where alpha is 0
     class_id : uint8 [H, W] class of the Gaussian at which the transmittance falls below one half;
@@ -23,6 +25,7 @@ class GBuffer:
 
     rgb: NDArray[np.float32]
     depth: NDArray[np.float32]
+    expected_depth: NDArray[np.float32]
     alpha: NDArray[np.float32]
     normal: NDArray[np.float32]
     class_id: NDArray[np.uint8]

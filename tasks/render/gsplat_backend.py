@@ -1,8 +1,8 @@
 """The same views drawn by gsplat 1.5 (Apache-2.0) on a CUDA device.
 
 gsplat compiles its kernels with nvcc at first use. It blends colours that are evaluated before, here
-three of light and three of the normal, and expected depth; the class is found from the list of
-(Gaussian, pixel) pairs that it can return.
+three of light and three of the normal, and expected depth; class and surface depth are found from the
+list of (Gaussian, pixel) pairs that it can return.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from tasks.render.blending import MAX_ALPHA, SURFACE_RATIO
 from tasks.render.gbuffer import GBuffer
-from tasks.render.projection import LOW_PASS, NEAR
-from tasks.render.view import View, view_of
+from tasks.render.projection import NEAR, low_pass
+from tasks.render.view import view_of
 from tasks.scene.gaussians import Gaussians, check_gaussians
 
 _EVERY_BATCH = 2**31 - 1
@@ -33,6 +33,7 @@ class DeviceGaussians:
     sh: torch.Tensor
     normals: torch.Tensor
     class_id: torch.Tensor
+    antialiased: bool
 
 
 class GsplatBackend:
@@ -67,6 +68,7 @@ class GsplatBackend:
             sh=self._tensor(gaussians.sh),
             normals=self._tensor(gaussians.normals),
             class_id=self._tensor(gaussians.class_id),
+            antialiased=gaussians.antialiased,
         )
 
     @torch.no_grad()
@@ -90,39 +92,40 @@ class GsplatBackend:
             quats=prepared.quats,
             scales=prepared.scales,
             opacities=prepared.opacities,
-            colors=torch.cat((colours, facing, (facing * direction).sum(dim=1, keepdim=True)), dim=1),
+            colors=torch.cat((colours, facing), dim=1),
             viewmats=self._tensor(view.viewmat.astype(np.float32))[None],
             Ks=self._tensor(view.K.astype(np.float32))[None],
             width=width,
             height=height,
             near_plane=NEAR,
-            eps2d=LOW_PASS,
+            eps2d=low_pass(prepared.antialiased),
+            rasterize_mode="antialiased" if prepared.antialiased else "classic",
             render_mode="RGB+ED",
             packed=False,
         )
         alpha = alpha[0, ..., 0]
         normal = torch.nn.functional.normalize(blended[0, ..., 3:6], dim=-1)
-        expected = torch.where(alpha > 0, blended[0, ..., 7], torch.nan)
-        surface = blended[0, ..., 6] / (blended[0, ..., 3:6] * self._rays(view)).sum(dim=-1)
-        is_one = (surface < expected * SURFACE_RATIO) & (expected < surface * SURFACE_RATIO)
-        depth = torch.where(is_one, surface, expected)
+        expected = torch.where(alpha > 0, blended[0, ..., 6], torch.nan)
+        front = self._front(splats, width, height)
+        seen, splat = front >= 0, front.clamp_min(0)
+        pixels = np.dstack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5, 1.0))
+        rays = self._tensor((pixels @ view.rays).astype(np.float32))
+        plane = (facing * direction).sum(dim=1)[splat] / (facing[splat] * rays).sum(dim=-1)
+        centre = splats["depths"][0, splat]
+        tilted = (plane < centre * SURFACE_RATIO) & (centre < plane * SURFACE_RATIO)
+        depth = torch.where(seen, torch.where(tilted, plane, centre), expected)
+        class_id = torch.where(seen, prepared.class_id[splat], 0)
         return GBuffer(
             rgb=blended[0, ..., :3].cpu().numpy(),
             depth=depth.cpu().numpy(),
+            expected_depth=expected.cpu().numpy(),
             alpha=alpha.cpu().numpy(),
             normal=normal.cpu().numpy(),
-            class_id=self._class_id(splats, prepared.class_id, width, height),
+            class_id=class_id.cpu().numpy(),
         )
 
-    def _rays(self, view: View) -> torch.Tensor:
-        """World directions of the pixels, camera z 1, [height, width, 3]."""
-        u, v = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
-        rays = np.stack((u, v, np.ones_like(u)), axis=-1) @ view.rays
-        return self._tensor(rays.astype(np.float32))
-
-    def _class_id(
-        self, splats: dict[str, Any], class_id: torch.Tensor, width: int, height: int
-    ) -> NDArray[np.uint8]:
+    def _front(self, splats: dict[str, Any], width: int, height: int) -> torch.Tensor:
+        """Gaussian at which each pixel's transmittance falls below one half, -1 where none does; [H, W]."""
         gaussian, pixel, _ = gsplat.rasterize_to_indices_in_range(
             0,
             _EVERY_BATCH,
@@ -142,9 +145,9 @@ class GsplatBackend:
         power = 0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy
         alpha = (splats["opacities"][0, gaussian] * torch.exp(-power)).clamp_max(MAX_ALPHA)
         halves = first_below_half(alpha, pixel)
-        picture = torch.zeros(height * width, dtype=torch.uint8, device=self.device)
-        picture[pixel[halves]] = class_id[gaussian[halves]]
-        return picture.reshape(height, width).cpu().numpy()
+        front = torch.full((height * width,), -1, dtype=torch.int64, device=self.device)
+        front[pixel[halves]] = gaussian[halves]
+        return front.reshape(height, width)
 
     def _tensor(self, array: NDArray[Any]) -> torch.Tensor:
         return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)

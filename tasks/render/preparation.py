@@ -34,7 +34,7 @@ class PreparedGaussians:
     reach : float64 [B] largest standard deviation within the block [m]
     class_id : uint8 [64 B] `SemanticClass`
     order : int64 [N] index in the original cloud of each Gaussian along the curve
-    display_encoded : carried over from `Gaussians`
+    antialiased, display_encoded : carried over from `Gaussians`
     """
 
     blocks: NDArray[np.float32]
@@ -43,6 +43,7 @@ class PreparedGaussians:
     reach: NDArray[np.float64]
     class_id: NDArray[np.uint8]
     order: NDArray[np.int64]
+    antialiased: bool
     display_encoded: bool
 
     def __len__(self) -> int:
@@ -141,6 +142,7 @@ def prepare(gaussians: Gaussians) -> PreparedGaussians:
         reach=reach,
         class_id=gaussians.class_id[members].ravel(),
         order=order,
+        antialiased=gaussians.antialiased,
         display_encoded=gaussians.display_encoded,
     )
 

@@ -1,8 +1,10 @@
 """EWA projection of prepared Gaussians: from blocks in the world to splat records in the picture.
 
-Zwicker et al. 2002 (doi:10.1109/TVCG.2002.1021576) with the rules of gsplat (arXiv:2409.06765): 0.3 px^2
-added to the picture covariance without compensation, the Jacobian's ray clamped to 1.3 times the field
-of view, nothing below an opacity of 1/255. A splat is stored so that along a picture row y its opacity is
+Zwicker et al. 2002 (doi:10.1109/TVCG.2002.1021576) with the rules of gsplat (arXiv:2409.06765): a pixel's
+variance added to the picture covariance, the Jacobian's ray clamped to 1.3 times the field of view, nothing
+below an opacity of 1/255. Clouds made for it (`Gaussians.antialiased`) lose in opacity what they gain in area;
+without that, discs smaller than a pixel grow, the near ones hide the far ones, and a road slides under the car.
+A splat is stored so that along a picture row y its opacity is
 
     alpha(x) = exp(log_opacity - row_falloff dy^2 - column_falloff (x - x0 - slope dy)^2),  dy = y - y0,
 
@@ -19,8 +21,9 @@ from tasks.render.view import View
 
 NEAR = 0.05
 """Nothing closer than this is drawn [m]."""
-LOW_PASS = 0.3
-"""Variance added to both picture axes, for a pixel's own extent [px^2]."""
+CLASSIC_LOW_PASS, ANTIALIASED_LOW_PASS = 0.3, 0.1
+"""Variance added to both picture axes, for a pixel's own extent [px^2]: in the INRIA code (Kerbl et al. 2023,
+doi:10.1145/3592433), and near that of the pixel itself, 1/12 (Yu et al. 2024, doi:10.1109/CVPR52733.2024.01839)."""
 LOG_CUT = float(np.log(1 / 255))
 """Logarithm of the opacity below which a splat is not drawn [1]."""
 
@@ -28,11 +31,10 @@ X, Y, SLOPE, COLUMN_FALLOFF, ROW_FALLOFF, LOG_ALPHA, DISTANCE, HALF_HEIGHT = ran
 DEPTH, RED, GREEN, BLUE, NORMAL_X, NORMAL_Y, NORMAL_Z, CLASS = range(8, 16)
 RECORD = 16
 """Columns of a splat record: one cache line of float32. ``DISTANCE`` is from the eye to the splat's plane along
-its normal [m], negative as it faces the eye: at a pixel, the camera z of that plane is ``distance / (normal . ray)``.
-Blending both sides of the fraction gives the plane itself where many discs make one surface. The mean of the
-discs' centres does not: seen at a grazing angle, the near halves hide the far ones and it comes out too near."""
+its normal [m], negative as it faces the eye: at a pixel, the camera z of that plane is
+``distance / (normal . ray)``."""
 
-_LOW_PASS, _LOW_PASS_DET = np.float32(LOW_PASS), np.float32(LOW_PASS**2)
+_EDGE_ON = np.float32(1e-12)
 _NEAR, _LOG_CUT = np.float32(NEAR), np.float32(LOG_CUT)
 _LARGEST_DET = np.float32(1e37)
 _ZERO, _HALF, _ONE, _TWO = (np.float32(c) for c in (0, 0.5, 1, 2))
@@ -42,16 +44,21 @@ _ZERO, _HALF, _ONE, _TWO = (np.float32(c) for c in (0, 0.5, 1, 2))
 _RECORD = SH * BLOCK
 
 
+def low_pass(antialiased: bool) -> float:
+    """Variance added to both picture axes [px^2]."""
+    return ANTIALIASED_LOW_PASS if antialiased else CLASSIC_LOW_PASS
+
+
 def visible_blocks(prepared: PreparedGaussians, view: View) -> NDArray[np.int64]:
     """Blocks of which some Gaussian may touch the picture; never leaves out one that does.
 
     A splat's half width is at most 3.33 sqrt(variance), and its variance at most
-    (f sigma / z)^2 (1 + ray^2) + 0.3, so "outside one edge" is a half-space of camera coordinates.
+    (f sigma / z)^2 (1 + ray^2) plus the low pass, so "outside one edge" is a half-space of camera coordinates.
     """
     x, y, z = view.to_camera(prepared.origins).T
     keep = z + prepared.radii >= NEAR
     extent = np.sqrt(-2 * LOG_CUT)
-    blur = extent * np.sqrt(LOW_PASS) + 1.0
+    blur = extent * np.sqrt(low_pass(prepared.antialiased)) + 1.0
     limits = view.ray_limits
     for p, f, c, size, ray in ((x, 0, 0, view.width, limits[:2]), (y, 1, 1, view.height, limits[2:])):
         focal, centre = view.K[f, f], view.K[c, 2]
@@ -86,7 +93,8 @@ def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32
     records = room[line : line + len(wanted) * BLOCK * RECORD].reshape(-1, RECORD)
     slots = np.empty(len(records), dtype=np.int64)
     count = _project_blocks(
-        prepared.blocks, prepared.class_id, wanted, view.to_camera(prepared.origins[wanted]).astype(np.float32),
+        prepared.blocks, prepared.class_id, prepared.antialiased, wanted,
+        view.to_camera(prepared.origins[wanted]).astype(np.float32),
         from_eye.astype(np.float32), rotation, lens, np.float32(view.width), np.float32(view.height), records, slots
     )  # fmt: skip
     return records[:count], slots[:count]
@@ -94,7 +102,7 @@ def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _project_blocks(  # type: ignore[no-untyped-def]
-    blocks, class_id, wanted, in_camera, from_eye, rotation, lens, width, height, records, slots
+    blocks, class_id, antialiased, wanted, in_camera, from_eye, rotation, lens, width, height, records, slots
 ):
     s = np.empty((SH + RECORD) * BLOCK, dtype=np.float32)
     directions, colours = np.empty(3 * BLOCK, dtype=np.float32), s[_RECORD + RED * BLOCK :]
@@ -105,7 +113,7 @@ def _project_blocks(  # type: ignore[no-untyped-def]
         for plane in range(SH):
             for l in range(BLOCK):
                 s[plane * BLOCK + l] = block[plane, l]
-        if not _project_lanes(s, in_camera[i], rotation, lens, width, height, visible):
+        if not _project_lanes(s, antialiased, in_camera[i], rotation, lens, width, height, visible):
             continue
         _face_camera(s, from_eye[i], directions)
         shade_lanes(directions, block, colours)
@@ -121,12 +129,13 @@ def _project_blocks(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _project_lanes(s, origin, rotation, lens, width, height, visible):  # type: ignore[no-untyped-def]
+def _project_lanes(s, antialiased, origin, rotation, lens, width, height, visible):  # type: ignore[no-untyped-def]
     r00, r01, r02 = rotation[0]
     r10, r11, r12 = rotation[1]
     r20, r21, r22 = rotation[2]
     fx, fy, cx, cy, x_low, x_high, y_low, y_high = lens
     ox, oy, oz = origin
+    blur = np.float32(ANTIALIASED_LOW_PASS if antialiased else CLASSIC_LOW_PASS)
     for l in range(BLOCK):
         dx, dy, dz = s[OFFSET * BLOCK + l], s[(OFFSET + 1) * BLOCK + l], s[(OFFSET + 2) * BLOCK + l]
         x = r00 * dx + r01 * dy + r02 * dz + ox
@@ -153,11 +162,14 @@ def _project_lanes(s, origin, rotation, lens, width, height, visible):  # type: 
 
         pp, qq = p0 * p0 + p1 * p1 + p2 * p2, q0 * q0 + q1 * q1 + q2 * q2
         pq = p0 * q0 + p1 * q1 + p2 * q2
-        # det(M M^T + 0.3 I) by Cauchy-Binet: only positive terms, so nothing cancels.
+        # det(M M^T + blur I) by Cauchy-Binet: only positive terms, so nothing cancels.
         m01, m02, m12 = p0 * q1 - p1 * q0, p0 * q2 - p2 * q0, p1 * q2 - p2 * q1
-        det = m01 * m01 + m02 * m02 + m12 * m12 + _LOW_PASS * (pp + qq) + _LOW_PASS_DET
-        xx, yy = pp + _LOW_PASS, qq + _LOW_PASS
+        sharp_det = m01 * m01 + m02 * m02 + m12 * m12
+        det = sharp_det + blur * (pp + qq) + blur * blur
+        xx, yy = pp + blur, qq + blur
         log_alpha = s[LOG_OPACITY * BLOCK + l]
+        if antialiased:
+            log_alpha += _HALF * np.log(max(sharp_det / det, _EDGE_ON))
         reach = _TWO * max(log_alpha - _LOG_CUT, _ZERO)
         half_width, half_height = np.sqrt(reach * xx), np.sqrt(reach * yy)
         u, v = fx * ray_x + cx, fy * ray_y + cy

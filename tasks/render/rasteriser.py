@@ -45,12 +45,13 @@ def rasterise(
     buffers = GBuffer(
         rgb=np.empty((height, width, 3), dtype=np.float32),
         depth=np.empty((height, width), dtype=np.float32),
+        expected_depth=np.empty((height, width), dtype=np.float32),
         alpha=np.empty((height, width), dtype=np.float32),
         normal=np.empty((height, width, 3), dtype=np.float32),
         class_id=np.empty((height, width), dtype=np.uint8),
     )
     blend(
         records, view.rays.astype(np.float32), starts, splats,
-        buffers.rgb, buffers.depth, buffers.alpha, buffers.normal, buffers.class_id
+        buffers.rgb, buffers.depth, buffers.expected_depth, buffers.alpha, buffers.normal, buffers.class_id
     )  # fmt: skip
     return buffers

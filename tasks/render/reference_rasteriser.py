@@ -12,7 +12,7 @@ from tasks.render.preparation import morton_order, rotation_matrices
 from tasks.render.spherical_harmonics import sh_basis
 from tasks.scene.gaussians import Gaussians
 
-NEAR, LOW_PASS, RAY_MARGIN, MIN_ALPHA, MAX_ALPHA, STOP = 0.05, 0.3, 0.3, 1 / 255, 0.999, 1e-4
+NEAR, RAY_MARGIN, MIN_ALPHA, MAX_ALPHA, STOP = 0.05, 0.3, 1 / 255, 0.999, 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,8 +67,10 @@ def blend_steps(
         ray = means[i, :2] / z
         J = np.column_stack((np.diag(f / z), -f * np.clip(ray, low, high) / z))
         M = J @ R @ axes[i]
-        covariance = M @ M.T + LOW_PASS * np.eye(2)
+        covariance = M @ M.T + (0.1 if gaussians.antialiased else 0.3) * np.eye(2)
         opacity = float(gaussians.opacities[i])
+        if gaussians.antialiased:
+            opacity *= np.sqrt(max(np.linalg.det(M @ M.T) / np.linalg.det(covariance), 1e-12))
         centre = f * ray + c
         half = np.sqrt(2 * max(np.log(opacity / MIN_ALPHA), 0) * np.diag(covariance))
         first = np.clip(np.floor(centre - half), 0, size).astype(int)
@@ -120,31 +122,33 @@ def rasterise_reference(
     normals = np.where(away[:, None], -gaussians.normals, gaussians.normals)
 
     rgb, normal = np.zeros((height, width, 3)), np.zeros((height, width, 3))
-    depth, left, distance = np.zeros((height, width)), np.ones((height, width)), np.zeros((height, width))
-    planes = ((gaussians.means.astype(np.float64) + R.T @ t) * normals).sum(axis=1)
+    expected, left, front = np.zeros((height, width)), np.ones((height, width)), np.full((height, width), -1)
     class_id = np.zeros((height, width), dtype=np.uint8)
     for step in blend_steps(gaussians, viewmat, K, width, height):
         rgb[step.window] += step.weight[..., None] * colours[step.gaussian]
         normal[step.window] += step.weight[..., None] * normals[step.gaussian]
-        depth[step.window] += step.weight * step.depth
-        distance[step.window] += step.weight * planes[step.gaussian]
+        expected[step.window] += step.weight * step.depth
         left[step.window] -= step.weight
         halves = (step.transmittance >= 0.5) & (step.transmittance - step.weight < 0.5)
         class_id[step.window][halves] = gaussians.class_id[step.gaussian]
+        front[step.window][halves] = step.gaussian
     alpha = 1 - left
     covered = alpha > 0
-    depth[covered] /= alpha[covered]
-    depth[~covered] = np.nan
+    expected[covered] /= alpha[covered]
+    expected[~covered] = np.nan
     u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     rays = np.stack(((u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)), axis=-1) @ R
+    from_eye = gaussians.means.astype(np.float64) + R.T @ t
+    centre = (gaussians.means.astype(np.float64) @ R.T + t)[front, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
-        surface = distance / (normal * rays).sum(axis=-1)
-        is_one = (surface < depth * SURFACE_RATIO) & (depth < surface * SURFACE_RATIO)
-    depth = np.where(is_one, surface, depth)
+        plane = (from_eye * normals).sum(axis=1)[front] / (normals[front] * rays).sum(axis=-1)
+    tilted = (plane < centre * SURFACE_RATIO) & (centre < plane * SURFACE_RATIO)
+    depth = np.where(front < 0, expected, np.where(tilted, plane, centre))
     normal[covered] /= np.linalg.norm(normal[covered], axis=1, keepdims=True)
     return GBuffer(
         rgb=rgb.astype(np.float32),
         depth=depth.astype(np.float32),
+        expected_depth=expected.astype(np.float32),
         alpha=alpha.astype(np.float32),
         normal=normal.astype(np.float32),
         class_id=class_id,

@@ -22,6 +22,8 @@ class Gaussians:
         colour = max(SH(direction) + 0.5, 0) [1]
     normals : float32 [N, 3] unit normals, world frame [1]
     class_id : uint8 [N] `SemanticClass`
+    antialiased : splats narrower than a pixel fade instead of growing (Yu et al. 2024, Mip-Splatting,
+        doi:10.1109/CVPR52733.2024.01839); False: the rule of the INRIA code, for which most files are made
     display_encoded : the colours blend in sRGB display space (scenes trained on pictures) and the
         picture is linearised after blending; False: they are linear light
     """
@@ -33,6 +35,7 @@ class Gaussians:
     sh: NDArray[np.float32]
     normals: NDArray[np.float32]
     class_id: NDArray[np.uint8]
+    antialiased: bool = False
     display_encoded: bool = False
 
     def __len__(self) -> int:

@@ -342,6 +342,7 @@ def test_reading_prints_nothing_where_json_is_printed(tmp_path, capfd):
     [
         ("name", None, "name must be"),
         ("display_encoded", "yes", "display_encoded"),
+        ("antialiased", None, "antialiased"),
         ("carriageway_left", -3, "carriageway_left"),
         ("carriageway_right", None, "carriageway_right"),
         ("sha256", {}, "sha256 must name means.npy"),

@@ -63,9 +63,7 @@ def test_all_problems_of_a_file_are_listed_at_once(tmp_path):
 
 def test_wet_friction_above_dry_is_refused(tmp_path):
     path = broken(tmp_path, flooded_friction={"value": 0.9, "bounds": [0.85, 0.95]})
-    with pytest.raises(
-        InputError, match="flooded_friction must not exceed dry_friction"
-    ):
+    with pytest.raises(InputError, match="flooded_friction must not exceed dry_friction"):
         load_surface(path)
 
 

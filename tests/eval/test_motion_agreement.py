@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.synthetic_street import Clip
+from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
@@ -23,7 +24,13 @@ CAMERA_ONLY = replace(THRESHOLDS, pitch_relative_error=0.20, progress_rmse_m=Non
 
 @pytest.fixture(scope="module")
 def recovered(full_clip: Clip) -> dict[str, RecoveredMotion]:
-    with_depth = (full_clip.frames, full_clip.depth, full_clip.K, full_clip.T_rig_camera, full_clip.class_id)
+    with_depth = (
+        full_clip.frames,
+        full_clip.depth,
+        full_clip.K,
+        full_clip.T_rig_camera,
+        full_clip.class_id == SemanticClass.SKY,
+    )
     return {
         "pnp": recover_motion_pnp(*with_depth),
         "photometric": recover_motion_photometric(*with_depth),

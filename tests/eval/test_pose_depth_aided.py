@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.synthetic_street import Clip
+from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
 from tasks.eval.pose_photometric import recover_motion_photometric
@@ -34,7 +35,7 @@ def check(method: str) -> Check:
 def watch(check: Check, clip: Clip, upto: int | None = None, **others: object) -> RecoveredMotion:
     arguments: dict[str, object] = {
         "frames": clip.frames[:upto], "depth": clip.depth[:upto], "K": clip.K, "T_rig_camera": clip.T_rig_camera,
-        "class_id": clip.class_id[:upto],
+        "unusable": clip.class_id[:upto] == SemanticClass.SKY,
     }  # fmt: skip
     return check(**(arguments | others))
 
@@ -97,12 +98,13 @@ def test_one_picture_repeated_is_a_car_that_stands_with_particles_or_without(
     hump_clip: Clip, check: Check
 ) -> None:
     still = np.repeat(hump_clip.frames[:1], 5, axis=0)
-    depth, classes = (np.repeat(a[:1], 5, axis=0) for a in (hump_clip.depth, hump_clip.class_id))
-    bare = watch(check, hump_clip, frames=still, depth=depth, class_id=classes)
+    depth = np.repeat(hump_clip.depth[:1], 5, axis=0)
+    sky = np.repeat(hump_clip.class_id[:1] == SemanticClass.SKY, 5, axis=0)
+    bare = watch(check, hump_clip, frames=still, depth=depth, unusable=sky)
     assert np.abs(bare.progress).max() < 1e-6 and np.abs(bare.pitch).max() < 1e-6
     assert not bare.failed.any()
     assert np.isnan(bare.normalised_path).all()
-    snowing = watch(check, hump_clip, frames=with_flakes(still), depth=depth, class_id=classes)
+    snowing = watch(check, hump_clip, frames=with_flakes(still), depth=depth, unusable=sky)
     assert np.abs(snowing.progress).max() < 0.01
     assert np.rad2deg(np.abs(snowing.pitch)).max() < 0.02
 

@@ -32,7 +32,8 @@ def buffer(alpha: float) -> GBuffer:
     shape = (4, 5)
     return GBuffer(
         rgb=np.full((*shape, 3), 0.4 * alpha, np.float32), depth=np.ones(shape, np.float32),
-        alpha=np.full(shape, alpha, np.float32), normal=np.zeros((*shape, 3), np.float32),
+        expected_depth=np.ones(shape, np.float32), alpha=np.full(shape, alpha, np.float32),
+        normal=np.zeros((*shape, 3), np.float32),
         class_id=np.zeros(shape, np.uint8),
     )  # fmt: skip
 

@@ -33,23 +33,28 @@ def psnr(a: NDArray[np.float32], b: NDArray[np.float32], peak: float) -> float:
     return float(10 * np.log10(peak**2 / max(error, 1e-30)))
 
 
+@pytest.mark.parametrize("antialiased", [False, True])
 @pytest.mark.parametrize(("sh_count", "seed"), [(1, 0), (4, 1), (9, 2), (16, 3)])
-def test_picture_equals_the_numpy_twin(sh_count: int, seed: int) -> None:
-    gaussians = random_cloud(1500, sh_count, seed)
+def test_picture_equals_the_numpy_twin(sh_count: int, seed: int, antialiased: bool) -> None:
+    gaussians = replace(random_cloud(1500, sh_count, seed), antialiased=antialiased)
     viewmat = camera_at((0.4, -0.2, 0.1), rotation(seed))
     got, wanted = draw(gaussians, viewmat), rasterise_reference(gaussians, viewmat, K, WIDTH, HEIGHT)
     covered = wanted.alpha > 0
-    assert covered.mean() > 0.5 and wanted.alpha.max() > 0.98
+    assert covered.mean() > 0.5 and wanted.alpha.max() > 0.95
     assert psnr(got.rgb, wanted.rgb, 1.0) > 80
     assert psnr(got.alpha, wanted.alpha, 1.0) > 80
-    assert np.array_equal(np.isnan(got.depth), ~covered)
-    assert psnr(got.depth[covered], wanted.depth[covered], 10.0) > 80
+    for name in ("depth", "expected_depth"):
+        assert np.array_equal(np.isnan(getattr(got, name)), ~covered)
+    assert psnr(got.expected_depth[covered], wanted.expected_depth[covered], 10.0) > 80
     assert psnr(got.normal, wanted.normal, 1.0) > 80
     tie = np.zeros((HEIGHT, WIDTH), dtype=bool)
     for step in blend_steps(gaussians, viewmat, K, WIDTH, HEIGHT):
         for light in (step.transmittance, step.transmittance - step.weight):
             tie[step.window] |= np.abs(light - 0.5) < 1e-5
     assert np.array_equal(got.class_id[~tie], wanted.class_id[~tie])
+    # a plane that is just tilted enough to count in one precision may not be in the other
+    clear = covered & ~tie
+    assert np.mean(np.abs(got.depth / wanted.depth - 1)[clear] < 1e-4) > 0.999
     assert tie.mean() < 0.01
 
 

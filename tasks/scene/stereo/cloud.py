@@ -95,6 +95,7 @@ def cloud_of(
         sh=((surfels.radiance - 0.5) / C0)[of, None, :].astype(np.float32),
         normals=np.ascontiguousarray(rotation[of, :, 2], dtype=np.float32),
         class_id=class_id[of],
+        antialiased=True,
     )
     return Cloud(gaussians=gaussians, rays=rays[of], extents=extents)
 

@@ -82,6 +82,7 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
             sh=((radiance - 0.5) / _SH_BAND_0).astype(np.float32)[:, None, :],
             normals=line.directions(station, surfels.axes[:, 2]).astype(np.float32),
             class_id=surfels.class_id,
+            antialiased=True,
         ),
         route=route(layout, line),
         environment=panorama(layout, seed),

@@ -13,7 +13,7 @@ from tasks.scene.street.surfels import Surfels, graded_cells, join, tiles
 
 CELL = 6.3
 """Width of an asphalt cell where it is seen closest [px]."""
-_OVERLAP, _OPACITY = 0.8, 0.9
+_OVERLAP, _OPACITY = 0.8, 0.94
 """Standard deviation over cell size and peak opacity: wide and a little clear. Where cells are smaller than a
 pixel, opaque ones hide all behind them and the road seems to slide under a moving camera."""
 _STONES = 32.0

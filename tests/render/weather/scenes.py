@@ -62,9 +62,11 @@ def flat_gbuffer(
         normal[wall], kind[wall], depth[wall] = (-1, 0, 0), SemanticClass.BUILDING, wall_x
         picture[wall] = stripe[wall][:, None]
     covered = np.isfinite(depth)
+    depth = np.where(covered, depth, np.nan).astype(np.float32)
     return picture, GBuffer(
         rgb=np.where(covered[..., None], picture, 0).astype(np.float32),
-        depth=np.where(covered, depth, np.nan).astype(np.float32),
+        depth=depth,
+        expected_depth=depth,
         alpha=covered.astype(np.float32),
         normal=normal,
         class_id=kind,

@@ -1,0 +1,23 @@
+"""Pixels whose picture does not stand where their depth says."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import ROAD_CLASSES, SemanticClass
+
+
+def unusable_pixels(class_id: NDArray[np.uint8], film_depth_mm: float) -> NDArray[np.bool_]:
+    """The sky, which has no depth; crowns of trees, into which one sees, so that they have no single depth; and a
+    wet road, which mirrors the street: its image moves as the mirrored thing does, not as the road.
+
+    Parameters
+    ----------
+    class_id : uint8 [F, H, W] semantic classes [1]
+    film_depth_mm : water on the road [mm]
+
+    Returns
+    -------
+    bool [F, H, W]
+    """
+    hidden = np.isin(class_id, (SemanticClass.SKY, SemanticClass.VEGETATION))
+    return hidden | np.isin(class_id, ROAD_CLASSES) if film_depth_mm > 0 else hidden
