@@ -233,6 +233,7 @@ def judge(
         catalogue.camera.K - PIXEL_CENTRE,
         catalogue.camera.T_rig_camera,
         unusable=unusable_pixels(buffers["class"], film_depth_mm),
+        route_rotations=catalogue.scene.route.pose(frames["station"])[:, :3, :3],
     )
     verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)
     return {
