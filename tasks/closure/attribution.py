@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.closure.campaign import SESSION
+from tasks.closure.campaign import SESSION, Tolerances
+from tasks.closure.disturbance import Disturbance
 from tasks.closure.evidence import RunEvidence
 from tasks.closure.fit import Fit, Hypothesis, fit, library_hypothesis, misfit_by_run
 from tasks.vehicle.effects.library import Effect
@@ -54,18 +55,23 @@ class Evidence:
     ----------
     train, held_out : runs
     effects : the library
-    session_sigma : float64 [7] prior sigmas of the session
-    samples : number of whitened training values, N of the score
+    tolerances, disturbance : priors of session, offsets and disturbances
     """
 
     train: tuple[RunEvidence, ...]
     held_out: tuple[RunEvidence, ...]
     effects: tuple[Effect, ...]
-    session_sigma: NDArray[np.float64]
+    tolerances: Tolerances
+    disturbance: Disturbance
+
+    @property
+    def session_sigma(self) -> NDArray[np.float64]:
+        """Prior sigmas of the session, float64 [7]."""
+        return np.array(self.tolerances.session)
 
     @property
     def samples(self) -> int:
-        """Number of whitened training values."""
+        """Number of whitened training values, N of the score."""
         return sum(len(run.nuisance) for run in self.train)
 
 
@@ -178,15 +184,51 @@ def judge(
         if fitted.objective < base.objective and not (offsets is base.offsets and worthwhile):
             break
     assert fitted is not None
+    return assess(evidence, base, base_held_out, hypothesis, fitted)
+
+
+def assess(
+    evidence: Evidence,
+    base: Fit,
+    base_held_out: NDArray[np.float64],
+    hypothesis: Hypothesis,
+    fitted: Fit,
+) -> Candidate:
+    """Judge a fit that extends ``base`` by a hypothesis.
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at the fit
+    base : fit of what is accepted so far
+    base_held_out : float64 [H] held-out misfits under ``base``
+    hypothesis : what was added; its parameters come last
+    fitted : the joint fit
+    """
     gain = 0.5 * (base.objective - fitted.objective)
     factor = inflation(evidence, fitted, _own_scores(evidence, fitted, hypothesis))
-    score = gain / factor - len(hypothesis.names) * np.log(evidence.samples)
+    penalty = float(len(hypothesis.names) * np.log(evidence.samples))
+    if gain / factor - penalty > ACCEPT_SCORE:
+        # what the base reaches from here as well is no merit of the hypothesis
+        gain = min(gain, 0.5 * (_back(evidence, base, hypothesis, fitted).objective - fitted.objective))
+    score = gain / factor - penalty
     held_out = 0.0
     if score > ACCEPT_SCORE:
         held_out = float(np.sum(base_held_out - misfit_by_run(evidence.held_out, fitted))) / factor
     return Candidate(
         hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out
     )
+
+
+def _back(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
+    """The base fitted again from where a fit that extends it ended."""
+    session = fitted.session.copy()
+    k = len(hypothesis.names)
+    if hypothesis.names[0] in SESSION:
+        session[SESSION.index(hypothesis.names[0])] += fitted.values[-k]
+    return fit(
+        evidence.train, base.parts, evidence.session_sigma, values=fitted.values[:-k], session=session,
+        offsets=fitted.offsets, iterations=4,
+    )  # fmt: skip
 
 
 def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDArray[np.float64]:
@@ -221,15 +263,6 @@ def ladder(evidence: Evidence, base: Fit, count: int = REFINED) -> list[Candidat
     return sorted(judged, key=lambda c: -c.score)
 
 
-def rivals(candidates: list[Candidate]) -> list[Candidate]:
-    """Candidates that cannot be told from the first, the simpler first; the first itself included."""
-    best = candidates[0]
-    near = [
-        c for c in candidates if c.score > best.score - RIVAL_SPAN and c.gain / c.inflation > ACCEPT_SCORE
-    ]
-    return sorted(near, key=lambda c: (len(c.hypothesis.names), -c.score))
-
-
 def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     """Share of bootstrap resamples of the runs in which the first candidate keeps the best score.
 
@@ -254,18 +287,6 @@ def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
 def nested(small: Hypothesis, large: Hypothesis) -> bool:
     """Whether every parameter of ``small`` is also one of ``large``."""
     return set(small.names) < set(large.names)
-
-
-def simplest(candidates: list[Candidate]) -> list[Candidate]:
-    """Rivals without those that only extend another rival by a parameter that earns less than it costs."""
-    kept = []
-    for c in candidates:
-        simpler = [
-            o for o in candidates if nested(o.hypothesis, c.hypothesis) and o.score > c.score - RIVAL_SPAN
-        ]
-        if not simpler:
-            kept.append(c)
-    return kept
 
 
 def without(base: Fit, index: int, evidence: Evidence) -> Fit:

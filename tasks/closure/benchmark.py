@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
+from tasks.closure.answer import Verdict
 from tasks.closure.campaign import Campaign, Run, Tolerances
 from tasks.closure.evidence import SESSION_INDEX
 from tasks.closure.forward import SUBSTEPS, Slot, instruments, roll, run_model
-from tasks.closure.verdict import Verdict
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import PARAMETER_INDEX, parameter_vector
 from tasks.vehicle.parameters import Vehicle

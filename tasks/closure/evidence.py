@@ -6,38 +6,22 @@ run, so that screening, bootstrap and leave-one-run-out are sums of small matric
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from tasks.closure.campaign import CHANNELS, SESSION, Tolerances
+from tasks.closure.disturbance import DISTURBED, KNOT_SPACING, N_OFFSETS, Disturbance, prior_precision
 from tasks.closure.forward import RunModel, Slot, instruments, roll
 from tasks.closure.noise import whiten
 from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
-DISTURBED = ("longitudinal_force", "friction", "pitch_moment")
-KNOT_SPACING = (0.15, 0.25, 0.1)
-"""Spacing of the disturbance's knots at each port: finer than any disturbance seen in brake tests [s]."""
 KNOT_STEP = (30.0, 0.01, 30.0)
-N_OFFSETS = 4
-FREED = 20.0
-"""Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Disturbance:
-    """Scale and correlation time of the smooth disturbances, in the order of `DISTURBED`.
-
-    Parameters
-    ----------
-    scale : standard deviations [N, 1, N m]
-    time : correlation times [s]
-    """
-
-    scale: tuple[float, float, float] = (60.0, 0.01, 60.0)
-    time: tuple[float, float, float] = (1.0, 0.25, 0.2)
+DERIVATIVE_SUBSTEPS = 5
+"""Integration steps between samples while derivatives are taken: a difference needs less than a prediction."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +104,7 @@ def run_evidence(
     effects: tuple[Effect, ...],
     tolerances: Tolerances,
     disturbance: Disturbance,
+    slots: tuple[Slot, ...] = (),
 ) -> RunEvidence:
     """Simulate a run and its derivatives.
 
@@ -131,12 +116,15 @@ def run_evidence(
     effects : the library; may be empty for runs that only judge
     tolerances : priors of the run's offsets
     disturbance : prior of the disturbances
+    slots : forms that belong to the base point
     """
-    out, states = roll(model, base)
+    out, states = roll(model, base, slots=slots, substeps=DERIVATIVE_SUBSTEPS)
     y = instruments(model, base, out)
 
-    def slope(theta: NDArray[np.float64], step: float, **options: object) -> NDArray[np.float64]:
-        moved, _ = roll(model, theta, **options)  # type: ignore[arg-type]
+    def slope(
+        theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
+    ) -> NDArray[np.float64]:
+        moved, _ = roll(model, theta, slots=(*slots, *extra), substeps=DERIVATIVE_SUBSTEPS, **options)
         return (instruments(model, theta, moved) - y) / step
 
     columns = [
@@ -161,7 +149,7 @@ def run_evidence(
                 spacing=spacing,
                 values=np.array([0.0, step, 0.0]),
             )
-            columns.append(slope(base, step, slots=(slot,), start=(first, states, out)))
+            columns.append(slope(base, step, (slot,), start=(first, states, out)))
     session = [
         slope(_moved(base, i, 0.5 * s), 0.5 * s)
         for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
@@ -169,9 +157,10 @@ def run_evidence(
     library = []
     for effect in effects:
         theta = base.copy()
-        for parameter in effect.parameters[1:]:
-            theta[parameter.index] = parameter.start
         first_parameter = effect.parameters[0]
+        if base[first_parameter.index] == 0.0:
+            for parameter in effect.parameters[1:]:
+                theta[parameter.index] = parameter.start
         library.append(
             slope(_moved(theta, first_parameter.index, first_parameter.step), first_parameter.step)
         )
@@ -202,92 +191,6 @@ def with_disturbance(evidence: RunEvidence, tolerances: Tolerances, disturbance:
     return replace(
         changed, session_q=changed.project(changed.session), library_q=changed.project(changed.library)
     )
-
-
-def prior_precision(
-    knots: tuple[int, ...], tolerances: Tolerances, disturbance: Disturbance
-) -> tuple[NDArray[np.float64], float]:
-    """Precision of a run's offsets and knots (first-order Gauss-Markov processes) and its log determinant."""
-    size = N_OFFSETS + sum(knots)
-    precision = np.zeros((size, size))
-    sigmas = (
-        tolerances.initial_speed,
-        tolerances.friction,
-        tolerances.acceleration_bias,
-        tolerances.pitch_offset,
-    )
-    precision[np.arange(N_OFFSETS), np.arange(N_OFFSETS)] = 1.0 / np.square(sigmas)
-    log_det = -2.0 * float(np.sum(np.log(sigmas)))
-    at = N_OFFSETS
-    for count, spacing, scale, time in zip(
-        knots, KNOT_SPACING, disturbance.scale, disturbance.time, strict=True
-    ):
-        r = np.exp(-spacing / time)
-        block = np.zeros((count, count))
-        i = np.arange(count)
-        block[i, i] = 1.0 + r**2
-        block[0, 0] = block[-1, -1] = 1.0
-        block[i[:-1], i[1:]] = block[i[1:], i[:-1]] = -r
-        precision[at : at + count, at : at + count] = block / (scale**2 * (1.0 - r**2))
-        log_det -= 2.0 * count * np.log(scale) + (count - 1) * np.log(1.0 - r**2)
-        at += count
-    return precision, log_det
-
-
-def fit_disturbance(
-    evidence: tuple[RunEvidence, ...],
-    residuals: list[NDArray[np.float64]],
-    tolerances: Tolerances,
-    effects: tuple[Effect, ...],
-    start: Disturbance,
-) -> Disturbance:
-    """Scales and times by marginal likelihood, every library direction and the session free.
-
-    With the directions fixed at 0 an effect would inflate the disturbance that then hides it.
-
-    Parameters
-    ----------
-    evidence : training runs
-    residuals : whitened residual of each run at the base point, float64 [M]
-    tolerances : session priors
-    effects : the library, whose steps set broad priors
-    start : first guess
-    """
-    broad = [(30.0 * e.parameters[0].step) ** -2 for e in effects]
-    prior = np.concatenate((1.0 / np.square(FREED * np.array(tolerances.session)), broad))
-    blocks = []
-    for run, r in zip(evidence, residuals, strict=True):
-        b = np.column_stack((r, run.session, run.library))
-        blocks.append((b.T @ b, run.nuisance.T @ b))
-
-    def cost(trial: Disturbance) -> float:
-        total = np.zeros_like(blocks[0][0])
-        value = 0.0
-        for run, (gram, cross) in zip(evidence, blocks, strict=True):
-            precision, log_det = prior_precision(run.knots, tolerances, trial)
-            factor = cholesky(run.information + precision, lower=True, check_finite=False)
-            q = solve_triangular(factor, cross, lower=True, check_finite=False)
-            total += gram - q.T @ q
-            value += 2.0 * float(np.sum(np.log(np.diag(factor)))) - log_det
-        inner = cholesky(total[1:, 1:] + np.diag(prior), lower=True, check_finite=False)
-        q = solve_triangular(inner, total[1:, 0], lower=True, check_finite=False)
-        return value + float(total[0, 0] - q @ q) + 2.0 * float(np.sum(np.log(np.diag(inner))))
-
-    best, lowest = start, cost(start)
-    for factor in (2.0, 1.4):
-        for field in ("scale", "time"):
-            for port in range(3):
-                for direction in (factor, 1.0 / factor):
-                    improved = True
-                    while improved:
-                        values = list(getattr(best, field))
-                        values[port] *= direction
-                        trial = replace(best, **{field: tuple(values)})
-                        value = cost(trial) if 0.15 <= trial.time[port] <= 6.0 else np.inf
-                        improved = value < lowest - 0.5
-                        if improved:
-                            best, lowest = trial, value
-    return best
 
 
 def _moved(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:

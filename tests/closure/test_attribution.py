@@ -11,7 +11,8 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.effects import load_effects
 from tasks.closure.attribution import Evidence, ladder
-from tasks.closure.evidence import Disturbance, prior_precision, run_evidence
+from tasks.closure.disturbance import Disturbance, prior_precision
+from tasks.closure.evidence import run_evidence
 from tasks.closure.fit import fit
 from tasks.closure.forward import predict, run_model
 from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
@@ -49,7 +50,7 @@ def evidence_of(theta: np.ndarray) -> Evidence:
         for i, (v, p, d, t) in enumerate(runs)
     )
     return Evidence(
-        train=derived, held_out=derived[-2:], effects=LIBRARY, session_sigma=np.array(TOLERANCES.session)
+        train=derived, held_out=derived[-2:], effects=LIBRARY, tolerances=TOLERANCES, disturbance=QUIET
     )
 
 

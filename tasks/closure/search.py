@@ -1,0 +1,266 @@
+"""The search: what is added to the model, round by round, and where derivatives must be taken anew."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tasks.closure.attribution import (
+    ACCEPT_SCORE,
+    HELD_OUT_GAIN,
+    RIVAL_SPAN,
+    Candidate,
+    Evidence,
+    assess,
+    judge,
+    ladder,
+    nested,
+)
+from tasks.closure.campaign import SESSION
+from tasks.closure.derivation import fit_disturbance, rederived, rescaled, whitened_residuals
+from tasks.closure.disturbance import Disturbance
+from tasks.closure.fit import Fit, fit, library_hypothesis, misfit_by_run
+from tasks.closure.forms import form_hypotheses, scan
+
+MAX_EFFECTS = 3
+RETUNE_PULL = 4.0
+"""Pull of a session nuisance, in prior sigmas, from which it is called a wrong number of the vehicle."""
+LARGE_GAIN = 300.0
+"""Gain from which derivatives taken without an effect no longer hold with it."""
+NEAR = 0.1
+"""Relative change of the parameters below which derivatives need not be taken anew once more."""
+SETTLED = 2
+"""Candidates of a round that are settled, if their gain is large."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """One round of the search: what was tried on top of ``base`` and which candidate was accepted."""
+
+    base: Fit
+    tried: tuple[Candidate, ...]
+    accepted: Candidate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """State of the search.
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at ``base``
+    base : fit of what is accepted
+    rounds : how it came about
+    tried : candidates of the last round, none of which was accepted
+    """
+
+    evidence: Evidence
+    base: Fit
+    rounds: tuple[Round, ...] = ()
+    tried: tuple[Candidate, ...] = ()
+
+
+def settle(evidence: Evidence, base: Fit, candidate: Candidate) -> tuple[Evidence, Candidate]:
+    """Take derivatives anew at a candidate whose gain is large, refit it and judge it there.
+
+    Parameters
+    ----------
+    evidence : the runs as differentiated for ``base``
+    base : fit of what is accepted so far
+    candidate : judged with them
+
+    Returns
+    -------
+    The runs with derivatives that hold at the candidate, and the candidate.
+    """
+    if candidate.gain < LARGE_GAIN:
+        return evidence, candidate
+    here, fitted = evidence, candidate.fitted
+    for _ in range(2):
+        here = rederived(here, fitted, library=True)
+        again = fit(
+            here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
+        )  # fmt: skip
+        shift = np.abs(again.values - fitted.values) / np.maximum(np.abs(again.values), 1e-9)
+        fitted = again
+        if np.all(shift < NEAR):
+            break
+    base_held_out = misfit_by_run(evidence.held_out, base)
+    return here, assess(here, base, base_held_out, candidate.hypothesis, fitted)
+
+
+def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
+    """Add library effects one by one, the best first.
+
+    Parameters
+    ----------
+    start : what is accepted already
+    gated : accept only what passes every gate; else whatever explains most, to learn what is left beside it
+    explored : an earlier search whose first effect, where it is met again, need not be looked for anew
+    """
+    state = start
+    for _ in range(MAX_EFFECTS):
+        tried = ladder(state.evidence, state.base)
+        places: dict[str, Evidence] = {}
+        for i, candidate in enumerate(tried[:SETTLED] if gated else tried[:1]):
+            if candidate.score > max(ACCEPT_SCORE, 0.3 * tried[0].score):
+                near = _met_before(explored, candidate) if explored else candidate
+                places[candidate.hypothesis.name], tried[i] = settle(state.evidence, state.base, near)
+        tried.sort(key=lambda c: -c.score)
+        passing = [c for c in tried if (c.passes if gated else c.score > ACCEPT_SCORE)]
+        if not passing:
+            return replace(state, tried=tuple(tried))
+        best = passing[0]
+        simpler = [
+            c for c in passing if nested(c.hypothesis, best.hypothesis) and c.score > best.score - RIVAL_SPAN
+        ]
+        best = simpler[0] if simpler else best
+        here = places.get(best.hypothesis.name, state.evidence)
+        if gated and here is not state.evidence:
+            held_out = misfit_by_run(state.evidence.held_out, state.base)
+            tried = [
+                c if c.score < 0.3 * best.score or c.hypothesis.name in places
+                else judge(here, state.base, held_out, c.hypothesis)
+                for c in tried
+            ]  # fmt: skip
+        state = Found(
+            evidence=here,
+            base=best.fitted,
+            rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best)),
+        )
+    return state
+
+
+def _met_before(explored: Found, candidate: Candidate) -> Candidate:
+    """The candidate at the values that an earlier search settled it at."""
+    k = len(candidate.hypothesis.names)
+    for earlier in explored.rounds:
+        known = earlier.accepted
+        if known.hypothesis.name == candidate.hypothesis.name:
+            values = np.concatenate((candidate.fitted.values[:-k], known.fitted.values[-k:]))
+            return replace(
+                candidate, fitted=replace(candidate.fitted, values=values, session=known.fitted.session)
+            )
+    return candidate
+
+
+def scale_disturbances(explored: Found) -> Disturbance:
+    """Scales of the disturbances beside whatever explains the runs best.
+
+    A large effect that is not yet named would otherwise pass for a disturbance, which then hides it.
+
+    Parameters
+    ----------
+    explored : an ungated search under a first guess of the scales
+    """
+    residuals = whitened_residuals(explored.evidence, explored.base)
+    here = explored.evidence
+    return fit_disturbance(here.train, residuals, here.tolerances, here.effects, here.disturbance)
+
+
+def retuned(start: Found, reasons: list[str]) -> Found:
+    """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session."""
+    evidence, null = start.evidence, start.base
+    pulls = np.abs(null.session / evidence.session_sigma)
+    worst = int(np.argmax(pulls))
+    if pulls[worst] <= RETUNE_PULL:
+        return start
+    effect = next(
+        e for e in evidence.effects
+        if e.parameters[0].name == SESSION[worst] and len(e.parameters) == 1
+    )  # fmt: skip
+    held_out = misfit_by_run(evidence.held_out, null)
+    found = judge(evidence, null, held_out, library_hypothesis(effect, float(null.session[worst])))
+    gained = float(np.sum(held_out - misfit_by_run(evidence.held_out, found.fitted)))
+    found = replace(found, held_out_gain=gained / found.inflation)
+    reasons.append(f"session nuisance {SESSION[worst]} is pulled by {pulls[worst]:.1f} sigma")
+    if found.held_out_gain <= HELD_OUT_GAIN:
+        return start
+    return replace(start, base=found.fitted, rounds=(Round(base=null, tried=(), accepted=found),))
+
+
+def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candidate | None]:
+    """Look for forms outside the library: alone against all that was named, and in what the named leave over.
+
+    Parameters
+    ----------
+    start : what the library explains
+    null : nothing accepted, same scales
+    reasons : is added to
+
+    Returns
+    -------
+    The state, and a form alone that cannot be told from the first effect.
+    """
+    state, near = start, None
+    left = best_form(state.evidence, state.base)
+    if left is None or not left.passes:
+        return state, near
+    if state.rounds:
+        alone = best_form(null.evidence, null.base)
+        ahead = -np.inf
+        if alone is not None and alone.passes:
+            # a form has no direction of its own to be judged by, so both sides take the larger inflation
+            common = max(alone.inflation, *(r.accepted.inflation for r in state.rounds))
+            log_n = float(np.log(state.evidence.samples))
+            extra = len(alone.hypothesis.names) - sum(len(r.accepted.hypothesis.names) for r in state.rounds)
+            ahead = (alone.gain - sum(r.accepted.gain for r in state.rounds)) / common - extra * log_n
+        if alone is not None and ahead > RIVAL_SPAN:
+            reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
+            state = Found(
+                evidence=null.evidence,
+                base=alone.fitted,
+                rounds=(Round(base=null.base, tried=(), accepted=alone),),
+            )
+        elif alone is not None and ahead > -RIVAL_SPAN:
+            near = alone if alone.hypothesis.port != state.rounds[0].accepted.hypothesis.port else None
+    if state is start and len(state.rounds) < MAX_EFFECTS:
+        reasons.append(f"something is left over: {left.hypothesis.name}")
+        state = replace(
+            state, base=left.fitted, rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left))
+        )
+    return state, near
+
+
+def best_form(evidence: Evidence, base: Fit) -> Candidate | None:
+    """The form that explains most of what a fit leaves over, refined and judged; None if nothing is left.
+
+    Parameters
+    ----------
+    evidence : the runs
+    base : the fit
+    """
+    leftovers = [x for x in scan(evidence, base)[:2] if x.gain > ACCEPT_SCORE + np.log(evidence.samples)]
+    if not leftovers:
+        return None
+    held_out = misfit_by_run(evidence.held_out, base)
+    judged = [
+        judge(evidence, base, held_out, h) for x in leftovers for h in form_hypotheses(x, evidence.samples)
+    ]
+    best = max(judged, key=lambda c: c.score)
+    return settle(evidence, base, best)[1]
+
+
+def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found, Found, Candidate | None]:
+    """Scale the disturbances, then search library and forms under every gate.
+
+    Parameters
+    ----------
+    evidence : the runs under a first guess of the scales
+    null : fit without effects
+    reasons : is added to
+
+    Returns
+    -------
+    The start without effects, what was found, and a form alone that cannot be told from the first effect.
+    """
+    explored = search(Found(evidence=evidence, base=null), gated=False)
+    evidence = rescaled(evidence, scale_disturbances(explored))
+    start = Found(
+        evidence=evidence,
+        base=fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6),
+    )
+    found = search(start, gated=True, explored=explored)
+    if not found.rounds:
+        found = replace(retuned(start, reasons), tried=found.tried)
+    found, near = forms(found, start, reasons)
+    return start, found, near
