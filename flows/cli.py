@@ -194,6 +194,21 @@ def brake_protocol(
     _show(result if as_json else brief, as_json)
 
 
+@app.command("stop-study")
+def stop_study(
+    campaign: Annotated[str, typer.Argument(help="Campaign folder with brake and engine torque.")],
+    study: Annotated[str, typer.Option(help="Stop study: YAML file, or the name of one.")] = "bmw-m8",
+    vehicle: Annotated[str | None, typer.Option(help="Uncalibrated vehicle; by default the campaign's.")] = None,
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Calibrate on one stop of a car, predict another, and add what the model lacks step by step."""
+    result = _call("stop_study", prefect, campaign, study=study, vehicle=vehicle, out=out)
+    rungs = [{"rung": row["rung"], **row["held_out"]} for row in result["rungs"]]
+    _show(result if as_json else {**result, "rungs": rungs}, as_json)
+
+
 @app.command("synthetic-drives")
 def synthetic_drives(
     out: Annotated[str, typer.Option(help="Folder for one bus log a drive.")],
@@ -253,6 +268,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
         "calibrate": "calibration",
         "import_measurements": "importing", "brake_protocol": "protocol", "synthetic_drives": "bus_drives",
+        "stop_study": "stop_study",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

@@ -32,6 +32,7 @@ from flows import importing as _importing  # noqa: E402
 from flows import protocol as _protocol  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
 from flows import scenes as _scenes  # noqa: E402
+from flows import stop_study as _stop_study  # noqa: E402
 from flows import studies as _studies  # noqa: E402
 
 
@@ -53,3 +54,4 @@ scene_from_stereo = as_flow(_reconstruction.scene_from_stereo)
 scene_import = as_flow(_scenes.scene_import)
 import_measurements = as_flow(_importing.import_measurements)
 brake_protocol = as_flow(_protocol.brake_protocol)
+stop_study = as_flow(_stop_study.stop_study)

@@ -1,0 +1,69 @@
+"""Studies of one stop predicted from another: which runs, and what is added to the model in which order."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from catalogs.entries import find_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
+from tasks.recordings.stop_study import Rung
+from tasks.vehicle.effects.library import PARAMETER_INDEX
+
+FOLDER = Path(__file__).parent
+
+
+class RungEntry(CatalogueEntry):
+    """One step of the ladder; the meanings stand at ``Rung``."""
+
+    name: Text
+    adds: Text
+    engine_torque: bool = False
+    fixed: dict[str, Scalar] = Field(default_factory=dict)
+    longitudinal: Annotated[tuple[str, ...], Field(min_length=1)]
+    swing: bool = False
+
+    @field_validator("fixed", "longitudinal")
+    @classmethod
+    def _are_parameters(
+        cls, names: dict[str, Scalar] | tuple[str, ...]
+    ) -> dict[str, Scalar] | tuple[str, ...]:
+        unknown = [name for name in names if name not in PARAMETER_INDEX]
+        if unknown:
+            raise ValueError(f"no port knows {', '.join(unknown)}; there are: {', '.join(PARAMETER_INDEX)}")
+        return names
+
+
+class StopStudy(CatalogueEntry):
+    """What a study file must hold."""
+
+    train: Text
+    held_out: Text
+    lead_s: Annotated[Scalar, checked("s", above=0)]
+    rungs: Annotated[tuple[RungEntry, ...], Field(min_length=1)]
+
+    @property
+    def ladder(self) -> tuple[Rung, ...]:
+        """The rungs for the science floor."""
+        return tuple(
+            Rung(
+                name=rung.name,
+                adds=rung.adds,
+                engine_torque=rung.engine_torque,
+                fixed={name: entry.value for name, entry in rung.fixed.items()},
+                longitudinal=rung.longitudinal,
+                swing=rung.swing,
+            )
+            for rung in self.rungs
+        )
+
+
+def load_stop_study(name_or_path: str | Path) -> StopStudy:
+    """Read a study by its name in the catalogue or from a YAML file.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file, or the studies that exist.
+    """
+    return read_entry(StopStudy, find_entry(FOLDER, name_or_path, "stop study"), "stop study")
