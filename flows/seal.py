@@ -1,6 +1,7 @@
 """Sealing: staged clips become the dataset's tables, preview and frozen manifest."""
 
 import shutil
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from tasks.render.contact_sheet import contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
 PREVIEW_FRAMES = (0, 20, 40, 80)
+PREVIEW_CLIPS = 24
 
 
 def seal(layout: Layout, plan: Plan) -> None:
@@ -77,9 +79,15 @@ def _clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
 def _preview(layout: Layout, plan: Plan, receipts: list[dict[str, Any]]) -> bytes:
     frames = [frame for frame in PREVIEW_FRAMES if frame < plan.settings.frames]
     rows = []
-    for receipt in receipts:
+    for receipt in spread(receipts, PREVIEW_CLIPS):
         pictures = read_clip(layout.frames, receipt["index"], "rgb")
         columns = read_columns(layout.staged(receipt["clip_id"], "frames"))
         rows.append((receipt["label"], [pictures[frame] for frame in frames],
                      {"speed": columns["speed"], "pitch": columns["pitch"]}))  # fmt: skip
     return encode_png(contact_sheet(rows, frames, plan.settings.frame_rate_hz))
+
+
+def spread(items: Sequence[Any], most: int) -> list[Any]:
+    """At most that many of the items, evenly spread from the first to the last."""
+    chosen = np.linspace(0, len(items) - 1, min(len(items), most))
+    return [items[i] for i in np.rint(chosen).astype(int)]

@@ -54,6 +54,10 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
             problems.append(
                 f"{place}: {name} must have shape {shape}; it has {getattr(gaussians, name).shape}"
             )
+    for name in (*shapes, "sh"):
+        wanted, found = "uint8" if name == "class_id" else "float32", getattr(gaussians, name).dtype
+        if found != wanted:
+            problems.append(f"{place}: {name} must be {wanted}; it is {found}")
     if (
         gaussians.sh.ndim != 3
         or gaussians.sh.shape[0] != n
