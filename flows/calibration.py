@@ -22,6 +22,7 @@ from tasks.calibration.residual import WHEELS, CalibrationCase
 from tasks.calibration.scalars import calibration_scalars, scalar_value, with_scalars
 from tasks.calibration.staged import Procedure
 from tasks.calibration.staged import calibrate as run_stages
+from tasks.vehicle.effects.chassis import EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle
 
 DIGITS = 6
@@ -89,7 +90,7 @@ def calibrate(
 def calibration_case(
     case: ReferenceCase, columns: Traces, window: Sequence[float], interval: float, wheelbase: float
 ) -> CalibrationCase:
-    """One trace as the fit takes it: the judge's event window, thinned out.
+    """One trace as the fit takes it: the judge's event window and what leads from the brake onset to it.
 
     Parameters
     ----------
@@ -100,7 +101,8 @@ def calibration_case(
     wheelbase : of the model [m]
     """
     time = columns["time"]
-    inside = np.flatnonzero((time >= window[0] - 1e-9) & (time <= window[1] + 1e-9))
+    onset = case.brake_onset_s if case.braked and case.brake_onset_s is not None else window[0]
+    inside = np.flatnonzero((time >= min(onset, window[0]) - 1e-9) & (time <= window[1] + 1e-9))
     every = max(1, round(interval / float(np.median(np.diff(time)))))
     chosen = inside[::every]
     return CalibrationCase(
@@ -111,6 +113,7 @@ def calibration_case(
         controls=case.controls(),
         hazard=case.hazard(),
         time=time[chosen],
+        event_start=window[0],
         speed=columns["speed"][chosen],
         pitch=columns["pitch"][chosen],
         slip=np.stack([columns[f"slip_{wheel}"][chosen] for wheel in WHEELS]),
@@ -133,6 +136,12 @@ def _frozen(
     entry.pop("provenance", None)
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
     for group in procedure.groups:
+        if group in EFFECT_UNITS:
+            number = {"value": fitted.effects[group], "unit": EFFECT_UNITS[group], "source": note}
+            entry.setdefault("effects", {})[group] = number
+            continue
+        if group == "cg_to_front_axle":
+            entry["cg_to_rear_axle"] |= {"value": fitted.cg_to_rear_axle, "source": note}
         if hasattr(fitted, group):
             value = getattr(fitted, group)
             in_entry = degrees(value) if entry[group]["unit"] == "deg" else value

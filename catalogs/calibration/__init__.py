@@ -1,10 +1,10 @@
 """Calibration procedures: stages, bounds and scales, as YAML."""
 
-from math import radians
+from math import inf, radians
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, checked, read_entry
@@ -20,6 +20,7 @@ class ScalesEntry(CatalogueEntry):
     """Size of one unit of each response; the meanings stand at ``Yardstick``."""
 
     speed: Annotated[Scalar, checked("m s-1", above=0)]
+    speed_drop: Annotated[Scalar, checked("m s-1", above=0)]
     pitch: Annotated[Scalar, checked("deg", above=0)]
     slip: Annotated[Scalar, checked("1", above=0)]
     wheel_load: Annotated[Scalar, checked("N", above=0)]
@@ -34,6 +35,8 @@ class BoundsEntry(CatalogueEntry):
     upper: Number
     step: Number
     source: Text
+    smooth: Annotated[float, Field(gt=0)] | None = None
+    start: Number | None = None
 
     @model_validator(mode="after")
     def _limits_leave_room(self) -> "BoundsEntry":
@@ -121,8 +124,12 @@ def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
 
 def _inside(entry: BoundsEntry) -> Bounds:
     """SI inside: an angle comes in degrees and is handed on in radians."""
-    if entry.unit == "deg":
-        return Bounds(
-            unit="rad", lower=radians(entry.lower), upper=radians(entry.upper), step=radians(entry.step)
-        )
-    return Bounds(unit=entry.unit, lower=entry.lower, upper=entry.upper, step=entry.step)
+    unit, factor = ("rad", radians(1.0)) if entry.unit == "deg" else (entry.unit, 1.0)
+    return Bounds(
+        unit=unit,
+        lower=entry.lower * factor,
+        upper=entry.upper * factor,
+        step=entry.step * factor,
+        smooth=inf if entry.smooth is None else entry.smooth * factor,
+        start=None if entry.start is None else entry.start * factor,
+    )

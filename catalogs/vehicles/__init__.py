@@ -5,11 +5,12 @@ from math import radians
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
 from catalogs.vehicles.frozen import Provenance, check_seal
+from tasks.vehicle.effects.chassis import EFFECT_UNITS
 from tasks.vehicle.parameters import TyreFamily, Vehicle
 
 FOLDER = Path(__file__).parent
@@ -97,7 +98,25 @@ class VehicleEntry(CatalogueEntry):
     lock_speed: Annotated[Scalar, checked("rad s-1", above=0)]
     gravity: Annotated[Scalar, checked("m s-2", above=0)]
     families: FamiliesEntry
+    effects: dict[str, Scalar] = Field(default_factory=dict)
     provenance: Provenance | None = None
+
+    @model_validator(mode="after")
+    def _effects_exist(self) -> "VehicleEntry":
+        known = ", ".join(EFFECT_UNITS)
+        problems = [
+            f"effects: no effect has the number {name}; there are: {known}"
+            for name in self.effects
+            if name not in EFFECT_UNITS
+        ]
+        problems += [
+            f"effects.{name}: unit must be {unit}; it is {self.effects[name].unit}"
+            for name, unit in EFFECT_UNITS.items()
+            if name in self.effects and self.effects[name].unit != unit
+        ]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
 
 
 def vehicle_names() -> tuple[str, ...]:
@@ -151,7 +170,8 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
         for weather, family in entry.families
     }
     values["static_pitch"] = radians(values["static_pitch"])
-    return Vehicle(name=source.stem, families=families, **values)
+    effects = {name: number.value for name, number in entry.effects.items()}
+    return Vehicle(name=source.stem, families=families, effects=effects, **values)
 
 
 def _read(source: Path) -> VehicleEntry:

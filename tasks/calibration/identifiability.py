@@ -1,14 +1,14 @@
 """Which calibrated scalars the reference runs determine, and which they cannot tell apart."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.calibration.residual import CalibrationCase
 from tasks.calibration.scalars import CalibrationScalar, calibration_scalars, scalar_value
-from tasks.calibration.staged import Procedure, Stage, stage_jacobian
+from tasks.calibration.staged import Procedure, Stage, smoothness, stage_jacobian
 from tasks.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,8 @@ class Identifiability:
 def identifiability(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
 ) -> Identifiability:
-    """Fisher information of all scalars from all responses of all cases, with the bounds as a weak prior.
+    """Fisher information of all scalars from all responses of all cases, with bounds and smoothness as the
+    prior.
 
     Every response of every case counts as one observation whose standard deviation is the response's scale:
     residuals of a deterministic model are one smooth curve a case and not thousands of independent samples.
@@ -80,7 +81,14 @@ def identifiability(
         kinds=("flat", "hump", "depression"), phase="event",
     )  # fmt: skip
     x = np.array([scalar_value(vehicle, s) for s in scalars])
-    jacobian = stage_jacobian(vehicle, cases, everything, procedure, scalars, x)
+    coasting = replace(everything, responses=("speed_drop",), phase="start")
+    jacobian = np.vstack(
+        [
+            stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
+            stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
+            smoothness(scalars, procedure),
+        ]
+    )
     bounds = [procedure.bounds[s.group] for s in scalars]
     return knowledge(
         jacobian, scalars, x, [b.unit for b in bounds], np.array([b.upper - b.lower for b in bounds])

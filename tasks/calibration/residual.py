@@ -12,7 +12,7 @@ from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
 
 Floats = NDArray[np.float64]
-Response = Literal["speed", "pitch", "slip", "wheel_load", "stop"]
+Response = Literal["speed", "speed_drop", "pitch", "slip", "wheel_load", "stop"]
 Phase = Literal["start", "braking", "tail", "event"]
 WHEELS = {"fl": "f", "fr": "f", "rl": "r", "rr": "r"}
 
@@ -29,7 +29,8 @@ class CalibrationCase:
     surface_friction : mu_c [1]
     controls : initial speed and brake
     hazard : road feature
-    time : of the samples that count, ascending [s]
+    time : of the samples, from the brake onset on, ascending [s]
+    event_start : begin of what the judge scores; samples before it count in the start phase only [s]
     speed, pitch : there [m/s, deg]; pitch with its static offset
     slip, wheel_load : by wheel fl, fr, rl, rr, shape (4, n) [1, N]
     stopping_distance : of the reference; None where it is not scored [m]
@@ -42,6 +43,7 @@ class CalibrationCase:
     controls: Controls
     hazard: RoadHazard
     time: Floats
+    event_start: float
     speed: Floats
     pitch: Floats
     slip: Floats
@@ -55,8 +57,9 @@ class Yardstick:
 
     Parameters
     ----------
-    scales : size of one unit of each response [m/s, deg, 1, N, m]
-    start_s : length of the start of an event [s]
+    scales : size of one unit of each response; speed_drop is the speed less that of the first sample [m/s, m/s,
+        deg, 1, N, m]
+    start_s : length of the start of braking [s]
     tail_speed : the tail of a stop begins below it [m/s]
     slip_speed : slip counts above it [m/s]
     margin_s : how long the model rolls past the last sample [s]
@@ -95,15 +98,16 @@ def residuals(
     ride : the model's run
     case : the reference
     responses : which
-    phase : the start of the event, braking above the tail speed, tail below it, or the whole event
+    phase : the start of braking, braking above the tail speed, tail below it, or the whole event
     yardstick : scales and speeds
     """
     model = ride.columns
+    event = case.time >= case.event_start
     counts = {
         "start": case.time <= case.time[0] + yardstick.start_s,
-        "braking": case.speed > yardstick.tail_speed,
-        "tail": case.speed <= yardstick.tail_speed,
-        "event": np.ones(len(case.time), bool),
+        "braking": event & (case.speed > yardstick.tail_speed),
+        "tail": event & (case.speed <= yardstick.tail_speed),
+        "event": event,
     }[phase]
     time = model["t_ns"] * 1e-9
     parts = [np.empty(0)]
@@ -118,6 +122,9 @@ def residuals(
     for response in responses:
         if response == "speed":
             add("speed", model["speed"], case.speed, counts)
+        elif response == "speed_drop":
+            begin = float(np.interp(case.time[0], time, model["speed"]))
+            add("speed_drop", model["speed"] - begin, case.speed - case.speed[0], counts)
         elif response == "pitch":
             add("pitch", np.rad2deg(model["pitch"] + ride.static_pitch), case.pitch, counts)
         elif response == "slip":

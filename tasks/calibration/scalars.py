@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tasks.errors import InputError
+from tasks.vehicle.effects.chassis import EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle
 
 KNOT_GROUPS = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release_s")
@@ -42,13 +43,16 @@ def calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[Calibr
         Listing every group that the vehicle does not have.
     """
     unknown = [
-        g for g in groups if g not in KNOT_GROUPS and not isinstance(getattr(vehicle, g, None), float | int)
+        g for g in groups if g not in KNOT_GROUPS and g not in EFFECT_UNITS and not _is_field(vehicle, g)
     ]
     if unknown:
+        known = ", ".join((*KNOT_GROUPS, *EFFECT_UNITS))
         raise InputError(
-            [f"calibration group {g}: the vehicle has no such number; name a field or one of {', '.join(KNOT_GROUPS)}"
-             for g in unknown]
-        )  # fmt: skip
+            [
+                f"calibration group {g}: no such number; name a field of the vehicle or one of {known}"
+                for g in unknown
+            ]
+        )
     scalars: list[CalibrationScalar] = []
     for group in groups:
         scalars += (
@@ -65,6 +69,8 @@ def scalar_value(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
     vehicle : the vehicle
     scalar : one of its scalars
     """
+    if scalar.group in EFFECT_UNITS:
+        return float(vehicle.effects.get(scalar.group, 0.0))
     if not scalar.places:
         return float(getattr(vehicle, scalar.group))
     family, knot = scalar.places[0]
@@ -72,7 +78,7 @@ def scalar_value(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
 
 
 def with_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> Vehicle:
-    """The vehicle with other values of some scalars.
+    """The vehicle with other values of some scalars; moving its centre of gravity leaves the wheelbase as it is.
 
     Parameters
     ----------
@@ -80,15 +86,24 @@ def with_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) ->
     values : by scalar, in the unit of its field
     """
     families = dict(vehicle.families)
+    effects = dict(vehicle.effects)
     fields: dict[str, float] = {}
     for scalar, value in values.items():
-        if not scalar.places:
+        if scalar.group in EFFECT_UNITS:
+            effects[scalar.group] = value
+        elif not scalar.places:
             fields[scalar.group] = value
         for family, knot in scalar.places:
             table = list(getattr(families[family], scalar.group))
             table[knot] = value
             families[family] = replace(families[family], **{scalar.group: tuple(table)})
-    return replace(vehicle, families=families, **fields)  # type: ignore[arg-type]
+    if "cg_to_front_axle" in fields:
+        fields["cg_to_rear_axle"] = vehicle.wheelbase - fields["cg_to_front_axle"]
+    return replace(vehicle, families=families, effects=effects, **fields)  # type: ignore[arg-type]
+
+
+def _is_field(vehicle: Vehicle, group: str) -> bool:
+    return isinstance(vars(vehicle).get(group), float | int)
 
 
 def _knots(vehicle: Vehicle, group: str) -> list[CalibrationScalar]:

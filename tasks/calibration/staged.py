@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from scipy.optimize import least_squares
 
 from tasks.calibration.residual import CalibrationCase, Phase, Response, Yardstick, driven, residuals
 from tasks.calibration.scalars import CalibrationScalar, calibration_scalars, scalar_value, with_scalars
+from tasks.vehicle.effects.chassis import EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle, surface_response
 from tasks.vehicle.rollout import Mode
 
@@ -24,12 +27,16 @@ class Bounds:
     unit : of the group's scalars
     lower, upper : limits of every scalar [unit]
     step : for finite differences [unit]
+    smooth : standard deviation of the difference between neighbouring knots of a family; infinite for none [unit]
+    start : where an effect begins that the vehicle does not have yet; None for 0 [unit]
     """
 
     unit: str
     lower: float
     upper: float
     step: float
+    smooth: float = inf
+    start: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,6 +122,7 @@ def calibrate(
     The calibrated vehicle and a record of every stage.
     """
     records: list[StageRecord] = []
+    vehicle = _begun(vehicle, procedure)
     for turn in range(1, procedure.passes + 1):
         for stage in procedure.stages:
             vehicle, record = run_stage(vehicle, cases, stage, procedure)
@@ -145,14 +153,15 @@ def run_stage(
     start = np.clip(start, limits[:, 0] + 1e-6 * width, limits[:, 1] - 1e-6 * width)
 
     prior = np.diag(np.sqrt(12.0) / width)
+    smooth = smoothness(scalars, procedure)
 
     def residual(x: Floats) -> Floats:
         changed = with_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
         parts = [_case_residual(changed, case, stage, procedure) for case in chosen]
-        return np.concatenate([*parts, prior @ (x - start)])
+        return np.concatenate([*parts, prior @ (x - start), smooth @ x])
 
     def jacobian(x: Floats) -> Floats:
-        return np.vstack([stage_jacobian(vehicle, chosen, stage, procedure, scalars, x), prior])
+        return np.vstack([stage_jacobian(vehicle, chosen, stage, procedure, scalars, x), prior, smooth])
 
     before = float(np.sum(residual(start) ** 2))
     solution = least_squares(
@@ -209,6 +218,37 @@ def stage_jacobian(
             parts.append((up - down) / (2 * step))
         columns.append(np.concatenate(parts))
     return np.stack(columns, axis=1)
+
+
+def smoothness(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Floats:
+    """Rows that weigh the difference between neighbouring knots of a family, so that interpolation between them
+    holds where one of them is poorly determined.
+
+    Parameters
+    ----------
+    scalars : n of them
+    procedure : holds the allowed differences
+
+    Returns
+    -------
+    Shape (pairs, n) [1 / unit].
+    """
+    rows = []
+    for i, (one, other) in enumerate(pairwise(scalars)):
+        spread = procedure.bounds[one.group].smooth
+        neighbours = one.group == other.group and len(one.places) == len(other.places) == 1
+        if isfinite(spread) and neighbours and one.places[0][0] == other.places[0][0]:
+            row = np.zeros(len(scalars))
+            row[i], row[i + 1] = 1 / spread, -1 / spread
+            rows.append(row)
+    return np.array(rows).reshape(-1, len(scalars))
+
+
+def _begun(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
+    """The vehicle with the start values of effects that it does not have yet."""
+    missing = [group for group in procedure.groups if group in EFFECT_UNITS and group not in vehicle.effects]
+    starts = {group: procedure.bounds[group].start or 0.0 for group in missing}
+    return replace(vehicle, effects={**vehicle.effects, **starts})
 
 
 def _case_residual(vehicle: Vehicle, case: CalibrationCase, stage: Stage, procedure: Procedure) -> Floats:

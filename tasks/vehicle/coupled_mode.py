@@ -46,12 +46,12 @@ def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis)
     """
     if standing:
         return Motion(0.0, 0.0, 0.0, 0.0)
-    wheels = chassis.wheels
+    f, r, wheels = ports.front, ports.rear, chassis.wheels
     return Motion(
         motion.speed,
         ports.acceleration,
-        (wheels.radius * ports.front.tyre_force - ports.front.brake_torque) / wheels.front.inertia,
-        (wheels.radius * ports.rear.tyre_force - ports.rear.brake_torque) / wheels.rear.inertia,
+        (f.lever * f.tyre_force - f.brake_torque - f.ground_moment) / wheels.front.inertia,
+        (r.lever * r.tyre_force - r.brake_torque - r.ground_moment) / wheels.rear.inertia,
     )
 
 

@@ -1,7 +1,7 @@
 """The vehicle: specified mechanical values, frozen empirical tables, and what they give on one surface."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -62,6 +62,7 @@ class Vehicle:
     lock_speed : in coupled mode, wheel speed below which brake friction turns proportional to it [rad/s]
     gravity : g [m/s2]
     families : tyre family of each kind of weather
+    effects : numbers of ``tasks.vehicle.effects.chassis`` that coupled mode adds; none in the paper's model
     """
 
     name: str
@@ -95,6 +96,7 @@ class Vehicle:
     lock_speed: float
     gravity: float
     families: Mapping[str, TyreFamily]
+    effects: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def mass(self) -> float:

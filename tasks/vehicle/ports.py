@@ -9,10 +9,21 @@ from typing import NamedTuple
 from numba import njit
 
 from tasks.vehicle.brake import abs_command, abs_update
+from tasks.vehicle.effects.chassis import (
+    ChassisEffects,
+    added_strut_force,
+    air_drag,
+    chassis_effects,
+    effective_friction,
+    footprint,
+    grip_reserve,
+    link_lift,
+    stick_share,
+)
 from tasks.vehicle.half_car import HalfCar, HalfCarState, contact_load, half_car, suspension_forces
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.road import RoadFeature, height_at, slope_at
-from tasks.vehicle.tyre import TyreCurve, tyre_friction
+from tasks.vehicle.road import RoadFeature
+from tasks.vehicle.tyre import TyreCurve
 from tasks.vehicle.wheels import Axle, Wheels, wheels_of
 
 
@@ -25,12 +36,16 @@ class Chassis(NamedTuple):
     wheels : wheels, brakes and longitudinal values
     lever : height of the body's centre of gravity above the wheel centres [m]
     lock_speed : wheel speed below which brake friction is proportional to it [rad/s]
+    transfer : height of the centre of gravity over the wheelbase [1]
+    effects : what is added to the paper's model
     """
 
     body: HalfCar
     wheels: Wheels
     lever: float
     lock_speed: float
+    transfer: float
+    effects: ChassisEffects
 
 
 def chassis_of(vehicle: Vehicle) -> Chassis:
@@ -45,6 +60,8 @@ def chassis_of(vehicle: Vehicle) -> Chassis:
         wheels=wheels_of(vehicle),
         lever=body_height - vehicle.wheel_radius,
         lock_speed=vehicle.lock_speed,
+        transfer=vehicle.cg_height / vehicle.wheelbase,
+        effects=chassis_effects(vehicle.effects),
     )
 
 
@@ -75,7 +92,9 @@ class AxlePorts(NamedTuple):
     tyre_force : braking force at the contact, rearward positive [N]
     abs_scale : share of the brake torque let through [1]
     brake_torque : against the wheel's rotation [N m]
-    suspension_force : spring and damper [N]
+    suspension_force : spring, damper and what the links pass on [N]
+    lever : of the tyre force about the wheel centre [m]
+    ground_moment : of the ground's load, against the wheel's rotation [N m]
     """
 
     ground: Ground
@@ -84,6 +103,8 @@ class AxlePorts(NamedTuple):
     abs_scale: float
     brake_torque: float
     suspension_force: float
+    lever: float
+    ground_moment: float
 
 
 class Ports(NamedTuple):
@@ -93,7 +114,7 @@ class Ports(NamedTuple):
     ----------
     front, rear : the axles
     road_force : horizontal part of the contact loads on the slope, forward positive [N]
-    drag : coast drag, rearward positive [N]
+    drag : of coasting and of the air, rearward positive [N]
     acceleration : dv/dt [m/s2]
     pitch_moment : on the body, nose-down positive [N m]
     """
@@ -120,15 +141,18 @@ def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def signed_friction(slip: float, tyre: TyreCurve) -> float:
-    """Friction of the tyre curve, continued oddly to driving slip [1].
+def signed_friction(slip: float, share: float, tyre: TyreCurve, effects: ChassisEffects) -> float:
+    """Friction of the tyre, continued oddly to driving slip [1].
 
     Parameters
     ----------
     slip : signed braking slip [1]
+    share : of the tyre that sticks [1]
     tyre : the scaled curve
+    effects : the numbers
     """
-    return tyre_friction(slip, tyre) if slip >= 0.0 else -tyre_friction(-slip, tyre)
+    friction = effective_friction(abs(slip), share, tyre, effects)
+    return friction if slip >= 0.0 else -friction
 
 
 @njit(cache=True, nogil=True)
@@ -145,22 +169,32 @@ def lock_share(omega: float, lock_speed: float) -> float:
 
 @njit(cache=True, nogil=True)
 def ground_at(
-    station: float, unsprung_height: float, stiffness: float, static_load: float, road: RoadFeature
+    station: float,
+    speed: float,
+    unsprung_height: float,
+    unsprung_rate: float,
+    stiffness: float,
+    static_load: float,
+    road: RoadFeature,
+    effects: ChassisEffects,
 ) -> Ground:
     """Road and load under one axle.
 
     Parameters
     ----------
     station : of the axle [m]
-    unsprung_height : [m]
+    speed : of the vehicle [m/s]
+    unsprung_height, unsprung_rate : of the axle [m, m/s]
     stiffness : of the tyre [N/m]
     static_load : half-car's load at rest [N]
     road : the feature
+    effects : the numbers
     """
-    height = height_at(station, road)
-    return Ground(
-        height, slope_at(station, road), contact_load(height, unsprung_height, stiffness, static_load)
-    )
+    height, slope = footprint(station, road, effects)
+    load = contact_load(height, unsprung_height, stiffness, static_load)
+    if load > 0.0:
+        load = max(load + effects.tyre_damping * (speed * slope - unsprung_rate), 0.0)
+    return Ground(height, slope, load)
 
 
 @njit(cache=True, nogil=True)
@@ -172,6 +206,8 @@ def rolling_axle(
     pressure: float,
     scale: float,
     step: float,
+    static_load: float,
+    stiffness: float,
     axle: Axle,
     chassis: Chassis,
     tyre: TyreCurve,
@@ -187,15 +223,22 @@ def rolling_axle(
     pressure : brake pressure [MPa]
     scale : ABS scale one step before, from which its rate is limited [1]
     step : [s]
+    static_load, stiffness : of the tyre [N, N/m]
     axle, chassis, tyre : the values
     """
-    wheels = chassis.wheels
+    wheels, effects = chassis.wheels, chassis.effects
     slip = signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
-    tyre_force = signed_friction(slip, tyre) * ground.load
-    wanted = abs_command(slip, tyre.target_slip, wheels.release_width)
+    tyre_force = signed_friction(slip, stick_share(speed, effects), tyre, effects) * ground.load
+    wanted = abs_command(slip, tyre.target_slip, wheels.release_width) if speed >= effects.abs_cutoff else 1.0
     abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
-    brake_torque = axle.brake_gain * pressure * abs_scale * lock_share(omega, chassis.lock_speed)
-    return AxlePorts(ground, slip, tyre_force, abs_scale, brake_torque, suspension_force)
+    turning = lock_share(omega, chassis.lock_speed)
+    brake_torque = axle.brake_gain * pressure * abs_scale * turning
+    lever = wheels.radius - effects.radius_by_load * (ground.load - static_load) / stiffness
+    offset = effects.rolling_coefficient * turning - effects.slope_moment * ground.slope
+    ground_moment = ground.load * lever * offset
+    return AxlePorts(
+        ground, slip, tyre_force, abs_scale, brake_torque, suspension_force, lever, ground_moment
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -209,7 +252,38 @@ def standing_axle(ground: Ground, suspension_force: float, wheels: Wheels) -> Ax
     wheels : the values
     """
     tyre_force = -ground.load * ground.slope
-    return AxlePorts(ground, 0.0, tyre_force, 1.0, wheels.radius * tyre_force, suspension_force)
+    return AxlePorts(
+        ground, 0.0, tyre_force, 1.0, wheels.radius * tyre_force, suspension_force, wheels.radius, 0.0
+    )
+
+
+@njit(cache=True, nogil=True)
+def with_links(ports: AxlePorts, force: float) -> AxlePorts:
+    """The same ports with a force of the links in parallel to spring and damper.
+
+    Parameters
+    ----------
+    ports : of the axle
+    force : pulls body and wheel together where positive [N]
+    """
+    return AxlePorts(
+        ports.ground, ports.slip, ports.tyre_force, ports.abs_scale, ports.brake_torque,
+        ports.suspension_force + force, ports.lever, ports.ground_moment,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def reserve_of(ports: AxlePorts, tyre: TyreCurve) -> float:
+    """Sideways grip that an axle has left; none off the road [1].
+
+    Parameters
+    ----------
+    ports : of the axle
+    tyre : the scaled curve
+    """
+    if ports.ground.load <= 0.0:
+        return 0.0
+    return grip_reserve(ports.tyre_force / ports.ground.load, tyre.peak)
 
 
 @njit(cache=True, nogil=True)
@@ -242,24 +316,37 @@ def ports_at(
     held : its speed is held from outside
     chassis, tyre, road : the values
     """
-    body, wheels = chassis.body, chassis.wheels
-    ground_f = ground_at(motion.station, x[2], body.tyre_f, body.static_f, road)
-    ground_r = ground_at(motion.station - wheels.wheelbase, x[3], body.tyre_r, body.static_r, road)
+    body, wheels, effects = chassis.body, chassis.wheels, chassis.effects
+    ground_f = ground_at(motion.station, motion.speed, x[2], x[6], body.tyre_f, body.static_f, road, effects)
+    behind = motion.station - wheels.wheelbase
+    ground_r = ground_at(behind, motion.speed, x[3], x[7], body.tyre_r, body.static_r, road, effects)
     suspension_f, suspension_r = suspension_forces(x, body)
+    travel_f, rate_f = x[0] - x[2] - body.to_front * x[1], x[4] - x[6] - body.to_front * x[5]
+    travel_r, rate_r = x[0] - x[3] + body.to_rear * x[1], x[4] - x[7] + body.to_rear * x[5]
+    suspension_f += added_strut_force(travel_f, rate_f, body.damper_f, effects)
+    suspension_r += added_strut_force(travel_r, rate_r, body.damper_r, effects)
     if standing:
         front = standing_axle(ground_f, suspension_f, wheels)
         rear = standing_axle(ground_r, suspension_r, wheels)
     else:
         front = rolling_axle(
             ground_f, motion.speed, motion.omega_f, suspension_f, pressure, scale_f, step,
-            wheels.front, chassis, tyre,
+            body.static_f, body.tyre_f, wheels.front, chassis, tyre,
         )  # fmt: skip
         rear = rolling_axle(
             ground_r, motion.speed, motion.omega_r, suspension_r, pressure, scale_r, step,
-            wheels.rear, chassis, tyre,
+            body.static_r, body.tyre_r, wheels.rear, chassis, tyre,
         )  # fmt: skip
+    share = 0.0 if standing else stick_share(motion.speed, effects)
+    lift_f = link_lift(front.tyre_force, chassis.transfer, effects.anti_dive, effects.stick_anti_dive, share)
+    lift_r = link_lift(rear.tyre_force, chassis.transfer, effects.anti_lift, effects.stick_anti_lift, share)
+    if effects.scrub_stiffness != 0.0 and not standing:
+        scrub = effects.scrub_stiffness * (1.0 - share)
+        lift_f -= scrub * body.spring_f * travel_f * reserve_of(front, tyre)
+        lift_r += scrub * body.spring_r * travel_r * reserve_of(rear, tyre)
+    front, rear = with_links(front, -lift_f), with_links(rear, lift_r)
     slope_f, slope_r = ground_f.load * ground_f.slope, ground_r.load * ground_r.slope
-    drag = wheels.mass * wheels.coast
+    drag = wheels.mass * wheels.coast + air_drag(motion.speed, effects)
     acceleration = 0.0
     if not (standing or held):
         acceleration = -(front.tyre_force + rear.tyre_force + slope_f + slope_r + drag) / wheels.mass

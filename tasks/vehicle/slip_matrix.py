@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 from numba import njit
 
+from tasks.vehicle.effects.chassis import effective_slope, stick_share
 from tasks.vehicle.ports import AxlePorts, Chassis, Motion, lock_share
-from tasks.vehicle.tyre import TyreCurve, tyre_slope
+from tasks.vehicle.tyre import TyreCurve
 from tasks.vehicle.wheels import Axle
 
 
@@ -56,19 +57,20 @@ def axle_slope(
     full_torque = axle.brake_gain * pressure
     force, torque, locking = 0.0, 0.0, 0.0
     if abs(ports.slip) < 1.0:
-        force = tyre_slope(abs(ports.slip), tyre) * ports.ground.load
+        share = stick_share(motion.speed, chassis.effects)
+        force = effective_slope(abs(ports.slip), share, tyre, chassis.effects) * ports.ground.load
         if 0.0 < ports.abs_scale < 1.0:
-            share = lock_share(omega, chassis.lock_speed)
-            torque = -full_torque * share / (wheels.release_width * tyre.target_slip)
-    change = step * abs(wheels.radius * ports.tyre_force - ports.brake_torque) / axle.inertia
+            turning = lock_share(omega, chassis.lock_speed)
+            torque = -full_torque * turning / (wheels.release_width * tyre.target_slip)
+    change = step * abs(ports.lever * ports.tyre_force - ports.brake_torque) / axle.inertia
     if abs(omega) < chassis.lock_speed + change:
         locking = full_torque * ports.abs_scale / chassis.lock_speed
-    turning = wheels.radius * force - torque
+    moment = wheels.radius * force - torque
     return AxleSlope(
         -force * slip_per_speed / wheels.mass,
         -force * slip_per_wheel / wheels.mass,
-        turning * slip_per_speed / axle.inertia,
-        (turning * slip_per_wheel - locking) / axle.inertia,
+        moment * slip_per_speed / axle.inertia,
+        (moment * slip_per_wheel - locking) / axle.inertia,
     )
 
 

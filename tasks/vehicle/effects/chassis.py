@@ -1,0 +1,221 @@
+"""Effects that coupled mode carries: each a few numbers of the vehicle, all 0 in the paper's model.
+
+With every number 0 each function returns exactly what the plain model has at its port. Names that the library
+of effects has too mean the same there.
+"""
+
+from collections.abc import Mapping
+from math import sqrt
+from typing import NamedTuple
+
+from numba import njit
+
+from tasks.errors import InputError
+from tasks.vehicle.effects.ports import AIR_DENSITY
+from tasks.vehicle.road import RoadFeature, height_at, slope_at
+from tasks.vehicle.tyre import TyreCurve, tyre_friction, tyre_slope
+
+STICK_SLIP = 0.01
+"""Slip over which a sticking tyre builds up its force; any value well below the curve's peak serves [1]."""
+
+
+class ChassisEffects(NamedTuple):
+    """Numbers of the effects.
+
+    Parameters
+    ----------
+    drag_area : CdA of the air drag (Gillespie 1992, SAE R-114) [m2]
+    rolling_coefficient : rolling-resistance moment per load and radius, on the wheels (ISO 28580) [1]
+    slope_moment : share of the load's slope force that turns the wheel, as where the load acts below its centre and
+        not on the road's normal through it [1]
+    radius_by_load : share of the tyre's deflection by which its lever on the wheel shortens [1]
+    damper_asymmetry : rebound damping 1 + a, bump damping 1 - a times the nominal [1]
+    progressive_rate : cubic part of each axle's spring [N/m3]
+    scrub_stiffness : stiffness that the track's change adds where the tyre grips sideways, over the spring's [1]
+    anti_dive, anti_lift : share of the longitudinal load transfer that the links carry, front and rear [1]
+    enveloping_length : length of the footprint over which the tyre averages the road (Zegelaar 1998) [m]
+    tyre_damping : vertical, of each axle [N s/m]
+    abs_cutoff : speed below which the ABS lets the full brake torque through [m/s]
+    stick_ratio : friction of a tyre that sticks and slides instead of rolling, over its peak [1]
+    stick_below, stick_above : all of the tyre does so below the one speed, none above the other [m/s]
+    stick_anti_dive, stick_anti_lift : what anti_dive and anti_lift gain in that state [1]
+    """
+
+    drag_area: float = 0.0
+    rolling_coefficient: float = 0.0
+    slope_moment: float = 0.0
+    radius_by_load: float = 0.0
+    damper_asymmetry: float = 0.0
+    progressive_rate: float = 0.0
+    scrub_stiffness: float = 0.0
+    anti_dive: float = 0.0
+    anti_lift: float = 0.0
+    enveloping_length: float = 0.0
+    tyre_damping: float = 0.0
+    abs_cutoff: float = 0.0
+    stick_ratio: float = 0.0
+    stick_below: float = 0.0
+    stick_above: float = 0.0
+    stick_anti_dive: float = 0.0
+    stick_anti_lift: float = 0.0
+
+
+EFFECT_UNITS = {
+    "drag_area": "m2", "rolling_coefficient": "1", "slope_moment": "1", "radius_by_load": "1",
+    "damper_asymmetry": "1", "progressive_rate": "N m-3", "scrub_stiffness": "1", "anti_dive": "1",
+    "anti_lift": "1", "enveloping_length": "m", "tyre_damping": "N s m-1",
+    "abs_cutoff": "m s-1", "stick_ratio": "1", "stick_below": "m s-1", "stick_above": "m s-1",
+    "stick_anti_dive": "1", "stick_anti_lift": "1",
+}  # fmt: skip
+"""Unit of each number, as catalogue files write it."""
+
+
+def chassis_effects(values: Mapping[str, float]) -> ChassisEffects:
+    """The effects of a vehicle from named numbers; all others 0.
+
+    Parameters
+    ----------
+    values : by name, in the units of `EFFECT_UNITS`
+
+    Raises
+    ------
+    InputError
+        For names that coupled mode does not carry.
+    """
+    unknown = [name for name in values if name not in EFFECT_UNITS]
+    if unknown:
+        known = ", ".join(EFFECT_UNITS)
+        raise InputError(
+            [f"effect {name}: coupled mode has no such number; there are: {known}" for name in unknown]
+        )
+    return ChassisEffects(**{name: float(value) for name, value in values.items()})
+
+
+@njit(cache=True, nogil=True)
+def air_drag(speed: float, effects: ChassisEffects) -> float:
+    """Force of the air against the motion [N].
+
+    Parameters
+    ----------
+    speed : [m/s]
+    effects : the numbers
+    """
+    return 0.5 * AIR_DENSITY * effects.drag_area * speed * abs(speed)
+
+
+@njit(cache=True, nogil=True)
+def stick_share(speed: float, effects: ChassisEffects) -> float:
+    """Share of the tyre that sticks and slides instead of rolling: 1 at low speed, smoothly to 0 [1].
+
+    Parameters
+    ----------
+    speed : [m/s]
+    effects : the numbers
+    """
+    if speed >= effects.stick_above:
+        return 0.0
+    if speed <= effects.stick_below:
+        return 1.0
+    u = (effects.stick_above - speed) / (effects.stick_above - effects.stick_below)
+    return u * u * (3.0 - 2.0 * u)
+
+
+@njit(cache=True, nogil=True)
+def effective_friction(slip: float, share: float, tyre: TyreCurve, effects: ChassisEffects) -> float:
+    """Friction of a tyre of which a share sticks, for a braking slip [1].
+
+    Parameters
+    ----------
+    slip : braking slip, 0 or more [1]
+    share : that sticks [1]
+    tyre : the scaled curve
+    effects : the numbers
+    """
+    rolling = tyre_friction(slip, tyre)
+    if share == 0.0:
+        return rolling
+    u = slip / STICK_SLIP
+    return (1.0 - share) * rolling + share * effects.stick_ratio * tyre.peak * u / sqrt(1.0 + u * u)
+
+
+@njit(cache=True, nogil=True)
+def effective_slope(slip: float, share: float, tyre: TyreCurve, effects: ChassisEffects) -> float:
+    """Rise of ``effective_friction`` with slip [1].
+
+    Parameters
+    ----------
+    slip : braking slip, 0 or more [1]
+    share : that sticks [1]
+    tyre : the scaled curve
+    effects : the numbers
+    """
+    rolling = tyre_slope(slip, tyre)
+    if share == 0.0:
+        return rolling
+    u = slip / STICK_SLIP
+    return (1.0 - share) * rolling + share * effects.stick_ratio * tyre.peak / STICK_SLIP / (
+        1.0 + u * u
+    ) ** 1.5
+
+
+@njit(cache=True, nogil=True)
+def footprint(station: float, road: RoadFeature, effects: ChassisEffects) -> tuple[float, float]:
+    """Road height [m] and slope [m/m] that a tyre feels: their means over its footprint.
+
+    The mean of the height is by Gauss's three points, that of the slope is exact.
+
+    Parameters
+    ----------
+    station : of the axle [m]
+    road : the feature
+    effects : the numbers
+    """
+    half = 0.5 * effects.enveloping_length
+    if half <= 0.0:
+        return height_at(station, road), slope_at(station, road)
+    out = 0.7745966692414834 * half
+    ends = height_at(station - out, road) + height_at(station + out, road)
+    height = (5.0 * ends + 8.0 * height_at(station, road)) / 18.0
+    return height, (height_at(station + half, road) - height_at(station - half, road)) / (2.0 * half)
+
+
+@njit(cache=True, nogil=True)
+def added_strut_force(travel: float, rate: float, damping: float, effects: ChassisEffects) -> float:
+    """What an axle's strut has beyond its linear spring and damper [N].
+
+    Parameters
+    ----------
+    travel, rate : of the strut, rebound positive [m, m/s]
+    damping : nominal [N s/m]
+    effects : the numbers
+    """
+    return (
+        effects.damper_asymmetry * damping * abs(rate) + effects.progressive_rate * travel * travel * travel
+    )
+
+
+@njit(cache=True, nogil=True)
+def grip_reserve(friction: float, peak: float) -> float:
+    """Sideways grip that a braking tyre has left, by the friction circle [1].
+
+    Parameters
+    ----------
+    friction : of braking in use [1]
+    peak : of the curve [1]
+    """
+    used = friction / peak
+    return sqrt(max(1.0 - used * used, 0.0))
+
+
+@njit(cache=True, nogil=True)
+def link_lift(tyre_force: float, transfer: float, anti: float, stick_anti: float, share: float) -> float:
+    """Vertical force that an axle's links pass between body and wheel while it brakes [N].
+
+    Parameters
+    ----------
+    tyre_force : braking force of the axle [N]
+    transfer : height of the centre of gravity over the wheelbase [1]
+    anti, stick_anti : share of the load transfer, always and in addition where the tyre sticks [1]
+    share : that sticks [1]
+    """
+    return (anti + share * stick_anti) * tyre_force * transfer
