@@ -78,6 +78,24 @@ def audit(
 
 
 @app.command()
+def diff(
+    a: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    b: Annotated[str, typer.Argument(help="Another, of the same scenarios.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Compare two datasets: which clips differ, how far their labels moved, and which input can be why."""
+    result = _call("diff", prefect, a, b, out=out)
+    if as_json:
+        _show(result, as_json)
+    else:
+        from flows.dataset_diff import as_text
+
+        typer.echo(as_text(result), nl=False)
+
+
+@app.command()
 def describe(dataset: Annotated[str, typer.Argument()], as_json: Json = False) -> None:
     """Say what is in a dataset."""
     _show(_call("describe", False, dataset), as_json)
@@ -268,7 +286,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
         "calibrate": "calibration",
         "import_measurements": "importing", "brake_protocol": "protocol", "synthetic_drives": "bus_drives",
-        "stop_study": "stop_study",
+        "stop_study": "stop_study", "diff": "dataset_diff",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

@@ -26,6 +26,7 @@ from prefect import flow  # noqa: E402  (reads the environment when it is import
 
 from flows import audit as _audit  # noqa: E402
 from flows import calibration as _calibration  # noqa: E402
+from flows import dataset_diff as _dataset_diff  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import generate as _generate  # noqa: E402
 from flows import importing as _importing  # noqa: E402
@@ -55,3 +56,4 @@ scene_import = as_flow(_scenes.scene_import)
 import_measurements = as_flow(_importing.import_measurements)
 brake_protocol = as_flow(_protocol.brake_protocol)
 stop_study = as_flow(_stop_study.stop_study)
+diff = as_flow(_dataset_diff.diff)

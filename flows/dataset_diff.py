@@ -1,0 +1,155 @@
+"""Two datasets side by side: which clips differ, how far their labels moved, and which input can be why."""
+
+from collections.abc import Mapping
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flows.audit import read_manifest
+from flows.store.frames import read_clip
+from flows.store.layout import Layout, write_atomically, write_json
+from flows.store.telemetry import read_columns
+from manifests.canonical import content_id
+from manifests.compare import first_row_difference
+from manifests.explain import input_differences, reasons
+from tasks.conventions import TICK_CHANNELS
+from tasks.errors import InputError
+from tasks.eval.label_moves import figure_moves, tick_moves
+
+
+def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
+    """Compare two finished datasets clip by clip; clips are paired by their scenario.
+
+    Parameters
+    ----------
+    a, b : sealed dataset folders
+    out : folder for ``diff.json`` and ``diff.txt``; None writes none
+
+    Returns
+    -------
+    ``same``, ``why[]`` (inputs that differ, to the value), ``clips[]`` that differ with ``labels`` in physical
+    units, ``only_in_a``, ``only_in_b`` and ``summary``.
+
+    Raises
+    ------
+    InputError
+        If a folder is no sealed dataset, or its inputs are missing.
+    """
+    old, new = Layout(Path(a).resolve()), Layout(Path(b).resolve())
+    before, after = read_manifest(old), read_manifest(new)
+    why = input_differences(before, after, _inputs(old, before), _inputs(new, after))
+    theirs = {content_id(clip["scenario"]): clip for clip in after["clips"]}
+    ours = {content_id(clip["scenario"]): clip for clip in before["clips"]}
+    pairs = [(clip, theirs[key]) for key, clip in ours.items() if key in theirs]
+    rows = [row for x, y in pairs if (row := _clip_row(old, new, x, y, why)) is not None]
+    result: dict[str, Any] = {
+        "a": {"dataset": str(old.root), "run_id": before["run_id"]},
+        "b": {"dataset": str(new.root), "run_id": after["run_id"]},
+        "same": not rows and ours.keys() == theirs.keys(),
+        "why": why,
+        "clips": rows,
+        "only_in_a": [clip["label"] for key, clip in ours.items() if key not in theirs],
+        "only_in_b": [clip["label"] for key, clip in theirs.items() if key not in ours],
+        "summary": {
+            "compared": len(pairs),
+            "changed": len(rows),
+            "labels_changed": sum("ticks" in row["changed"] for row in rows),
+            "largest": _largest(rows),
+        },
+    }
+    if out is not None:
+        write_json(Path(out) / "diff.json", result)
+        write_atomically(Path(out) / "diff.txt", as_text(result).encode())
+    return result
+
+
+def as_text(result: Mapping[str, Any]) -> str:
+    """The comparison in lines for people.
+
+    Parameters
+    ----------
+    result : of `diff`
+    """
+    summary = result["summary"]
+    lines = [
+        f"{summary['changed']} of {summary['compared']} clips differ,"
+        f" {summary['labels_changed']} of them in their labels"
+    ]
+    lines += [f"only in A: {label}" for label in result["only_in_a"]]
+    lines += [f"only in B: {label}" for label in result["only_in_b"]]
+    lines.append("inputs that differ:" if result["why"] else "no recorded input differs")
+    for row in result["why"]:
+        place = f"{row['input']} {row['path']}".strip()
+        lines.append(f"  {place}: {row['a']} -> {row['b']} (reaches {', '.join(row['reaches'])})")
+    for row in result["clips"]:
+        because = ", ".join(row["why"]) or "no recorded input"
+        lines.append(f"{row['label']}: {', '.join(row['changed'])} differ; can come from: {because}")
+        for name, value in row["labels"].items():
+            if value:
+                lines.append(f"  {name}: {value:+.4g}" if "change" in name else f"  {name}: {value:.4g}")
+    return "\n".join(lines) + "\n"
+
+
+def _clip_row(
+    old: Layout, new: Layout, a: Mapping[str, Any], b: Mapping[str, Any], why: list[dict[str, Any]]
+) -> dict[str, Any] | None:
+    changed = [name for name in a["content"] if a["content"][name] != b["content"].get(name)]
+    if not changed:
+        return None
+    row: dict[str, Any] = {
+        "label": a["label"],
+        "clip_id_a": a["clip_id"],
+        "clip_id_b": b["clip_id"],
+        "changed": changed,
+        "why": reasons(changed, why),
+        "first": None,
+        "picture": None,
+    }
+    moves = figure_moves(a["figures"], b["figures"])
+    if "ticks" in changed:
+        ours, theirs = _ticks(old, a), _ticks(new, b)
+        moves |= tick_moves(ours, theirs)
+        first = first_row_difference(ours, theirs, [channel.name for channel in TICK_CHANNELS])
+        row["first"] = first and {
+            "channel": first["channel"], "tick": first["tick"], "a": first["recorded"], "b": first["remade"]
+        }  # fmt: skip
+    if "rgb" in changed:
+        row["picture"] = _picture(old, new, a["index"], b["index"])
+    return row | {"labels": {name: None if isnan(value) else value for name, value in moves.items()}}
+
+
+def _ticks(layout: Layout, clip: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    return read_columns(layout.telemetry / "ticks" / f"family={clip['scenario']['weather']}", clip["clip_id"])
+
+
+def _picture(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | None:
+    """Share of changed pixels and mean change of their 8-bit values; None for pictures of two sizes."""
+    ours, theirs = read_clip(old.frames, a, "rgb"), read_clip(new.frames, b, "rgb")
+    if ours.shape[1:] != theirs.shape[1:]:
+        return None
+    count = min(len(ours), len(theirs))
+    change = np.abs(ours[:count].astype(np.int16) - theirs[:count])
+    return {
+        "changed_pixels_share": float((change.max(axis=-1) > 0).mean()),
+        "mean_change_8bit": float(change.mean()),
+    }
+
+
+def _inputs(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, bytes]:
+    files = {name: layout.inputs / name for name in manifest["inputs"]}
+    missing = [file for file in files.values() if not file.is_file()]
+    if missing:
+        raise InputError([f"{file}: the manifest names this input, but it is not there" for file in missing])
+    return {name: file.read_bytes() for name, file in files.items()}
+
+
+def _largest(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Per label the clip in which it moved furthest."""
+    largest: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        for name, value in row["labels"].items():
+            if value is not None and abs(value) > abs(largest.get(name, {"value": 0.0})["value"]):
+                largest[name] = {"value": value, "label": row["label"]}
+    return largest

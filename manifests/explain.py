@@ -1,0 +1,99 @@
+"""Why two datasets differ: what their manifests and frozen inputs say was different before anything was made."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+import yaml
+
+VEHICLE, RENDER, JUDGING = "vehicle", "render", "judging"
+REACHES = {
+    "vehicle.yaml": (VEHICLE, RENDER),
+    "surface.yaml": (VEHICLE, RENDER),
+    "camera.yaml": (RENDER,),
+    "gates.yaml": (JUDGING,),
+    "weather": (RENDER,),
+    "scene": (RENDER,),
+    "backend": (RENDER,),
+    "vehicle_mode": (VEHICLE, RENDER),
+    "frames": (VEHICLE, RENDER),
+    "frame_rate_hz": (VEHICLE, RENDER),
+    "seed": (RENDER,),
+    "code": (VEHICLE, RENDER, JUDGING),
+    "libraries": (VEHICLE, RENDER, JUDGING),
+    "processor": (VEHICLE, RENDER),
+}
+"""Stages whose bytes an input can change; motion reaches the picture because the camera rides on the body."""
+STAGE_OF_CONTENT = {"ticks": VEHICLE, "frames": JUDGING, "rgb": RENDER, "depth": RENDER, "class": RENDER}
+ABSENT = "absent"
+
+
+def input_differences(
+    a: Mapping[str, Any], b: Mapping[str, Any], inputs_a: Mapping[str, bytes], inputs_b: Mapping[str, bytes]
+) -> list[dict[str, Any]]:
+    """Every input that differs, down to the value inside a catalogue entry.
+
+    Parameters
+    ----------
+    a, b : manifests
+    inputs_a, inputs_b : frozen catalogue files by their path under ``inputs/``
+
+    Returns
+    -------
+    Rows with ``input``, ``path`` (inside it), ``a``, ``b`` and ``reaches`` (stages that it can change).
+    """
+    rows: list[dict[str, Any]] = []
+    for name in sorted(a["inputs"].keys() | b["inputs"].keys()):
+        if a["inputs"].get(name) != b["inputs"].get(name):
+            key = "weather" if PurePosixPath(name).parts[0] == "weather" else name
+            rows += _rows(name, key, _parsed(inputs_a.get(name)), _parsed(inputs_b.get(name)))
+    rows += _rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
+    rows += _rows("backend", "backend", a["backend"], b["backend"])
+    for name in ("vehicle_mode", "frames", "frame_rate_hz", "seed"):
+        rows += _rows(name, name, a["grid"].get(name), b["grid"].get(name))
+    for name in ("code", "libraries"):
+        rows += _rows(name, name, a["made_with"].get(name), b["made_with"].get(name))
+    return rows + _rows("processor", "processor", a.get("processor"), b.get("processor"))
+
+
+def reasons(changed: Sequence[str], differences: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Inputs that can have caused a clip's earliest change, by name; empty if no recorded input can.
+
+    Parameters
+    ----------
+    changed : contents of the clip that differ: ticks, frames, rgb, depth, class
+    differences : rows of `input_differences`
+    """
+    stages = {STAGE_OF_CONTENT[name] for name in changed}
+    first = next((stage for stage in (VEHICLE, RENDER, JUDGING) if stage in stages), None)
+    return list(dict.fromkeys(row["input"] for row in differences if first in row["reaches"]))
+
+
+def value_differences(a: Any, b: Any, place: str = "") -> list[tuple[str, Any, Any]]:
+    """Leaves at which two JSON-like values differ, as (path, in a, in b).
+
+    Parameters
+    ----------
+    a, b : values; tables are compared key by key, lists of one length item by item
+    place : path so far
+    """
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        keys: list[Any] = sorted(a.keys() | b.keys(), key=str)
+        pairs = [(str(key), a.get(key, ABSENT), b.get(key, ABSENT)) for key in keys]
+    elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        pairs = [(str(i), x, y) for i, (x, y) in enumerate(zip(a, b, strict=True))]
+    else:
+        return [] if a == b else [(place, a, b)]
+    return [row for key, x, y in pairs for row in value_differences(x, y, f"{place}.{key}" if place else key)]
+
+
+def _rows(name: str, key: str, a: Any, b: Any) -> list[dict[str, Any]]:
+    reaches = list(REACHES.get(key, (VEHICLE, RENDER, JUDGING)))
+    return [
+        {"input": name, "path": path, "a": x, "b": y, "reaches": reaches}
+        for path, x, y in value_differences(a, b)
+    ]
+
+
+def _parsed(content: bytes | None) -> Any:
+    return ABSENT if content is None else yaml.safe_load(content)

@@ -1,0 +1,111 @@
+"""Two toy datasets: the same, one with another car, one with another look."""
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from catalogs.scenes import write_scene
+from catalogs.vehicles import FOLDER
+from flows.dataset_diff import as_text, diff
+from flows.generate import generate
+from tasks.errors import InputError
+from tests.toy_street import TOY_CAMERA, toy_street
+
+GRID = """
+name: toy
+scene: {scene}
+camera: {camera}
+vehicle: {vehicle}
+frames: 31
+frame_rate_hz: 10
+seed: {seed}
+axes:
+  weather:
+    dry: {{weather: dry}}
+    snow-3: {{weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1}}
+  drive:
+    brakes: {{initial_speed_km_h: 25, peak_pressure_mpa: 2.0, brake_onset_s: 0.2}}
+    coasts: {{initial_speed_km_h: 25}}
+"""
+
+
+@pytest.fixture(scope="module")
+def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("diff")
+    write_scene(toy_street(), folder / "scene", {})
+    (folder / "camera.yaml").write_text(TOY_CAMERA)
+    car = yaml.safe_load((FOLDER / "paper-reference.yaml").read_text())
+    (folder / "plain.yaml").write_text(yaml.safe_dump(car))
+    car["brake_gain"]["value"] = 800
+    (folder / "weak.yaml").write_text(yaml.safe_dump(car))
+    made = {}
+    for name, vehicle, seed in (
+        ("a", "plain", 1),
+        ("again", "plain", 1),
+        ("weak", "weak", 1),
+        ("seed", "plain", 2),
+    ):
+        (folder / f"{name}-grid.yaml").write_text(
+            GRID.format(
+                scene=folder / "scene",
+                camera=folder / "camera.yaml",
+                vehicle=folder / f"{vehicle}.yaml",
+                seed=seed,
+            )
+        )
+        generate(str(folder / f"{name}-grid.yaml"), str(folder / name), runner="threads", workers=1)
+        made[name] = str(folder / name)
+    return made
+
+
+def test_the_same_grid_made_twice_is_the_same(datasets: dict[str, str], tmp_path: Path) -> None:
+    result = diff(datasets["a"], datasets["again"], out=str(tmp_path))
+    assert result["same"] and result["clips"] == [] and result["why"] == []
+    assert result == json.loads((tmp_path / "diff.json").read_text())
+    assert (tmp_path / "diff.txt").read_text().startswith("0 of 4 clips differ")
+
+
+def test_a_weaker_brake_moves_only_the_clips_that_brake_and_is_named(datasets: dict[str, str]) -> None:
+    result = diff(datasets["a"], datasets["weak"])
+    assert not result["same"]
+    clips = {row["label"]: row for row in result["clips"]}
+    assert "dry/brakes" in clips and "dry/coasts" not in clips
+    row = clips["dry/brakes"]
+    assert row["labels"]["stopping_distance_change_m"] > 0.3
+    assert row["labels"]["speed_rms_m_s"] > 0.05 and row["labels"]["axle_load_largest_n"] > 50
+    assert row["labels"]["tyre_peak_change"] == 0.0
+    assert row["why"] == ["vehicle.yaml"] and row["first"]["tick"] > 200
+    named = [(why["path"], why["a"], why["b"]) for why in result["why"] if why["input"] == "vehicle.yaml"]
+    assert named == [("brake_gain.value", 1000, 800)]
+    assert result["summary"]["largest"]["stopping_distance_change_m"]["label"] in clips
+
+
+def test_swapping_the_datasets_turns_the_changes_round(datasets: dict[str, str]) -> None:
+    there, back = diff(datasets["a"], datasets["weak"]), diff(datasets["weak"], datasets["a"])
+    for x, y in zip(there["clips"], back["clips"], strict=True):
+        assert x["labels"]["speed_rms_m_s"] == y["labels"]["speed_rms_m_s"]
+        change = x["labels"]["stopping_distance_change_m"]
+        if change is not None:
+            assert change == -y["labels"]["stopping_distance_change_m"]
+
+
+def test_another_seed_changes_the_picture_and_no_label(datasets: dict[str, str]) -> None:
+    result = diff(datasets["a"], datasets["seed"])
+    assert result["clips"] and all("ticks" not in row["changed"] for row in result["clips"])
+    snow = next(row for row in result["clips"] if row["label"].startswith("snow"))
+    assert 0 < snow["picture"]["changed_pixels_share"] <= 1
+    assert snow["why"] == ["seed"]
+    assert not any(row["labels"]["stopping_distance_change_m"] for row in result["clips"])
+
+
+def test_the_text_says_which_label_moved_how_far_and_why(datasets: dict[str, str]) -> None:
+    text = as_text(diff(datasets["a"], datasets["weak"]))
+    assert "vehicle.yaml brake_gain.value: 1000 -> 800" in text
+    assert "can come from: vehicle.yaml" in text and "stopping_distance_change_m: +" in text
+
+
+def test_an_unfinished_or_foreign_folder_is_refused(datasets: dict[str, str], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"manifest\.json: no such file"):
+        diff(datasets["a"], str(tmp_path))
