@@ -32,17 +32,18 @@ class DriveCampaign:
     drives: tuple[Drive, ...]
 
 
-def read_drives(folder: str | Path) -> DriveCampaign:
+def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> DriveCampaign:
     """Read a campaign folder.
 
     Parameters
     ----------
     folder : holds campaign.yaml, runs.csv and runs/NAME.parquet
+    needed : channels that every run must have
 
     Raises
     ------
     InputError
-        Listing missing files, keys, and channels that a braking event needs.
+        Listing missing files, keys and channels.
     """
     folder = Path(folder)
     missing = [name for name in ("campaign.yaml", "runs.csv") if not (folder / name).is_file()]
@@ -70,7 +71,7 @@ def read_drives(folder: str | Path) -> DriveCampaign:
             for name in table.column_names
             if name in CHANNELS_BY_NAME
         }
-        problems += [f"{row['run']}: channel {name} is missing" for name in NEEDED if name not in columns]
+        problems += [f"{row['run']}: channel {name} is missing" for name in needed if name not in columns]
         problems += [
             f"{row['run']}: channel {name} has a gap; import the recording again"
             for name, values in columns.items()

@@ -227,6 +227,26 @@ def stop_study(
     _show(result if as_json else {**result, "rungs": rungs}, as_json)
 
 
+@app.command("bump-study")
+def bump_study(
+    campaign: Annotated[str, typer.Argument(help="Campaign folder with pitch rate and speed.")],
+    study: Annotated[str, typer.Option(help="Bump study: YAML file, or the name of one.")] = "comma2k19",
+    vehicle: Annotated[str | None, typer.Option(help="Vehicle to start from; by default the campaign's.")] = None,
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Find the road features that a recording's pitch rate gives away, and the car that fits them."""
+    result = _call("bump_study", prefect, campaign, study=study, vehicle=vehicle, out=out)
+    figures = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
+    rows = [
+        {"window": row["window"], "car": car, **row[car]["feature"], **{name: row[car][name] for name in figures}}
+        for row in result["windows"]
+        for car in ("uncalibrated", "calibrated")
+    ]
+    _show(result if as_json else {**result, "windows": rows}, as_json)
+
+
 @app.command("synthetic-drives")
 def synthetic_drives(
     out: Annotated[str, typer.Option(help="Folder for one bus log a drive.")],
@@ -287,6 +307,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "calibrate": "calibration",
         "import_measurements": "importing", "brake_protocol": "protocol", "synthetic_drives": "bus_drives",
         "stop_study": "stop_study", "diff": "dataset_diff",
+        "bump_study": "bump_study",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

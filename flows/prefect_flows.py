@@ -25,6 +25,7 @@ Path(os.environ["PREFECT_HOME"]).mkdir(parents=True, exist_ok=True)
 from prefect import flow  # noqa: E402  (reads the environment when it is imported)
 
 from flows import audit as _audit  # noqa: E402
+from flows import bump_study as _bump_study  # noqa: E402
 from flows import calibration as _calibration  # noqa: E402
 from flows import dataset_diff as _dataset_diff  # noqa: E402
 from flows import describe as _describe  # noqa: E402
@@ -57,3 +58,4 @@ import_measurements = as_flow(_importing.import_measurements)
 brake_protocol = as_flow(_protocol.brake_protocol)
 stop_study = as_flow(_stop_study.stop_study)
 diff = as_flow(_dataset_diff.diff)
+bump_study = as_flow(_bump_study.bump_study)

@@ -1,0 +1,45 @@
+"""Studies of road features in a recording: which run, and where to look."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from catalogs.entries import find_entry
+from catalogs.quantities import CatalogueEntry, Number, Text, read_entry
+
+FOLDER = Path(__file__).parent
+
+
+class BumpWindow(CatalogueEntry):
+    """A stretch of the run with one road feature [s]."""
+
+    name: Text
+    from_s: Number
+    to_s: Number
+
+    @model_validator(mode="after")
+    def _is_an_interval(self) -> "BumpWindow":
+        if self.from_s + 1.0 > self.to_s:
+            raise ValueError(
+                f"window {self.name} must last 1 s or more; it goes from {self.from_s:g} to {self.to_s:g}"
+            )
+        return self
+
+
+class BumpStudy(CatalogueEntry):
+    """What a study file must hold; the first window calibrates the car."""
+
+    run: Text
+    windows: Annotated[tuple[BumpWindow, ...], Field(min_length=1)]
+
+
+def load_bump_study(name_or_path: str | Path) -> BumpStudy:
+    """Read a study by its name in the catalogue or from a YAML file.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file, or the studies that exist.
+    """
+    return read_entry(BumpStudy, find_entry(FOLDER, name_or_path, "bump study"), "bump study")
