@@ -205,10 +205,25 @@ def brake_protocol(
 ) -> None:
     """Select braking events by the paper's rules and predict each drive from the others (Appendix C.5)."""
     result = _call(
-        "brake_protocol", prefect, campaign, protocol=protocol, vehicle=vehicle, all_events=all_events, out=out
+        "brake_protocol",
+        prefect,
+        campaign,
+        protocol=protocol,
+        vehicle=vehicle,
+        all_events=all_events,
+        out=out,
     )
-    folds = [{k: v for k, v in fold.items() if k != "mean_trajectory"} for fold in result["folds"]]
-    brief = {key: value for key, value in result.items() if key != "events"} | {"folds": folds}
+    wide = {
+        "criterion",
+        "fails_only_here",
+        "mean_trajectory",
+        "trained_on",
+        "rate_correlation",
+        "no_dive_rmse",
+    }
+    brief = {key: value for key, value in result.items() if key != "events"}
+    for table in ("attrition", "folds"):
+        brief[table] = [{k: v for k, v in row.items() if k not in wide} for row in result[table]]
     _show(result if as_json else brief, as_json)
 
 
@@ -216,7 +231,9 @@ def brake_protocol(
 def stop_study(
     campaign: Annotated[str, typer.Argument(help="Campaign folder with brake and engine torque.")],
     study: Annotated[str, typer.Option(help="Stop study: YAML file, or the name of one.")] = "bmw-m8",
-    vehicle: Annotated[str | None, typer.Option(help="Uncalibrated vehicle; by default the campaign's.")] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="Uncalibrated vehicle; by default the campaign's.")
+    ] = None,
     out: Out = None,
     prefect: Prefect = False,
     as_json: Json = False,
@@ -231,7 +248,9 @@ def stop_study(
 def bump_study(
     campaign: Annotated[str, typer.Argument(help="Campaign folder with pitch rate and speed.")],
     study: Annotated[str, typer.Option(help="Bump study: YAML file, or the name of one.")] = "comma2k19",
-    vehicle: Annotated[str | None, typer.Option(help="Vehicle to start from; by default the campaign's.")] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="Vehicle to start from; by default the campaign's.")
+    ] = None,
     out: Out = None,
     prefect: Prefect = False,
     as_json: Json = False,
@@ -240,7 +259,12 @@ def bump_study(
     result = _call("bump_study", prefect, campaign, study=study, vehicle=vehicle, out=out)
     figures = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
     rows = [
-        {"window": row["window"], "car": car, **row[car]["feature"], **{name: row[car][name] for name in figures}}
+        {
+            "window": row["window"],
+            "car": car,
+            **row[car]["feature"],
+            **{name: row[car][name] for name in figures},
+        }
         for row in result["windows"]
         for car in ("uncalibrated", "calibrated")
     ]

@@ -33,12 +33,14 @@ class EventsEntry(CatalogueEntry):
     peak_pressure: Annotated[Table, checked("bar", above=0)]
     ramp: Seconds
     hold: Seconds
+    release: Seconds
     curve_share: Share
     rough_share: Share
     dragging_share: Share
+    lift_share: Share
     slope: Annotated[Scalar, checked("deg", minimum=0)]
 
-    @field_validator("start_speed", "peak_pressure", "ramp", "hold")
+    @field_validator("start_speed", "peak_pressure", "ramp", "hold", "release")
     @classmethod
     def _is_a_range(cls, table: Table) -> Table:
         if len(table.value) != 2 or table.value[0] > table.value[1]:
@@ -97,9 +99,11 @@ def load_bus(name_or_path: str | Path = "a2d2-like") -> Bus:
             peak_pressure=pair(events.peak_pressure, unit_factor("bar", "MPa")),
             ramp=pair(events.ramp),
             hold=pair(events.hold),
+            release=pair(events.release),
             curve_share=events.curve_share.value,
             rough_share=events.rough_share.value,
             dragging_share=events.dragging_share.value,
+            lift_share=events.lift_share.value,
             slope=events.slope.value,
         ),
         signals=tuple(BusSignal(**signal.model_dump()) for signal in entry.signals),

@@ -56,10 +56,11 @@ class DriveStyle:
     ----------
     start_speed : [m/s]
     peak_pressure : [MPa]
-    ramp, hold : of the brake pressure [s]
+    ramp, hold, release : of the brake pressure [s]
     curve_share : of the events that are in a turn [1]
     rough_share : on rough road [1]
     dragging_share : with the brake lightly on before [1]
+    lift_share : with the foot coming off the throttle just before the brake [1]
     slope : amplitude of the road's slow slope [deg]
     """
 
@@ -67,9 +68,11 @@ class DriveStyle:
     peak_pressure: Range
     ramp: Range
     hold: Range
+    release: Range
     curve_share: float
     rough_share: float
     dragging_share: float
+    lift_share: float
     slope: float
 
 
@@ -145,18 +148,26 @@ def drive_motion(
 def _braking(
     car: Vehicle, friction: float, start: float, style: DriveStyle, rng: np.random.Generator
 ) -> Columns:
-    peak, ramp, hold = (float(rng.uniform(*span)) for span in (style.peak_pressure, style.ramp, style.hold))
-    curved, rough, dragging = rng.random(3) < (style.curve_share, style.rough_share, style.dragging_share)
+    spans = (style.peak_pressure, style.ramp, style.hold, style.release)
+    peak, ramp, hold, release = (float(rng.uniform(*span)) for span in spans)
+    shares = (style.curve_share, style.rough_share, style.dragging_share, style.lift_share)
+    curved, rough, dragging, lifted = rng.random(4) < shares
     command = BrakeCommand(
-        peak_pressure_mpa=peak, ramp_s=ramp, onset_s=LEAD_S, onset_station_m=None, hold_s=hold, release_s=0.4
+        peak_pressure_mpa=peak,
+        ramp_s=ramp,
+        onset_s=LEAD_S,
+        onset_station_m=None,
+        hold_s=hold,
+        release_s=release,
     )
     controls = Controls(initial_speed=start, brake=command, hold_speed_until_brake=True)
-    duration = round(LEAD_S + ramp + hold + 0.4 + SETTLING_S, 3)
+    duration = round(LEAD_S + ramp + hold + release + SETTLING_S, 3)
     ride = rollout(car, "dry", friction, controls, FLAT_ROAD, mode="coupled", duration_s=duration).columns
     count = len(ride["speed"]) - 1
     turning = _bump(count) if curved else np.zeros(count)
     side = float(rng.choice((-1.0, 1.0)))
-    return {
+    lift = _answer(car, _lift_off(count, float(rng.uniform(0.3, 1.2))) if lifted else np.zeros(count))
+    motion = {
         "brake_pressure": ride["brake_pressure_mpa"][:count] + (0.1 if dragging else 0.0),
         "speed": ride["speed"][:count],
         "longitudinal_acceleration": ride["longitudinal_acceleration"][:count],
@@ -168,6 +179,17 @@ def _braking(
         "yaw_rate": side * 8.0 * turning,
         "steering_angle": side * 40.0 * turning,
     }
+    # the body answers linearly, so the lift's answer adds to the brake's
+    return motion | {name: np.maximum(motion[name] + x, 0.0) if name == "speed" else motion[name] + x
+                     for name, x in lift.items()}  # fmt: skip
+
+
+def _lift_off(count: int, size: float) -> NDArray[np.float64]:
+    """A pulse of deceleration that ends with the brake's onset [m/s^2]."""
+    width, onset = round(0.6 / STEP), round(LEAD_S / STEP)
+    pulse = np.zeros(count)
+    pulse[onset - width : onset] = -size * _bump(width)
+    return pulse
 
 
 def _pull_away(car: Vehicle, start: float, end: float) -> Columns:
@@ -175,19 +197,26 @@ def _pull_away(car: Vehicle, start: float, end: float) -> Columns:
     count = max(round(2.0 * abs(end - start) / PULL_AWAY / STEP), 1000)
     pulse = _bump(count)
     acceleration = (end - start) * pulse / (pulse.sum() * STEP)
+    still = np.zeros(count)
+    return {
+        "brake_pressure": still,
+        "roll_rate": still,
+        "yaw_rate": still,
+        "steering_angle": still,
+    } | _answer(car, acceleration, start)
+
+
+def _answer(car: Vehicle, acceleration: NDArray[np.float64], start: float = 0.0) -> Columns:
+    """Speed and body motion of a car that accelerates by its engine [m/s^2] from a speed [m/s]."""
     moment = -car.sprung_mass * car.cg_height * acceleration
-    flat = np.zeros(count)
+    flat = np.zeros(len(acceleration))
     states = integrate_half_car(flat, flat, moment, STEP, half_car(car))
     return {
-        "brake_pressure": flat,
         "speed": start + np.cumsum(acceleration) * STEP,
         "longitudinal_acceleration": acceleration,
         "pitch": np.degrees(states[:, 1]),
         "pitch_rate": np.degrees(states[:, 5]),
         "vertical_acceleration": np.gradient(states[:, 4], STEP),
-        "roll_rate": flat,
-        "yaw_rate": flat,
-        "steering_angle": flat,
     }
 
 

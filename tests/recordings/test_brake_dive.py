@@ -23,7 +23,7 @@ from tasks.recordings.selection import Drive, Event, select_events
 
 VEHICLE, SURFACE, BUS = load_vehicle("paper-reference"), load_surface("dense-asphalt"), load_bus("a2d2-like")
 STRAIGHT = replace(
-    BUS, style=replace(BUS.style, curve_share=0.0, rough_share=0.0, dragging_share=0.0, slope=0.0,
+    BUS, style=replace(BUS.style, curve_share=0.0, rough_share=0.0, dragging_share=0.0, lift_share=0.0, slope=0.0,
                        start_speed=(8.0, 15.0), peak_pressure=(0.4, 1.6))
 )  # fmt: skip
 
