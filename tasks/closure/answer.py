@@ -5,9 +5,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from tasks.closure.attribution import Candidate
-from tasks.closure.evidence import Disturbance
+from tasks.closure.campaign import SESSION
+from tasks.closure.disturbance import Disturbance
 from tasks.closure.forward import Slot
 
 VerdictName = Literal["FOUND", "SET", "UNKNOWN_FORM", "RETUNE", "SENSOR", "NOTHING"]
@@ -93,6 +95,7 @@ class Verdict:
     campaign, content_hash, split_hash : what was read
     theta : float64 full parameter vector of the effects, without session nuisances
     slots : tables of the forms found
+    torn : runs left out because they fork when the integration step is halved
     reasons : sentences that say why the answer is what it is
     """
 
@@ -110,14 +113,27 @@ class Verdict:
     split_hash: str
     theta: NDArray[np.float64]
     slots: tuple[Slot, ...]
+    torn: tuple[str, ...]
     reasons: tuple[str, ...]
 
 
 def named_effect(candidate: Candidate, share: float) -> NamedEffect:
+    """A candidate as it is reported: estimates with 95 % intervals, widened by the runs' disagreement.
+
+    Student's t with as many runs as inform the parameter, less one, since the runs' scatter is itself estimated.
+
+    Parameters
+    ----------
+    candidate : refined and judged
+    share : bootstrap win share
+    """
     h = candidate.hypothesis
     k = len(h.names)
     values = candidate.fitted.values[-k:]
-    sigma = np.sqrt(np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation)
+    variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation
+    # the session's own doubt about the same number belongs to the car's
+    doubt = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
+    sigma = np.sqrt(variance + np.square(doubt)) * student.ppf(0.975, max(candidate.informed - 1, 1))
     return NamedEffect(
         name=h.name,
         effect_class=h.effect_class,
@@ -125,7 +141,7 @@ def named_effect(candidate: Candidate, share: float) -> NamedEffect:
         variable=h.variable,
         parameters=tuple(
             Parameter(
-                name=n, value=float(v), ci_low=float(v - 1.96 * s), ci_high=float(v + 1.96 * s), lower=float(lo),
+                name=n, value=float(v), ci_low=float(v - s), ci_high=float(v + s), lower=float(lo),
                 upper=float(hi), unit=u,
             )
             for n, v, s, lo, hi, u in zip(h.names, values, sigma, h.lower, h.upper, h.units, strict=True)

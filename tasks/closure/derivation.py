@@ -6,17 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from tasks.closure.attribution import Evidence
 from tasks.closure.campaign import Campaign, Tolerances
 from tasks.closure.disturbance import Disturbance, prior_precision
 from tasks.closure.evidence import RunEvidence, run_evidence, with_disturbance
 from tasks.closure.fit import Fit, compose
-from tasks.closure.forward import run_model
-from tasks.closure.noise import channel_noise
+from tasks.closure.forward import SUBSTEPS, RunModel, predict, run_model
+from tasks.closure.noise import channel_noise, whiten
+from tasks.closure.screening import Evidence
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
 from tasks.vehicle.parameters import Vehicle
 
+TORN = 100.0
+"""Misfit by halving the step from which a run is left out: sound runs have under 20, forked ones over 10,000."""
+FEWEST = 3
 FREED = 20.0
 """Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
 
@@ -35,18 +38,35 @@ def prepare(
     rho, sigma = channel_noise(campaign)
     plain = np.zeros(len(ALL_PARAMETERS))
     guess = Disturbance()
-    train, held_out = (
-        tuple(
-            run_evidence(
-                run_model(run, vehicle, surface), rho, sigma, plain, library, campaign.tolerances, guess
-            )
-            for run in runs
+    models = [run_model(run, vehicle, surface) for run in campaign.runs]
+    torn = tuple(m.run.name for m in models if step_change(m, rho, sigma) > TORN)
+
+    def derived(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
+        own = [m for m in models if m.run.held_out == held_out]
+        # too few sound runs to do without the others
+        kept = [m for m in own if m.run.name not in torn]
+        return tuple(
+            run_evidence(model, rho, sigma, plain, library, campaign.tolerances, guess)
+            for model in (kept if len(kept) >= FEWEST else own)
         )
-        for runs, library in ((campaign.train, effects), (campaign.held_out, ()))
-    )
+
     return Evidence(
-        train=train, held_out=held_out, effects=effects, tolerances=campaign.tolerances, disturbance=guess
-    )
+        train=derived(False, effects), held_out=derived(True, ()), effects=effects,
+        tolerances=campaign.tolerances, disturbance=guess, torn=torn,
+    )  # fmt: skip
+
+
+def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.float64]) -> float:
+    """Misfit that halving the integration step alone makes: a run that forks, as at the ABS threshold, has much.
+
+    Parameters
+    ----------
+    model : the run
+    rho, sigma : channel noise
+    """
+    plain = np.zeros(len(ALL_PARAMETERS))
+    change = predict(model, plain) - predict(model, plain, substeps=2 * SUBSTEPS)
+    return float(np.sum(whiten(change, rho, sigma) ** 2))
 
 
 def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:

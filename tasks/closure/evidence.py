@@ -20,8 +20,6 @@ from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
 KNOT_STEP = (30.0, 0.01, 30.0)
-DERIVATIVE_SUBSTEPS = 5
-"""Integration steps between samples while derivatives are taken: a difference needs less than a prediction."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,13 +116,13 @@ def run_evidence(
     disturbance : prior of the disturbances
     slots : forms that belong to the base point
     """
-    out, states = roll(model, base, slots=slots, substeps=DERIVATIVE_SUBSTEPS)
+    out, states = roll(model, base, slots=slots)
     y = instruments(model, base, out)
 
     def slope(
         theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
     ) -> NDArray[np.float64]:
-        moved, _ = roll(model, theta, slots=(*slots, *extra), substeps=DERIVATIVE_SUBSTEPS, **options)
+        moved, _ = roll(model, theta, slots=(*slots, *extra), **options)
         return (instruments(model, theta, moved) - y) / step
 
     columns = [

@@ -6,12 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.closure.campaign import SESSION
 from tasks.closure.evidence import SESSION_INDEX, RunEvidence
 from tasks.closure.forward import Slot
 from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
 
 Build = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], tuple[Slot, ...]]]
 
+SETTLING = 4
+"""Moves of a run's point of linearisation before its misfit is taken."""
+HELD = 1e18
+"""Prior precision that holds a nuisance at 0."""
 SLACK = 1.0
 """Rise of a run's misfit that is taken for rounding when its point of linearisation moves."""
 
@@ -156,9 +161,12 @@ def fit(
     )
     s = np.zeros(len(SESSION_INDEX)) if session is None else session.copy()
     prior = 1.0 / np.square(session_sigma)
+    # a free parameter that is also a session nuisance is the same number: the nuisance rests at 0
+    taken = [SESSION.index(name) for part in parts for name in part.names if name in SESSION]
+    s[taken], prior[taken] = 0.0, HELD
     k = len(x)
     if offsets is None:
-        offsets, by_run, residuals = _settled(evidence, parts, x, s)
+        offsets, by_run, residuals, _ = _settled(evidence, parts, x, s)
         objective = float(by_run.sum() + np.sum(prior * s**2))
     else:
         objective, by_run, residuals = _misfit(evidence, parts, x, s, prior, offsets)
@@ -205,7 +213,7 @@ def fit(
             break
         before = objective
         x, s = x_try, s_try
-        offsets, by_run, residuals = _relinearised(evidence, parts, x, s, offsets, trial[1], trial[2])
+        offsets, by_run, residuals, _ = _relinearised(evidence, parts, x, s, offsets, trial[1], trial[2])
         objective = float(by_run.sum() + np.sum(prior * s**2))
         if abs(before - objective) < 0.3 and expected < 0.5:
             break
@@ -216,9 +224,26 @@ def fit(
     )  # fmt: skip
 
 
-def misfit_by_run(evidence: tuple[RunEvidence, ...], fitted: Fit) -> NDArray[np.float64]:
-    """Marginalised misfit of runs under a fit made on other runs, float64 [R]."""
-    return _settled(evidence, fitted.parts, fitted.values, fitted.session)[1]
+def misfit_by_run(
+    evidence: tuple[RunEvidence, ...], fitted: Fit
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Marginalised misfit of runs under a fit made on other runs, and how far it is from settled; float64 [R]."""
+    _, by_run, _, doubt = _settled(evidence, fitted.parts, fitted.values, fitted.session)
+    return by_run, doubt
+
+
+def fall(
+    before: tuple[NDArray[np.float64], NDArray[np.float64]],
+    after: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> float:
+    """Fall of the misfit summed over runs, each run's counted only beyond its numerical doubt.
+
+    Parameters
+    ----------
+    before, after : of `misfit_by_run`
+    """
+    change = before[0] - after[0]
+    return float(np.sum(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0)))
 
 
 def _settled(
@@ -226,12 +251,15 @@ def _settled(
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
-) -> tuple[tuple[NDArray[np.float64], ...], NDArray[np.float64], list[NDArray[np.float64]]]:
+) -> tuple[
+    tuple[NDArray[np.float64], ...], NDArray[np.float64], list[NDArray[np.float64]], NDArray[np.float64]
+]:
     offsets = tuple(np.zeros(run.nuisance.shape[1]) for run in evidence)
     _, by_run, residuals = _misfit(evidence, parts, x, s, np.zeros_like(s), None)
-    for _ in range(2):
-        offsets, by_run, residuals = _relinearised(evidence, parts, x, s, offsets, by_run, residuals)
-    return offsets, by_run, residuals
+    doubt = np.zeros_like(by_run)
+    for _ in range(SETTLING):
+        offsets, by_run, residuals, doubt = _relinearised(evidence, parts, x, s, offsets, by_run, residuals)
+    return offsets, by_run, residuals, doubt
 
 
 def _relinearised(
@@ -242,14 +270,29 @@ def _relinearised(
     offsets: tuple[NDArray[np.float64], ...],
     by_run: NDArray[np.float64],
     residuals: list[NDArray[np.float64]],
-) -> tuple[tuple[NDArray[np.float64], ...], NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Move every run's point of linearisation to its posterior, save where that makes the run fit worse."""
-    moved = tuple(run.offsets(r) for run, r in zip(evidence, residuals, strict=True))
-    _, again, fresh = _misfit(evidence, parts, x, s, np.zeros_like(s), moved)
-    worse = again > by_run + SLACK
-    offsets = tuple(old if w else new for old, new, w in zip(offsets, moved, worse, strict=True))
-    kept = [old if w else new for old, new, w in zip(residuals, fresh, worse, strict=True)]
-    return offsets, np.where(worse, by_run, again), kept
+) -> tuple[
+    tuple[NDArray[np.float64], ...], NDArray[np.float64], list[NDArray[np.float64]], NDArray[np.float64]
+]:
+    """Move every run's point of linearisation towards its posterior, as far as the run does not fit worse.
+
+    Last comes by how much the full move changes each run's misfit: 0 where the linearisation holds.
+    """
+    theta, slots = compose(parts, x, s)
+    places, misfits, fresh = list(offsets), by_run.copy(), list(residuals)
+    doubt = np.zeros_like(by_run)
+    for i, run in enumerate(evidence):
+        move = run.offsets(residuals[i]) - offsets[i]
+        for share in (1.0, 0.4):
+            trial = offsets[i] + share * move
+            r = run.residual(theta, slots, trial)
+            q = run.project(r)
+            misfit = float(r @ r - q @ q)
+            if share == 1.0:
+                doubt[i] = abs(misfit - by_run[i])
+            if misfit <= by_run[i] + SLACK:
+                places[i], misfits[i], fresh[i] = trial, misfit, r
+                break
+    return tuple(places), misfits, fresh, doubt
 
 
 def _misfit(

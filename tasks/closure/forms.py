@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.closure.attribution import Evidence, inflation
 from tasks.closure.evidence import RunEvidence
 from tasks.closure.fit import Fit, Hypothesis, compose
 from tasks.closure.forward import Slot, instruments, roll
 from tasks.closure.noise import whiten
+from tasks.closure.screening import Evidence, inflation
 from tasks.vehicle.effects.library import ALL_PARAMETERS
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
 

@@ -3,10 +3,10 @@
 import numpy as np
 
 from tasks.closure.answer import ChannelError
-from tasks.closure.attribution import Evidence
 from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.closure.fit import Fit, compose, fit
 from tasks.closure.forward import predict
+from tasks.closure.screening import Evidence
 from tasks.vehicle.effects.library import ALL_PARAMETERS
 
 RETUNE_WIDENING = 10.0

@@ -5,20 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 from tasks.closure.answer import NamedEffect, named_effect
-from tasks.closure.attribution import (
+from tasks.closure.attribution import (  # fmt: skip
     ACCEPT_SCORE,
     RIVAL_SPAN,
     WIN_SHARE,
-    Evidence,
-    inflation,
     judge,
     ladder,
     nested,
     win_share,
     without,
-)  # fmt: skip
+)
 from tasks.closure.campaign import SESSION
 from tasks.closure.fit import Fit, misfit_by_run
+from tasks.closure.screening import Evidence, inflation
 from tasks.closure.search import Round
 
 

@@ -9,7 +9,6 @@ from tasks.closure.attribution import (
     HELD_OUT_GAIN,
     RIVAL_SPAN,
     Candidate,
-    Evidence,
     assess,
     judge,
     ladder,
@@ -18,14 +17,17 @@ from tasks.closure.attribution import (
 from tasks.closure.campaign import SESSION
 from tasks.closure.derivation import fit_disturbance, rederived, rescaled, whitened_residuals
 from tasks.closure.disturbance import Disturbance
-from tasks.closure.fit import Fit, fit, library_hypothesis, misfit_by_run
+from tasks.closure.fit import Fit, fall, fit, library_hypothesis, misfit_by_run
 from tasks.closure.forms import form_hypotheses, scan
+from tasks.closure.screening import Evidence
 
 MAX_EFFECTS = 3
 RETUNE_PULL = 4.0
 """Pull of a session nuisance, in prior sigmas, from which it is called a wrong number of the vehicle."""
 LARGE_GAIN = 300.0
 """Gain from which derivatives taken without an effect no longer hold with it."""
+FAR_PULL = 2.5
+"""Pull, in prior sigmas, from which the model without effects has its derivatives taken anew at its session."""
 NEAR = 0.1
 """Relative change of the parameters below which derivatives need not be taken anew once more."""
 SETTLED = 2
@@ -158,24 +160,32 @@ def scale_disturbances(explored: Found) -> Disturbance:
 
 
 def retuned(start: Found, reasons: list[str]) -> Found:
-    """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session."""
+    """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session.
+
+    Parameters
+    ----------
+    start : nothing accepted
+    reasons : is added to
+    """
     evidence, null = start.evidence, start.base
     pulls = np.abs(null.session / evidence.session_sigma)
-    worst = int(np.argmax(pulls))
-    if pulls[worst] <= RETUNE_PULL:
+    judged = []
+    for place in np.flatnonzero(pulls > RETUNE_PULL):
+        reasons.append(f"session nuisance {SESSION[place]} is pulled by {pulls[place]:.1f} sigma")
+        effect = next(
+            e for e in evidence.effects if e.parameters[0].name == SESSION[place] and len(e.parameters) == 1
+        )
+        frozen = null.session.copy()
+        frozen[place] = 0.0
+        held_out = misfit_by_run(evidence.held_out, replace(null, session=frozen))
+        found = judge(evidence, null, held_out, library_hypothesis(effect, float(null.session[place])))
+        gained = fall(held_out, misfit_by_run(evidence.held_out, found.fitted))
+        judged.append(replace(found, held_out_gain=gained / found.inflation))
+    accepted = [c for c in judged if c.held_out_gain > HELD_OUT_GAIN and c.gain > 0.0]
+    if not accepted:
         return start
-    effect = next(
-        e for e in evidence.effects
-        if e.parameters[0].name == SESSION[worst] and len(e.parameters) == 1
-    )  # fmt: skip
-    held_out = misfit_by_run(evidence.held_out, null)
-    found = judge(evidence, null, held_out, library_hypothesis(effect, float(null.session[worst])))
-    gained = float(np.sum(held_out - misfit_by_run(evidence.held_out, found.fitted)))
-    found = replace(found, held_out_gain=gained / found.inflation)
-    reasons.append(f"session nuisance {SESSION[worst]} is pulled by {pulls[worst]:.1f} sigma")
-    if found.held_out_gain <= HELD_OUT_GAIN:
-        return start
-    return replace(start, base=found.fitted, rounds=(Round(base=null, tried=(), accepted=found),))
+    best = max(accepted, key=lambda c: c.gain)
+    return replace(start, base=best.fitted, rounds=(Round(base=null, tried=tuple(judged), accepted=best),))
 
 
 def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candidate | None]:
@@ -253,12 +263,13 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
     -------
     The start without effects, what was found, and a form alone that cannot be told from the first effect.
     """
+    if np.any(np.abs(null.session) > FAR_PULL * evidence.session_sigma):
+        evidence = rederived(evidence, null, library=True)
+        null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search(Found(evidence=evidence, base=null), gated=False)
     evidence = rescaled(evidence, scale_disturbances(explored))
-    start = Found(
-        evidence=evidence,
-        base=fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6),
-    )
+    null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+    start = Found(evidence=evidence, base=null)
     found = search(start, gated=True, explored=explored)
     if not found.rounds:
         found = replace(retuned(start, reasons), tried=found.tried)

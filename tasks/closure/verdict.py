@@ -92,6 +92,7 @@ def attribute(
         split_hash=campaign.split_hash,
         theta=theta,
         slots=slots,
+        torn=evidence.torn,
         reasons=tuple(reasons),
     )
 

@@ -10,11 +10,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.effects import load_effects
-from tasks.closure.attribution import Evidence, ladder
+from tasks.closure.attribution import ladder
 from tasks.closure.disturbance import Disturbance, prior_precision
 from tasks.closure.evidence import run_evidence
 from tasks.closure.fit import fit
 from tasks.closure.forward import predict, run_model
+from tasks.closure.screening import Evidence
 from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
 
 WANTED = (

@@ -1,0 +1,135 @@
+"""The runs with the library they were differentiated by, and what the library's directions say linearly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.closure.campaign import Tolerances
+from tasks.closure.disturbance import Disturbance
+from tasks.closure.evidence import RunEvidence
+from tasks.closure.fit import Fit
+from tasks.vehicle.effects.library import Effect
+
+ALIKE = 0.85
+"""Cosine between two library directions, nuisances taken out, from which both are refined if one is good."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Training and held-out runs with the library they were differentiated by.
+
+    Parameters
+    ----------
+    train, held_out : runs
+    effects : the library
+    tolerances, disturbance : priors of session, offsets and disturbances
+    torn : names of the runs that fork when the integration step is halved, and are left out
+    """
+
+    train: tuple[RunEvidence, ...]
+    held_out: tuple[RunEvidence, ...]
+    effects: tuple[Effect, ...]
+    tolerances: Tolerances
+    disturbance: Disturbance
+    torn: tuple[str, ...] = ()
+
+    @property
+    def session_sigma(self) -> NDArray[np.float64]:
+        """Prior sigmas of the session, float64 [7]."""
+        return np.array(self.tolerances.session)
+
+    @property
+    def samples(self) -> int:
+        """Number of whitened training values, N of the score."""
+        return sum(len(run.nuisance) for run in self.train)
+
+
+def screen(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Gain and estimate of every library effect, linearly, beyond the accepted ones.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit that holds the accepted effects
+
+    Returns
+    -------
+    gains float64 [E] and estimates float64 [E] of the first parameter
+    """
+    accepted = [j for j, e in enumerate(evidence.effects) if e.name in {p.name for p in at.parts}]
+    library, n_session = len(evidence.effects), len(evidence.session_sigma)
+    gram, right = np.zeros((library + n_session,) * 2), np.zeros(library + n_session)
+    for run, r in zip(evidence.train, at.residuals, strict=True):
+        b = np.column_stack((run.library, run.session))
+        q = np.column_stack((run.library_q, run.session_q))
+        gram += b.T @ b - q.T @ q
+        right += b.T @ r - q.T @ run.project(r)
+    others = [*accepted, *range(library, library + n_session)]
+    precision = np.concatenate((np.zeros(len(accepted)), 1.0 / np.square(evidence.session_sigma)))
+    right[library:] -= at.session / np.square(evidence.session_sigma)
+    inner = np.linalg.inv(
+        gram[np.ix_(others, others)] + np.diag(precision) + 1e-9 * np.diag(np.diag(gram)[others])
+    )
+    gains, estimates = np.zeros(library), np.zeros(library)
+    for j, effect in enumerate(evidence.effects):
+        if j in accepted:
+            continue
+        cross = gram[j, others]
+        information = gram[j, j] - cross @ inner @ cross
+        if information <= 1e-6 * gram[j, j] or gram[j, j] <= 0.0:
+            continue
+        value = (right[j] - cross @ inner @ right[others]) / information
+        first = effect.parameters[0]
+        value = min(max(value, first.lower), first.upper)
+        estimates[j] = value
+        gains[j] = value * (right[j] - cross @ inner @ right[others]) - 0.5 * information * value**2
+    return gains, estimates
+
+
+def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> float:
+    """How much the runs disagree beyond their noise about one direction and about the library's in general.
+
+    Under a right model every run's score z in any direction is standard normal. Q is the sum of z^2 over runs
+    (Cochran 1954, doi:10.2307/3001666); the null's level is the median over the library's directions, and the
+    direction's own Q counts beside it.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit whose residuals are looked at
+    own : float64 [R] z of the direction itself, or None
+    """
+    z = np.full((len(evidence.train), len(evidence.effects)), np.nan)
+    for i, (run, r) in enumerate(zip(evidence.train, at.residuals, strict=True)):
+        q, qr = run.library_q, run.project(r)
+        information = np.einsum("ij,ij->j", run.library, run.library) - np.einsum("ij,ij->j", q, q)
+        alive = information * np.array([e.parameters[0].step for e in evidence.effects]) ** 2 > 0.05
+        z[i, alive] = ((run.library.T @ r - q.T @ qr) / np.sqrt(np.maximum(information, 1e-30)))[alive]
+    count = np.sum(np.isfinite(z), axis=0)
+    mean_square = np.nansum(z**2, axis=0)[count >= 4] / count[count >= 4]
+    level = max(float(np.median(mean_square)), 1.0) if mean_square.size else 1.0
+    if own is None or len(own) < 3:
+        return level
+    return max(level, (float(np.sum(own**2)) + 6.0 * level) / (len(own) - 1 + 6.0))
+
+
+def look_alikes(evidence: Evidence, index: int) -> list[int]:
+    """Library effects that the runs can hardly tell from one of them, the most alike first.
+
+    Parameters
+    ----------
+    evidence : the runs
+    index : of the effect in the library
+    """
+    size, n_session = len(evidence.effects), len(evidence.session_sigma)
+    gram, cross = np.zeros((size, size)), np.zeros((size, n_session))
+    session = np.diag(1.0 / np.square(evidence.session_sigma))
+    for run in evidence.train:
+        gram += run.library.T @ run.library - run.library_q.T @ run.library_q
+        cross += run.library.T @ run.session - run.library_q.T @ run.session_q
+        session += run.session.T @ run.session - run.session_q.T @ run.session_q
+    gram = gram - cross @ np.linalg.solve(session, cross.T)
+    length = np.sqrt(np.maximum(np.diag(gram), 1e-30))
+    cosine = np.abs(gram[index]) / (length * length[index])
+    return [int(j) for j in np.argsort(-cosine, kind="stable") if j != index and cosine[j] > ALIKE]
