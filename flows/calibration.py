@@ -59,7 +59,7 @@ def calibrate(
     reference = read_reference(Path(traces), split=split)
     before = agreement_of(start, reference, steps.mode)
     cases = [
-        calibration_case(case, columns, row["window"], interval, start.wheelbase)
+        calibration_case(case, columns, row["window"], interval, steps.yardstick.start_s, start.wheelbase)
         for (case, columns), row in zip(reference, before["cases"], strict=True)
     ]
     fitted, records = run_stages(start, cases, steps)
@@ -88,7 +88,12 @@ def calibrate(
 
 
 def calibration_case(
-    case: ReferenceCase, columns: Traces, window: Sequence[float], interval: float, wheelbase: float
+    case: ReferenceCase,
+    columns: Traces,
+    window: Sequence[float],
+    interval: float,
+    head_s: float,
+    wheelbase: float,
 ) -> CalibrationCase:
     """One trace as the fit takes it: the judge's event window and what leads from the brake onset to it.
 
@@ -98,13 +103,15 @@ def calibration_case(
     columns : the trace
     window : begin and end of what counts [s]
     interval : spacing of the samples [s]
+    head_s : how long every sample counts at first [s]
     wheelbase : of the model [m]
     """
     time = columns["time"]
     onset = case.brake_onset_s if case.braked and case.brake_onset_s is not None else window[0]
     inside = np.flatnonzero((time >= min(onset, window[0]) - 1e-9) & (time <= window[1] + 1e-9))
     every = max(1, round(interval / float(np.median(np.diff(time)))))
-    chosen = inside[::every]
+    head = inside[time[inside] <= time[inside[0]] + head_s + 1e-9]
+    chosen = np.union1d(inside[::every], head)
     return CalibrationCase(
         name=case.case,
         kind=case.facts(wheelbase).kind,

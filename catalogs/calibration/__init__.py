@@ -65,6 +65,7 @@ class ProcedureEntry(CatalogueEntry):
     passes: Count
     evaluations: Count
     start: Annotated[Scalar, checked("s", above=0)]
+    settle: Annotated[Scalar, checked("s", minimum=0)]
     tail_speed: Annotated[Scalar, checked("m s-1", above=0)]
     slip_speed: Annotated[Scalar, checked("m s-1", minimum=0)]
     interval: Annotated[Scalar, checked("s", above=0)]
@@ -114,6 +115,7 @@ def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
         yardstick=Yardstick(
             scales={name: scale.value for name, scale in entry.scales},
             start_s=entry.start.value,
+            settle_s=entry.settle.value,
             tail_speed=entry.tail_speed.value,
             slip_speed=entry.slip_speed.value,
             margin_s=entry.margin.value,

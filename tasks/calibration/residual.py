@@ -57,9 +57,10 @@ class Yardstick:
 
     Parameters
     ----------
-    scales : size of one unit of each response; speed_drop is the speed less that of the first sample [m/s, m/s,
+    scales : size of one unit of each response; speed_drop is the speed less that at first [m/s, m/s,
         deg, 1, N, m]
     start_s : length of the start of braking [s]
+    settle_s : what speed_drop leaves out of it, until a speed that was held is let go [s]
     tail_speed : the tail of a stop begins below it [m/s]
     slip_speed : slip counts above it [m/s]
     margin_s : how long the model rolls past the last sample [s]
@@ -67,6 +68,7 @@ class Yardstick:
 
     scales: Mapping[str, float]
     start_s: float
+    settle_s: float
     tail_speed: float
     slip_speed: float
     margin_s: float
@@ -123,8 +125,10 @@ def residuals(
         if response == "speed":
             add("speed", model["speed"], case.speed, counts)
         elif response == "speed_drop":
-            begin = float(np.interp(case.time[0], time, model["speed"]))
-            add("speed_drop", model["speed"] - begin, case.speed - case.speed[0], counts)
+            free = counts & (case.time >= case.time[0] + yardstick.settle_s)
+            first = int(np.argmax(free))
+            begin = float(np.interp(case.time[first], time, model["speed"]))
+            add("speed_drop", model["speed"] - begin, case.speed - case.speed[first], free)
         elif response == "pitch":
             add("pitch", np.rad2deg(model["pitch"] + ride.static_pitch), case.pitch, counts)
         elif response == "slip":

@@ -1,0 +1,168 @@
+import json
+import shutil
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from catalogs.calibration import FOLDER, load_procedure
+from catalogs.vehicles import load_vehicle, vehicle_names, vehicle_provenance, vehicle_source
+from flows.calibration import calibrate
+from flows.cli import app
+from flows.studies import agreement
+from manifests.canonical import sha256_of_file
+from tasks.errors import InputError
+
+
+@pytest.fixture
+def frozen(vehicle, make_traces, tmp_path):
+    traces = make_traces(vehicle, "coupled", ("wet",))
+    entry = yaml.safe_load((FOLDER / "coupled-grown.yaml").read_text())
+    entry["stages"] = [
+        {"name": "air", "groups": ["drag_area", "cg_to_front_axle", "static_pitch", "efficiency"],
+         "responses": ["speed"], "kinds": ["flat"], "phase": "braking"}
+    ]  # fmt: skip
+    entry["passes"]["value"] = entry["evaluations"]["value"] = 1
+    procedure = tmp_path / "short.yaml"
+    procedure.write_text(yaml.safe_dump(entry))
+    calibrate(str(traces), out=str(tmp_path / "out"), procedure=str(procedure), name="car")
+    return traces, tmp_path / "out" / "car.yaml"
+
+
+def test_a_frozen_file_says_where_its_numbers_come_from(frozen):
+    traces, path = frozen
+    provenance = vehicle_provenance(path)
+    assert provenance is not None
+    assert (provenance.mode, provenance.base, provenance.split) == (
+        "coupled",
+        "paper-reference",
+        "development",
+    )
+    assert provenance.base_sha256 == sha256_of_file(vehicle_source("paper-reference"))
+    assert provenance.data_sha256 == {"wet": sha256_of_file(traces / "development" / "wet.parquet")}
+    assert provenance.bounds["drag_area"].upper == 2
+    assert [s.name for s in provenance.stages] == ["air"]
+
+
+def test_frozen_values_are_read_back_in_their_units(frozen):
+    _, path = frozen
+    entry, car = yaml.safe_load(path.read_text()), load_vehicle(path)
+    assert car.effects == {"drag_area": entry["effects"]["drag_area"]["value"]}
+    assert np.rad2deg(car.static_pitch) == pytest.approx(entry["static_pitch"]["value"], rel=1e-12)
+    assert car.wheelbase == pytest.approx(2.7, abs=1e-9)
+    assert car.families["rain"].efficiency == tuple(entry["families"]["rain"]["efficiency"]["value"])
+
+
+@pytest.mark.parametrize("edit", [("unit: m2", "unit: m3"), ("value: 1200", "value: 1201")])
+def test_an_edited_frozen_file_is_refused(frozen, edit):
+    _, path = frozen
+    text = path.read_text()
+    assert edit[0] in text or edit[0] == "value: 1200"
+    path.write_text(text.replace(*edit, 1))
+    with pytest.raises(InputError, match="must be as it was frozen"):
+        load_vehicle(path)
+
+
+def test_agreement_drives_a_frozen_vehicle_in_the_mode_it_was_fitted_in(frozen):
+    traces, path = frozen
+    assert agreement(str(traces), vehicle=str(path))["mode"] == "coupled"
+    assert agreement(str(traces), vehicle=str(path), mode="paper")["mode"] == "paper"
+    assert agreement(str(traces))["mode"] == "paper"
+
+
+def test_every_vehicle_of_the_catalogue_loads_with_its_seal():
+    assert "paper-reference" in vehicle_names()
+    for name in vehicle_names():
+        load_vehicle(name)
+
+
+def spoil(folder, case="wet", **columns):
+    path = folder / "development" / f"{case}.parquet"
+    table = pq.read_table(path)
+    for name, change in columns.items():
+        index = table.column_names.index(name)
+        if change is None:
+            table = table.remove_column(index)
+        else:
+            table = table.set_column(index, name, [change(table[name].to_numpy())])
+    pq.write_table(table, path)
+
+
+def with_nan(values):
+    return np.where(np.arange(len(values)) == 5, np.nan, values)
+
+
+@pytest.mark.parametrize(
+    ("harm", "sentence"),
+    [
+        (lambda f: (f / "development" / "wet.parquet").unlink(), "case wet needs wet.parquet"),
+        (lambda f: spoil(f, slip_rr=None), "needs the columns slip_rr"),
+        (lambda f: spoil(f, pitch=with_nan), "pitch must hold numbers throughout; 1 are not"),
+        (lambda f: spoil(f, time=lambda t: t[::-1].copy()), "time must hold at least two ascending times"),
+        (lambda f: (f / "development" / "wet.parquet").write_text("no"), "must be readable Parquet"),
+        (lambda f: (f / "cases.json").write_text("{}"), "must be a list of at least one case"),
+        (lambda f: (f / "cases.json").unlink(), "no such file"),
+    ],
+)
+def test_bad_traces_are_one_sentence_and_exit_code_2(vehicle, make_traces, harm, sentence, tmp_path):
+    folder = make_traces(vehicle, "paper", ("wet",))
+    harm(folder)
+    for command in (["calibrate", str(folder), "--out", str(tmp_path / "out")], ["agreement", str(folder)]):
+        result = CliRunner().invoke(app, command)
+        assert isinstance(result.exception, InputError)
+        assert any(sentence in problem for problem in result.exception.problems)
+        assert len(result.exception.problems) == 1
+
+
+def test_a_split_that_is_none_lists_those_that_exist(vehicle, make_traces, tmp_path):
+    folder = make_traces(vehicle, "paper", ("wet",))
+    with pytest.raises(InputError, match="no case has the split test; there are: development"):
+        calibrate(str(folder), out=str(tmp_path), split="test")
+
+
+def test_conditions_may_hold_nulls_and_leave_the_onset_to_the_trace(vehicle, make_traces):
+    folder = make_traces(vehicle, "paper", ("wet",))
+    told = agreement(str(folder))["cases"]
+    rows = json.loads((folder / "cases.json").read_text())
+    rows[0] |= {"brake_onset_s": None, "hazard_center_m": None, "hazard_height_m": None, "note": "unseen"}
+    (folder / "cases.json").write_text(json.dumps(rows))
+    with pytest.raises(InputError, match="add one of them"):
+        agreement(str(folder))
+    path = folder / "development" / "wet.parquet"
+    table = pq.read_table(path)
+    pressure = np.clip(np.round(table["time"].to_numpy() - 0.3, 6) / 0.5, 0, 1) * 2.3
+    pq.write_table(table.append_column("brake_pressure", [pressure]), path)
+    read = agreement(str(folder))["cases"]
+    assert read[0]["window"] == pytest.approx(told[0]["window"], abs=1e-9)
+    assert read[0]["speed_rmse_m_s"] == pytest.approx(told[0]["speed_rmse_m_s"], rel=0.01)
+
+
+def test_traces_may_lie_beside_their_conditions(vehicle, make_traces):
+    folder = make_traces(vehicle, "paper", ("wet",))
+    nested = agreement(str(folder))["cases"]
+    shutil.move(folder / "development" / "wet.parquet", folder / "wet.parquet")
+    assert agreement(str(folder))["cases"] == nested
+
+
+@pytest.mark.parametrize(
+    ("harm", "sentence"),
+    [
+        (lambda e: e["bounds"].pop("efficiency"), "every group of a stage needs bounds; efficiency has none"),
+        (lambda e: e["bounds"]["efficiency"].update(lower=2.0), "lower must be below upper"),
+        (
+            lambda e: e["stages"][0].update(phase="dawn"),
+            "phase: must be 'start', 'braking', 'tail' or 'event'",
+        ),
+        (lambda e: e["scales"]["speed"].update(unit="km h-1"), "unit must be m s-1"),
+    ],
+)
+def test_a_faulty_procedure_is_told_by_place_and_rule(tmp_path, harm, sentence):
+    entry = yaml.safe_load((FOLDER / "paper-staged.yaml").read_text())
+    harm(entry)
+    path = tmp_path / "faulty.yaml"
+    path.write_text(yaml.safe_dump(entry))
+    with pytest.raises(InputError) as failure:
+        load_procedure(path)
+    assert sentence in str(failure.value)
