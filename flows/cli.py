@@ -49,6 +49,7 @@ def generate(
             "run_id": report.run_id,
             "clips": report.clips,
             "made": report.made,
+            "pose_check_failed": list(report.doubtful),
             "dataset": str(layout.root),
             "manifest": str(layout.manifest),
             "contact_sheet": str(layout.previews / "contact_sheet.png"),

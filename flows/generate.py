@@ -11,19 +11,29 @@ from flows.progress import progress_bar
 from flows.runner import RunnerName, open_executor, run_unordered
 from flows.seal import seal
 from flows.store.frames import create_arrays
-from flows.store.layout import Layout, clear_partial_files, write_atomically, write_json
+from flows.store.layout import Layout, clear_partial_files, read_json, write_atomically, write_json
 from flows.store.lock import sole_writer
 from tasks.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
-    """What a generating run did."""
+    """What a generating run did.
+
+    Parameters
+    ----------
+    layout : where it lies
+    run_id : of its frozen plan
+    clips, made : clips of the dataset, and of these those made now
+    doubtful : labels of the clips whose pose check failed; they stay in the dataset, with their verdict
+    cost : CPU and wall seconds and peak memory by label of what was made now
+    """
 
     layout: Layout
     run_id: str
     clips: int
     made: int
+    doubtful: tuple[str, ...]
     cost: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
@@ -48,13 +58,25 @@ def generate(
     layout = Layout(Path(out).resolve())
     plan = stage(prepare)(grid, layout, backend)
     if layout.manifest.is_file():
-        return RunReport(layout=layout, run_id=plan.run_id, clips=len(plan.clips), made=0)
+        return _report(layout, plan, 0, {})
     with sole_writer(layout):
         clear_partial_files(layout)
         missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
         cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
         stage(seal)(layout, plan)
-    return RunReport(layout=layout, run_id=plan.run_id, clips=len(plan.clips), made=len(missing), cost=cost)
+    return _report(layout, plan, len(missing), cost)
+
+
+def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, float]]) -> RunReport:
+    clips = read_json(layout.manifest)["clips"]
+    return RunReport(
+        layout=layout,
+        run_id=plan.run_id,
+        clips=len(plan.clips),
+        made=made,
+        doubtful=tuple(clip["label"] for clip in clips if not clip["verdict"]["passed"]),
+        cost=cost,
+    )
 
 
 def prepare(grid: str, layout: Layout, backend: str) -> Plan:

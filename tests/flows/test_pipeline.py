@@ -125,6 +125,13 @@ def test_a_finished_dataset_is_not_made_again(dataset, grid):
     assert generate(grid, str(dataset.root), runner="threads").made == 0
 
 
+def test_the_report_names_the_clips_whose_pose_check_failed(dataset, grid):
+    verdicts = {clip["label"]: clip["verdict"]["passed"] for clip in manifest_of(dataset)["clips"]}
+    report = generate(grid, str(dataset.root), runner="threads")
+    assert report.doubtful == tuple(label for label, passed in verdicts.items() if not passed)
+    assert 0 < len(report.doubtful) <= len(verdicts), "one second of a toy street is too little for the gates"
+
+
 def broken_on_two(root: str, index: int) -> dict:
     if index == 2:
         raise RuntimeError("lightning struck")
