@@ -1,7 +1,7 @@
 """Calibration of what is known: fit a vehicle's scalars to reference traces, freeze it, say how well it is known."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,9 @@ from tasks.calibration.residual import WHEELS, CalibrationCase
 from tasks.calibration.scalars import calibration_scalars, scalar_value, with_scalars
 from tasks.calibration.staged import Procedure
 from tasks.calibration.staged import calibrate as run_stages
-from tasks.vehicle.effects.chassis import EFFECT_UNITS
+from tasks.vehicle.effects.chassis import CHASSIS_EFFECTS, EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Mode
 
 DIGITS = 6
 """Significant digits that a frozen file keeps of a calibrated scalar."""
@@ -81,6 +82,7 @@ def calibrate(
         "stages": [asdict(record) for record in records],
         "before": before["groups"],
         "after": after["groups"],
+        "without": _without(frozen, reference, steps.mode),
         "identifiability": asdict(identifiability(frozen, cases, steps)),
     }
     write_json(Path(out) / "calibration.json", result)
@@ -127,6 +129,18 @@ def calibration_case(
         wheel_load=np.stack([columns[f"wheel_load_{wheel}"][chosen] for wheel in WHEELS]),
         stopping_distance=case.stopping_distance_m if case.hazard_height_m == 0 and case.braked else None,
     )
+
+
+def _without(
+    vehicle: Vehicle, reference: list[tuple[ReferenceCase, Traces]], mode: Mode
+) -> list[dict[str, Any]]:
+    """Mean agreement with each effect of the vehicle switched off and nothing fitted again: what it is worth."""
+    rows = []
+    for effect, numbers in CHASSIS_EFFECTS.items():
+        if any(vehicle.effects.get(number) for number in numbers):
+            off = replace(vehicle, effects={**vehicle.effects, **dict.fromkeys(numbers, 0.0)})
+            rows.append({"effect": effect} | agreement_of(off, reference, mode)["mean"])
+    return rows
 
 
 def _rounded(vehicle: Vehicle, procedure: Procedure) -> Vehicle:

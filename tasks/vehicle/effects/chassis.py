@@ -69,6 +69,22 @@ EFFECT_UNITS = {
 }  # fmt: skip
 """Unit of each number, as catalogue files write it."""
 
+CHASSIS_EFFECTS = {
+    "air drag": ("drag_area",),
+    "rolling resistance": ("rolling_coefficient",),
+    "tyre radius by load": ("radius_by_load",),
+    "slope moment": ("slope_moment",),
+    "footprint": ("enveloping_length",),
+    "tyre damping": ("tyre_damping",),
+    "damper asymmetry": ("damper_asymmetry",),
+    "progressive spring": ("progressive_rate",),
+    "scrub": ("scrub_stiffness",),
+    "anti-dive and anti-lift": ("anti_dive", "anti_lift"),
+    "ABS cut-off": ("abs_cutoff",),
+    "sticking tyre": ("stick_ratio", "stick_below", "stick_above", "stick_anti_dive", "stick_anti_lift"),
+}
+"""The effects, and the numbers of each."""
+
 
 def chassis_effects(values: Mapping[str, float]) -> ChassisEffects:
     """The effects of a vehicle from named numbers; all others 0.

@@ -1,0 +1,114 @@
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from tasks.errors import InputError
+from tasks.vehicle.effects.chassis import (
+    CHASSIS_EFFECTS,
+    EFFECT_UNITS,
+    ChassisEffects,
+    chassis_effects,
+    effective_friction,
+    effective_slope,
+    footprint,
+    grip_reserve,
+    stick_share,
+)
+from tasks.vehicle.effects.ports import AIR_DENSITY
+from tasks.vehicle.parameters import surface_response
+from tasks.vehicle.road import height_at, road_feature
+from tests.vehicle.conftest import HUMP, command
+
+COAST = command(0.0, onset=None)
+
+
+@pytest.fixture
+def coupled(drive, vehicle):
+    def run(*surface, effects=None, **scenario):
+        car = replace(vehicle, effects=effects or {})
+        return drive(*surface, mode="coupled", car=car, **scenario)
+
+    return run
+
+
+def test_every_number_has_a_unit_and_belongs_to_one_effect():
+    numbers = [number for effect in CHASSIS_EFFECTS.values() for number in effect]
+    assert sorted(numbers) == sorted(EFFECT_UNITS) == sorted(ChassisEffects._fields)
+
+
+def test_an_effect_that_is_none_is_named_and_those_that_exist_are_listed():
+    with pytest.raises(InputError, match=r"effect turbo: coupled mode has no such number.*drag_area"):
+        chassis_effects({"turbo": 1.0})
+
+
+def test_coasting_loses_what_air_and_rolling_resistance_take(vehicle, coupled):
+    effects = {"drag_area": 0.7, "rolling_coefficient": 0.012}
+    car = coupled(brake=COAST, duration=1.0, effects=effects).columns
+    plain = coupled(brake=COAST, duration=1.0).columns
+    v = car["speed"][500]
+    turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
+    force = 0.5 * AIR_DENSITY * 0.7 * v**2 + 0.012 * vehicle.mass * vehicle.gravity
+    extra = plain["longitudinal_acceleration"][500] - car["longitudinal_acceleration"][500]
+    assert extra == pytest.approx(force / (vehicle.mass + turning), rel=2e-3)
+
+
+def test_brakes_lock_the_wheels_below_the_cut_off_and_not_above(coupled):
+    car = coupled("rain", 0.4, effects={"abs_cutoff": 2.0}).columns
+    fast, slow = car["speed"] > 2.05, (car["speed"] < 1.5) & (car["speed"] > 0.6)
+    assert car["braking_slip_f"][fast].max() < 0.2
+    assert car["braking_slip_f"][slow].min() > 0.9
+    assert coupled("rain", 0.4).columns["braking_slip_f"][slow].max() < 0.2
+
+
+def test_a_sticking_tyre_has_its_own_friction_below_one_speed_and_the_curve_above_the_other(vehicle):
+    effects = ChassisEffects(stick_ratio=0.7, stick_below=1.0, stick_above=3.0)
+    tyre = surface_response(vehicle, "rain", 0.4).tyre
+    shares = [stick_share(v, effects) for v in (0.1, 1.0, 2.0, 3.0, 20.0)]
+    assert shares == [1.0, 1.0, pytest.approx(0.5), 0.0, 0.0]
+    assert effective_friction(1.0, 1.0, tyre, effects) == pytest.approx(0.7 * tyre.peak, rel=1e-4)
+    assert effective_friction(tyre.target_slip, 0.0, tyre, effects) == pytest.approx(tyre.peak)
+    for slip in (0.003, 0.02, 0.3):
+        rise = (effective_friction(slip + 1e-6, 0.4, tyre, effects)
+                - effective_friction(slip - 1e-6, 0.4, tyre, effects)) / 2e-6  # fmt: skip
+        assert effective_slope(slip, 0.4, tyre, effects) == pytest.approx(rise, rel=1e-5)
+
+
+def test_the_footprint_feels_the_mean_of_the_road(vehicle):
+    road, effects = road_feature(HUMP), ChassisEffects(enveloping_length=0.2)
+    for station in (18.2, 18.9, 20.0, 21.3):
+        at = np.linspace(station - 0.1, station + 0.1, 2001)
+        heights = np.array([height_at(s, road) for s in at])
+        height, slope = footprint(station, road, effects)
+        assert height == pytest.approx(np.trapezoid(heights, at) / 0.2, abs=2e-5)
+        assert slope == pytest.approx((heights[-1] - heights[0]) / 0.2, rel=1e-9)
+
+
+def test_with_a_slope_moment_the_whole_ground_force_turns_the_wheels(vehicle, coupled):
+    car = coupled(speed_km_h=40, hazard=HUMP, duration=2.8, effects={"slope_moment": 1.0}).columns
+    ground = car["tyre_force_f"] + car["tyre_force_r"] - car["road_force"]
+    turned = vehicle.wheel_inertia_f * (car["wheel_speed_f"] + car["wheel_speed_r"])
+    rate = np.gradient(turned, 1e-3)
+    moment = vehicle.wheel_radius * ground - car["brake_torque_f"] - car["brake_torque_r"]
+    climbing = (car["station"] > 18.3) & (car["station"] < 20) & (car["abs_scale_f"] == 1)
+    assert climbing.sum() > 50
+    np.testing.assert_allclose(moment[climbing], rate[climbing], atol=2.0)
+    assert np.abs(car["road_force"][climbing]).max() * vehicle.wheel_radius > 100
+
+
+def test_anti_dive_and_anti_lift_take_their_share_of_the_load_from_the_springs(vehicle, coupled):
+    plain, anti = (
+        coupled(brake=command(1.5), duration=3.9, effects=effects).columns
+        for effects in ({}, {"anti_dive": 0.4, "anti_lift": 0.4})
+    )
+    # half of the load transfer at either axle, 0.4 of the brake force of both: the springs lose a fifth
+    spring, tyre = 1 / vehicle.suspension_stiffness_f, 1 / vehicle.tyre_stiffness_f
+    expected = 1 - 0.2 * spring / (spring + tyre)
+    assert anti["pitch"][-1] / plain["pitch"][-1] == pytest.approx(expected, rel=0.01)
+    assert anti["axle_load_f"][-1] == pytest.approx(plain["axle_load_f"][-1], rel=2e-3)
+
+
+def test_the_friction_circle_leaves_all_grip_free_and_none_at_the_peak():
+    assert [grip_reserve(f, 0.8) for f in (0.0, 0.48, 0.8, 0.9)] == pytest.approx([1.0, 0.8, 0.0, 0.0])
+    assert grip_reserve(0.4, 0.8) == pytest.approx(sqrt(0.75))
