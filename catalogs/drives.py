@@ -10,7 +10,7 @@ import yaml
 
 from tasks.errors import InputError
 from tasks.recordings.channels import CHANNELS_BY_NAME
-from tasks.recordings.selection import Drive
+from tasks.recordings.events import Drive
 from tasks.surface.state import Weather
 
 NEEDED = ("brake_pressure", "speed", "pitch", "longitudinal_acceleration")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -95,7 +96,10 @@ def read_signals(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
 
 
 def _read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    table = pq.read_table(path)
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise InputError(f"{path}: must be a readable Parquet file; {_brief(error)}") from None
     units = {
         f.name: f.metadata[b"units"].decode() for f in table.schema if f.metadata and b"units" in f.metadata
     }
@@ -112,8 +116,8 @@ def _read_csv(path: Path, channel_map: ChannelMap) -> tuple[dict[str, Any], dict
             skiprows=options.skip_rows,
             encoding="utf-8-sig",
         )
-    except (ValueError, pd.errors.ParserError) as error:
-        raise InputError(f"{path}: must be a table of text; {' '.join(str(error).split())}") from None
+    except ValueError as error:
+        raise InputError(f"{path}: must be a table of text; {_brief(error)}") from None
     frame.columns = [str(name).strip() for name in frame.columns]
     return {name: frame[name].to_numpy() for name in frame.columns}, {}
 
@@ -122,8 +126,8 @@ def _read_bus(path: Path, names: tuple[str, ...], time_unit: str) -> dict[str, S
     """Signals as A2D2 stores its bus: per name a unit and [time, value] pairs."""
     try:
         content = json.loads(path.read_text())
-    except (ValueError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: must be JSON; {error}") from None
+    except ValueError as error:
+        raise InputError(f"{path}: must be JSON; {_brief(error)}") from None
     if not isinstance(content, dict):
         raise InputError(f"{path}: must be a table of signals, each with values of [time, value]")
     problems = _missing(path, names, content)
@@ -148,7 +152,11 @@ def _read_bus(path: Path, names: tuple[str, ...], time_unit: str) -> dict[str, S
 
 def _read_mdf(path: Path, names: tuple[str, ...]) -> dict[str, Signal]:
     asammdf = _asammdf()
-    with asammdf.MDF(path) as recording:
+    try:
+        recording = asammdf.MDF(path)
+    except Exception as error:  # whatever a damaged file makes the library raise
+        raise InputError(f"{path}: must be a readable MDF file; {_brief(error)}") from None
+    with recording:
         problems = _missing(path, names, recording.channels_db)
         signals = {}
         for name in names:
@@ -181,6 +189,10 @@ def _asammdf() -> ModuleType:
         ) from None
     module: ModuleType = asammdf
     return module
+
+
+def _brief(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]
 
 
 def _missing(path: Path, names: tuple[str, ...], there: Iterable[str]) -> list[str]:

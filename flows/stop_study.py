@@ -12,17 +12,10 @@ from catalogs.vehicles import load_vehicle
 from flows.store.layout import write_json
 from tasks.closure.campaign import CHANNELS
 from tasks.errors import InputError
-from tasks.recordings.selection import Drive
+from tasks.recordings.events import Drive
+from tasks.recordings.stop import Stop, StopErrors, stop_of, stopping_distance
 from tasks.recordings.stop_findings import after_stop, rebound, saturation, slip_cycles
-from tasks.recordings.stop_study import (
-    RungResult,
-    Stop,
-    StopErrors,
-    climb,
-    stop_of,
-    stopping_distance,
-    uncalibrated,
-)
+from tasks.recordings.stop_study import RungResult, climb, uncalibrated
 
 NEEDED = (*CHANNELS, "brake_pressure", "brake_torque", "engine_torque")
 ERROR_UNITS = {

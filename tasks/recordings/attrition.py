@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from tasks.recordings.selection import QUANTITIES, Protocol, Selection
+from tasks.recordings.events import Protocol
+from tasks.recordings.selection import QUANTITIES, Selection
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from tasks.closure.campaign import CHANNELS, Run
 from tasks.closure.forward import RunModel, roll, run_model
 from tasks.closure.rollout import CONSTANTS, OUTPUTS
-from tasks.recordings.selection import Event
+from tasks.recordings.events import Event
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import ALL_PARAMETERS, PARAMETER_INDEX
 from tasks.vehicle.half_car import half_car, integrate_half_car

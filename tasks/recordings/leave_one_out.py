@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.recordings.brake_dive import DiveModel, Prediction, fit_brake_gain, fit_pitch, predict_event
-from tasks.recordings.selection import Event
+from tasks.recordings.events import Event
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
 

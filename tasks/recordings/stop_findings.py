@@ -7,7 +7,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.recordings.stop_study import REBOUND_S, Stop
+from tasks.recordings.stop import REBOUND_S, Stop
 from tasks.recordings.stop_swing import STANDING
 from tasks.vehicle.parameters import Vehicle
 

@@ -253,3 +253,28 @@ def test_the_measured_sets_come_in_through_their_maps(tmp_path: Path, outside_da
     comma = measured / "comma2k19" / "comma2k19_example1_100hz.parquet"
     report = import_measurements(str(comma), map="comma2k19", out=str(tmp_path / "comma"))
     assert report["not_measured"] == ["brake_pressure", "wheel_speed_front", "wheel_speed_rear"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("log.parquet", "must be a readable Parquet file"),
+        ("log.mf4", "must be a readable MDF file"),
+        ("log.json", "must be JSON"),
+        ("log.xlsx", "measurements must be of .csv"),
+    ],
+)
+def test_a_damaged_or_foreign_file_is_one_sentence(tmp_path: Path, name: str, words: str) -> None:
+    if name.endswith("mf4"):
+        pytest.importorskip("asammdf", reason="reading MDF4 needs asammdf")
+    (tmp_path / name).write_bytes(b"\x00\x01 not what it says")
+    with pytest.raises(InputError, match=words):
+        import_measurements(str(tmp_path / name), map=write_map(tmp_path), out=str(tmp_path / "out"))
+
+
+def test_text_in_a_number_column_is_named(tmp_path: Path) -> None:
+    log: dict[str, object] = dict(logged(braking_columns()))
+    log["v_kmh"] = ["fast"] * len(braking_columns()["time"])
+    pd.DataFrame(log).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(InputError, match="signal v_kmh must be of numbers"):
+        import_measurements(str(tmp_path / "log.csv"), map=write_map(tmp_path), out=str(tmp_path / "out"))

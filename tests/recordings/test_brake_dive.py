@@ -18,8 +18,9 @@ from tasks.recordings.brake_dive import (
     with_model,
 )
 from tasks.recordings.bus_drive import drive_motion
+from tasks.recordings.events import Drive, Event
 from tasks.recordings.leave_one_out import leave_one_drive_out, macro_mean, score_of
-from tasks.recordings.selection import Drive, Event, select_events
+from tasks.recordings.selection import select_events
 
 VEHICLE, SURFACE, BUS = load_vehicle("paper-reference"), load_surface("dense-asphalt"), load_bus("a2d2-like")
 STRAIGHT = replace(

@@ -7,7 +7,8 @@ import pytest
 
 from catalogs.protocols import load_protocol
 from tasks.recordings.attrition import attrition_table
-from tasks.recordings.selection import QUANTITIES, Drive, Event, judge, select_events
+from tasks.recordings.events import Drive, Event
+from tasks.recordings.selection import QUANTITIES, judge, select_events
 
 PROTOCOL = load_protocol("brake-dive")
 INTERVAL = 0.01

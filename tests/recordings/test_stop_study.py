@@ -10,18 +10,10 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.closure.campaign import CHANNELS
 from tasks.closure.forward import predict
-from tasks.recordings.selection import Drive
+from tasks.recordings.events import Drive
+from tasks.recordings.stop import Stop, stop_errors, stop_of, stopping_distance
 from tasks.recordings.stop_findings import rebound, saturation, slip_cycles
-from tasks.recordings.stop_study import (
-    Rung,
-    Stop,
-    _model,
-    climb,
-    stop_errors,
-    stop_of,
-    stopping_distance,
-    uncalibrated,
-)
+from tasks.recordings.stop_study import Rung, _model, climb, uncalibrated
 from tasks.recordings.stop_swing import Swing, fit_swing, swing_acceleration, with_swing
 from tasks.vehicle.effects.library import parameter_vector
 
