@@ -36,13 +36,18 @@ def generate(
     workers: Workers = None,
     scheduler: Scheduler = None,
     backend: Annotated[str, typer.Option(help="Rasteriser: auto, cpu or gsplat.")] = "auto",
+    vehicle: Annotated[
+        str | None,
+        typer.Option(help="Vehicle name or file in place of the grid's; a frozen one in its own mode."),
+    ] = None,
     prefect: Prefect = False,
     as_json: Json = False,
 ) -> None:
     """Make the dataset of a scenario grid, or what is missing of it."""
     report = _call(
-        "generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend
-    )
+        "generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend,
+        vehicle=vehicle,
+    )  # fmt: skip
     layout = report.layout
     _show(
         {
@@ -284,6 +289,59 @@ def synthetic_drives(
     _show(_call("synthetic_drives", False, out, drives=drives, events=events, seed=seed), as_json)
 
 
+@app.command("close-loop")
+def close_loop(
+    campaign: Annotated[
+        str, typer.Argument(help="Campaign folder: campaign.yaml, runs.csv, runs/*.parquet.")
+    ],
+    out: Annotated[str, typer.Option(help="Folder for verdict, report and grown vehicle.")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="Vehicle name or file; by default the campaign's.")
+    ] = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Say what a measured campaign shows that the model lacks, and write the vehicle model with it."""
+    _one_thread()
+    result = _call("close_loop", prefect, campaign, out=out, vehicle=vehicle)
+    keys = ("verdict", "reasons", "vehicle_file", "report")
+    brief: dict[str, Any] = {
+        "effects": [
+            {
+                "name": e["name"],
+                "class": e["class"],
+                "parameter": name,
+                **{key: p[key] for key in ("value", "ci_low", "ci_high", "unit")},
+            }
+            for e in result["effects"]
+            for name, p in e["parameters"].items()
+        ],
+        "error": [
+            {"channel": channel, **{key: e[key] for key in ("frozen", "retuned", "after", "unit")}}
+            for channel, e in result["error"].items()
+        ],
+    }
+    _show(result if as_json else {key: result[key] for key in keys} | brief, as_json)
+
+
+@app.command("close-loop-benchmark")
+def close_loop_benchmark(
+    out: Annotated[
+        str, typer.Option(help="Folder for closing-benchmark.json; a later call goes on with it.")
+    ],
+    seeds: Annotated[int, typer.Option(help="Campaigns of each known truth.", min=0)] = 10,
+    nulls: Annotated[int, typer.Option(help="Campaigns of a model that lacks nothing.", min=0)] = 100,
+    minutes: Annotated[float, typer.Option(help="Stop after so long, with what is done.")] = 1e9,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Count how often close-loop is right on campaigns whose truth is known."""
+    _one_thread()
+    result = _call("close_loop_benchmark", prefect, out=out, seeds=seeds, nulls=nulls, minutes=minutes)
+    keys = ("campaigns", "false_discoveries", "summary")
+    _show(result if as_json else {key: result[key] for key in keys}, as_json)
+
+
 @scene_app.command("from-stereo")
 def scene_from_stereo(
     folder: Annotated[str, typer.Argument(help="calib.txt, poses.txt, image_l/, image_r/.")],
@@ -311,6 +369,11 @@ def scene_import(
     _show(_call("scene_import", False, gaussians, route, out, **sizes), as_json)
 
 
+def _one_thread() -> None:
+    # many small linear systems: the threads of a BLAS spend more time waiting for each other than computing
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 def _call(name: str, prefect: bool, /, *args: Any, **kwargs: Any) -> Any:
     """Call a pipeline function, as a Prefect flow where one is asked for."""
     return _function(name, prefect or "PREFECT_API_URL" in os.environ)(*args, **kwargs)
@@ -332,7 +395,8 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "calibrate": "calibration",
         "import_measurements": "importing", "brake_protocol": "protocol", "synthetic_drives": "bus_drives",
         "stop_study": "stop_study", "diff": "dataset_diff",
-        "bump_study": "bump_study",
+        "bump_study": "bump_study", "close_loop": "closing",
+        "close_loop_benchmark": "closing_benchmark",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

@@ -45,8 +45,9 @@ def generate(
     workers: int | None = None,
     scheduler: str | None = None,
     backend: str = "auto",
+    vehicle: str | None = None,
 ) -> RunReport:
-    """Make the dataset of ``grid`` in ``out``, or what is missing of it.
+    """Make the dataset of ``grid`` in ``out``, or what is missing of it; ``vehicle`` takes the grid's place.
 
     Raises
     ------
@@ -56,7 +57,7 @@ def generate(
         If clips failed; run the same command again to make just those.
     """
     layout = Layout(Path(out).resolve())
-    plan = stage(prepare)(grid, layout, backend)
+    plan = stage(prepare)(grid, layout, backend, vehicle)
     if layout.manifest.is_file():
         return _report(layout, plan, 0, {})
     with sole_writer(layout):
@@ -79,11 +80,11 @@ def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, flo
     )
 
 
-def prepare(grid: str, layout: Layout, backend: str) -> Plan:
+def prepare(grid: str, layout: Layout, backend: str, vehicle: str | None = None) -> Plan:
     """Check and freeze the plan, and lay out the folder; resumes a folder that holds the same plan."""
     from tasks.render.backend import select_backend
 
-    plan, inputs = make_plan(grid, select_backend(backend).name)
+    plan, inputs = make_plan(grid, select_backend(backend).name, vehicle)
     if layout.plan.is_file():
         existing = read_plan(layout.root)
         if existing.run_id != plan.run_id:

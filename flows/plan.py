@@ -1,7 +1,7 @@
 """From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from catalogs.grids import Grid, GridFile, load_grid
 from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.surfaces import surface_source
-from catalogs.vehicles import vehicle_source
+from catalogs.vehicles import vehicle_provenance, vehicle_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.store.layout import Layout, read_json
 from manifests.canonical import content_id, sha256_of
@@ -72,8 +72,14 @@ class Plan:
         }
 
 
-def make_plan(source: str | Path, backend: str) -> tuple[Plan, dict[str, bytes]]:
+def make_plan(source: str | Path, backend: str, vehicle: str | None = None) -> tuple[Plan, dict[str, bytes]]:
     """Check a grid against its catalogue entries and scene, and freeze it.
+
+    Parameters
+    ----------
+    source : grid file, or the name of one that ships
+    backend : rasteriser
+    vehicle : takes the place of the grid's; a frozen one runs in the mode it was fitted in
 
     Returns
     -------
@@ -85,6 +91,8 @@ def make_plan(source: str | Path, backend: str) -> tuple[Plan, dict[str, bytes]]
         Listing every problem at once.
     """
     grid = load_grid(source)
+    if vehicle is not None:
+        grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
     settings = grid.settings
     inputs: dict[str, bytes] = {}
     problems: list[str] = []
@@ -177,6 +185,12 @@ def plan_differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], place: 
             short = isinstance(a, str | float | int) and isinstance(b, str | float | int)
             differences.append(f"{path} is {b!r} there and {a!r} here" if short else f"{path} differs")
     return differences
+
+
+def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:
+    provenance = vehicle_provenance(vehicle)
+    mode = settings.vehicle_mode if provenance is None else provenance.mode
+    return settings.model_copy(update={"vehicle": vehicle, "vehicle_mode": mode})
 
 
 def _clip_plan(

@@ -27,6 +27,8 @@ from prefect import flow  # noqa: E402  (reads the environment when it is import
 from flows import audit as _audit  # noqa: E402
 from flows import bump_study as _bump_study  # noqa: E402
 from flows import calibration as _calibration  # noqa: E402
+from flows import closing as _closing  # noqa: E402
+from flows import closing_benchmark as _closing_benchmark  # noqa: E402
 from flows import dataset_diff as _dataset_diff  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import generate as _generate  # noqa: E402
@@ -59,3 +61,5 @@ brake_protocol = as_flow(_protocol.brake_protocol)
 stop_study = as_flow(_stop_study.stop_study)
 diff = as_flow(_dataset_diff.diff)
 bump_study = as_flow(_bump_study.bump_study)
+close_loop = as_flow(_closing.close_loop)
+close_loop_benchmark = as_flow(_closing_benchmark.close_loop_benchmark)

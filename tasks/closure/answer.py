@@ -10,6 +10,7 @@ from scipy.stats import t as student
 from tasks.closure.attribution import Candidate
 from tasks.closure.campaign import SESSION
 from tasks.closure.disturbance import Disturbance
+from tasks.closure.experiment import Experiment
 from tasks.closure.forward import Slot
 
 VerdictName = Literal["FOUND", "SET", "UNKNOWN_FORM", "RETUNE", "SENSOR", "NOTHING"]
@@ -95,6 +96,7 @@ class Verdict:
     campaign, content_hash, split_hash : what was read
     theta : float64 full parameter vector of the effects, without session nuisances
     slots : tables of the forms found
+    experiment : the planned run that would tell the first effect from its closest alternative best
     torn : runs left out because they fork when the integration step is halved
     reasons : sentences that say why the answer is what it is
     """
@@ -113,6 +115,7 @@ class Verdict:
     split_hash: str
     theta: NDArray[np.float64]
     slots: tuple[Slot, ...]
+    experiment: Experiment | None
     torn: tuple[str, ...]
     reasons: tuple[str, ...]
 

@@ -6,7 +6,7 @@ the model is given; wheel inertia is off by an amount that no nuisance covers.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,13 @@ from scipy.stats import beta
 
 from tasks.closure.answer import Verdict
 from tasks.closure.campaign import Campaign, Run, Tolerances
+from tasks.closure.drives import RICH, TRAINING, Drive, planned_run
 from tasks.closure.evidence import SESSION_INDEX
 from tasks.closure.forward import SUBSTEPS, Slot, instruments, roll, run_model
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import PARAMETER_INDEX, parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
-INTERVAL = 0.01
 NOISE_SIGMA = np.array([0.03, 0.05, 0.09, 0.09, 0.015, 0.1, 0.1])
 NOISE_RHO = np.array([0.6, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0])
 PRESSURE_NOISE = 0.01
@@ -37,48 +37,6 @@ DISTURBANCE = (
     ("pitch_moment", 70.0, 0.3, 0.08),
 )
 """Port, standard deviation [unit of the port], correlation time and knot spacing [s]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Drive:
-    """One planned run.
-
-    Parameters
-    ----------
-    weather, rate : weather and its rate [mm/h]
-    speed : initial speed [m/s]
-    peak : brake pressure after the ramp; negative pulses between it and 0.3 of it [MPa]
-    duration : [s]
-    disc_rise : [K]
-    hazard : centre, length, height [m]
-    """
-
-    weather: str = "dry"
-    rate: float = 0.0
-    speed: float
-    peak: float
-    duration: float = 6.0
-    disc_rise: float = 20.0
-    hazard: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-RICH: tuple[Drive, ...] = (
-    Drive(speed=32.0, peak=0.0, duration=8.0), Drive(speed=16.7, peak=0.0, duration=8.0),
-    Drive(speed=25.0, peak=2.0, disc_rise=350.0), Drive(speed=27.8, peak=1.5, disc_rise=150.0),
-    Drive(speed=26.4, peak=-2.4), Drive(speed=16.7, peak=2.3), Drive(speed=11.1, peak=3.5, duration=4.0),
-    Drive(weather="rain", rate=10.0, speed=22.2, peak=2.3), Drive(weather="rain", rate=25.0, speed=12.5, peak=3.0),
-    Drive(weather="snow", rate=3.0, speed=13.9, peak=2.3), Drive(weather="snow", rate=1.0, speed=9.7, peak=0.6),
-    Drive(speed=11.1, peak=0.0, duration=4.0, hazard=(12.0, 3.7, 0.075)),
-    Drive(speed=9.7, peak=0.0, duration=4.0, hazard=(10.0, 2.0, -0.08)),
-    Drive(speed=7.8, peak=0.5, duration=4.0, hazard=(10.0, 3.7, 0.06)),
-    Drive(speed=25.0, peak=0.0, duration=8.0), Drive(speed=22.2, peak=2.6, disc_rise=250.0),
-    Drive(speed=33.3, peak=2.0, disc_rise=80.0), Drive(speed=13.9, peak=1.6, duration=5.0),
-    Drive(weather="rain", rate=10.0, speed=16.7, peak=2.6), Drive(weather="snow", rate=1.0, speed=12.5, peak=2.0),
-    Drive(speed=8.9, peak=0.8, duration=4.0, hazard=(9.0, 3.7, 0.05)),
-    Drive(speed=9.7, peak=0.0, duration=4.0, hazard=(12.0, 2.5, 0.06)),
-)  # fmt: skip
-"""A design that excites every port, 14 training runs first."""
-TRAINING = 14
 
 
 def synthetic_campaign(
@@ -128,19 +86,8 @@ def _measure(
     slots: tuple[Slot, ...],
     rng: np.random.Generator,
 ) -> Run:
-    count = round(drive.duration / INTERVAL)
-    t = np.arange(count) * INTERVAL
-    pressure = abs(drive.peak) * np.clip((t - 1.0) / 0.3, 0.0, 1.0)
-    if drive.peak < 0:
-        pressure *= np.where((t > 1.5) & (((t - 1.5) % 1.0) < 0.5), 0.3, 1.0)
-    response = np.zeros((count, 7))
-    response[:, 0] = drive.speed
-    run = Run(
-        name=f"run-{number + 1:02d}", held_out=number >= TRAINING, weather=drive.weather, precipitation_mm_h=drive.rate,
-        snow_accumulation_h=1.0 if drive.weather == "snow" else 0.0, direction=direction, disc_rise=drive.disc_rise,
-        hazard_center=drive.hazard[0], hazard_length=drive.hazard[1], hazard_height=drive.hazard[2],
-        interval=INTERVAL, pressure=pressure, response=response,
-    )  # fmt: skip
+    run = planned_run(drive, f"run-{number + 1:02d}", direction, held_out=number >= TRAINING)
+    pressure, count = run.pressure, len(run.pressure)
     model = run_model(run, vehicle, surface)
     own = theta.copy()
     own[PARAMETER_INDEX["friction"]] += TOLERANCES.friction * rng.standard_normal()
@@ -171,28 +118,44 @@ def _autoregressive(rho: float, count: int, rng: np.random.Generator) -> NDArray
     return x
 
 
-def outcome(verdict: Verdict, truth: str | None) -> str:
-    """How a verdict stands to the truth: right, wrong, set (with or without the truth) or refused.
+def outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] | None = None) -> str:
+    """How a verdict stands to the truth: right, wrong, set (with or without the truth), form or refused.
 
     Parameters
     ----------
     verdict : what the tool said
     truth : name of the effect in the data; None where there is none
+    form : port and variable of a truth that no library holds
     """
     names = [effect.name for effect in verdict.effects]
     if truth is None:
         return "right" if not names else "false discovery"
     if not names:
         return "refused"
-    if verdict.verdict == "SET":
-        return (
-            "set with truth"
-            if truth in {*names, *(rival.name for _, rival in verdict.rivals)}
-            else "set without truth"
-        )
     if verdict.verdict == "UNKNOWN_FORM":
-        return "form"
+        if form is None:
+            return "form"
+        right = form in {(e.port, e.variable) for e in verdict.effects if e.effect_class == "form"}
+        return "right form" if right else "wrong form"
+    if verdict.verdict == "SET":
+        told = truth in {*names, *(rival.name for _, rival in verdict.rivals)}
+        return "set with truth" if told else "set without truth"
     return "right" if names == [truth] else "wrong"
+
+
+def covered(verdict: Verdict, truth: str, values: Mapping[str, float]) -> bool | None:
+    """Whether the 95 % interval of the first parameter holds the truth; None unless the truth alone is named.
+
+    Parameters
+    ----------
+    verdict : what the tool said
+    truth : name of the effect in the data
+    values : its parameters
+    """
+    if [effect.name for effect in verdict.effects] != [truth]:
+        return None
+    first = verdict.effects[0].parameters[0]
+    return first.ci_low <= values[first.name] <= first.ci_high
 
 
 def exact_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:

@@ -165,6 +165,17 @@ def form_hypotheses(leftover: Leftover, samples: int, count: int = 2) -> list[Hy
     return [_form(leftover, name, coefficients, scale) for _, name, coefficients in ranked[:count]]
 
 
+def curve(form: Hypothesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A form at its first values: its variable and its value at the port, float64 [TABLE] each.
+
+    Parameters
+    ----------
+    form : of `form_hypotheses`
+    """
+    (slot,) = form.build(form.start)[1]
+    return slot.origin + slot.spacing * np.arange(len(slot.values), dtype=np.float64), slot.values
+
+
 def _form(leftover: Leftover, name: str, start: NDArray[np.float64], scale: float) -> Hypothesis:
     grid = np.linspace(leftover.grid[0], leftover.grid[-1], TABLE)
     basis = SHAPES[name](grid / scale)

@@ -1,14 +1,14 @@
 """What cannot be told from what was named, and how large an effect would have to be to be named at all."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.closure.answer import NamedEffect, named_effect
 from tasks.closure.attribution import (  # fmt: skip
     ACCEPT_SCORE,
     RIVAL_SPAN,
     WIN_SHARE,
+    Candidate,
     judge,
     ladder,
     nested,
@@ -18,13 +18,37 @@ from tasks.closure.attribution import (  # fmt: skip
 from tasks.closure.campaign import SESSION
 from tasks.closure.fit import Fit, misfit_by_run
 from tasks.closure.screening import Evidence, inflation
-from tasks.closure.search import Round
+from tasks.closure.search import RETUNE_PULL, Round
 
 
-def rivals(
-    evidence: Evidence, base: Fit, rounds: list[Round]
-) -> tuple[list[NamedEffect], list[tuple[str, NamedEffect]]]:
-    named, near = [], []
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """An accepted effect beside all else that was tried in its place.
+
+    Parameters
+    ----------
+    own : the effect, beyond all other accepted ones
+    share : bootstrap win share
+    others : what was tried in its place, with win shares, best first
+    near : those of them that cannot be told from it
+    """
+
+    own: Candidate
+    share: float
+    others: tuple[tuple[Candidate, float], ...]
+    near: tuple[tuple[Candidate, float], ...]
+
+
+def compare(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Compared]:
+    """Hold every accepted effect against its alternatives, all other accepted ones present.
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at ``base``
+    base : fit of all accepted effects
+    rounds : how they were found
+    """
+    compared = []
     for i, found in enumerate(rounds):
         rest, own, tried = found.base, found.accepted, found.tried
         if i + 1 < len(rounds):
@@ -36,17 +60,39 @@ def rivals(
             tried = tuple(ladder(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
         share = win_share([own, *others], rest)
-        named.append(named_effect(own, share))
-        for c in others:
-            wins = win_share([c, own, *[o for o in others if o is not c]], rest)
-            close = c.score > own.score - RIVAL_SPAN or (share < WIN_SHARE and wins > 0.5 * (1.0 - WIN_SHARE))
-            if close and not nested(own.hypothesis, c.hypothesis) and c.score > 0.0:
-                near.append((own.hypothesis.name, named_effect(c, wins)))
-    return named, near
+        shares = [win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
+        near = tuple(
+            (c, wins)
+            for c, wins in zip(others, shares, strict=True)
+            if c.score > 0.0
+            and _close(own, share, c, wins)
+            and not nested(own.hypothesis, c.hypothesis)
+            and _credible(c, own, evidence)
+        )
+        compared.append(
+            Compared(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
+        )
+    return compared
+
+
+def _close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
+    return other.score > own.score - RIVAL_SPAN or (share < WIN_SHARE and wins > 0.5 * (1.0 - WIN_SHARE))
+
+
+def _credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
+    """An explanation that still bends the session beyond belief is none, beside one that does not."""
+    bent, straight = (float(np.max(np.abs(c.fitted.session) / evidence.session_sigma)) for c in (other, own))
+    return bent <= RETUNE_PULL or straight > RETUNE_PULL
 
 
 def detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
-    """Smallest first parameter whose linear gain would pass the score gate, at the level of the null's inflation."""
+    """Smallest first parameter whose linear gain would pass the score gate, at the level of the null's inflation.
+
+    Parameters
+    ----------
+    evidence : the runs
+    base : fit without effects
+    """
     level = inflation(evidence, base, None)
     needed = 2.0 * level * (ACCEPT_SCORE + np.log(evidence.samples))
     library = np.zeros((len(evidence.effects),) * 2)

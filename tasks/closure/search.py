@@ -28,6 +28,8 @@ LARGE_GAIN = 300.0
 """Gain from which derivatives taken without an effect no longer hold with it."""
 FAR_PULL = 2.5
 """Pull, in prior sigmas, from which the model without effects has its derivatives taken anew at its session."""
+AT_ODDS = 2.0
+"""Inflation of a named effect from which its runs are at odds about it, and a form alone is held against it."""
 NEAR = 0.1
 """Relative change of the parameters below which derivatives need not be taken anew once more."""
 SETTLED = 2
@@ -203,9 +205,9 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
     """
     state, near = start, None
     left = best_form(state.evidence, state.base)
-    if left is None or not left.passes:
-        return state, near
-    if state.rounds:
+    over = left is not None and left.passes
+    torn = any(r.accepted.inflation > AT_ODDS for r in state.rounds)
+    if state.rounds and (over or torn):
         alone = best_form(null.evidence, null.base)
         ahead = -np.inf
         if alone is not None and alone.passes:
@@ -223,7 +225,7 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
             )
         elif alone is not None and ahead > -RIVAL_SPAN:
             near = alone if alone.hypothesis.port != state.rounds[0].accepted.hypothesis.port else None
-    if state is start and len(state.rounds) < MAX_EFFECTS:
+    if left is not None and over and state is start and len(state.rounds) < MAX_EFFECTS:
         reasons.append(f"something is left over: {left.hypothesis.name}")
         state = replace(
             state, base=left.fitted, rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left))

@@ -1,6 +1,7 @@
 """The decision: what is missing, how sure, and what it does to the error on runs that no fit has seen."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,15 +9,34 @@ from tasks.closure.answer import NamedEffect, Verdict, VerdictName, named_effect
 from tasks.closure.attribution import RIVAL_SPAN
 from tasks.closure.campaign import CHANNELS, SESSION, Campaign
 from tasks.closure.derivation import prepare
+from tasks.closure.experiment import next_experiment
 from tasks.closure.fit import compose, fit
 from tasks.closure.held_out import held_out_error
-from tasks.closure.rivals import detectable, rivals
-from tasks.closure.search import search_all
+from tasks.closure.rivals import Compared, compare, detectable
+from tasks.closure.search import Found, search_all
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
 
 WORSE_LIMIT = 1.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """A verdict with what it stands on.
+
+    Parameters
+    ----------
+    verdict : the answer
+    start : the model as it stands, with the runs differentiated about it
+    end : the grown model, with the runs differentiated about it; ``start`` where nothing is named
+    compared : every named effect beside its alternatives
+    """
+
+    verdict: Verdict
+    start: Found
+    end: Found
+    compared: tuple[Compared, ...]
 
 
 def attribute(
@@ -26,7 +46,7 @@ def attribute(
     effects: tuple[Effect, ...],
     *,
     progress: Callable[[str], None] = lambda stage: None,
-) -> Verdict:
+) -> Trace:
     """Trace the residual of a campaign to what the model lacks.
 
     Parameters
@@ -38,7 +58,7 @@ def attribute(
 
     Returns
     -------
-    The verdict; nothing in it has been fitted to a held-out run.
+    The verdict and what it stands on; nothing in it has been fitted to a held-out run.
     """
     progress("derivatives")
     evidence = prepare(campaign, vehicle, surface, effects)
@@ -47,54 +67,61 @@ def attribute(
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
     start, found, near_form = search_all(evidence, null, reasons)
     progress("rivals")
-    named, near = rivals(found.evidence, found.base, list(found.rounds)) if found.rounds else ([], [])
-    if near_form is not None and named:
-        near.append((named[0].name, named_effect(near_form, 0.0)))
-    null, base, tried = start.base, found.base, list(found.tried)
-    error = held_out_error(start.evidence, null, base)
-    kind = _kind(named, near)
+    compared = compare(found.evidence, found.base, found.rounds)
+    progress("held-out error")
+    error = held_out_error(start.evidence, start.base, found.base)
     worse = [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
-    if named and worse:
+    tried = list(found.tried)
+    if compared and worse:
         # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
         reasons.append(
-            f"{', '.join(e.name for e in named)} would fit, but predicts {', '.join(worse)} of the held-out runs"
-            " worse than the frozen model: not named"
+            f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
+            " held-out runs worse than the frozen model: not named"
         )
-        kind, base = "NOTHING", null
-        tried, named, near = [r.accepted for r in found.rounds], [], []
-        error = held_out_error(start.evidence, null, null)
+        tried, compared, near_form = [r.accepted for r in found.rounds], [], None
+        found = start
+        error = held_out_error(start.evidence, start.base, start.base)
+    named = [named_effect(c.own, c.share) for c in compared]
+    near = [(c.own.hypothesis.name, named_effect(o, wins)) for c in compared for o, wins in c.near]
+    if near_form is not None:
+        near.append((named[0].name, named_effect(near_form, 0.0)))
+    kind = _kind(named, near)
     if kind == "SET":
         reasons.append(
             f"{len(near)} other explanation(s) lie within {RIVAL_SPAN:g} units or win too many resamples"
         )
-    if kind == "NOTHING" and not found.rounds:
+    if not named and not worse:
         reasons.append("no candidate passes the score, held-out and bound gates together")
-    theta, slots = compose(base.parts, base.values, np.zeros(len(SESSION)))
-    sigma = evidence.session_sigma
-    first = evidence.train[0]
-    return Verdict(
+    experiment = None
+    if compared:
+        first = compared[0]
+        ranked = sorted((*first.near, *first.others), key=lambda pair: -pair[0].score)
+        other = first.near[0][0] if first.near else ranked[0][0] if ranked else None
+        second = other.fitted if other is not None else start.base
+        experiment = next_experiment(start.evidence, first.own.fitted, second, vehicle, surface)
+    theta, slots = compose(found.base.parts, found.base.values, np.zeros(len(SESSION)))
+    sigma, lead = evidence.session_sigma, evidence.train[0]
+    pulls = zip(SESSION, start.base.session / sigma, found.base.session / sigma, strict=True)
+    verdict = Verdict(
         verdict=kind,
         effects=tuple(named),
         rivals=tuple(near),
         tried=tuple(named_effect(c, 0.0) for c in tried[:6]),
         error=error,
-        session_pulls={
-            name: (float(a), float(b))
-            for name, a, b in zip(SESSION, null.session / sigma, base.session / sigma, strict=True)
-        },
-        noise={
-            name: (float(r), float(s)) for name, r, s in zip(CHANNELS, first.rho, first.sigma, strict=True)
-        },
+        session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
+        noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
         disturbance=start.evidence.disturbance,
-        detectable=detectable(start.evidence, null),
+        detectable=detectable(start.evidence, start.base),
         campaign=campaign.name,
         content_hash=campaign.content_hash,
         split_hash=campaign.split_hash,
         theta=theta,
         slots=slots,
+        experiment=experiment,
         torn=evidence.torn,
         reasons=tuple(reasons),
     )
+    return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
 
 
 def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:

@@ -1,0 +1,185 @@
+"""Figures of a close-loop report, each a PNG in base64: what an engineer looks at before believing a verdict."""
+
+import base64
+from io import BytesIO
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
+from tasks.closure.evidence import RunEvidence
+from tasks.closure.fit import compose
+from tasks.closure.forms import Leftover, curve, form_hypotheses, scan
+from tasks.closure.forward import CONSTANTS, N_STATES, RunModel, predict, roll
+from tasks.closure.search import Found
+from tasks.closure.verdict import Trace
+from tasks.vehicle.effects.library import ALL_PARAMETERS
+from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
+
+FROZEN, AFTER, MEASURED = "#c0392b", "#1f6fb2", "#222222"
+SHOWN = ("speed", "longitudinal_acceleration", "pitch")
+MEAN_OVER = 20
+"""Samples averaged into one point of the residual force: its noise falls below what is looked for."""
+DISC_STATE = 13
+"""Column of the front disc's temperature in a run's states."""
+assert DISC_STATE < N_STATES
+
+
+def picture(figure: Figure) -> str:
+    """A figure as base64 PNG, without any date in it."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight", metadata={"Software": None})
+    return base64.b64encode(buffer.getvalue()).decode()
+
+
+def residual_force(trace: Trace) -> str:
+    """Residual longitudinal force of the training runs against a state, frozen and after, coloured by run."""
+    variable = _state_to_show(trace)
+    figure = Figure(figsize=(10, 3.6))
+    axes = figure.subplots(1, 2, sharey=True)
+    colours = matplotlib.colormaps["turbo"](np.linspace(0.05, 0.95, len(trace.start.evidence.train)))
+    for axis, state, title in zip(axes, (trace.start, trace.end), ("frozen", "after"), strict=True):
+        grown = state is trace.end and trace.end is not trace.start
+        for run, colour in zip(state.evidence.train, colours, strict=True):
+            x, force = _force_points(run.model, state, variable, grown)
+            axis.plot(x, force, ".", ms=2.5, color=colour, label=run.model.run.name)
+        axis.axhline(0.0, color="#888888", lw=0.8)
+        axis.set_title(title)
+        axis.set_xlabel(f"{variable} [{VARIABLE_UNITS[VARIABLES.index(variable)]}]")
+    axes[0].set_ylabel("measured - model [N]")
+    axes[1].legend(fontsize=6, ncol=2, loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=3)
+    return picture(figure)
+
+
+def _state_to_show(trace: Trace) -> str:
+    known = ("speed", "pressure", "disc_temperature", "deceleration")
+    named = [e.variable for e in trace.verdict.effects if e.variable in known]
+    return named[0] if named else "speed"
+
+
+def _force_points(
+    model: RunModel, state: Found, variable: str, grown: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    theta, slots = (
+        compose(state.base.parts, state.base.values, state.base.session)
+        if grown
+        else (np.zeros(len(ALL_PARAMETERS)), ())
+    )
+    channel = CHANNELS.index("longitudinal_acceleration")
+    y = predict(model, theta, slots=slots)
+    _, states = roll(model, theta, slots=slots)
+    mass = sum(
+        model.constants[CONSTANTS.index(n)] for n in ("sprung_mass", "unsprung_mass_f", "unsprung_mass_r")
+    )
+    force = mass * (model.measured - y)[:, channel]
+    x = {
+        "speed": y[:, 0],
+        "pressure": model.run.pressure[: model.samples],
+        "disc_temperature": states[:, DISC_STATE],
+        "deceleration": -y[:, channel],
+    }[variable]
+    count = model.samples // MEAN_OVER
+    return tuple(v[: count * MEAN_OVER].reshape(count, MEAN_OVER).mean(axis=1) for v in (x, force))
+
+
+def spline(trace: Trace) -> str:
+    """Shape of the strongest left-over of the frozen model, with its band and the form that fits it best."""
+    left = scan(trace.start.evidence, trace.start.base)[0]
+    figure = Figure(figsize=(5.2, 3.4))
+    axis = figure.subplots()
+    band = 1.96 * np.sqrt(np.maximum(np.diag(left.covariance), 0.0))
+    axis.fill_between(left.grid, left.values - band, left.values + band, color="#c9dff2", label="95 % band")
+    axis.plot(left.grid, left.values, "o-", color=AFTER, label="spline")
+    form = form_hypotheses(left, trace.start.evidence.samples, count=1)[0]
+    x, y = curve(form)
+    axis.plot(x, y, "--", color=FROZEN, label=form.name.partition(", x")[0])
+    axis.axhline(0.0, color="#888888", lw=0.8)
+    axis.set_xlabel(f"{left.variable} [{VARIABLE_UNITS[VARIABLES.index(left.variable)]}]")
+    axis.set_ylabel(f"{left.port} [{PORT_UNITS[PORTS.index(left.port)]}]")
+    axis.legend(fontsize=7)
+    return picture(figure)
+
+
+def leftovers(trace: Trace) -> str:
+    """What a spline at every scanned port and variable would gain, before and after."""
+    before = scan(trace.start.evidence, trace.start.base)
+    after = scan(trace.end.evidence, trace.end.base)
+    keys = [(x.port, x.variable) for x in sorted(before, key=lambda x: (x.port, x.variable))]
+
+    def gains(found: list[Leftover]) -> list[float]:
+        known = {(x.port, x.variable): max(x.gain, 0.1) for x in found}
+        return [known[key] for key in keys]
+
+    figure = Figure(figsize=(5.2, 3.8))
+    axis = figure.subplots()
+    y = np.arange(len(keys))
+    axis.barh(y - 0.2, gains(before), 0.4, color=FROZEN, label="frozen")
+    axis.barh(y + 0.2, gains(after), 0.4, color=AFTER, label="after")
+    axis.set_yticks(y, [f"{port} ~ {variable}" for port, variable in keys], fontsize=7)
+    axis.invert_yaxis()
+    axis.set_xscale("log")
+    axis.set_xlabel("gain of a spline / inflation")
+    axis.legend(fontsize=7)
+    return picture(figure)
+
+
+def pulls(trace: Trace) -> str:
+    """Pulls of the session's nuisances, before and after."""
+    items = trace.verdict.session_pulls
+    figure = Figure(figsize=(5.2, 2.6))
+    axis = figure.subplots()
+    y = np.arange(len(items))
+    axis.barh(y - 0.2, [before for before, _ in items.values()], 0.4, color=FROZEN, label="before")
+    axis.barh(y + 0.2, [after for _, after in items.values()], 0.4, color=AFTER, label="after")
+    axis.set_yticks(y, list(items), fontsize=8)
+    axis.invert_yaxis()
+    for limit in (-4.0, 4.0):
+        axis.axvline(limit, color="#888888", lw=0.8, ls=":")
+    axis.set_xlabel("pull [prior sigma]; beyond 4 a number of the vehicle is wrong")
+    axis.legend(fontsize=7)
+    return picture(figure)
+
+
+def traces(trace: Trace) -> str:
+    """Measured, frozen and after on the held-out runs that gained most and least."""
+    runs = trace.start.evidence.held_out
+    theta, slots = compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
+    plain = np.zeros(len(ALL_PARAMETERS))
+
+    def gain(run: RunEvidence) -> float:
+        sigma = run.sigma
+        frozen, after = (
+            np.mean(((run.model.measured - y) / sigma) ** 2)
+            for y in (predict(run.model, plain), predict(run.model, theta, slots=slots))
+        )
+        return float(np.log(frozen / after))
+
+    ranked = sorted(runs, key=gain)
+    figure = Figure(figsize=(10, 6.4))
+    axes = figure.subplots(len(SHOWN), 2, sharex="col", squeeze=False)
+    for column, (run, title) in enumerate(((ranked[-1], "gained most"), (ranked[0], "gained least"))):
+        frozen, after = predict(run.model, plain), predict(run.model, theta, slots=slots)
+        time = np.arange(run.model.samples, dtype=np.float64) * run.model.run.interval
+        for row, channel in enumerate(SHOWN):
+            c = CHANNELS.index(channel)
+            _trace(axes[row, column], time, run.model.measured[:, c], frozen[:, c], after[:, c])
+            axes[row, column].set_ylabel(f"{channel.replace('_', ' ')}\n[{CHANNEL_UNITS[c]}]", fontsize=8)
+        axes[0, column].set_title(f"{title}: {run.model.run.name} ({run.model.run.weather})")
+        axes[-1, column].set_xlabel("time [s]")
+    axes[0, 0].legend(fontsize=7)
+    return picture(figure)
+
+
+def _trace(
+    axis: Axes,
+    time: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    frozen: NDArray[np.float64],
+    after: NDArray[np.float64],
+) -> None:
+    axis.plot(time, measured, color=MEASURED, lw=0.7, alpha=0.7, label="measured")
+    axis.plot(time, frozen, color=FROZEN, lw=1.1, label="frozen")
+    axis.plot(time, after, color=AFTER, lw=1.1, ls="--", label="after")

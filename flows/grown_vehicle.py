@@ -1,0 +1,103 @@
+"""The vehicle with what a verdict adds, as a catalogue entry that names where it comes from."""
+
+from typing import Any
+
+import yaml
+
+from catalogs.effects import LIBRARY_FILE
+from catalogs.vehicles import vehicle_source
+from catalogs.vehicles.frozen import frozen_text
+from manifests.canonical import sha256_of_file
+from manifests.provenance import code_version
+from tasks.closure.answer import NamedEffect, Parameter, Verdict
+from tasks.vehicle.effects.chassis import EFFECT_UNITS
+
+SCALED = {
+    "pressure_gain": ("brake_gain",),
+    "mass": ("sprung_mass",),
+    "wheel_radius": ("wheel_radius",),
+    "damping": ("suspension_damping_f", "suspension_damping_r"),
+    "stiffness": ("suspension_stiffness_f", "suspension_stiffness_r"),
+}
+"""Parameters that are a relative change of the vehicle's own numbers."""
+SHIFTED = {"front_bias": ("front_brake_share",), "wheel_inertia": ("wheel_inertia_f", "wheel_inertia_r")}
+"""Parameters that are added to the vehicle's own numbers."""
+TABLES = {"friction": "efficiency", "slip_stiffness": "slip_stiffness"}
+"""Parameters that are a relative change of a table of every tyre family."""
+
+
+def grown_vehicle(name: str, verdict: Verdict) -> tuple[str | None, list[str]]:
+    """The text of the grown vehicle's file.
+
+    Sensor faults are no part of the car; what coupled mode does not carry is left out and named.
+
+    Parameters
+    ----------
+    name : catalogue name or file of the vehicle that was judged
+    verdict : what was found
+
+    Returns
+    -------
+    The text, or None where nothing was added; and the parameters that could not be.
+    """
+    source = vehicle_source(name)
+    entry: dict[str, Any] = yaml.safe_load(source.read_text(encoding="utf-8"))
+    entry.pop("provenance", None)
+    added: list[Parameter] = []
+    missing: list[str] = []
+    for effect in verdict.effects:
+        if effect.effect_class == "sensor":
+            continue
+        fits = effect.effect_class != "form" and all(_carried(p.name) for p in effect.parameters)
+        if not fits:
+            missing += [f"{effect.name}: {p.name}" for p in effect.parameters]
+            continue
+        for parameter in effect.parameters:
+            _apply(entry, parameter, _source(effect, parameter, verdict))
+            added.append(parameter)
+    if not added:
+        return None, missing
+    provenance = {
+        "mode": "coupled",
+        "base": source.stem,
+        "base_sha256": sha256_of_file(source),
+        "procedure": f"close-loop, verdict {verdict.verdict}: {', '.join(e.name for e in verdict.effects)}",
+        "procedure_sha256": sha256_of_file(LIBRARY_FILE),
+        "version": code_version()["version"],
+        "split": f"train of {verdict.campaign}",
+        "data_sha256": {"campaign": verdict.content_hash, "split": verdict.split_hash},
+        "stages": [],
+        "bounds": {p.name: {"unit": p.unit, "lower": p.lower, "upper": p.upper} for p in added},
+    }
+    title = f"{source.stem} with what the campaign {verdict.campaign} shows it lacks. Frozen: do not edit."
+    return frozen_text(entry, provenance, title), missing
+
+
+def _carried(name: str) -> bool:
+    return name in EFFECT_UNITS or name in SCALED or name in SHIFTED or name in TABLES
+
+
+def _source(effect: NamedEffect, p: Parameter, verdict: Verdict) -> str:
+    return (
+        f"close-loop on {verdict.campaign}, verdict {verdict.verdict}: {effect.name}, {p.name} {p.value:.6g} {p.unit},"
+        f" 95 % interval {p.ci_low:.6g} to {p.ci_high:.6g}"
+    )
+
+
+def _apply(entry: dict[str, Any], p: Parameter, source: str) -> None:
+    if p.name in SCALED or p.name in SHIFTED:
+        for key in SCALED.get(p.name, ()) or SHIFTED[p.name]:
+            value = entry[key]["value"]
+            grown = value * (1.0 + p.value) if p.name in SCALED else value + p.value
+            entry[key] = {**entry[key], "value": float(grown), "source": f"{entry[key]['source']}; {source}"}
+    elif p.name in TABLES:
+        for family in entry["families"].values():
+            table = family[TABLES[p.name]]
+            family[TABLES[p.name]] = {
+                **table,
+                "value": [float(v * (1.0 + p.value)) for v in table["value"]],
+                "source": f"{table['source']}; {source}",
+            }
+    else:
+        effects = entry.setdefault("effects", {})
+        effects[p.name] = {"value": float(p.value), "unit": EFFECT_UNITS[p.name], "source": source}
