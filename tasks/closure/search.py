@@ -224,7 +224,8 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
                 rounds=(Round(base=null.base, tried=(), accepted=alone),),
             )
         elif alone is not None and ahead > -RIVAL_SPAN:
-            near = alone if alone.hypothesis.port != state.rounds[0].accepted.hypothesis.port else None
+            elsewhere = alone.hypothesis.port != state.rounds[0].accepted.hypothesis.port
+            near = alone if elsewhere or torn else None
     if left is not None and over and state is start and len(state.rounds) < MAX_EFFECTS:
         reasons.append(f"something is left over: {left.hypothesis.name}")
         state = replace(
