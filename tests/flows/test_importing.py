@@ -123,7 +123,8 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
     columns = braking_columns(seconds=12.0)
     t = columns["time"]
     pulses = sum(np.clip((t - s) / 0.1, 0, 1) * np.clip((s + 0.8 - t) / 0.1, 0, 1) for s in (2.0, 5.0, 8.0))
-    columns["brake_pressure"] = 0.9 * pulses + 0.001 * np.sin(40 * t)
+    touch = np.clip((t - 10.5) / 0.05, 0, 1) * np.clip((10.7 - t) / 0.05, 0, 1)
+    columns["brake_pressure"] = 0.9 * (pulses + touch) + 0.001 * np.sin(40 * t)
     columns["longitudinal_acceleration"] = -1.5 * columns["brake_pressure"] + 1e-3 * np.cos(50 * t)
     columns["speed"] = 20.0 + np.cumsum(columns["longitudinal_acceleration"]) / 100
     for name in ("wheel_speed_front", "wheel_speed_rear"):

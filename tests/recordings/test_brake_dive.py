@@ -64,6 +64,14 @@ def test_a_steady_deceleration_gives_the_static_dive() -> None:
     assert abs(rate[-1]) < 1e-3
 
 
+def test_the_stiffest_and_most_damped_car_is_integrated_as_by_a_finer_step() -> None:
+    model = DiveModel(brake_gain=1.0, pitch_gain=1.0, stiffness=8.0, damping_ratio=1.5)
+    t = np.arange(301) * 0.01
+    coarse, _ = dive_of_deceleration(VEHICLE, model, np.clip(t, 0.0, 1.0), 0.01)
+    fine, _ = dive_of_deceleration(VEHICLE, model, np.clip(np.arange(3001) * 0.001, 0.0, 1.0), 0.001)
+    np.testing.assert_allclose(coarse, fine[::10], atol=1e-5)
+
+
 def test_the_cars_true_brake_and_pitch_mode_come_back(events: tuple[Event, ...]) -> None:
     folds = leave_one_drive_out(events, VEHICLE, SURFACE)
     assert [(fold.variant, fold.drive) for fold in folds] == [

@@ -57,6 +57,11 @@ def test_a_feature_comes_back_from_its_pitch_rate_alone(feature: RoadHazard) -> 
     assert found.vertical_correlation > 0.99, "the vertical acceleration was not fitted"
 
 
+def test_the_factors_scale_both_axles() -> None:
+    frequency, damping_ratio = pitch_mode(VEHICLE)
+    assert pitch_mode(with_factors(VEHICLE, 4.0, 3.0)) == pytest.approx((2 * frequency, 1.5 * damping_ratio))
+
+
 def test_another_cars_springs_and_dampers_come_back_with_the_feature() -> None:
     car = with_factors(VEHICLE, 1.8, 1.3)
     found, fitted = fit_feature_and_car(passage(HUMP, car), VEHICLE)

@@ -128,6 +128,7 @@ def test_the_dive_is_the_change_about_the_line_before_the_event() -> None:
 def test_quantities_are_measured_from_the_median_before_the_event() -> None:
     columns = good_columns()
     columns["longitudinal_acceleration"] = columns["longitudinal_acceleration"] - 0.25
+    columns["longitudinal_acceleration"][110] = 4.0  # one jolt before the event moves no median
     event = only_event(columns)
     assert QUANTITIES["deceleration_increase"].measure(event) == pytest.approx(1.0)
     assert QUANTITIES["pressure_increase"].measure(event) == pytest.approx(0.5)

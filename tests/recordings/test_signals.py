@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tasks.errors import InputError
+from tasks.recordings.assembly import assemble_run
 from tasks.recordings.channels import UNITS, likely_unit, unit_factor
 from tasks.recordings.episodes import pressure_episodes
 from tasks.recordings.signals import ChannelRule, Gain, Signal, as_channel, common_clock, on_clock
@@ -60,7 +61,7 @@ def test_a_slow_signal_is_linear_between_its_samples() -> None:
 
 def test_a_fast_signal_keeps_its_mean_and_does_not_fold_into_the_clock() -> None:
     t = np.arange(20001) / 10_000
-    tone = Signal(time=t, values=3.0 + np.sin(2 * np.pi * 100.0 * t))
+    tone = Signal(time=t, values=3.0 + np.sin(2 * np.pi * 100.0 * t + 0.9))
     clock = np.arange(10, 190) / 100
     np.testing.assert_allclose(on_clock(tone, clock), 3.0, atol=2e-3)
 
@@ -72,6 +73,15 @@ def test_the_common_clock_covers_only_what_all_signals_have() -> None:
     clock = common_clock([signal(0.0, 2.0), signal(0.5, 3.0)], 10.0)
     assert (clock[0], clock[-1], len(clock)) == (0.5, 2.0, 16)
     assert not len(common_clock([signal(0.0, 1.0), signal(2.0, 3.0)], 10.0))
+
+
+def test_a_run_with_a_problem_gives_no_columns() -> None:
+    t = np.arange(300) / 100
+    rule = ChannelRule(channel="pitch", sources=("x",), unit="deg")
+    sound = assemble_run({"x": Signal(time=t, values=np.sin(t))}, [rule], -np.inf, np.inf, 100.0)
+    assert list(sound.columns) == ["pitch"] and not sound.problems
+    broken = assemble_run({"x": Signal(time=t, values=90 * np.sin(t))}, [rule], -np.inf, np.inf, 100.0)
+    assert broken.problems and not broken.columns
 
 
 def test_active_samples_up_to_the_gap_apart_are_one_episode() -> None:

@@ -104,6 +104,7 @@ def test_the_longest_application_that_ends_at_rest_is_the_stop() -> None:
     drive = Drive(name="d", drive="d", interval=INTERVAL, columns=columns)
     stop = stop_of(drive, 0.4)
     assert stop is not None and stop.onset == 40
+    assert len(stop.columns["speed"]) == pytest.approx(1200 - 600 + 40, abs=2)
     assert stop.columns["speed"][stop.onset] == pytest.approx(20.0, abs=0.1)
     assert np.all(stop.columns["pitch"] == 0.0)
     assert stop_of(replace(drive, columns=columns | {"speed": speed + 5.0}), 0.4) is None
@@ -166,6 +167,16 @@ def test_slip_cycles_are_counted_and_a_steady_slip_has_none() -> None:
     assert counted(0.08 + 0.05 * np.sin(2 * np.pi * 4.0 * t)) == pytest.approx(4.0, abs=0.6)
     assert counted(np.full(200, 0.1)) == 0.0
     assert counted(0.1 + 0.005 * np.sin(2 * np.pi * 4.0 * t)) == 0.0
+
+
+def test_a_late_wheel_speed_is_put_back_before_slip_is_taken() -> None:
+    t = np.arange(200) * INTERVAL
+    speed = np.maximum(15.0 - 8.0 * t, 0.0)
+    late = np.interp(t - 0.05, t, speed) / VEHICLE.wheel_radius
+    columns = {"speed": speed, "wheel_speed_front": late}
+    stop = Stop(name="x", interval=INTERVAL, columns=columns, onset=10)
+    assert abs(slip_cycles(stop, columns, VEHICLE, {"wheel_speed_delay": 0.05}).median) < 1e-9
+    assert slip_cycles(stop, columns, VEHICLE, {}).median < -0.02
 
 
 def test_the_rebound_is_measured_about_the_pitch_at_rest() -> None:
