@@ -3,11 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-from catalogs.scenes.stereo_folder import read_stereo_folder
-from tasks.scene.stereo.reconstruct import reconstruct
-
 from catalogs.scenes import write_scene
 from catalogs.scenes.folder import must_be_new
+from catalogs.scenes.stereo_folder import read_stereo_folder
+from tasks.scene.stereo.reconstruct import reconstruct
 
 
 def scene_from_stereo(folder: str, out: str) -> dict[str, Any]:
