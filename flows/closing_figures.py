@@ -86,8 +86,10 @@ def _force_points(
 
 
 def spline(trace: Trace) -> str:
-    """Shape of the strongest left-over of the frozen model, with its band and the form that fits it best."""
-    left = scan(trace.start.evidence, trace.start.base)[0]
+    """Shape of what the frozen model leaves over at the port of what is named, with its band and best form."""
+    found = scan(trace.start.evidence, trace.start.base)
+    ports = [effect.port for effect in trace.verdict.effects]
+    left = next((x for x in found if x.port in ports), found[0])
     figure = Figure(figsize=(5.2, 3.4))
     axis = figure.subplots()
     band = 1.96 * np.sqrt(np.maximum(np.diag(left.covariance), 0.0))
@@ -158,7 +160,7 @@ def traces(trace: Trace) -> str:
         return float(np.log(frozen / after))
 
     ranked = sorted(runs, key=gain)
-    figure = Figure(figsize=(10, 6.4))
+    figure = Figure(figsize=(11, 6.4), layout="constrained")
     axes = figure.subplots(len(SHOWN), 2, sharex="col", squeeze=False)
     for column, (run, title) in enumerate(((ranked[-1], "gained most"), (ranked[0], "gained least"))):
         frozen, after = predict(run.model, plain), predict(run.model, theta, slots=slots)

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from catalogs.effects.truths import load_truths
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from tasks.closure.benchmark import TRAINING, exact_interval, synthetic_campaign
+from flows.closing_benchmark import summary
+from tasks.closure.benchmark import exact_interval, synthetic_campaign
+from tasks.closure.drives import TRAINING
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 
@@ -30,3 +33,27 @@ def test_the_exact_interval_is_clopper_and_pearsons() -> None:
     assert exact_interval(0, 100) == pytest.approx((0.0, 1.0 - 0.025**0.01))
     low, high = exact_interval(3, 40)
     assert binom.sf(2, 40, low) == pytest.approx(0.025) and binom.cdf(3, 40, high) == pytest.approx(0.025)
+
+
+def test_every_truth_is_of_the_library_or_a_form_outside_it() -> None:
+    truths = load_truths()
+    assert sum(t.in_library for t in truths) >= 20 and sum(not t.in_library for t in truths) >= 6
+    assert all((t.form is None) == t.in_library for t in truths)
+
+
+def row(truth: str | None, outcome: str, *, in_library: bool = True, covered: bool | None = None) -> dict:
+    return {"truth": truth, "outcome": outcome, "in_library": in_library, "covered": covered, "cpu_s": 1.0}
+
+
+def test_the_summary_counts_each_kind_once() -> None:
+    rows = [
+        row(None, "right"), row(None, "false discovery"), row("brake_lag", "right", covered=True),
+        row("brake_lag", "wrong"), row("brake_fade", "set with truth"), row("hump", "right form", in_library=False),
+    ]  # fmt: skip
+    result = summary(rows)
+    assert (result["false_discoveries"]["hits"], result["false_discoveries"]["of"]) == (1, 2)
+    shares = {entry["figure"]: (entry["hits"], entry["of"]) for entry in result["summary"]}
+    assert shares["library effect named exactly"] == (1, 3) and shares["wrong single label"] == (1, 3)
+    assert shares["truth within the 95 % interval"] == (1, 1)
+    assert shares["outside the library: form with right port and variable"] == (1, 1)
+    assert result["confusion"]["brake_lag"] == {"right": 1, "wrong": 1}

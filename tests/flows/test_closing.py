@@ -1,0 +1,208 @@
+"""close-loop from a folder on disk to verdict, grown vehicle, report and ledger."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle, vehicle_provenance
+from flows.cli import app
+from flows.closing import close_loop, verdict_json
+from flows.closing_ledger import record_reading
+from flows.grown_vehicle import grown_vehicle
+from flows.plan import make_plan
+from tasks.closure.answer import ChannelError, NamedEffect, Parameter, Verdict
+from tasks.closure.benchmark import TOLERANCES, synthetic_campaign
+from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
+from tasks.closure.disturbance import Disturbance
+from tasks.closure.drives import Drive
+
+VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+SHORT = tuple(
+    Drive(speed=speed, peak=peak, duration=2.4, disc_rise=rise)
+    for speed, peak, rise in ((16.0, 1.2, 20.0), (20.0, -1.8, 60.0), (12.0, 0.8, 20.0), (18.0, 1.5, 100.0))
+)
+
+
+def write_campaign(campaign: Campaign, folder: Path) -> None:
+    (folder / "runs").mkdir(parents=True)
+    t = TOLERANCES
+    names = (
+        "pressure_gain",
+        "mass",
+        "pitch_gain",
+        "wheel_radius",
+        "suspension_damping",
+        "suspension_stiffness",
+    )
+    tolerances = dict(zip((*names, "grade"), t.session, strict=True)) | {
+        "run": {
+            "initial_speed_m_s": t.initial_speed, "friction": t.friction,
+            "acceleration_bias_m_s2": t.acceleration_bias, "pitch_offset_deg": t.pitch_offset,
+        }
+    }  # fmt: skip
+    header = {
+        "campaign": folder.name, "vehicle": "paper-reference", "sample_rate_hz": 100, "tolerances_1sigma": tolerances,
+        "split": {
+            "train": [r.name for r in campaign.train], "held_out": [r.name for r in campaign.held_out]
+        },
+    }  # fmt: skip
+    (folder / "campaign.yaml").write_text(yaml.safe_dump(header))
+    rows = [
+        {
+            "run": r.name, "weather": r.weather, "precipitation_mm_h": r.precipitation_mm_h,
+            "snow_accumulation_h": r.snow_accumulation_h, "direction": r.direction,
+            "disc_temperature_above_ambient_c": r.disc_rise, "hazard_center_m": r.hazard_center,
+            "hazard_length_m": r.hazard_length, "hazard_height_m": r.hazard_height,
+        }
+        for r in campaign.runs
+    ]  # fmt: skip
+    with open(folder / "runs.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    for run in campaign.runs:
+        columns = {"time": np.arange(len(run.pressure)) * run.interval, "brake_pressure": run.pressure}
+        columns |= dict(zip(CHANNELS, run.response.T, strict=True))
+        pq.write_table(pa.table(columns), folder / "runs" / f"{run.name}.parquet")
+
+
+@pytest.fixture(scope="module")
+def lagging(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = synthetic_campaign(VEHICLE, SURFACE, {"lag": 0.1}, 7, design=SHORT * 2)
+    runs = tuple(replace(run, held_out=i >= 5) for i, run in enumerate(made.runs))
+    folder = tmp_path_factory.mktemp("campaigns") / "lagging"
+    write_campaign(replace(made, runs=runs), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def closed(lagging: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("closed")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MUSYNC_LEDGER", str(out / "ledger.jsonl"))
+        result = CliRunner().invoke(app, ["close-loop", str(lagging), "--out", str(out), "--json"])
+    assert result.exit_code == 0, result.output
+    return out
+
+
+def test_a_lag_in_the_data_is_named_with_its_value_and_better_predictions(closed: Path) -> None:
+    verdict = json.loads((closed / "verdict.json").read_text())
+    assert verdict["verdict"] == "FOUND" and [e["name"] for e in verdict["effects"]] == ["brake_lag"]
+    lag = verdict["effects"][0]["parameters"]["lag"]
+    assert lag["ci_low"] <= 0.1 <= lag["ci_high"] and lag["ci_high"] - lag["ci_low"] < 0.03
+    speed = verdict["error"]["speed"]
+    assert speed["after"] < 0.5 * speed["frozen"] and speed["ci_low"] <= speed["after"] <= speed["ci_high"]
+
+
+def test_the_report_needs_no_other_file_and_the_split_is_on_disk(closed: Path) -> None:
+    page = (closed / "report.html").read_text()
+    assert "brake_lag" in page and page.count("data:image/png;base64,") == 5
+    assert 'src="http' not in page and "href=" not in page
+    split = json.loads((closed / "split.json").read_text())
+    assert split["split_sha256"] == json.loads((closed / "verdict.json").read_text())["split_sha256"]
+    assert not set(split["train"]) & set(split["held_out"])
+
+
+def test_a_second_reading_of_the_same_held_out_runs_is_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MUSYNC_LEDGER", str(tmp_path / "ledger.jsonl"))
+    made = synthetic_campaign(VEHICLE, SURFACE, {}, 1, design=SHORT)
+    first, other = replace(made, content_hash="a", split_hash="s"), replace(made, content_hash="b")
+    assert [record_reading(c, "v") for c in (first, first, other, first)] == [0, 1, 0, 2]
+
+
+def parameter(name: str, value: float, unit: str = "1") -> Parameter:
+    return Parameter(
+        name=name, value=value, ci_low=0.9 * value, ci_high=1.1 * value, lower=0.0, upper=9.0, unit=unit
+    )
+
+
+def named(name: str, kind: str, *parameters: Parameter) -> NamedEffect:
+    return NamedEffect(
+        name=name, effect_class=kind, port="p", variable="v", parameters=parameters, score=50.0, gain=60.0,
+        inflation=1.0, held_out_gain=9.0, win_share=1.0,
+    )  # fmt: skip
+
+
+def verdict_of(*effects: NamedEffect) -> Verdict:
+    error = ChannelError(
+        frozen=2.0, retuned=3.0, after=1.0, ci_low=0.5, ci_high=1.5, change_low=-2.0, change_high=-0.5, wins=3,
+        worst_run="run-01", unit="m/s",
+    )  # fmt: skip
+    return Verdict(
+        verdict="FOUND", effects=effects, rivals=(), tried=(), error=dict.fromkeys(CHANNELS, error),
+        session_pulls=dict.fromkeys(SESSION, (0.0, 0.0)), noise=dict.fromkeys(CHANNELS, (0.0, 1.0)),
+        disturbance=Disturbance(), detectable={"bump_stop": float("inf")}, campaign="toy", content_hash="c" * 64,
+        split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, torn=(), reasons=(),
+    )  # fmt: skip
+
+
+def test_the_verdict_has_the_keys_that_others_read_and_is_plain_json() -> None:
+    content = verdict_json(
+        verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m^2")))
+    )
+    assert {"verdict", "effects", "rivals", "discriminating_experiment", "error"} <= set(content)
+    effect = content["effects"][0]
+    assert {"name", "class", "port", "variable", "parameters", "score"} <= set(effect)
+    assert {"value", "ci_low", "ci_high", "unit"} <= set(effect["parameters"]["drag_area"])
+    assert {"frozen", "retuned", "after", "ci_low", "ci_high", "unit"} <= set(content["error"]["speed"])
+    json.dumps(content, allow_nan=False)
+    assert len(content["error"]) == len(CHANNEL_UNITS)
+
+
+def test_the_grown_vehicle_has_the_effect_the_retuned_number_and_where_they_come_from(tmp_path: Path) -> None:
+    verdict = verdict_of(
+        named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m^2")),
+        named("retuned_pressure_gain", "retune", parameter("pressure_gain", 0.1)),
+        named("retuned_friction_level", "retune", parameter("friction", -0.05)),
+    )
+    text, missing = grown_vehicle("paper-reference", verdict)
+    assert text is not None and missing == []
+    path = tmp_path / "grown.yaml"
+    path.write_text(text)
+    grown = load_vehicle(path)
+    assert grown.effects == {"drag_area": 0.7}
+    assert grown.brake_gain == pytest.approx(1.1 * VEHICLE.brake_gain)
+    assert grown.families["dry"].efficiency == pytest.approx((0.95 * 1.01,))
+    assert grown.sprung_mass == VEHICLE.sprung_mass
+    provenance = vehicle_provenance(path)
+    assert provenance is not None and provenance.mode == "coupled"
+    assert provenance.data_sha256["campaign"] == "c" * 64 and "FOUND" in provenance.procedure
+    assert "95 % interval 0.63 to 0.77" in text
+
+
+def test_sensor_faults_do_not_change_the_car_and_what_is_not_carried_is_named() -> None:
+    sensor = named("sensor_pitch_scale", "sensor", parameter("pitch_scale", 0.05))
+    unheard = named("unheard_of", "effect", parameter("no_such_number", 0.05))
+    assert grown_vehicle("paper-reference", verdict_of(sensor)) == (None, [])
+    assert grown_vehicle("paper-reference", verdict_of(unheard)) == (None, ["unheard_of: no_such_number"])
+
+
+def test_a_dataset_is_planned_with_the_grown_vehicle_in_coupled_mode(tmp_path: Path) -> None:
+    text, _ = grown_vehicle(
+        "paper-reference", verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m^2")))
+    )
+    assert text is not None
+    path = tmp_path / "grown.yaml"
+    path.write_text(text)
+    plain, _ = make_plan("demo", "cpu")
+    grown, inputs = make_plan("demo", "cpu", str(path))
+    assert grown.settings.vehicle_mode == "coupled" and inputs["vehicle.yaml"] == path.read_bytes()
+    assert grown.inputs["vehicle.yaml"] != plain.inputs["vehicle.yaml"] and grown.run_id != plain.run_id
+
+
+def test_a_folder_that_is_no_campaign_is_the_users_mistake(tmp_path: Path) -> None:
+    from tasks.errors import InputError
+
+    with pytest.raises(InputError, match=r"needs campaign\.yaml"):
+        close_loop(str(tmp_path), out=str(tmp_path / "out"))
