@@ -1,5 +1,6 @@
 """Scenario grids: a YAML file of named axes whose product is a list of scenarios."""
 
+from copy import deepcopy
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -84,11 +85,37 @@ def load_grid(source: str | Path) -> Grid:
         raise InputError(f"{path}: a grid must be valid YAML; {' '.join(str(error).split())}") from None
     if not isinstance(content, dict):
         raise InputError(f"{path}: a grid must be a YAML mapping; it is {type(content).__name__}")
+    settings, problems = _settings(content, path)
     try:
-        settings = GridFile.model_validate(content)
+        grid = expand_grid(settings, str(path)) if settings else None
+    except InputError as error:
+        problems += error.problems
+    if problems or grid is None:
+        raise InputError(problems)
+    return grid
+
+
+def _settings(content: dict[str, Any], path: Path) -> tuple[GridFile | None, list[str]]:
+    """The settings, and what is wrong with their form; what is wrong is left out, so that the rest is checked."""
+    try:
+        return GridFile.model_validate(content), []
     except ValidationError as error:
-        raise InputError([_sentence(path, problem) for problem in error.errors()]) from None
-    return expand_grid(settings, str(path))
+        problems = [_sentence(path, problem) for problem in error.errors()]
+        kept = deepcopy(content)
+        for problem in error.errors():
+            _leave_out(kept, problem["loc"])
+    try:
+        return GridFile.model_validate(kept), problems
+    except ValidationError:
+        return None, problems
+
+
+def _leave_out(content: dict[str, Any], place: tuple[int | str, ...]) -> None:
+    """Take out the key at fault, or the whole level of an axis, so that nothing follows from its absence."""
+    if len(place) == 1:
+        content.pop(place[0], None)
+    elif place[0] == "axes" and len(place) > 2:
+        content["axes"][place[1]].pop(place[2], None)
 
 
 def expand_grid(settings: GridFile, place: str) -> Grid:

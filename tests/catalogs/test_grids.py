@@ -61,6 +61,19 @@ def test_all_faults_of_a_file_are_listed_at_once_each_with_its_place(tmp_path):
         assert f"{path}: {place}:" in text
 
 
+def test_faults_of_form_do_not_hide_broken_rules_and_make_none_up(tmp_path):
+    path = grid_file(
+        tmp_path,
+        "{name: t, colour: red, axes: {w: {a: {weather: hail, precipitation_mm_h: 3},"
+        " b: {weather: rain, precipitation_mm_h: -1}}}}",
+    )
+    with pytest.raises(InputError) as caught:
+        load_grid(path)
+    form, rules = caught.value.problems[:2], caught.value.problems[2:]
+    assert sorted(sentence.split(": ")[1] for sentence in form) == ["axes.w.a.weather", "colour"]
+    assert rules == (f"{path}: scenario b: precipitation_mm_h must not be negative; it is -1",)
+
+
 def test_a_rule_broken_by_many_scenarios_is_told_once(tmp_path):
     path = grid_file(
         tmp_path,
