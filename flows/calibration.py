@@ -22,6 +22,7 @@ from tasks.calibration.residual import WHEELS, CalibrationCase
 from tasks.calibration.scalars import calibration_scalars, scalar_value, with_scalars
 from tasks.calibration.staged import Procedure
 from tasks.calibration.staged import calibrate as run_stages
+from tasks.errors import InputError
 from tasks.vehicle.effects.chassis import CHASSIS_EFFECTS, EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode
@@ -134,12 +135,18 @@ def calibration_case(
 def _without(
     vehicle: Vehicle, reference: list[tuple[ReferenceCase, Traces]], mode: Mode
 ) -> list[dict[str, Any]]:
-    """Mean agreement with each effect of the vehicle switched off and nothing fitted again: what it is worth."""
-    rows = []
+    """Mean agreement with each effect of the vehicle switched off and nothing fitted again: what it is worth.
+
+    A vehicle that no longer stops without an effect has no figures, and a sentence instead.
+    """
+    rows: list[dict[str, Any]] = []
     for effect, numbers in CHASSIS_EFFECTS.items():
         if any(vehicle.effects.get(number) for number in numbers):
             off = replace(vehicle, effects={**vehicle.effects, **dict.fromkeys(numbers, 0.0)})
-            rows.append({"effect": effect} | agreement_of(off, reference, mode)["mean"])
+            try:
+                rows.append({"effect": effect, "mean": agreement_of(off, reference, mode)["mean"]})
+            except InputError as error:
+                rows.append({"effect": effect, "mean": None, "note": error.problems[0]})
     return rows
 
 

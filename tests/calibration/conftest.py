@@ -20,6 +20,11 @@ CONDITIONS = {
     "snowy": {"weather": "snow", "surface_coefficient": 0.42, "initial_speed_km_h": 40.0},
     "bump": {"weather": "dry", "surface_coefficient": 0.82, "initial_speed_km_h": 40.0}
     | {"hazard_center_m": 16.0, "hazard_length_m": 3.0, "hazard_height_m": 0.05},
+    "roll": {"weather": "dry", "surface_coefficient": 0.82, "initial_speed_km_h": 40.0}
+    | {"hazard_center_m": 20.0, "hazard_length_m": 3.0, "hazard_height_m": -0.08}
+    | {"peak_pressure_mpa": None, "brake_onset_s": None, "stopping_distance_m": None},
+    "trigger": {"weather": "dry", "surface_coefficient": 0.82, "initial_speed_km_h": 60.0}
+    | {"brake_onset_s": None, "brake_onset_m": 12.0, "ramp_s": 0.2},
 }
 NOISE = {"speed": 0.005, "pitch": 0.005, "slip": 0.001, "wheel_load": 5.0}
 Make = Callable[..., Path]

@@ -139,6 +139,16 @@ def test_conditions_may_hold_nulls_and_leave_the_onset_to_the_trace(vehicle, mak
     assert read[0]["speed_rmse_m_s"] == pytest.approx(told[0]["speed_rmse_m_s"], rel=0.01)
 
 
+@pytest.mark.parametrize("mode", ["paper", "coupled"])
+def test_cases_that_coast_and_cases_that_brake_at_a_place_are_driven_as_they_were(vehicle, make_traces, mode):
+    cases = agreement(str(make_traces(vehicle, mode, ("roll", "trigger"), noise=0.0)), mode=mode)["cases"]
+    assert [case["event_unit"] for case in cases] == ["km/h", "m"]
+    for case in cases:
+        assert case["speed_rmse_m_s"] < 1e-9
+        assert case["pitch_rmse_deg"] < 1e-9
+        assert case["event_error"] < 2e-3
+
+
 def test_traces_may_lie_beside_their_conditions(vehicle, make_traces):
     folder = make_traces(vehicle, "paper", ("wet",))
     nested = agreement(str(folder))["cases"]
