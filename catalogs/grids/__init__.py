@@ -115,7 +115,7 @@ def _leave_out(content: dict[str, Any], place: tuple[int | str, ...]) -> None:
     if len(place) == 1:
         content.pop(place[0], None)
     elif place[0] == "axes" and len(place) > 2:
-        content["axes"][place[1]].pop(place[2], None)
+        content["axes"][place[1]].pop(str(place[2]), None)
 
 
 def expand_grid(settings: GridFile, place: str) -> Grid:
