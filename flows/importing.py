@@ -75,8 +75,9 @@ def import_measurements(source: str, *, map: str, out: str) -> dict[str, Any]:
     ]
     if problems:
         raise InputError(problems)
-    sources = {file.name: sha256_of_file(file) for file in recordings}
-    return write_campaign(folder, channel_map, made, sources, sha256_of_file(map_file))
+    root = Path(source) if Path(source).is_dir() else Path(source).parent
+    sources = {file.relative_to(root).as_posix(): sha256_of_file(file) for file in recordings}
+    return write_campaign(folder, root, channel_map, made, sources, sha256_of_file(map_file))
 
 
 def planned_runs(channel_map: ChannelMap, recordings: dict[Path, dict[str, Signal]]) -> list[PlannedRun]:
@@ -87,11 +88,10 @@ def planned_runs(channel_map: ChannelMap, recordings: dict[Path, dict[str, Signa
     InputError
         If there is none.
     """
-    by_name = {file.name: file for file in recordings}
     runs = [
         PlannedRun(
             name=run.name,
-            file=by_name[Path(run.file).name],
+            file=next(file for file in recordings if file.match(run.file)),
             start=-inf if run.from_s is None else run.from_s,
             end=inf if run.to_s is None else run.to_s,
             part=run.part,
@@ -120,6 +120,7 @@ def planned_runs(channel_map: ChannelMap, recordings: dict[Path, dict[str, Signa
 
 def write_campaign(
     folder: Path,
+    root: Path,
     channel_map: ChannelMap,
     made: list[tuple[PlannedRun, Assembled]],
     sources: dict[str, str],
@@ -132,7 +133,8 @@ def write_campaign(
     writer = csv.DictWriter(table, ["run", *Conditions.model_fields, "drive", "start_s"], lineterminator="\n")
     writer.writeheader()
     for run, found in made:
-        row = {"run": run.name, "drive": run.file.stem, "start_s": f"{found.start:.6f}"}
+        drive = run.file.relative_to(root).with_suffix("").as_posix()
+        row = {"run": run.name, "drive": drive, "start_s": f"{found.start:.6f}"}
         writer.writerow(row | run.conditions.model_dump())
         write_parquet(run_table(found.columns, rate), folder / "runs" / f"{run.name}.parquet")
     write_atomically(folder / "runs.csv", table.getvalue().encode())
@@ -155,7 +157,7 @@ def write_campaign(
             {
                 "run": run.name,
                 "part": run.part,
-                "file": run.file.name,
+                "file": run.file.relative_to(root).as_posix(),
                 "start_s": found.start,
                 "duration_s": (len(next(iter(found.columns.values()))) - 1) / rate,
             }

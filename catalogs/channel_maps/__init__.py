@@ -72,7 +72,7 @@ class Conditions(CatalogueEntry):
 class RunEntry(CatalogueEntry):
     """One run: a stretch of one file in the logger's time, with what differs from the common conditions."""
 
-    name: Text
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
     file: Text
     from_s: Number | None = None
     to_s: Number | None = None

@@ -119,6 +119,19 @@ def test_the_campaign_is_the_one_that_closing_the_loop_reads(tmp_path: Path) -> 
     np.testing.assert_allclose(speed, braking_columns(14.0)["speed"][40 : 40 + len(speed)], atol=1e-9)
 
 
+def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
+    for day, seconds in (("monday", 3.0), ("tuesday", 4.0)):
+        (tmp_path / "logs" / day).mkdir(parents=True)
+        write_csv(tmp_path / "logs" / day / "log.csv", logged(braking_columns(seconds)))
+    runs = [{"name": day, "file": f"{day}/log.csv"} for day in ("monday", "tuesday")]
+    report = import_measurements(
+        str(tmp_path / "logs"), map=write_map(tmp_path, runs=runs), out=str(tmp_path / "campaign")
+    )
+    assert [run["duration_s"] for run in report["runs"]] == pytest.approx([3.0, 4.0], abs=0.1)
+    assert set(report["sources"]) == {"monday/log.csv", "tuesday/log.csv"}
+    assert "monday/log" in (tmp_path / "campaign" / "runs.csv").read_text()
+
+
 def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> None:
     columns = braking_columns(seconds=12.0)
     t = columns["time"]
@@ -228,6 +241,7 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
             "run a: conditions",
         ),
         ({"colour": "red"}, "colour is not a known key"),
+        ({"runs": [{"name": "../a", "file": "log.csv"}]}, "runs.0.name"),
     ],
 )
 def test_a_faulty_map_is_named_by_its_key(tmp_path: Path, changes: dict[str, object], words: str) -> None:
