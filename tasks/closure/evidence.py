@@ -19,6 +19,8 @@ from tasks.closure.noise import whiten
 from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
+BROKEN = 1e4
+"""Whitened residual of a trial that the integration does not survive: no fit goes there."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 
 
@@ -66,6 +68,8 @@ class RunEvidence:
         """
         if offsets is None:
             out, _ = roll(self.model, theta, slots=slots)
+            if not np.isfinite(out).all():
+                return np.full(len(self.nuisance), BROKEN)
             return whiten(self.model.measured - instruments(self.model, theta, out), self.rho, self.sigma)
         moved = theta.copy()
         moved[PARAMETER_INDEX["friction"]] += offsets[1]
@@ -78,6 +82,8 @@ class RunEvidence:
             )
             at += count
         out, _ = roll(self.model, moved, slots=slots, initial_speed=self.model.initial_speed + offsets[0])
+        if not np.isfinite(out).all():
+            return np.full(len(self.nuisance), BROKEN)
         y = instruments(self.model, moved, out)
         y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
         y[:, CHANNELS.index("pitch")] += offsets[3]

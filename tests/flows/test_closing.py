@@ -27,7 +27,7 @@ from tasks.closure.drives import Drive
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 SHORT = tuple(
-    Drive(speed=speed, peak=peak, duration=2.4, disc_rise=rise)
+    Drive(speed=speed, peak=peak, duration=2.6, disc_rise=rise)
     for speed, peak, rise in ((16.0, 1.2, 20.0), (20.0, -1.8, 60.0), (12.0, 0.8, 20.0), (18.0, 1.5, 100.0))
 )
 
