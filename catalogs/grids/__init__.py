@@ -110,12 +110,12 @@ def _settings(content: dict[str, Any], path: Path) -> tuple[GridFile | None, lis
         return None, problems
 
 
-def _leave_out(content: dict[str, Any], place: tuple[int | str, ...]) -> None:
+def _leave_out(content: Any, place: tuple[int | str, ...]) -> None:
     """Take out the key at fault, or the whole level of an axis, so that nothing follows from its absence."""
     if len(place) == 1:
         content.pop(place[0], None)
     elif place[0] == "axes" and len(place) > 2:
-        content["axes"][place[1]].pop(str(place[2]), None)
+        content["axes"][place[1]].pop(place[2], None)
 
 
 def expand_grid(settings: GridFile, place: str) -> Grid:
