@@ -108,6 +108,20 @@ def describe(dataset: Annotated[str, typer.Argument()], as_json: Json = False) -
 
 
 @app.command()
+def preview(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Annotated[str, typer.Option(help="Folder for the films.")],
+    clip: Annotated[
+        list[str] | None, typer.Option(help="Label or id of a clip, more than once; by default all.")
+    ] = None,
+    traces: Annotated[bool, typer.Option(help="Run the vehicle's traces below the picture.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Make an MP4 film of each clip, with speed, slip, pitch, load and brake pressure below it."""
+    _show(_call("preview", False, dataset, out, clips=clip, traces=traces), as_json)
+
+
+@app.command()
 def validate(grid: Annotated[str, typer.Argument()], as_json: Json = False) -> None:
     """Check a grid without making anything."""
     _show(_call("validate", False, grid), as_json)
@@ -391,6 +405,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
 
     module = {
         "generate": "generate", "audit": "audit", "describe": "describe", "validate": "describe",
+        "preview": "previews", "replay_audit": "replay",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
         "calibrate": "calibration",
         "import_measurements": "importing", "brake_protocol": "protocol", "synthetic_drives": "bus_drives",

@@ -33,6 +33,7 @@ from flows import dataset_diff as _dataset_diff  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import generate as _generate  # noqa: E402
 from flows import importing as _importing  # noqa: E402
+from flows import previews as _previews  # noqa: E402
 from flows import protocol as _protocol  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
 from flows import scenes as _scenes  # noqa: E402
@@ -51,6 +52,7 @@ generate = as_flow(_generate.generate)
 audit = as_flow(_audit.audit)
 describe = as_flow(_describe.describe)
 validate = as_flow(_describe.validate)
+preview = as_flow(_previews.preview)
 sensitivity = as_flow(_studies.sensitivity)
 agreement = as_flow(_studies.agreement)
 calibrate = as_flow(_calibration.calibrate)

@@ -1,0 +1,80 @@
+"""Films of a dataset's clips, with the vehicle's traces below the picture."""
+
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from flows.plan import read_plan
+from flows.progress import progress_bar
+from flows.store.frames import read_clip
+from flows.store.layout import Layout, read_json
+from flows.store.telemetry import read_columns
+from tasks.errors import InputError
+from tasks.render.traces import with_traces
+
+CONSTANT_RATE_FACTOR = 18
+"""Quality of H.264: visually lossless [1]."""
+
+
+def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: bool = True) -> dict[str, Any]:
+    """Write one MP4 a clip.
+
+    Parameters
+    ----------
+    dataset : a finished dataset
+    out : folder for the films
+    clips : labels or clip ids; all by default
+    traces : whether speed, slip, pitch, load and brake pressure run below the picture
+
+    Raises
+    ------
+    InputError
+        The folder holds no finished dataset, or a clip is not in it.
+    """
+    layout = Layout(Path(dataset))
+    if not layout.manifest.is_file():
+        raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
+    plan, rows = read_plan(layout.root), read_json(layout.manifest)["clips"]
+    chosen = [row for row in rows if not clips or row["label"] in clips or row["clip_id"] in clips]
+    unknown = set(clips or ()) - {row[key] for row in rows for key in ("label", "clip_id")}
+    if unknown:
+        raise InputError(
+            [f"{dataset}: no clip {name!r}; musync describe lists them" for name in sorted(unknown)]
+        )
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    films = []
+    with progress_bar("films", len(chosen)) as advance:
+        for row in chosen:
+            film = folder / f"{row['label'].replace('/', '_')}.mp4"
+            write_film(film, _pictures(layout, row, traces), plan.settings.frame_rate_hz)
+            films.append(str(film))
+            advance(row["label"])
+    return {"films": films}
+
+
+def _pictures(layout: Layout, row: dict[str, Any], traces: bool) -> list[NDArray[np.uint8]]:
+    pictures = list(read_clip(layout.frames, row["index"], "rgb"))
+    if not traces:
+        return pictures
+    columns = read_columns(layout.telemetry / "frames", row["clip_id"])
+    return [with_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]
+
+
+def write_film(path: Path, pictures: list[NDArray[np.uint8]], frame_rate_hz: float) -> None:
+    """Encode pictures [H, W, 3] of even size as H.264 in MP4; the same pictures give the same bytes."""
+    height, width = pictures[0].shape[:2]
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=round(frame_rate_hz))
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream.options = {"crf": str(CONSTANT_RATE_FACTOR), "preset": "medium", "threads": "1"}
+        for picture in pictures:
+            for packet in stream.encode(
+                av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+            ):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)
