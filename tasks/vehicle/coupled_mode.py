@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.brake import PressureProfile, brake_pressure, onset_by_position
+from tasks.vehicle.effects.brake_line import acting_pressure, disc_rise_after, line_after
 from tasks.vehicle.half_car import HalfCar, HalfCarState, half_car_rates, moved
 from tasks.vehicle.history import History
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
@@ -113,6 +114,7 @@ def drive_coupled(
     scale_f, scale_r = 1.0, 1.0
     onset, onset_station, stop = profile.onset_time, inf, inf
     standing = False
+    line, disc_rise, dead = 0.0, 0.0, chassis.effects.dead_time
     for n in range(steps + 1):
         time = n * step
         if isinf(onset):
@@ -121,7 +123,10 @@ def drive_coupled(
             onset_station = motion.station - motion.speed * (time - onset)
         held = hold_speed and time < onset
         pressure = brake_pressure(time - onset, profile)
-        ports = ports_at(motion, x, pressure, scale_f, scale_r, step, standing, held, chassis, tyre, road)
+        if n == 0 or chassis.effects.lag <= 0.0:
+            line = brake_pressure(time - onset - dead, profile)
+        acting = acting_pressure(line, motion.speed, disc_rise, chassis.effects)
+        ports = ports_at(motion, x, acting, scale_f, scale_r, step, standing, held, chassis, tyre, road)
         if n % per_tick == 0:
             f, r = ports.front, ports.rear
             log[n // per_tick] = (
@@ -132,9 +137,12 @@ def drive_coupled(
             )  # fmt: skip
         if n == steps:
             break
-        next_pressure = brake_pressure(time + step - onset, profile)
+        line = line_after(line, brake_pressure(time + step - onset - dead, profile), step, chassis.effects)
+        next_acting = acting_pressure(line, motion.speed, disc_rise, chassis.effects)
+        power = ports.front.brake_torque * motion.omega_f + ports.rear.brake_torque * motion.omega_r
+        disc_rise = disc_rise_after(disc_rise, power, step)
         motion, x = coupled_step(
-            motion, x, ports, pressure, next_pressure, step, standing, held, chassis, tyre, road
+            motion, x, ports, acting, next_acting, step, standing, held, chassis, tyre, road
         )
         scale_f, scale_r = ports.front.abs_scale, ports.rear.abs_scale
         if not standing and motion.speed <= wheels.stop_speed:

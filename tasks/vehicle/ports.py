@@ -17,6 +17,7 @@ from tasks.vehicle.effects.chassis import (
     effective_friction,
     footprint,
     grip_reserve,
+    grip_share,
     link_lift,
     stick_share,
 )
@@ -220,7 +221,7 @@ def rolling_axle(
     speed : [m/s]
     omega : wheel speed [rad/s]
     suspension_force : [N]
-    pressure : brake pressure [MPa]
+    pressure : brake pressure as it acts [MPa]
     scale : ABS scale one step before, from which its rate is limited [1]
     step : [s]
     static_load, stiffness : of the tyre [N, N/m]
@@ -228,13 +229,16 @@ def rolling_axle(
     """
     wheels, effects = chassis.wheels, chassis.effects
     slip = signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
-    tyre_force = signed_friction(slip, stick_share(speed, effects), tyre, effects) * ground.load
+    grip = grip_share(speed, ground.load / static_load, effects)
+    tyre_force = signed_friction(slip, stick_share(speed, effects), tyre, effects) * grip * ground.load
     wanted = abs_command(slip, tyre.target_slip, wheels.release_width) if speed >= effects.abs_cutoff else 1.0
     abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
     turning = lock_share(omega, chassis.lock_speed)
-    brake_torque = axle.brake_gain * pressure * abs_scale * turning
+    rubbing = effects.pad_drag / (wheels.front.brake_gain + wheels.rear.brake_gain)
+    brake_torque = axle.brake_gain * (pressure * abs_scale + rubbing) * turning
     lever = wheels.radius - effects.radius_by_load * (ground.load - static_load) / stiffness
-    offset = effects.rolling_coefficient * turning - effects.slope_moment * ground.slope
+    rolling = effects.rolling_coefficient + effects.rolling_speed * speed
+    offset = rolling * turning - effects.slope_moment * ground.slope
     ground_moment = ground.load * lever * offset
     return AxlePorts(
         ground, slip, tyre_force, abs_scale, brake_torque, suspension_force, lever, ground_moment

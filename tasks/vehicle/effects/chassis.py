@@ -5,13 +5,13 @@ of effects has too mean the same there.
 """
 
 from collections.abc import Mapping
-from math import sqrt
+from math import sqrt, tanh
 from typing import NamedTuple
 
 from numba import njit
 
 from tasks.errors import InputError
-from tasks.vehicle.effects.ports import AIR_DENSITY
+from tasks.vehicle.effects.ports import AIR_DENSITY, COULOMB_SPEED
 from tasks.vehicle.road import RoadFeature, height_at, slope_at
 from tasks.vehicle.tyre import TyreCurve, tyre_friction, tyre_slope
 
@@ -39,6 +39,19 @@ class ChassisEffects(NamedTuple):
     stick_ratio : friction of a tyre that sticks and slides instead of rolling, over its peak [1]
     stick_below, stick_above : all of the tyre does so below the one speed, none above the other [m/s]
     stick_anti_dive, stick_anti_lift : what anti_dive and anti_lift gain in that state [1]
+    wind_speed : of the wind against the vehicle, on its drag area [m/s]
+    rolling_speed : rise of the rolling-resistance coefficient with speed [s/m]
+    creep_force, creep_speed : drive of an idling engine at rest, and the speed at which it ends [N, m/s]
+    pad_drag : torque of pads that rub, shared as the brakes are [N m]
+    load_sensitivity : fall of the tyre's friction per relative rise of its load [1]
+    friction_speed : fall of the tyre's friction per speed [s/m]
+    coulomb_friction : dry friction of each axle's suspension [N]
+    stop_stiffness, stop_clearance : bump stop of each axle, and the bump travel before it [N/m, m]
+    dead_time, lag : of the brake line, from command to pads [s]
+    push_out : pressure that the pads' return takes [MPa]
+    pressure_curve : rise of the torque per pressure with pressure [1/MPa]
+    pad_speed, pad_speed_reference : fall of pad friction with speed, and the speed at which it is nominal [s/m, m/s]
+    fade : fall of pad friction per 100 K of the discs above ambient [1]
     """
 
     drag_area: float = 0.0
@@ -58,6 +71,23 @@ class ChassisEffects(NamedTuple):
     stick_above: float = 0.0
     stick_anti_dive: float = 0.0
     stick_anti_lift: float = 0.0
+    wind_speed: float = 0.0
+    rolling_speed: float = 0.0
+    creep_force: float = 0.0
+    creep_speed: float = 0.0
+    pad_drag: float = 0.0
+    load_sensitivity: float = 0.0
+    friction_speed: float = 0.0
+    coulomb_friction: float = 0.0
+    stop_stiffness: float = 0.0
+    stop_clearance: float = 0.0
+    dead_time: float = 0.0
+    lag: float = 0.0
+    push_out: float = 0.0
+    pressure_curve: float = 0.0
+    pad_speed: float = 0.0
+    pad_speed_reference: float = 0.0
+    fade: float = 0.0
 
 
 EFFECT_UNITS = {
@@ -65,7 +95,10 @@ EFFECT_UNITS = {
     "damper_asymmetry": "1", "progressive_rate": "N m-3", "scrub_stiffness": "1", "anti_dive": "1",
     "anti_lift": "1", "enveloping_length": "m", "tyre_damping": "N s m-1",
     "abs_cutoff": "m s-1", "stick_ratio": "1", "stick_below": "m s-1", "stick_above": "m s-1",
-    "stick_anti_dive": "1", "stick_anti_lift": "1",
+    "stick_anti_dive": "1", "stick_anti_lift": "1", "wind_speed": "m s-1", "rolling_speed": "s m-1",
+    "creep_force": "N", "creep_speed": "m s-1", "pad_drag": "N m", "load_sensitivity": "1", "friction_speed": "s m-1",
+    "coulomb_friction": "N", "stop_stiffness": "N m-1", "stop_clearance": "m", "dead_time": "s", "lag": "s",
+    "push_out": "MPa", "pressure_curve": "MPa-1", "pad_speed": "s m-1", "pad_speed_reference": "m s-1", "fade": "1",
 }  # fmt: skip
 """Unit of each number, as catalogue files write it."""
 
@@ -82,6 +115,20 @@ CHASSIS_EFFECTS = {
     "anti-dive and anti-lift": ("anti_dive", "anti_lift"),
     "ABS cut-off": ("abs_cutoff",),
     "sticking tyre": ("stick_ratio", "stick_below", "stick_above", "stick_anti_dive", "stick_anti_lift"),
+    "wind": ("wind_speed",),
+    "rolling resistance by speed": ("rolling_speed",),
+    "idle creep": ("creep_force", "creep_speed"),
+    "pad drag": ("pad_drag",),
+    "load sensitivity": ("load_sensitivity",),
+    "tyre friction by speed": ("friction_speed",),
+    "suspension friction": ("coulomb_friction",),
+    "bump stop": ("stop_stiffness", "stop_clearance"),
+    "brake dead time": ("dead_time",),
+    "brake lag": ("lag",),
+    "push-out pressure": ("push_out",),
+    "pressure curve": ("pressure_curve",),
+    "pad friction by speed": ("pad_speed", "pad_speed_reference"),
+    "brake fade": ("fade",),
 }
 """The effects, and the numbers of each."""
 
@@ -109,14 +156,32 @@ def chassis_effects(values: Mapping[str, float]) -> ChassisEffects:
 
 @njit(cache=True, nogil=True)
 def air_drag(speed: float, effects: ChassisEffects) -> float:
-    """Force of the air against the motion [N].
+    """Force of the air against the motion, less what an idling engine drives with [N].
 
     Parameters
     ----------
     speed : [m/s]
     effects : the numbers
     """
-    return 0.5 * AIR_DENSITY * effects.drag_area * speed * abs(speed)
+    air = speed + effects.wind_speed
+    force = 0.5 * AIR_DENSITY * effects.drag_area * air * abs(air)
+    if speed < effects.creep_speed:
+        force -= effects.creep_force * (1.0 - speed / effects.creep_speed)
+    return force
+
+
+@njit(cache=True, nogil=True)
+def grip_share(speed: float, load_ratio: float, effects: ChassisEffects) -> float:
+    """Tyre friction as a factor of its nominal: falls with speed and with load [1].
+
+    Parameters
+    ----------
+    speed : [m/s]
+    load_ratio : contact load over that at rest [1]
+    effects : the numbers
+    """
+    by_load = 1.0 - effects.load_sensitivity * (load_ratio - 1.0)
+    return max(by_load * (1.0 - effects.friction_speed * speed), 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -205,9 +270,14 @@ def added_strut_force(travel: float, rate: float, damping: float, effects: Chass
     damping : nominal [N s/m]
     effects : the numbers
     """
-    return (
+    force = (
         effects.damper_asymmetry * damping * abs(rate) + effects.progressive_rate * travel * travel * travel
     )
+    if effects.coulomb_friction != 0.0:
+        force += effects.coulomb_friction * tanh(rate / COULOMB_SPEED)
+    if -travel > effects.stop_clearance:
+        force += effects.stop_stiffness * (travel + effects.stop_clearance)
+    return force
 
 
 @njit(cache=True, nogil=True)

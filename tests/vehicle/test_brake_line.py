@@ -1,0 +1,94 @@
+"""What lies between command and pads, and the other numbers that a grown vehicle brings into coupled mode."""
+
+from dataclasses import replace
+from math import exp
+
+import numpy as np
+import pytest
+
+from tasks.vehicle.effects.brake_line import DISC_COOLING, acting_pressure, disc_rise_after, line_after
+from tasks.vehicle.effects.chassis import ChassisEffects, added_strut_force, air_drag, grip_share
+from tests.vehicle.conftest import command
+
+STOP = command(1.5)
+
+
+@pytest.fixture
+def coupled(drive, vehicle):
+    def run(effects=None, **scenario):
+        return drive(mode="coupled", car=replace(vehicle, effects=effects or {}), **scenario).columns
+
+    return run
+
+
+def test_with_no_numbers_the_acting_pressure_is_the_commanded_one():
+    assert acting_pressure(2.345, 17.0, 300.0, ChassisEffects()) == 2.345
+    assert line_after(1.0, 2.345, 5e-4, ChassisEffects()) == 2.345
+    assert grip_share(30.0, 1.4, ChassisEffects()) == 1.0
+
+
+def test_each_number_of_the_line_does_what_it_says():
+    assert acting_pressure(2.0, 20.0, 0.0, ChassisEffects(push_out=0.1)) == pytest.approx(1.9)
+    assert acting_pressure(2.0, 20.0, 200.0, ChassisEffects(fade=0.06)) == pytest.approx(2.0 * 0.88)
+    assert acting_pressure(2.0, 20.0, 0.0, ChassisEffects(pressure_curve=0.04)) == pytest.approx(2.16)
+    pads = ChassisEffects(pad_speed=0.006, pad_speed_reference=15.0)
+    assert acting_pressure(2.0, 20.0, 0.0, pads) == pytest.approx(2.0 * 0.97)
+    assert line_after(0.0, 1.0, 0.1, ChassisEffects(lag=0.1)) == pytest.approx(1.0 - exp(-1.0))
+
+
+def test_discs_take_the_heat_and_give_it_to_the_air():
+    assert disc_rise_after(0.0, 12000.0, 1.0) == pytest.approx(1.0)
+    assert disc_rise_after(50.0, 50.0 * DISC_COOLING, 1.0) == 50.0
+
+
+def test_a_lag_and_a_dead_time_delay_the_torque_by_as_much(coupled):
+    def reached(effects):
+        columns = coupled(effects, brake=STOP, duration=2.5)
+        torque = columns["brake_torque_f"]
+        return np.flatnonzero(torque > 0.5 * torque.max())[0] * 1e-3
+
+    plain = reached({})
+    assert reached({"dead_time": 0.06}) - plain == pytest.approx(0.06, abs=0.002)
+    assert 0.02 < reached({"lag": 0.05}) - plain < 0.06
+
+
+def test_fade_lengthens_a_stop_and_leaves_coasting_as_it_is(coupled):
+    plain, faded = (
+        coupled(effects, brake=STOP, duration=3.5, speed_km_h=100) for effects in ({}, {"fade": 0.5})
+    )
+    assert faded["speed"][-1] > plain["speed"][-1] + 0.1
+    coast = command(0.0, onset=None)
+    still = [coupled(effects, brake=coast, duration=1.0)["speed"] for effects in ({}, {"fade": 0.5})]
+    assert np.array_equal(*still)
+
+
+def test_wind_creep_rubbing_pads_and_rolling_by_speed_change_coasting_by_their_force(coupled, vehicle):
+    coast = command(0.0, onset=None)
+    turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
+    plain = coupled(brake=coast, duration=0.6)
+    v, a = plain["speed"][500], plain["longitudinal_acceleration"][500]
+    weight = vehicle.mass * vehicle.gravity
+    for effects, force in (
+        ({"pad_drag": 40.0}, 40.0 / vehicle.wheel_radius),
+        ({"rolling_speed": 0.0006}, 0.0006 * v * weight),
+        ({"creep_force": 500.0, "creep_speed": 40.0}, -500.0 * (1.0 - v / 40.0)),
+    ):
+        got = (a - coupled(effects, brake=coast, duration=0.6)["longitudinal_acceleration"][500]) * (
+            vehicle.mass + turning
+        )
+        assert got == pytest.approx(force, rel=0.02), effects
+    assert air_drag(10.0, ChassisEffects(drag_area=1.0, wind_speed=-10.0)) == 0.0
+
+
+def test_struts_meet_friction_and_a_stop():
+    dry = ChassisEffects(coulomb_friction=80.0)
+    assert added_strut_force(0.0, 0.5, 0.0, dry) == pytest.approx(80.0)
+    assert added_strut_force(0.0, -0.5, 0.0, dry) == pytest.approx(-80.0)
+    stop = ChassisEffects(stop_stiffness=1e5, stop_clearance=0.04)
+    assert added_strut_force(-0.03, 0.0, 0.0, stop) == 0.0
+    assert added_strut_force(-0.05, 0.0, 0.0, stop) == pytest.approx(-1000.0)
+
+
+def test_friction_falls_with_speed_and_load():
+    effects = ChassisEffects(friction_speed=0.01, load_sensitivity=0.15)
+    assert grip_share(20.0, 1.2, effects) == pytest.approx(0.8 * 0.97)
