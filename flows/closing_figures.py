@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.closure.evidence import RunEvidence
-from tasks.closure.fit import compose
 from tasks.closure.forms import Leftover, curve, form_hypotheses, scan
 from tasks.closure.forward import CONSTANTS, N_STATES, RunModel, predict, roll
+from tasks.closure.hypothesis import compose
 from tasks.closure.search import Found
 from tasks.closure.verdict import Trace
 from tasks.vehicle.effects.library import ALL_PARAMETERS

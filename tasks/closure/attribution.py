@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.closure.campaign import SESSION
-from tasks.closure.fit import Fit, Hypothesis, fall, fit, library_hypothesis, misfit_by_run
+from tasks.closure.fit import Fit, fall, fit, misfit_by_run
+from tasks.closure.hypothesis import Hypothesis, library_hypothesis
 from tasks.closure.screening import Evidence, inflation, look_alikes, screen
 
 ACCEPT_SCORE = 25.0

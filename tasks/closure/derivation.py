@@ -9,8 +9,9 @@ from scipy.linalg import cholesky, solve_triangular
 from tasks.closure.campaign import Campaign, Tolerances
 from tasks.closure.disturbance import Disturbance, prior_precision
 from tasks.closure.evidence import RunEvidence, run_evidence, with_disturbance
-from tasks.closure.fit import Fit, compose
+from tasks.closure.fit import Fit
 from tasks.closure.forward import SUBSTEPS, RunModel, predict, run_model
+from tasks.closure.hypothesis import compose
 from tasks.closure.noise import channel_noise, whiten
 from tasks.closure.screening import Evidence
 from tasks.surface.state import SurfaceParameters

@@ -6,8 +6,9 @@ import numpy as np
 
 from tasks.closure.drives import EXPERIMENTS, planned_run
 from tasks.closure.evidence import run_evidence
-from tasks.closure.fit import Fit, compose
+from tasks.closure.fit import Fit
 from tasks.closure.forward import predict, run_model
+from tasks.closure.hypothesis import compose
 from tasks.closure.noise import whiten
 from tasks.closure.screening import Evidence
 from tasks.surface.state import SurfaceParameters

@@ -1,6 +1,5 @@
 """Fitting a hypothesis through the simulation: Gauss-Newton with every nuisance integrated out."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +7,7 @@ from numpy.typing import NDArray
 
 from tasks.closure.campaign import SESSION
 from tasks.closure.evidence import SESSION_INDEX, RunEvidence
-from tasks.closure.forward import Slot
-from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
-
-Build = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], tuple[Slot, ...]]]
+from tasks.closure.hypothesis import Hypothesis, compose
 
 SETTLING = 4
 """Moves of a run's point of linearisation before its misfit is taken."""
@@ -19,33 +15,6 @@ HELD = 1e18
 """Prior precision that holds a nuisance at 0."""
 SLACK = 1.0
 """Rise of a run's misfit that is taken for rounding when its point of linearisation moves."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Hypothesis:
-    """What may be added to the model: parameters and how they enter.
-
-    Parameters
-    ----------
-    name : label
-    effect_class : effect, retune, sensor or form
-    port, variable : where it enters and what it depends on
-    names, units : of the parameters
-    lower, upper, step, start : float64 [K] bounds, finite-difference step and first value
-    build : parameters to full theta (float64) and slots
-    """
-
-    name: str
-    effect_class: str
-    port: str
-    variable: str
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
-    step: NDArray[np.float64]
-    start: NDArray[np.float64]
-    build: Build
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,49 +55,6 @@ class Fit:
         margin = 1e-6 * (upper - lower)
         touching = (self.values <= lower + margin) | (self.values >= upper - margin)
         return bool(np.any(touching & (first.astype(bool) | (self.values != 0.0))))
-
-
-def library_hypothesis(effect: Effect, start: float | None = None) -> Hypothesis:
-    """A library effect as a hypothesis; ``start`` replaces the first parameter's first value."""
-    indices = [p.index for p in effect.parameters]
-
-    def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
-        theta = np.zeros(len(ALL_PARAMETERS))
-        theta[indices] = values
-        return theta, ()
-
-    first = effect.parameters[0]
-    begin = np.array([p.start for p in effect.parameters])
-    begin[0] = min(max(first.step if start is None else start, first.lower), first.upper)
-    return Hypothesis(
-        name=effect.name,
-        effect_class=effect.effect_class,
-        port=effect.port,
-        variable=effect.variable,
-        names=tuple(p.name for p in effect.parameters),
-        units=tuple(p.unit for p in effect.parameters),
-        lower=np.array([p.lower for p in effect.parameters]),
-        upper=np.array([p.upper for p in effect.parameters]),
-        step=np.array([p.step for p in effect.parameters]),
-        start=begin,
-        build=build,
-    )
-
-
-def compose(
-    parts: tuple[Hypothesis, ...], values: NDArray[np.float64], session: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
-    """Full theta and slots of all parts together with the session's nuisances."""
-    theta = np.zeros(len(ALL_PARAMETERS))
-    theta[list(SESSION_INDEX)] += session
-    slots: tuple[Slot, ...] = ()
-    at = 0
-    for part in parts:
-        added, more = part.build(values[at : at + len(part.names)])
-        theta += added
-        slots += more
-        at += len(part.names)
-    return theta, slots
 
 
 def fit(

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.closure.evidence import RunEvidence
-from tasks.closure.fit import Fit, Hypothesis, compose
+from tasks.closure.fit import Fit
 from tasks.closure.forward import Slot, instruments, roll
+from tasks.closure.hypothesis import Hypothesis, compose
 from tasks.closure.noise import whiten
 from tasks.closure.screening import Evidence, inflation
 from tasks.vehicle.effects.library import ALL_PARAMETERS

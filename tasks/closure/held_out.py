@@ -4,8 +4,9 @@ import numpy as np
 
 from tasks.closure.answer import ChannelError
 from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.closure.fit import Fit, compose, fit
+from tasks.closure.fit import Fit, fit
 from tasks.closure.forward import predict
+from tasks.closure.hypothesis import compose
 from tasks.closure.screening import Evidence
 from tasks.vehicle.effects.library import ALL_PARAMETERS
 

@@ -17,8 +17,9 @@ from tasks.closure.attribution import (
 from tasks.closure.campaign import SESSION
 from tasks.closure.derivation import fit_disturbance, rederived, rescaled, whitened_residuals
 from tasks.closure.disturbance import Disturbance
-from tasks.closure.fit import Fit, fall, fit, library_hypothesis, misfit_by_run
+from tasks.closure.fit import Fit, fall, fit, misfit_by_run
 from tasks.closure.forms import form_hypotheses, scan
+from tasks.closure.hypothesis import library_hypothesis
 from tasks.closure.screening import Evidence
 
 MAX_EFFECTS = 3
@@ -216,7 +217,13 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
             log_n = float(np.log(state.evidence.samples))
             extra = len(alone.hypothesis.names) - sum(len(r.accepted.hypothesis.names) for r in state.rounds)
             ahead = (alone.gain - sum(r.accepted.gain for r in state.rounds)) / common - extra * log_n
-        if alone is not None and ahead > RIVAL_SPAN:
+        first = state.rounds[0].accepted.hypothesis
+        # a form of the same variable at the same port is the named effect in another dress, not an unknown one
+        dressed = alone is not None and (alone.hypothesis.port, alone.hypothesis.variable) == (
+            first.port,
+            first.variable,
+        )
+        if alone is not None and ahead > RIVAL_SPAN and not dressed:
             reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
             state = Found(
                 evidence=null.evidence,
@@ -224,8 +231,8 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
                 rounds=(Round(base=null.base, tried=(), accepted=alone),),
             )
         elif alone is not None and ahead > -RIVAL_SPAN:
-            elsewhere = alone.hypothesis.port != state.rounds[0].accepted.hypothesis.port
-            near = alone if elsewhere or torn else None
+            elsewhere = alone.hypothesis.port != first.port
+            near = alone if elsewhere or torn or ahead > RIVAL_SPAN else None
     if left is not None and over and state is start and len(state.rounds) < MAX_EFFECTS:
         reasons.append(f"something is left over: {left.hypothesis.name}")
         state = replace(

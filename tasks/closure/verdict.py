@@ -10,8 +10,9 @@ from tasks.closure.attribution import RIVAL_SPAN
 from tasks.closure.campaign import CHANNELS, SESSION, Campaign
 from tasks.closure.derivation import prepare
 from tasks.closure.experiment import next_experiment
-from tasks.closure.fit import compose, fit
+from tasks.closure.fit import fit
 from tasks.closure.held_out import held_out_error
+from tasks.closure.hypothesis import compose
 from tasks.closure.rivals import Compared, compare, detectable
 from tasks.closure.search import Found, search_all
 from tasks.surface.state import SurfaceParameters

@@ -16,8 +16,9 @@ from tasks.closure.disturbance import Disturbance
 from tasks.closure.drives import EXPERIMENTS, RICH, planned_run
 from tasks.closure.evidence import run_evidence
 from tasks.closure.experiment import next_experiment
-from tasks.closure.fit import fall, fit, library_hypothesis
+from tasks.closure.fit import fall, fit
 from tasks.closure.forward import run_model
+from tasks.closure.hypothesis import library_hypothesis
 from tasks.closure.screening import Evidence, look_alikes
 from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
 
