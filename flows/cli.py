@@ -121,6 +121,23 @@ def preview(
     _show(_call("preview", False, dataset, out, clips=clip, traces=traces), as_json)
 
 
+@app.command("replay-audit")
+def replay_audit(
+    grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")] = "severity",
+    seeds: Annotated[int, typer.Option(help="Visual seeds a scenario.")] = 3,
+    frames: Annotated[int, typer.Option(help="Frames drawn a run.")] = 2,
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Prove that visual seeds move the weather in the picture and nothing in the motion."""
+    result = _call("replay_audit", prefect, grid, seeds=seeds, frames=frames, out=out)
+    brief = {key: value for key, value in result.items() if key != "largest_difference"}
+    _show(result if as_json else brief, as_json)
+    if not result["verified"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
 @app.command()
 def validate(grid: Annotated[str, typer.Argument()], as_json: Json = False) -> None:
     """Check a grid without making anything."""

@@ -65,12 +65,16 @@ class Catalogue:
 @lru_cache(maxsize=2)
 def catalogue_of(root: Path) -> Catalogue:
     """Load a dataset's frozen inputs and its scene."""
-    inputs = Layout(root).inputs
+    return load_catalogue(Layout(root).inputs, read_plan(root).settings.scene)
+
+
+def load_catalogue(inputs: Path, scene: str) -> Catalogue:
+    """Load frozen inputs from their folder, and a scene."""
     return Catalogue(
         vehicle=load_vehicle(inputs / "vehicle.yaml"),
         surface=load_surface(inputs / "surface.yaml"),
         camera=load_camera(inputs / "camera.yaml"),
-        scene=load_scene(read_plan(root).settings.scene),
+        scene=load_scene(scene),
         looks=load_weather(inputs / "weather"),
         gates=load_gates(inputs / "gates.yaml"),
     )

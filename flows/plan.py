@@ -93,6 +93,11 @@ def make_plan(source: str | Path, backend: str, vehicle: str | None = None) -> t
     grid = load_grid(source)
     if vehicle is not None:
         grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
+    return freeze_grid(grid, str(source), backend)
+
+
+def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, bytes]]:
+    """`make_plan` of a grid that is already read; ``source`` is what messages call it."""
     settings = grid.settings
     inputs: dict[str, bytes] = {}
     problems: list[str] = []

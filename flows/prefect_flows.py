@@ -36,6 +36,7 @@ from flows import importing as _importing  # noqa: E402
 from flows import previews as _previews  # noqa: E402
 from flows import protocol as _protocol  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
+from flows import replay as _replay  # noqa: E402
 from flows import scenes as _scenes  # noqa: E402
 from flows import stop_study as _stop_study  # noqa: E402
 from flows import studies as _studies  # noqa: E402
@@ -52,6 +53,7 @@ generate = as_flow(_generate.generate)
 audit = as_flow(_audit.audit)
 describe = as_flow(_describe.describe)
 validate = as_flow(_describe.validate)
+replay_audit = as_flow(_replay.replay_audit)
 preview = as_flow(_previews.preview)
 sensitivity = as_flow(_studies.sensitivity)
 agreement = as_flow(_studies.agreement)

@@ -1,0 +1,57 @@
+"""The replay audit: a seed that reaches the motion, or a picture that ignores it, is named."""
+
+from dataclasses import replace
+
+import pytest
+
+from catalogs.scenes import write_scene
+from flows import replay
+from flows.clip import drive, picture
+from tasks.errors import InputError
+from tests.flows.test_pipeline import GRID
+from tests.toy_street import TOY_CAMERA, toy_street
+
+
+@pytest.fixture(scope="module")
+def grid(tmp_path_factory) -> str:
+    folder = tmp_path_factory.mktemp("replay")
+    write_scene(toy_street(), folder / "scene", {})
+    (folder / "camera.yaml").write_text(TOY_CAMERA)
+    path = folder / "grid.yaml"
+    path.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=4))
+    return str(path)
+
+
+def test_seeds_move_the_snow_and_nothing_in_the_motion(grid, tmp_path):
+    result = replay.replay_audit(grid, seeds=2, out=str(tmp_path))
+    assert result["verified"] and result["problems"] == []
+    assert result["runs"] == 8
+    assert set(result["largest_difference"].values()) == {0.0}
+    assert {"speed", "pitch", "surface_friction", "T_world_rig"} <= set(result["largest_difference"])
+    assert (tmp_path / "replay.json").is_file()
+
+
+def test_a_seed_that_reaches_the_motion_is_named_by_channel(grid, monkeypatch):
+    calls = []
+
+    def leaking(*args):
+        facts, ride = drive(*args)
+        calls.append(1)
+        columns = ride.columns | {"heave": ride.columns["heave"] + 1e-9 * len(calls)}
+        return facts, replace(ride, columns=columns)
+
+    monkeypatch.setattr(replay, "drive", leaking)
+    result = replay.replay_audit(grid, seeds=2)
+    assert not result["verified"]
+    assert any(problem.startswith("heave differs by up to") for problem in result["problems"])
+
+
+def test_snow_that_ignores_the_seed_is_named(grid, monkeypatch):
+    monkeypatch.setattr(replay, "picture", lambda *args: picture(*args[:-1], 7))
+    result = replay.replay_audit(grid, seeds=2)
+    assert "snow-3/flat: 2 seeds gave 1 different pictures" in result["problems"]
+
+
+def test_one_seed_is_no_audit(grid):
+    with pytest.raises(InputError, match="seeds and frames must be at least 2"):
+        replay.replay_audit(grid, seeds=1)
