@@ -7,6 +7,7 @@ from typing import Any
 from flows import closing_figures as figures
 from tasks.closure.campaign import Campaign
 from tasks.closure.verdict import Trace
+from tasks.vehicle.effects.library import Effect
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 68rem; margin: 2rem auto; padding: 0 1rem; color: #1b1b1b; }
@@ -49,7 +50,10 @@ def report_html(trace: Trace, result: Mapping[str, Any], campaign: Campaign) -> 
         _section("Held-out runs", _image(figures.traces(trace))),
         _section("Pulls of the session", _image(figures.pulls(trace))),
         _section("Next experiment", _experiment(result["discriminating_experiment"])),
-        _section("What this campaign could show at all", _detectable(result["minimum_detectable"])),
+        _section(
+            "What this campaign could show at all",
+            _detectable(result["minimum_detectable"], trace.start.evidence.effects),
+        ),
         _section("Data and split, fixed before any fit", _data(result, campaign)),
     ]
     return (
@@ -178,9 +182,10 @@ def _experiment(plan: Mapping[str, Any] | None) -> str:
     )
 
 
-def _detectable(values: Mapping[str, float | None]) -> str:
+def _detectable(values: Mapping[str, float | None], effects: Sequence[Effect]) -> str:
+    rows = [(e.name, e.parameters[0].name, values[e.name], e.parameters[0].unit) for e in effects]
     return "<p>Smallest first parameter of each library effect that would pass the score.</p>" + _table(
-        ("effect", "smallest"), list(values.items())
+        ("effect", "parameter", "smallest", "unit"), rows
     )
 
 

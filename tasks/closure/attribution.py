@@ -150,7 +150,7 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
     return np.array(scores)
 
 
-def ladder(evidence: Evidence, base: Fit, count: int = REFINED) -> list[Candidate]:
+def ladder(evidence: Evidence, base: Fit, count: int = REFINED, *, alike: bool = True) -> list[Candidate]:
     """The best candidates to add to ``base``, refined and sorted by score, best first.
 
     Parameters
@@ -158,6 +158,7 @@ def ladder(evidence: Evidence, base: Fit, count: int = REFINED) -> list[Candidat
     evidence : the runs
     base : fit of what is accepted so far
     count : how many of the screening are refined
+    alike : refine what looks like the best of them too
     """
     gains, estimates = screen(evidence, base)
     held_out = misfit_by_run(evidence.held_out, base)
@@ -167,7 +168,7 @@ def ladder(evidence: Evidence, base: Fit, count: int = REFINED) -> list[Candidat
         return judge(evidence, base, held_out, library_hypothesis(evidence.effects[j], float(estimates[j])))
 
     candidates = [judged(j) for j in order]
-    if candidates:
+    if candidates and alike:
         best = max(range(len(order)), key=lambda i: candidates[i].score)
         if candidates[best].score > ACCEPT_SCORE:
             near = [j for j in look_alikes(evidence, order[best]) if j not in order and gains[j] > 0.0]

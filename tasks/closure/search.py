@@ -7,6 +7,7 @@ import numpy as np
 from tasks.closure.attribution import (
     ACCEPT_SCORE,
     HELD_OUT_GAIN,
+    REFINED,
     RIVAL_SPAN,
     Candidate,
     assess,
@@ -33,6 +34,8 @@ AT_ODDS = 2.0
 """Inflation of a named effect from which its runs are at odds about it, and a form alone is held against it."""
 NEAR = 0.1
 """Relative change of the parameters below which derivatives need not be taken anew once more."""
+EXPLORED = 3
+"""Candidates that are refined while only the disturbances are to be scaled: any that explains as much will do."""
 SETTLED = 2
 """Candidates of a round that are settled, if their gain is large."""
 
@@ -104,7 +107,8 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
     """
     state = start
     for _ in range(MAX_EFFECTS):
-        tried = ladder(state.evidence, state.base)
+        count = REFINED if gated else EXPLORED
+        tried = ladder(state.evidence, state.base, count, alike=gated)
         places: dict[str, Evidence] = {}
         for i, candidate in enumerate(tried[:SETTLED] if gated else tried[:1]):
             if candidate.score > max(ACCEPT_SCORE, 0.3 * tried[0].score):
