@@ -1,0 +1,62 @@
+"""Compiled kernels are kept by the source of all of them.
+
+Numba keeps a compiled kernel as long as the kernel's own file is unchanged. A kernel that calls one from another
+file would then go on running the other's old code after an update, in silence. So every state of the kernels'
+sources has a folder of its own.
+"""
+
+import hashlib
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+
+_IMPORT = re.compile(r"^\s*from (tasks[\w.]*) import", re.MULTILINE)
+
+KEPT = 4
+"""States of the sources whose kernels stay on disk."""
+
+
+def place_kernel_cache() -> None:
+    """Point Numba at the folder of the present sources, unless the user has chosen one (NUMBA_CACHE_DIR)."""
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = Path(os.environ.get("MUSYNC_CACHE", home / "musync")) / "kernels" / sources_hash()
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    if "numba" in sys.modules:
+        from numba.core import config
+
+        config.CACHE_DIR = str(folder)
+    if not folder.is_dir():
+        _forget_old(folder.parent)
+
+
+def sources_hash(package: Path = Path(__file__).parent) -> str:
+    """SHA-256, shortened, over every file with a kernel and all that these import: called kernels and constants."""
+    waiting = [
+        path for path in package.rglob("*.py") if b"njit" in path.read_bytes() and path != Path(__file__)
+    ]
+    sources: dict[str, bytes] = {}
+    while waiting:
+        path = waiting.pop()
+        name = path.relative_to(package).as_posix()
+        if name in sources:
+            continue
+        sources[name] = path.read_bytes()
+        for module in _IMPORT.findall(sources[name].decode()):
+            stem = package.parent.joinpath(*module.split("."))
+            waiting += [file for file in (stem.with_suffix(".py"), stem / "__init__.py") if file.is_file()]
+    digest = hashlib.sha256()
+    for name in sorted(sources):
+        digest.update(f"{name} {len(sources[name])}\n".encode() + sources[name])
+    return digest.hexdigest()[:16]
+
+
+def _forget_old(folder: Path) -> None:
+    """Remove all but the latest states; one that another process still writes to comes back by itself."""
+    if folder.is_dir():
+        states = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
+        for state in states[: -KEPT + 1]:
+            shutil.rmtree(state, ignore_errors=True)

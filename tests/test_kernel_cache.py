@@ -1,0 +1,77 @@
+"""A compiled kernel never outlives the source of anything it calls."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from manifests.provenance import SOURCE_ROOT
+from tasks.kernel_cache import KEPT, sources_hash
+
+CALLED = """
+from numba import njit
+from tasks.level import LEVEL
+
+@njit(cache=True)
+def height(x):
+    return x + {}
+"""
+CALLING = """
+from numba import njit
+from tasks.called import height
+
+@njit(cache=True)
+def twice(x):
+    return 2.0 * height(x)
+"""
+
+
+@pytest.fixture
+def package(tmp_path) -> Path:
+    """A copy of the rule with two kernels, one calling the other."""
+    folder = tmp_path / "tasks"
+    folder.mkdir()
+    for name in ("__init__.py", "kernel_cache.py"):
+        (folder / name).write_bytes((SOURCE_ROOT / "tasks" / name).read_bytes())
+    (folder / "level.py").write_text("LEVEL = 1.0\n")
+    (folder / "called.py").write_text(CALLED.format("LEVEL"))
+    (folder / "calling.py").write_text(CALLING)
+    return folder
+
+
+def result(package: Path) -> float:
+    env = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    env |= {"MUSYNC_CACHE": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
+    done = subprocess.run(
+        [sys.executable, "-c", "from tasks.calling import twice; print(twice(3.0))"],
+        cwd=package.parent,
+        env=env,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return float(done.stdout)
+
+
+def test_a_change_in_a_called_file_or_a_constant_reaches_the_caller(package):
+    assert result(package) == 8.0
+    assert result(package) == 8.0
+    (package / "called.py").write_text(CALLED.format("2 * LEVEL"))
+    assert result(package) == 10.0
+    (package / "level.py").write_text("LEVEL = 5.0\n")
+    assert result(package) == 26.0
+
+
+def test_a_file_without_kernels_changes_nothing(package):
+    before = sources_hash(package)
+    (package / "prose.py").write_text("TEXT = 'words'\n")
+    assert sources_hash(package) == before
+
+
+def test_old_states_are_forgotten(package):
+    for offset in range(KEPT + 3):
+        (package / "level.py").write_text(f"LEVEL = {offset}.0\n")
+        result(package)
+    assert len(list((package.parent / "cache" / "kernels").iterdir())) == KEPT
