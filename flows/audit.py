@@ -11,8 +11,9 @@ from flows.generate import create_frame_arrays, fan_out
 from flows.orchestration import stage
 from flows.plan import Plan, read_plan
 from flows.runner import RunnerName
-from flows.store.frames import ARRAYS, read_clip
+from flows.store.frames import LABEL_ARRAYS, arrays_of, read_clip
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_json
+from flows.store.lock import sole_writer
 from flows.store.telemetry import read_columns
 from manifests.canonical import sha256_of
 from manifests.compare import first_pixel_difference, first_row_difference
@@ -22,6 +23,7 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 
 STAGE_OF = {"ticks": "vehicle", "frames": "frames", "rgb": "render", "depth": "render", "class": "render"}
+STAGE_OF |= dict.fromkeys(LABEL_ARRAYS, "render")
 
 
 def audit(
@@ -117,7 +119,8 @@ def remake_and_compare(
         plan = read_plan(remade.root)
         create_frame_arrays(remade, plan)
         indices = sorted((clip["index"] for clip in chosen), reverse=True)
-        fan_out(remade, plan, indices, runner, workers, scheduler)
+        with sole_writer(remade):  # what holds no lock is a left-over of a killed audit
+            fan_out(remade, plan, indices, runner, workers, scheduler)
         return [
             difference
             for clip in chosen
@@ -142,7 +145,11 @@ def _first_difference(
 ) -> dict[str, Any] | None:
     clip_id, index = clip["clip_id"], clip["index"]
     new = read_json(remade.receipt(clip_id))["content"]
-    changed = [name for name in (*STAGED_TABLES, *ARRAYS) if new[name] != clip["content"][name]]
+    changed = [
+        name
+        for name in (*STAGED_TABLES, *arrays_of(plan.settings.labels))
+        if new[name] != clip["content"][name]
+    ]
     if not changed:
         return None
     first = changed[0]

@@ -84,6 +84,48 @@ def audit(
 
 
 @app.command()
+def verify(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Verify every hash of a dataset and the seal of its manifest; make nothing."""
+    result = _call("verify", prefect, dataset, out=out)
+    _show(result, as_json)
+    if not result["verified"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def repair(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Out = None,
+    runner: Runner = "dask",
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Make again what is broken or missing in a dataset; only the recorded bytes are put in place."""
+    result = _call("repair", prefect, dataset, out=out, runner=runner, workers=workers, scheduler=scheduler)
+    _show(result, as_json)
+    if not result["repaired"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def gc(
+    dataset: Annotated[str, typer.Argument(help="A dataset folder, finished or not.")],
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Name the left-overs and leave them.")] = False,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Remove what killed runs left in a dataset and beside it; committed clips stay."""
+    _show(_call("gc", prefect, dataset, dry_run=dry_run), as_json)
+
+
+@app.command()
 def diff(
     a: Annotated[str, typer.Argument(help="A finished dataset folder.")],
     b: Annotated[str, typer.Argument(help="Another, of the same scenarios.")],
@@ -421,7 +463,8 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
     from importlib import import_module
 
     module = {
-        "generate": "generate", "audit": "audit", "describe": "describe", "validate": "describe",
+        "generate": "generate", "audit": "audit", "verify": "verify", "gc": "verify", "repair": "repair",
+        "describe": "describe", "validate": "describe",
         "preview": "previews", "replay_audit": "replay",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
         "calibrate": "calibration",

@@ -1,8 +1,8 @@
 """From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -101,17 +101,11 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
     settings = grid.settings
     inputs: dict[str, bytes] = {}
     problems: list[str] = []
-    for name, lookup, entry in (
-        ("vehicle.yaml", vehicle_source, settings.vehicle),
-        ("surface.yaml", surface_source, settings.surface),
-        ("camera.yaml", camera_source, settings.camera),
-    ):
+    for name, lookup in input_sources(settings).items():
         try:
-            inputs[name] = lookup(entry).read_bytes()
+            inputs[name] = lookup().read_bytes()
         except InputError as error:
             problems += error.problems
-    inputs["gates.yaml"] = GATES.read_bytes()
-    inputs |= {f"weather/{path.name}": path.read_bytes() for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
     try:
         scene = {"name": settings.scene, "sha256": scene_identity(settings.scene)}
         problems += _route_problems(grid)
@@ -149,6 +143,18 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         clips=clips,
     )
     return plan, inputs
+
+
+def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
+    """The catalogue files that a grid stands on: name under ``inputs/`` to what finds it."""
+    weather = {f"weather/{path.name}": path for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
+    return {
+        "vehicle.yaml": partial(vehicle_source, settings.vehicle),
+        "surface.yaml": partial(surface_source, settings.surface),
+        "camera.yaml": partial(camera_source, settings.camera),
+        "gates.yaml": lambda: GATES,
+        **{name: partial(Path, path) for name, path in weather.items()},
+    }
 
 
 @lru_cache(maxsize=4)

@@ -36,10 +36,12 @@ from flows import importing as _importing  # noqa: E402
 from flows import previews as _previews  # noqa: E402
 from flows import protocol as _protocol  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
+from flows import repair as _repair  # noqa: E402
 from flows import replay as _replay  # noqa: E402
 from flows import scenes as _scenes  # noqa: E402
 from flows import stop_study as _stop_study  # noqa: E402
 from flows import studies as _studies  # noqa: E402
+from flows import verify as _verify  # noqa: E402
 
 
 def as_flow(function: Callable[..., Any]) -> Any:
@@ -51,6 +53,9 @@ def as_flow(function: Callable[..., Any]) -> Any:
 
 generate = as_flow(_generate.generate)
 audit = as_flow(_audit.audit)
+verify = as_flow(_verify.verify)
+repair = as_flow(_repair.repair)
+gc = as_flow(_verify.gc)
 describe = as_flow(_describe.describe)
 validate = as_flow(_describe.validate)
 replay_audit = as_flow(_replay.replay_audit)

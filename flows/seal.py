@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,15 @@ PREVIEW_CLIPS = 24
 def seal(layout: Layout, plan: Plan) -> None:
     """Gather the staged tables, draw the contact sheet, and freeze the manifest last."""
     receipts = [read_json(layout.receipt(clip.clip_id)) for clip in plan.clips]
-    tables = [path for table in STAGED_TABLES for path in _gather(layout, plan, table)]
-    write_parquet(_clips_table(receipts), layout.telemetry / "clips.parquet")
-    write_atomically(layout.previews / "contact_sheet.png", _preview(layout, plan, receipts))
+    tables = [
+        write_part(layout, table, path, clip_ids)
+        for table in STAGED_TABLES
+        for path, clip_ids in table_parts(plan, table).items()
+    ]
+    write_parquet(clips_table(receipts), layout.telemetry / "clips.parquet")
+    write_atomically(
+        layout.previews / "contact_sheet.png", preview_sheet(layout, layout.frames, plan, receipts)
+    )
     shared = [
         *tables,
         layout.telemetry / "clips.parquet",
@@ -41,25 +48,28 @@ def seal(layout: Layout, plan: Plan) -> None:
     shutil.rmtree(layout.staging)
 
 
-def _gather(layout: Layout, plan: Plan, table: str) -> list[Any]:
-    """Staged tables of one kind into one file per weather and hundred clips, in plan order."""
-    written = []
+def table_parts(plan: Plan, table: str) -> dict[str, list[str]]:
+    """The files of one kind of table and the clips in each: one a weather and hundred clips, in plan order."""
     by_weather: dict[str, list[str]] = {}
     for clip in plan.clips:
         by_weather.setdefault(clip.scenario.weather, []).append(clip.clip_id)
-    for weather, clip_ids in by_weather.items():
-        for part, start in enumerate(range(0, len(clip_ids), CLIPS_PER_FILE)):
-            staged = [
-                pq.read_table(layout.staged(clip_id, table))
-                for clip_id in clip_ids[start : start + CLIPS_PER_FILE]
-            ]
-            path = layout.telemetry / table / f"family={weather}" / f"part-{part:04d}.parquet"
-            write_parquet(pa.concat_tables(staged).unify_dictionaries().combine_chunks(), path)
-            written.append(path)
-    return written
+    return {
+        f"telemetry/{table}/family={weather}/part-{part:04d}.parquet": clip_ids[
+            start : start + CLIPS_PER_FILE
+        ]
+        for weather, clip_ids in by_weather.items()
+        for part, start in enumerate(range(0, len(clip_ids), CLIPS_PER_FILE))
+    }
 
 
-def _clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
+def write_part(layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -> Path:
+    """Gather the staged tables of some clips into one file of the dataset."""
+    staged = [pq.read_table(layout.staged(clip_id, table)) for clip_id in clip_ids]
+    write_parquet(pa.concat_tables(staged).unify_dictionaries().combine_chunks(), layout.root / path)
+    return layout.root / path
+
+
+def clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
     """One row a clip: controls, surface, outcome and verdict."""
     rows = [
         {"clip_id": r["clip_id"], "index": r["index"], "label": r["label"], "seed": r["seed"]}
@@ -76,11 +86,12 @@ def _clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
     return labelled_table(columns)
 
 
-def _preview(layout: Layout, plan: Plan, receipts: list[dict[str, Any]]) -> bytes:
+def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: list[dict[str, Any]]) -> bytes:
+    """The contact sheet as PNG, from staged frame tables and the frames at ``pictures_at``."""
     frames = [frame for frame in PREVIEW_FRAMES if frame < plan.settings.frames]
     rows = []
     for receipt in spread(receipts, PREVIEW_CLIPS):
-        pictures = read_clip(layout.frames, receipt["index"], "rgb")
+        pictures = read_clip(pictures_at, receipt["index"], "rgb")
         columns = read_columns(layout.staged(receipt["clip_id"], "frames"))
         rows.append((receipt["label"], [pictures[frame] for frame in frames],
                      {"speed": columns["speed"], "pitch": columns["pitch"]}))  # fmt: skip

@@ -1,10 +1,13 @@
 """The frozen manifest of a dataset: what was asked, what it was made with, and every hash."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from manifests.canonical import canonical_bytes, sha256_of_file
+from rfc8785 import CanonicalizationError
+
+from manifests.canonical import canonical_bytes, sha256_of, sha256_of_file
 from tasks.errors import InputError
 
 MANIFEST_FORMAT = "musync-manifest/1"
@@ -32,7 +35,32 @@ def freeze(
         "artifacts": dict(artifacts),
         "processor": dict(processor),
     }
-    return canonical_bytes(manifest)
+    return canonical_bytes(manifest | {"seal": seal_of(manifest)})
+
+
+def seal_of(manifest: Mapping[str, Any]) -> str:
+    """SHA-256 of the canonical form of all but the seal itself: what tells a changed manifest from its own."""
+    return sha256_of([canonical_bytes({key: value for key, value in manifest.items() if key != "seal"})])
+
+
+def manifest_damage(content: bytes) -> str | None:
+    """What is wrong with a manifest's bytes; None when they are those that were frozen.
+
+    Parameters
+    ----------
+    content : the file's bytes
+    """
+    try:
+        manifest = json.loads(content)
+    except (ValueError, RecursionError):
+        return "changed: it is no longer JSON"
+    if not isinstance(manifest, dict) or "seal" not in manifest:
+        return "changed: it carries no seal"
+    try:
+        sealed = seal_of(manifest) == manifest["seal"] and canonical_bytes(manifest) == content
+    except CanonicalizationError:
+        sealed = False
+    return None if sealed else "changed: its seal does not match its content"
 
 
 def check_format(manifest: Mapping[str, Any], place: Path) -> None:

@@ -1,0 +1,147 @@
+"""A flipped bit is found and named, what is broken is made again byte for byte, left-overs go."""
+
+import json
+import random
+import shutil
+
+import pytest
+
+from catalogs.scenes import write_scene
+from flows.generate import generate
+from flows.repair import repair
+from flows.store.layout import Layout
+from flows.store.lock import sole_writer
+from flows.verify import gc, verify
+from manifests.canonical import canonical_bytes
+from manifests.manifest import recorded_files
+from tasks.errors import InputError
+from tests.flows.test_pipeline import GRID
+from tests.toy_street import TOY_CAMERA, toy_street
+
+FLIPS = 200
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory) -> Layout:
+    folder = tmp_path_factory.mktemp("verify")
+    write_scene(toy_street(), folder / "scene", {})
+    (folder / "camera.yaml").write_text(TOY_CAMERA)
+    grid = folder / "grid.yaml"
+    grid.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=3))
+    return generate(str(grid), str(folder / "data"), runner="threads", workers=1).layout
+
+
+@pytest.fixture
+def copy(dataset, tmp_path) -> Layout:
+    shutil.copytree(dataset.root, tmp_path / "copy")
+    return Layout(tmp_path / "copy")
+
+
+def files_of(layout: Layout) -> dict[str, bytes]:
+    return {layout.relative(p): p.read_bytes() for p in layout.root.rglob("*") if p.is_file()}
+
+
+def flip(layout: Layout, path: str, bit: int) -> None:
+    content = bytearray((layout.root / path).read_bytes())
+    content[bit // 8 % len(content)] ^= 1 << bit % 8
+    (layout.root / path).write_bytes(content)
+
+
+def test_a_sound_dataset_verifies(dataset):
+    result = verify(str(dataset.root))
+    assert result["verified"] and result["damaged"] == [] and result["unrecorded"] == []
+    assert result["files"] == len(files_of(dataset))
+
+
+def test_every_one_of_200_flipped_bits_is_found_and_its_file_named(dataset):
+    """Every file has its turn, the manifest among them; the bit within it is drawn by a seed."""
+    draw = random.Random(6)
+    files = sorted(files_of(dataset))
+    named = 0
+    for turn in range(FLIPS):
+        path = files[turn % len(files)]
+        original = (dataset.root / path).read_bytes()
+        flip(dataset, path, draw.randrange(8 * len(original)))
+        try:
+            result = verify(str(dataset.root))
+        finally:
+            (dataset.root / path).write_bytes(original)
+        named += not result["verified"] and [row["path"] for row in result["damaged"]] == [path]
+    assert named == FLIPS
+
+
+def test_a_manifest_that_was_written_anew_with_other_figures_does_not_verify(copy):
+    forged = json.loads(copy.manifest.read_bytes())
+    forged["clips"][0]["figures"]["peak_pitch"] = 0.1
+    copy.manifest.write_bytes(canonical_bytes(forged))
+    assert verify(str(copy.root))["damaged"][0]["path"] == "manifest.json"
+    with pytest.raises(InputError, match="put back a copy of the manifest"):
+        repair(str(copy.root))
+
+
+def test_a_file_among_the_data_that_nobody_recorded_is_damage(copy):
+    (copy.telemetry / "ticks" / "family=dry" / "part-0009.parquet").write_bytes(b"PAR1")
+    (copy.root / "notes.txt").write_text("mine")
+    result = verify(str(copy.root))
+    assert [row["damage"] for row in result["damaged"]] == ["not recorded"]
+    assert len(result["unrecorded"]) == 2
+
+
+def test_everything_but_the_manifest_is_made_again_with_equal_bytes(dataset, copy):
+    for path in recorded_files(json.loads(copy.manifest.read_bytes())):
+        (copy.root / path).unlink()
+    result = repair(str(copy.root), runner="threads", workers=1)
+    assert result["repaired"] and result["failed"] == []
+    assert files_of(copy) == files_of(dataset)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "frames.zarr/rgb/c/2/0/0/0/0", "telemetry/frames/family=snow/part-0000.parquet",
+        "telemetry/clips.parquet", "previews/contact_sheet.png", "plan.json", "inputs/vehicle.yaml",
+    ],
+)  # fmt: skip
+def test_one_broken_file_is_repaired_and_no_other_is_touched(dataset, copy, path):
+    before = {name: (copy.root / name).stat().st_mtime_ns for name in files_of(copy)}
+    flip(copy, path, 4001)
+    assert repair(str(copy.root), runner="threads", workers=1)["restored"] == [path]
+    assert files_of(copy) == files_of(dataset)
+    changed = [name for name, when in before.items() if (copy.root / name).stat().st_mtime_ns != when]
+    assert changed == [path]
+
+
+def test_bytes_that_come_out_otherwise_are_not_put_in_place(copy):
+    """A file recorded with a hash that no run gives stays as it is and is named."""
+    from manifests.manifest import seal_of
+
+    forged = json.loads(copy.manifest.read_bytes())
+    forged["artifacts"]["telemetry/clips.parquet"] = "0" * 64
+    copy.manifest.write_bytes(canonical_bytes(forged | {"seal": seal_of(forged)}))
+    before = (copy.telemetry / "clips.parquet").read_bytes()
+    result = repair(str(copy.root), runner="threads", workers=1)
+    assert not result["repaired"] and result["failed"] == ["telemetry/clips.parquet"]
+    assert (copy.telemetry / "clips.parquet").read_bytes() == before
+
+
+def test_left_overs_of_killed_runs_go_and_nothing_else(dataset, copy, tmp_path):
+    (copy.telemetry / "clips.parquet.partial").write_bytes(b"half")
+    copy.staging.mkdir()
+    (copy.staging / "0123.json").write_text("{}")
+    for name in (".audit-dead", ".audit-live"):
+        (tmp_path / name / ".staging").mkdir(parents=True)
+        (tmp_path / name / ".staging" / "lock").touch()
+    (tmp_path / ".audit-of-mine").mkdir()
+    with sole_writer(Layout(tmp_path / ".audit-live")):
+        named = gc(str(copy.root), dry_run=True)["removed"]
+        assert (copy.staging / "0123.json").exists()
+        assert gc(str(copy.root))["removed"] == named
+        assert len(named) == 3
+        assert (tmp_path / ".audit-live").exists()
+    assert (tmp_path / ".audit-of-mine").exists() and not (tmp_path / ".audit-dead").exists()
+    assert files_of(copy) == files_of(dataset)
+
+
+def test_a_dataset_that_is_being_written_is_left_alone(copy):
+    with sole_writer(copy), pytest.raises(InputError, match="another run is writing"):
+        gc(str(copy.root))
