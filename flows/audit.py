@@ -11,7 +11,7 @@ from flows.generate import create_frame_arrays, fan_out
 from flows.orchestration import stage
 from flows.plan import Plan, read_plan
 from flows.runner import RunnerName
-from flows.store.frames import LABEL_ARRAYS, arrays_of, read_clip
+from flows.store.frames import arrays_of, read_clip
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_json
 from flows.store.lock import sole_writer
 from flows.store.telemetry import read_columns
@@ -22,8 +22,7 @@ from manifests.provenance import code_version, library_versions, processor
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 
-STAGE_OF = {"ticks": "vehicle", "frames": "frames", "rgb": "render", "depth": "render", "class": "render"}
-STAGE_OF |= dict.fromkeys(LABEL_ARRAYS, "render")
+STAGE_OF = {"ticks": "vehicle", "frames": "frames"} | dict.fromkeys(arrays_of(labels=True), "render")
 
 
 def audit(

@@ -24,7 +24,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
 from flows.plan import ClipPlan, Plan, read_plan
-from flows.store.frames import ARRAYS, buffer_hash, write_clip
+from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import Layout, write_json
 from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
@@ -99,7 +99,7 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
     identity = {"clip_id": clip.clip_id, "label": clip.label, "weather": clip.scenario.weather}
     write_parquet(labelled_table(ride.columns, identity), layout.staged(clip.clip_id, "ticks"))
     write_parquet(labelled_table(frames, identity | facts), layout.staged(clip.clip_id, "frames"))
-    shards = {name: layout.frame_shard(name, index) for name in ARRAYS}
+    shards = {name: layout.frame_shard(name, index) for name in buffers}
     receipt = {
         "index": clip.index,
         "clip_id": clip.clip_id,
@@ -107,7 +107,7 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
         "seed": clip.seed,
         "scenario": clip.scenario.as_row(),
         "artifacts": {layout.relative(path): sha256_of_file(path) for path in shards.values()},
-        "content": {name: buffer_hash(buffers[name]) for name in ARRAYS}
+        "content": {name: buffer_hash(values) for name, values in buffers.items()}
         | {"ticks": columns_hash(ride.columns, [channel.name for channel in TICK_CHANNELS]),
            "frames": columns_hash(frames, sorted(frames))},
         "figures": _json_numbers(facts | {
@@ -221,6 +221,7 @@ def picture(
         gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
         frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
         backend=select_backend(plan.backend),
+        labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
     )  # fmt: skip
 
 

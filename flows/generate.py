@@ -119,7 +119,7 @@ def create_frame_arrays(layout: Layout, plan: Plan) -> None:
         "axes": "rig: x forward, y left, z up (ISO 8855); camera: x right, y down, z forward",
     }
     clips, frames = len(plan.clips), plan.settings.frames
-    create_arrays(layout.frames, clips, frames, camera.height, camera.width, attributes)
+    create_arrays(layout.frames, clips, frames, camera.height, camera.width, plan.settings.labels, attributes)
 
 
 def fan_out(

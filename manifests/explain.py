@@ -24,7 +24,9 @@ REACHES = {
     "processor": (VEHICLE, RENDER),
 }
 """Stages whose bytes an input can change; motion reaches the picture because the camera rides on the body."""
-STAGE_OF_CONTENT = {"ticks": VEHICLE, "frames": JUDGING, "rgb": RENDER, "depth": RENDER, "class": RENDER}
+STAGE_OF_CONTENT = {"ticks": VEHICLE, "frames": JUDGING} | dict.fromkeys(
+    ("rgb", "depth", "class", "normal", "road", "flow", "marks"), RENDER
+)
 ABSENT = "absent"
 
 

@@ -49,6 +49,7 @@ class GridFile(BaseModel):
     frames: int = Field(default=81, ge=2)
     frame_rate_hz: float = Field(default=10.0, gt=0, le=1000)
     seed: int = Field(default=2025, ge=0, lt=2**53)
+    labels: bool = False
     base: PartialScenario = PartialScenario()
     axes: dict[str, dict[str, PartialScenario]] = Field(min_length=1)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flows.store.frames import arrays_of
 from tasks.errors import InputError
 
 STAGED_TABLES = ("ticks", "frames")
@@ -57,8 +58,8 @@ class Layout:
 
     def frame_shard(self, array: str, index: int) -> Path:
         """The one file that holds a clip's frames of one array (Zarr v3 default chunk keys)."""
-        trailing = "0/0/0" if array == "rgb" else "0/0"
-        return self.frames / array / "c" / str(index) / "0" / trailing
+        _, further, _ = arrays_of(labels=True)[array]
+        return self.frames.joinpath(array, "c", str(index), "0", "0", "0", *("0" for _ in further))
 
     def relative(self, path: Path) -> str:
         return path.relative_to(self.root).as_posix()

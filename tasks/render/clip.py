@@ -7,6 +7,8 @@ from tasks.render.backend import Backend
 from tasks.render.camera import Camera, viewmat
 from tasks.render.composition import compose, encode_8bit, round_depth
 from tasks.render.environment import environment_view
+from tasks.render.labels import clip_flow, frame_labels
+from tasks.render.road_edit import Profile
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter
@@ -26,6 +28,7 @@ def render_clip(
     looks: WeatherParameters,
     seed: int,
     backend: Backend,
+    labelled: Profile | None = None,
 ) -> dict[str, NDArray[np.generic]]:
     """Render every frame of a clip.
 
@@ -41,21 +44,19 @@ def render_clip(
     looks : how that looks
     seed : visual seed; it moves particles and snow, and nothing else [1]
     backend : the rasteriser
+    labelled : H_g(s) of the clip; with it the clip gets the labels of `tasks.render.labels` too
 
     Returns
     -------
     ``rgb`` uint8 [F, H, W, 3] sRGB, ``depth`` float32 [F, H, W] camera z [m] (NaN where nothing is seen),
-    ``class`` uint8 [F, H, W] `SemanticClass`
+    ``class`` uint8 [F, H, W] `SemanticClass`; with labels ``normal``, ``road``, ``marks`` and ``flow``
     """
     focal_px = float(camera.K[0, 0])
     scene, clip_weather = weather_scene(gaussians, environment, weather, looks, focal_px, seed, route)
     prepared = backend.prepare(scene)
     T_world_camera = T_world_rig @ camera.T_rig_camera
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / frame_rate_hz, axis=0)
-    shape = (len(T_world_rig), camera.height, camera.width)
-    rgb = np.empty((*shape, 3), np.uint8)
-    depth = np.empty(shape, np.float32)
-    class_id = np.empty(shape, np.uint8)
+    frames: list[dict[str, NDArray[np.generic]]] = []
     for frame, pose in enumerate(T_world_camera):
         view = viewmat(pose)
         gbuffer = backend.rasterise(prepared, view, camera.K, camera.width, camera.height)
@@ -70,7 +71,17 @@ def render_clip(
             exposure_s=camera.exposure_s,
         )
         clear = compose(gbuffer, sky, gaussians.display_encoded)
-        rgb[frame] = encode_8bit(apply_weather(clip_weather, clear, gbuffer, shutter).picture)
-        depth[frame] = round_depth(gbuffer.depth)
-        class_id[frame] = gbuffer.class_id
-    return {"rgb": rgb, "depth": depth, "class": class_id}
+        finished = apply_weather(clip_weather, clear, gbuffer, shutter)
+        buffers: dict[str, NDArray[np.generic]] = {
+            "rgb": encode_8bit(finished.picture),
+            "depth": round_depth(gbuffer.depth),
+            "class": gbuffer.class_id,
+        }
+        if labelled is not None:
+            buffers |= frame_labels(clip_weather, finished, gbuffer, shutter, route, labelled)
+        frames.append(buffers)
+    clip = {name: np.stack([buffers[name] for buffers in frames]) for name in frames[0]}
+    if labelled is not None:
+        clip["flow"], occluded = clip_flow(clip["depth"], camera.K, T_world_camera)
+        clip["marks"] |= occluded
+    return clip

@@ -21,6 +21,7 @@ from flows.store.telemetry import read_columns, write_parquet
 from manifests.canonical import canonical_bytes, sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
+from tasks.render.labels import MARK_BITS
 from tests.toy_street import TOY_CAMERA, toy_street
 
 GRID = """
@@ -123,6 +124,21 @@ def test_the_bytes_do_not_depend_on_the_runner(dataset, grid, tmp_path, runner, 
 
 def test_a_finished_dataset_is_not_made_again(dataset, grid):
     assert generate(grid, str(dataset.root), runner="threads").made == 0
+
+
+def test_labels_come_where_the_grid_asks_for_them_and_an_audit_makes_them_again(grid, tmp_path):
+    labelled = tmp_path / "labelled.yaml"
+    labelled.write_text(Path(grid).read_text() + "labels: true\n")
+    layout = generate(str(labelled), str(tmp_path / "data"), runner="threads", workers=2).layout
+    hump = next(clip for clip in manifest_of(layout)["clips"] if clip["label"] == "snow-3/hump")
+    marks, flow, road = (read_clip(layout.frames, hump["index"], name) for name in ("marks", "flow", "road"))
+    on_hump = (marks[0] & MARK_BITS["hazard"]) > 0
+    assert 0 < on_hump.mean() < 0.5
+    assert (np.abs(road[0][on_hump][:, 0] - 4) < 3.7 / 2 + 0.01).all()
+    assert ((marks & MARK_BITS["snow"]) > 0).any() and ((marks & MARK_BITS["particles"]) > 0).any()
+    seen = np.isfinite(read_clip(layout.frames, hump["index"], "depth"))
+    assert np.isfinite(flow[0][seen[0]]).mean() > 0.99 and np.isnan(flow[-1]).all()
+    assert audit(str(layout.root), share=0.2, runner="threads")["verified"]
 
 
 def test_the_report_names_the_clips_whose_pose_check_failed(dataset, grid):

@@ -14,7 +14,7 @@ SHAPE = (3, 16, 24)
 @pytest.fixture
 def layout(tmp_path):
     layout = Layout(tmp_path / "dataset")
-    create_arrays(layout.frames, 4, *SHAPE, {"camera": "test"})
+    create_arrays(layout.frames, 4, *SHAPE, False, {"camera": "test"})
     return layout
 
 
@@ -38,7 +38,7 @@ def test_a_clip_reads_back_bit_for_bit_from_one_file_an_array(layout):
 
 def test_the_same_pixels_give_the_same_bytes(layout, tmp_path):
     other = Layout(tmp_path / "other")
-    create_arrays(other.frames, 4, *SHAPE, {"camera": "test"})
+    create_arrays(other.frames, 4, *SHAPE, False, {"camera": "test"})
     for index in (0, 2):
         write_clip(layout.frames, index, buffers(1))
     for index in (2, 0):
