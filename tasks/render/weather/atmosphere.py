@@ -146,8 +146,9 @@ def air_layer(
     return Layer(name="air", gain=gain, add=add)
 
 
-OPAQUE = 0.999
-"""Alpha from which nothing of the sky behind is seen."""
+OPAQUE = 0.995
+"""Alpha from which what shines through of the sky behind is not sampled: under the brightest sky it is
+one 8-bit step."""
 
 
 @numba.njit(cache=True, nogil=True)
