@@ -125,6 +125,22 @@ def gc(
     _show(_call("gc", prefect, dataset, dry_run=dry_run), as_json)
 
 
+@app.command("audit-physics")
+def audit_physics(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Work every telemetry column out again from the others, and name the one that breaks a law."""
+    result = _call("audit_physics", prefect, dataset, out=out)
+    keys = ("label", "passed", "laws", "column", "tightest")
+    brief = result | {"clips": [{key: row[key] for key in keys} for row in result["clips"]]}
+    _show(result if as_json else brief, as_json)
+    if not result["verified"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
 @app.command()
 def diff(
     a: Annotated[str, typer.Argument(help="A finished dataset folder.")],
@@ -147,6 +163,23 @@ def diff(
 def describe(dataset: Annotated[str, typer.Argument()], as_json: Json = False) -> None:
     """Say what is in a dataset."""
     _show(_call("describe", False, dataset), as_json)
+
+
+@app.command()
+def sql(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    query: Annotated[str, typer.Argument(help="DuckDB SQL over clips, ticks, frames, verdicts and pairs.")],
+    as_json: Json = False,
+) -> None:
+    """Answer an SQL query over a dataset's views."""
+    result = _call("sql", False, dataset, query)
+    _show(result if as_json else {"rows": result["rows"]}, as_json)
+
+
+@app.command()
+def schema(as_json: Json = False) -> None:
+    """List every column of every view: unit, paper symbol, CF standard name and meaning."""
+    _show(_call("schema", False), as_json)
 
 
 @app.command()
@@ -464,6 +497,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
 
     module = {
         "generate": "generate", "audit": "audit", "verify": "verify", "gc": "verify", "repair": "repair",
+        "sql": "query", "schema": "query",
         "describe": "describe", "validate": "describe",
         "preview": "previews", "replay_audit": "replay",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
@@ -472,6 +506,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "stop_study": "stop_study", "diff": "dataset_diff",
         "bump_study": "bump_study", "close_loop": "closing",
         "close_loop_benchmark": "closing_benchmark",
+        "audit_physics": "physics",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

@@ -15,7 +15,7 @@ from flows.generate import create_frame_arrays, fan_out
 from flows.orchestration import stage
 from flows.plan import ClipPlan, Plan, input_sources, read_plan
 from flows.runner import RunnerName
-from flows.seal import clips_table, preview_sheet, table_parts, write_part
+from flows.seal import clips_table, pairs_table, preview_sheet, table_parts, write_part
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically, write_json
 from flows.store.lock import sole_writer
 from flows.store.telemetry import write_parquet
@@ -24,6 +24,8 @@ from manifests.canonical import sha256_of_file
 from manifests.manifest import recorded_files
 from tasks.errors import InputError
 
+SUMMARIES = {"telemetry/clips.parquet": clips_table, "telemetry/pairs.parquet": pairs_table}
+"""Tables that follow from the clips' records."""
 WHOLE_NUMBERS = {"index", "failed_frames"}
 """Keys of a clip's record that are integers; canonical JSON writes a float 0.0 as 0 too."""
 
@@ -116,7 +118,7 @@ def restore(
                 write_part(scratch, table, path, ids)
             move_in(scratch, [path for _, path, _ in broken])
             _remake_summaries(layout, scratch, plan, manifest, wanted)
-            move_in(scratch, ["telemetry/clips.parquet", "previews/contact_sheet.png"])
+            move_in(scratch, [*SUMMARIES, "previews/contact_sheet.png"])
     return sorted(restored)
 
 
@@ -178,10 +180,10 @@ def plan_of(manifest: Mapping[str, Any]) -> Plan:
 def _remake_summaries(
     layout: Layout, scratch: Layout, plan: Plan, manifest: Mapping[str, Any], wanted: Mapping[str, str]
 ) -> None:
-    """The clips table and the contact sheet, which follow from the manifest and the other files."""
+    """Tables of clips and the contact sheet, which follow from the manifest and the other files."""
     receipts = [_as_written(clip) for clip in manifest["clips"]]
-    if "telemetry/clips.parquet" in wanted:
-        write_parquet(clips_table(receipts), scratch.telemetry / "clips.parquet")
+    for path, table_of in SUMMARIES.items():
+        write_parquet(table_of(receipts), scratch.root / path)
     if "previews/contact_sheet.png" in wanted:
         for path, ids in table_parts(plan, "frames").items():
             for clip_id in ids:

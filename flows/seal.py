@@ -16,6 +16,8 @@ from flows.store.telemetry import labelled_table, read_columns, write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.manifest import freeze
 from manifests.provenance import processor
+from manifests.siblings import sibling_pairs
+from tasks.conventions import PAIR_CHANNELS
 from tasks.render.contact_sheet import contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
@@ -32,12 +34,14 @@ def seal(layout: Layout, plan: Plan) -> None:
         for path, clip_ids in table_parts(plan, table).items()
     ]
     write_parquet(clips_table(receipts), layout.telemetry / "clips.parquet")
+    write_parquet(pairs_table(receipts), layout.telemetry / "pairs.parquet")
     write_atomically(
         layout.previews / "contact_sheet.png", preview_sheet(layout, layout.frames, plan, receipts)
     )
     shared = [
         *tables,
         layout.telemetry / "clips.parquet",
+        layout.telemetry / "pairs.parquet",
         layout.previews / "contact_sheet.png",
         layout.plan,
         *sorted(path for path in layout.inputs.rglob("*") if path.is_file()),
@@ -83,6 +87,14 @@ def clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
         values = [row[name] for row in rows]
         numeric = any(isinstance(value, float) for value in values) or all(value is None for value in values)
         columns[name] = np.array([np.nan if v is None else v for v in values], float) if numeric else values
+    return labelled_table(columns)
+
+
+def pairs_table(receipts: list[dict[str, Any]]) -> pa.Table:
+    """One row a pair of clips that differ in exactly one control: what that control changes."""
+    rows = sibling_pairs(receipts)
+    kinds = {channel.name: float if channel.name.endswith("_change") else str for channel in PAIR_CHANNELS}
+    columns = {name: np.array([row[name] for row in rows], kind) for name, kind in kinds.items()}
     return labelled_table(columns)
 
 

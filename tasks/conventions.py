@@ -105,4 +105,43 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="static_pitch", unit="rad", symbol="theta_0", description="pitch of the resting body, not contained in the pitch column"),
 )  # fmt: skip
 
-CHANNELS_BY_NAME: dict[str, Channel] = {c.name: c for c in (*TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS)}
+IDENTITY_CHANNELS: tuple[Channel, ...] = (
+    Channel(name="clip_id", unit="", symbol="", description="content id of the clip, the join key of every table"),
+    Channel(name="index", unit="1", symbol="", description="number of the clip in the dataset, and in the Zarr arrays"),
+    Channel(name="label", unit="", symbol="", description="the clip's levels of the grid's axes"),
+    Channel(name="seed", unit="", symbol="", description="visual seed, 64 bit, as text"),
+    Channel(name="weather", unit="", symbol="w", description="dry, rain or snow; also the tyre family"),
+    Channel(name="calibration_extrapolated", unit="", symbol="", description="mu_c lies outside the calibrated knots, whose end values hold"),
+)  # fmt: skip
+
+CHECK_CHANNELS: tuple[Channel, ...] = (
+    Channel(name="check_method", unit="", symbol="", description="pose check that judged the finished frames"),
+    Channel(name="check_passed", unit="", symbol="", description="every judged figure keeps its threshold; null without frames"),
+    Channel(name="check_pitch_rmse_deg", unit="deg", symbol="", description="RMSE of recovered against claimed pitch, both from frame 0"),
+    Channel(name="check_pitch_relative_error", unit="1", symbol="", description="the same over the RMS of the claimed pitch"),
+    Channel(name="check_pitch_correlation", unit="1", symbol="", description="Pearson's, recovered against claimed pitch"),
+    Channel(name="check_claimed_pitch_rms_deg", unit="deg", symbol="", description="RMS of the claimed pitch from frame 0"),
+    Channel(name="check_progress_rmse_m", unit="m", symbol="", description="RMSE of recovered against claimed forward progress"),
+    Channel(name="check_normalised_progress_rmse", unit="1", symbol="", description="the same over the whole progress"),
+    Channel(name="check_failed_frames", unit="1", symbol="", description="frames without a recovered pose"),
+)  # fmt: skip
+
+PAIR_CHANNELS: tuple[Channel, ...] = (
+    Channel(name="clip_id_a", unit="", symbol="", description="the sibling that comes first in the dataset"),
+    Channel(name="clip_id_b", unit="", symbol="", description="the other sibling"),
+    Channel(name="label_a", unit="", symbol="", description="label of the first"),
+    Channel(name="label_b", unit="", symbol="", description="label of the other"),
+    Channel(name="control", unit="", symbol="", description="the one control in which they differ: weather, speed, braking or road"),
+    Channel(name="differs", unit="", symbol="", description="the scenario fields of that control whose values differ"),
+    Channel(name="surface_friction_change", unit="1", symbol="Delta mu_c", description="reference surface coefficient, b minus a"),
+    Channel(name="tyre_peak_change", unit="1", symbol="Delta mu_eff", description="effective peak of the tyre curve, b minus a"),
+    Channel(name="stopping_distance_change", unit="m", symbol="Delta d_stop", description="distance from brake onset to the stop, b minus a"),
+    Channel(name="peak_pitch_change", unit="rad", symbol="", description="largest nose-down pitch, b minus a"),
+)  # fmt: skip
+
+CHANNELS_BY_NAME: dict[str, Channel] = {
+    c.name: c
+    for c in (
+        *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS
+    )
+}  # fmt: skip

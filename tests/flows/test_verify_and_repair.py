@@ -6,8 +6,6 @@ import shutil
 
 import pytest
 
-from catalogs.scenes import write_scene
-from flows.generate import generate
 from flows.repair import repair
 from flows.store.layout import Layout
 from flows.store.lock import sole_writer
@@ -15,25 +13,13 @@ from flows.verify import gc, verify
 from manifests.canonical import canonical_bytes
 from manifests.manifest import recorded_files
 from tasks.errors import InputError
-from tests.flows.test_pipeline import GRID
-from tests.toy_street import TOY_CAMERA, toy_street
 
 FLIPS = 200
 
 
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Layout:
-    folder = tmp_path_factory.mktemp("verify")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    grid = folder / "grid.yaml"
-    grid.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=3))
-    return generate(str(grid), str(folder / "data"), runner="threads", workers=1).layout
-
-
 @pytest.fixture
-def copy(dataset, tmp_path) -> Layout:
-    shutil.copytree(dataset.root, tmp_path / "copy")
+def copy(toy_dataset, tmp_path) -> Layout:
+    shutil.copytree(toy_dataset.root, tmp_path / "copy")
     return Layout(tmp_path / "copy")
 
 
@@ -47,25 +33,25 @@ def flip(layout: Layout, path: str, bit: int) -> None:
     (layout.root / path).write_bytes(content)
 
 
-def test_a_sound_dataset_verifies(dataset):
-    result = verify(str(dataset.root))
+def test_a_sound_dataset_verifies(toy_dataset):
+    result = verify(str(toy_dataset.root))
     assert result["verified"] and result["damaged"] == [] and result["unrecorded"] == []
-    assert result["files"] == len(files_of(dataset))
+    assert result["files"] == len(files_of(toy_dataset))
 
 
-def test_every_one_of_200_flipped_bits_is_found_and_its_file_named(dataset):
+def test_every_one_of_200_flipped_bits_is_found_and_its_file_named(copy):
     """Every file has its turn, the manifest among them; the bit within it is drawn by a seed."""
     draw = random.Random(6)
-    files = sorted(files_of(dataset))
+    files = sorted(files_of(copy))
     named = 0
     for turn in range(FLIPS):
         path = files[turn % len(files)]
-        original = (dataset.root / path).read_bytes()
-        flip(dataset, path, draw.randrange(8 * len(original)))
+        original = (copy.root / path).read_bytes()
+        flip(copy, path, draw.randrange(8 * len(original)))
         try:
-            result = verify(str(dataset.root))
+            result = verify(str(copy.root))
         finally:
-            (dataset.root / path).write_bytes(original)
+            (copy.root / path).write_bytes(original)
         named += not result["verified"] and [row["path"] for row in result["damaged"]] == [path]
     assert named == FLIPS
 
@@ -87,12 +73,12 @@ def test_a_file_among_the_data_that_nobody_recorded_is_damage(copy):
     assert len(result["unrecorded"]) == 2
 
 
-def test_everything_but_the_manifest_is_made_again_with_equal_bytes(dataset, copy):
+def test_everything_but_the_manifest_is_made_again_with_equal_bytes(toy_dataset, copy):
     for path in recorded_files(json.loads(copy.manifest.read_bytes())):
         (copy.root / path).unlink()
     result = repair(str(copy.root), runner="threads", workers=1)
     assert result["repaired"] and result["failed"] == []
-    assert files_of(copy) == files_of(dataset)
+    assert files_of(copy) == files_of(toy_dataset)
 
 
 @pytest.mark.parametrize(
@@ -102,11 +88,11 @@ def test_everything_but_the_manifest_is_made_again_with_equal_bytes(dataset, cop
         "telemetry/clips.parquet", "previews/contact_sheet.png", "plan.json", "inputs/vehicle.yaml",
     ],
 )  # fmt: skip
-def test_one_broken_file_is_repaired_and_no_other_is_touched(dataset, copy, path):
+def test_one_broken_file_is_repaired_and_no_other_is_touched(toy_dataset, copy, path):
     before = {name: (copy.root / name).stat().st_mtime_ns for name in files_of(copy)}
     flip(copy, path, 4001)
     assert repair(str(copy.root), runner="threads", workers=1)["restored"] == [path]
-    assert files_of(copy) == files_of(dataset)
+    assert files_of(copy) == files_of(toy_dataset)
     changed = [name for name, when in before.items() if (copy.root / name).stat().st_mtime_ns != when]
     assert changed == [path]
 
@@ -124,7 +110,7 @@ def test_bytes_that_come_out_otherwise_are_not_put_in_place(copy):
     assert (copy.telemetry / "clips.parquet").read_bytes() == before
 
 
-def test_left_overs_of_killed_runs_go_and_nothing_else(dataset, copy, tmp_path):
+def test_left_overs_of_killed_runs_go_and_nothing_else(toy_dataset, copy, tmp_path):
     (copy.telemetry / "clips.parquet.partial").write_bytes(b"half")
     copy.staging.mkdir()
     (copy.staging / "0123.json").write_text("{}")
@@ -139,7 +125,7 @@ def test_left_overs_of_killed_runs_go_and_nothing_else(dataset, copy, tmp_path):
         assert len(named) == 3
         assert (tmp_path / ".audit-live").exists()
     assert (tmp_path / ".audit-of-mine").exists() and not (tmp_path / ".audit-dead").exists()
-    assert files_of(copy) == files_of(dataset)
+    assert files_of(copy) == files_of(toy_dataset)
 
 
 def test_a_dataset_that_is_being_written_is_left_alone(copy):

@@ -1,0 +1,155 @@
+"""A finished dataset for people who analyse it: the same tables in the library of their choice."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pandas as pd
+import pyarrow as pa
+import pyarrow.dataset
+import pyarrow.parquet as pq
+import zarr
+
+from flows.audit import read_manifest
+from flows.query import VIEWS, connect, schema
+from flows.store.layout import Layout
+from flows.windows import ClipWindows, windows_of
+from tasks.errors import InputError
+
+STORED = ("clips", "ticks", "frames", "pairs")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dataset:
+    """A sealed dataset, read lazily; nothing is copied before it is asked for.
+
+    Parameters
+    ----------
+    root : its folder
+    manifest : its frozen manifest
+    """
+
+    root: Path
+    manifest: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"Dataset({str(self.root)!r}, {len(self.manifest['clips'])} clips)"
+
+    def telemetry(self, table: str = "ticks") -> pyarrow.dataset.Dataset:
+        """A stored table as a pyarrow dataset: clips, ticks, frames or pairs; units stand in its schema.
+
+        Raises
+        ------
+        InputError
+            If there is no such table.
+        """
+        _known(table, STORED)
+        folder = Layout(self.root).telemetry
+        if table in {"clips", "pairs"}:
+            return pyarrow.dataset.dataset(folder / f"{table}.parquet")
+        partitioning = pyarrow.dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
+        first = next((folder / table).glob("*/*.parquet"))
+        labelled = pq.read_schema(first).append(pa.field("family", pa.string()))
+        return pyarrow.dataset.dataset(folder / table, schema=labelled, partitioning=partitioning)
+
+    @cached_property
+    def connection(self) -> duckdb.DuckDBPyConnection:
+        """A DuckDB connection with the views clips, ticks, frames, verdicts and pairs."""
+        return connect(self.root)
+
+    def sql(self, query: str) -> duckdb.DuckDBPyRelation:
+        """A query over the views, as a relation that is evaluated when its rows are asked for."""
+        return self.connection.sql(query)
+
+    def pandas(self, table: str = "clips", columns: Sequence[str] | None = None) -> pd.DataFrame:
+        """A view as a pandas frame; what is not represented is NaN.
+
+        Parameters
+        ----------
+        table : clips, ticks, frames, verdicts or pairs
+        columns : those to read; None takes all
+        """
+        return self._relation(table, columns).df()
+
+    def polars(self, table: str = "clips", columns: Sequence[str] | None = None) -> Any:
+        """A view as a Polars frame; needs the package polars.
+
+        Raises
+        ------
+        InputError
+            If Polars is not installed, or there is no such view.
+        """
+        try:
+            import polars as pl
+        except ImportError:
+            raise InputError("Polars is not installed: pip install 'musync[analysts]'") from None
+        return pl.from_arrow(self._relation(table, columns).to_arrow_table())
+
+    def _relation(self, table: str, columns: Sequence[str] | None) -> duckdb.DuckDBPyRelation:
+        _known(table, tuple(VIEWS))
+        chosen = "*" if columns is None else ", ".join(f'"{name}"' for name in columns)
+        return self.sql(f"SELECT {chosen} FROM {table}")
+
+    @property
+    def frames(self) -> zarr.Group:
+        """The frames as lazy Zarr arrays ``[clip, frame, y, x(, channel)]``; ``index`` of a clip is its first axis."""
+        return zarr.open_group(Layout(self.root).frames, mode="r")
+
+    def xarray(self) -> Any:
+        """The frames as a lazy xarray dataset with named dimensions; needs the package xarray.
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise InputError("xarray is not installed: pip install 'musync[analysts]'") from None
+        return xarray.open_zarr(Layout(self.root).frames, consolidated=False, chunks=None)
+
+    def torch(
+        self,
+        *,
+        window: int = 16,
+        stride: int | None = None,
+        columns: Sequence[str] = ("speed", "longitudinal_acceleration", "pitch", "heave"),
+        arrays: Sequence[str] = ("rgb",),
+        clips: Sequence[str] | None = None,
+    ) -> ClipWindows:
+        """Windows of consecutive frames with their telemetry, for `torch.utils.data.DataLoader`.
+
+        Parameters
+        ----------
+        window : frames in one sample [1]
+        stride : frames from the start of one window to the next in a clip; None takes ``window`` [1]
+        columns : numeric columns of the frame table
+        arrays : of rgb, depth and class; empty for telemetry alone
+        clips : labels or ids; None takes all
+        """
+        return windows_of(self.root, self.manifest, window, stride or window, columns, arrays, clips)
+
+    def schema(self) -> dict[str, Any]:
+        """Columns of every view with unit, paper symbol, CF standard name and description."""
+        return schema()
+
+
+def open(dataset: str | Path) -> Dataset:
+    """Open a finished dataset folder.
+
+    Raises
+    ------
+    InputError
+        If the folder is no sealed dataset.
+    """
+    layout = Layout(Path(dataset).resolve())
+    return Dataset(root=layout.root, manifest=read_manifest(layout))
+
+
+def _known(table: str, names: tuple[str, ...]) -> None:
+    if table not in names:
+        raise InputError(f"table {table!r}: no such table; there are {', '.join(names)}")

@@ -1,0 +1,70 @@
+"""Counterfactual pairs: clips of one dataset that differ in exactly one control, and what it changes."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations, pairwise
+from math import nan
+from typing import Any
+
+CONTROLS: dict[str, tuple[str, ...]] = {
+    "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h"),
+    "speed": ("initial_speed_km_h",),
+    "braking": ("peak_pressure_mpa", "ramp_s", "hold_s", "release_s", "brake_onset_s", "brake_onset_m"),
+    "road": ("hazard_center_m", "hazard_length_m", "hazard_height_m"),
+}
+"""The scenario's fields by what an experimenter turns: q, u (speed and braking) and g of Eq. overall_pipeline."""
+FIGURES = ("surface_friction", "tyre_peak", "stopping_distance", "peak_pitch")
+ALL_PAIRS_UP_TO = 32
+"""Larger groups of siblings pair each clip with the first and with the next, so that pairs stay as many as clips."""
+
+
+def sibling_pairs(clips: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Every pair that differs in exactly one control, in the order of the dataset.
+
+    Parameters
+    ----------
+    clips : records with ``clip_id``, ``label``, ``scenario`` and ``figures``; no two of one scenario
+
+    Returns
+    -------
+    Rows with the keys of ``PAIR_CHANNELS``; a change is b minus a, NaN where either has no such figure.
+    """
+    places = [
+        (i, j, control)
+        for control in CONTROLS
+        for group in _groups(clips, control)
+        for i, j in _chosen(group)
+    ]
+    return [_pair(clips[i], clips[j], control) for i, j, control in sorted(places)]
+
+
+def _groups(clips: Sequence[Mapping[str, Any]], control: str) -> Iterator[list[int]]:
+    """Clips that are alike in all other controls."""
+    others = [name for other, names in CONTROLS.items() if other != control for name in names]
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for place, clip in enumerate(clips):
+        groups.setdefault(tuple(clip["scenario"][name] for name in others), []).append(place)
+    yield from groups.values()
+
+
+def _chosen(group: Sequence[int]) -> list[tuple[int, int]]:
+    if len(group) <= ALL_PAIRS_UP_TO:
+        return list(combinations(group, 2))
+    return sorted({(group[0], other) for other in group[1:]} | set(pairwise(group)))
+
+
+def _pair(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> dict[str, Any]:
+    differs = [name for name in CONTROLS[control] if a["scenario"][name] != b["scenario"][name]]
+    names = {
+        "clip_id_a": a["clip_id"],
+        "clip_id_b": b["clip_id"],
+        "label_a": a["label"],
+        "label_b": b["label"],
+        "control": control,
+        "differs": ", ".join(differs),
+    }
+    changes = {f"{name}_change": _change(a["figures"][name], b["figures"][name]) for name in FIGURES}
+    return names | changes
+
+
+def _change(a: float | None, b: float | None) -> float:
+    return nan if a is None or b is None else float(b) - float(a)

@@ -1,0 +1,139 @@
+"""The same dataset in every library: one value, whichever way it is read; and the SQL views."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from torch.utils.data import DataLoader
+
+import musync
+from flows.query import VIEWS, schema, sql
+from flows.store.frames import read_clip
+from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
+from tasks.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def data(toy_dataset):
+    opened = musync.open(toy_dataset.root)
+    yield opened
+    opened.connection.close()
+
+
+def test_views_have_the_columns_that_the_schema_lists(data):
+    for view, channels in VIEWS.items():
+        names = set(data.sql(f"SELECT * FROM {view} LIMIT 1").columns) - {"family"}
+        assert names == {channel.name for channel in channels}, view
+
+
+def test_the_schema_is_that_of_the_parquet_files(data, toy_dataset):
+    assert schema()["ticks"][3] == {
+        "name": "t_ns", "unit": "ns", "symbol": "t", "standard_name": "time",
+        "description": "time since the start of the clip",
+    }  # fmt: skip
+    for table in ("clips", "pairs", "ticks", "frames"):
+        for field in data.telemetry(table).schema:
+            if field.name == "family":
+                continue
+            channel = CHANNELS_BY_NAME[field.name]
+            assert field.metadata[b"description"].decode() == channel.description
+            assert field.metadata.get(b"units", b"").decode() == channel.unit
+
+
+@pytest.mark.parametrize("channel", ["speed", "pitch", "axle_load_f"])
+def test_every_library_reads_the_same_numbers(data, toy_dataset, channel):
+    clip = data.manifest["clips"][1]["clip_id"]
+    path = toy_dataset.telemetry / "ticks" / "family=dry" / "part-0000.parquet"
+    plain = pq.read_table(path, filters=[("clip_id", "==", clip)])[channel].to_numpy()
+    lazy = data.telemetry("ticks").to_table(columns=["clip_id", channel])
+    frame = data.pandas("ticks", ["clip_id", channel])
+    relation = data.sql(f"SELECT {channel} FROM ticks WHERE clip_id = '{clip}' ORDER BY t_ns")
+    assert len(plain) == 1001
+    np.testing.assert_array_equal(lazy.to_pandas().query("clip_id == @clip")[channel], plain)
+    np.testing.assert_array_equal(frame[frame.clip_id == clip][channel], plain)
+    np.testing.assert_array_equal(relation.fetchnumpy()[channel], plain)
+
+
+def test_polars_reads_the_same_table(data):
+    pytest.importorskip("polars", reason="polars is optional")
+    assert data.polars("clips")["tyre_peak"].to_list() == data.pandas("clips")["tyre_peak"].to_list()
+
+
+def test_xarray_reads_frames_lazily_with_named_dimensions(data, toy_dataset):
+    pytest.importorskip("xarray", reason="xarray is optional")
+    picture = data.xarray()["rgb"].isel(clip=1, frame=3)
+    assert picture.dims == ("y", "x", "channel")
+    np.testing.assert_array_equal(picture.values, read_clip(toy_dataset.frames, 1, "rgb")[3])
+
+
+def test_what_is_not_represented_is_null_and_left_out_of_an_average(data, toy_dataset):
+    """Clips that coast over a hump have no stopping distance; in Parquet that is NaN."""
+    stored = pq.read_table(toy_dataset.telemetry / "clips.parquet")["stopping_distance"].to_numpy()
+    answer = sql(str(toy_dataset.root), "SELECT count(stopping_distance) n, avg(peak_pitch) p FROM clips")
+    assert np.isnan(stored).sum() >= 2
+    assert answer["rows"][0]["n"] == np.isfinite(stored).sum()
+    assert 0 < answer["rows"][0]["p"] < 0.2
+
+
+def test_pairs_are_those_of_the_grid_and_join_with_clips(data):
+    rows = data.sql(
+        "SELECT p.control, p.tyre_peak_change - (b.tyre_peak - a.tyre_peak) AS off FROM pairs p"
+        " JOIN clips a ON a.clip_id = p.clip_id_a JOIN clips b ON b.clip_id = p.clip_id_b"
+    ).fetchall()
+    assert sorted(control for control, _ in rows) == ["weather", "weather"]
+    assert all(off == 0 for _, off in rows)
+
+
+def test_a_query_that_is_no_sql_is_one_sentence_with_the_views(toy_dataset):
+    with pytest.raises(InputError, match="views are clips, ticks, frames, verdicts, pairs"):
+        sql(str(toy_dataset.root), "SELECT nothing FROM nowhere")
+
+
+def test_an_unknown_table_names_those_that_exist(data):
+    with pytest.raises(InputError, match="there are clips, ticks, frames"):
+        data.telemetry("rides")
+
+
+def test_answers_are_json(toy_dataset):
+    query = "SELECT *, [1.5, 'nan'::DOUBLE] AS l, DATE '2025-01-01' AS d FROM clips"
+    row = json.loads(json.dumps(sql(str(toy_dataset.root), query), allow_nan=False))["rows"][0]
+    assert (row["d"], row["l"]) == ("2025-01-01", [1.5, None])
+
+
+def test_windows_hold_consecutive_frames_and_their_telemetry(data, toy_dataset):
+    windows = data.torch(window=4, stride=3, columns=["speed", "pitch"], arrays=["rgb", "depth"])
+    assert len(windows) == 4 * 3
+    sample = windows[3 + 1]
+    assert (sample["clip"], sample["start"]) == (1, 3)
+    np.testing.assert_array_equal(sample["rgb"], read_clip(toy_dataset.frames, 1, "rgb")[3:7])
+    rows = data.sql("SELECT f.speed, f.pitch FROM frames f JOIN clips c USING (clip_id)"
+                    " WHERE c.index = 1 AND frame BETWEEN 3 AND 6 ORDER BY frame").fetchall()  # fmt: skip
+    np.testing.assert_array_equal(sample["telemetry"], np.array(rows, np.float32))
+
+
+def test_workers_give_the_same_batches_in_the_seeds_order(data):
+    windows = data.torch(window=5, columns=["speed"])
+
+    def batches(workers: int, seed: int, epoch: int = 0) -> list:
+        order = musync.SeededOrder(len(windows), seed)
+        order.set_epoch(epoch)
+        loader = DataLoader(windows, batch_size=2, sampler=order, num_workers=workers)
+        return [(b["clip"].tolist(), b["start"].tolist(), int(b["rgb"].sum())) for b in loader]
+
+    alone = batches(0, seed=7)
+    assert batches(2, seed=7) == alone
+    assert batches(0, seed=8) != alone and batches(0, seed=7, epoch=1) != alone
+    assert sorted(c for clips, _, _ in alone for c in clips) == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert not all(a <= b for a, b in pairwise(c for clips, _, _ in alone for c in clips))
+
+
+def test_wrong_arguments_of_windows_are_listed_all_at_once(data):
+    with pytest.raises(InputError) as caught:
+        data.torch(window=99, stride=-1, columns=["colour", "label"], arrays=["sound"], clips=["moon"])
+    assert len(caught.value.problems) == 6
+
+
+def test_every_tick_channel_is_a_column(data):
+    assert {c.name for c in TICK_CHANNELS} <= set(data.telemetry("ticks").schema.names)
