@@ -196,6 +196,17 @@ def preview(
     _show(_call("preview", False, dataset, out, clips=clip, traces=traces), as_json)
 
 
+@app.command()
+def sheets(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Annotated[str, typer.Option(help="Folder for weather.png and hazards.png.")],
+    station: Annotated[float, typer.Option(help="Where the weathers are shown [m].")] = 12.0,
+    as_json: Json = False,
+) -> None:
+    """Draw one place in every weather, and each road feature before, at and after contact."""
+    _show(_call("sheets", False, dataset, out, station=station), as_json)
+
+
 @app.command("replay-audit")
 def replay_audit(
     grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")] = "severity",
@@ -499,7 +510,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "generate": "generate", "audit": "audit", "verify": "verify", "gc": "verify", "repair": "repair",
         "sql": "query", "schema": "query",
         "describe": "describe", "validate": "describe",
-        "preview": "previews", "replay_audit": "replay",
+        "preview": "previews", "sheets": "sheets", "replay_audit": "replay",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
         "calibrate": "calibration",
         "import_measurements": "importing", "brake_protocol": "protocol", "synthetic_drives": "bus_drives",

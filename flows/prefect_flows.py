@@ -33,12 +33,14 @@ from flows import dataset_diff as _dataset_diff  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import generate as _generate  # noqa: E402
 from flows import importing as _importing  # noqa: E402
+from flows import physics as _physics  # noqa: E402
 from flows import previews as _previews  # noqa: E402
 from flows import protocol as _protocol  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
 from flows import repair as _repair  # noqa: E402
 from flows import replay as _replay  # noqa: E402
 from flows import scenes as _scenes  # noqa: E402
+from flows import sheets as _sheets  # noqa: E402
 from flows import stop_study as _stop_study  # noqa: E402
 from flows import studies as _studies  # noqa: E402
 from flows import verify as _verify  # noqa: E402
@@ -53,6 +55,7 @@ def as_flow(function: Callable[..., Any]) -> Any:
 
 generate = as_flow(_generate.generate)
 audit = as_flow(_audit.audit)
+audit_physics = as_flow(_physics.audit_physics)
 verify = as_flow(_verify.verify)
 repair = as_flow(_repair.repair)
 gc = as_flow(_verify.gc)
@@ -60,6 +63,7 @@ describe = as_flow(_describe.describe)
 validate = as_flow(_describe.validate)
 replay_audit = as_flow(_replay.replay_audit)
 preview = as_flow(_previews.preview)
+sheets = as_flow(_sheets.sheets)
 sensitivity = as_flow(_studies.sensitivity)
 agreement = as_flow(_studies.agreement)
 calibrate = as_flow(_calibration.calibrate)

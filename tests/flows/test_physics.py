@@ -1,0 +1,143 @@
+"""One per cent put into any column of a dataset's telemetry is caught, and the verdict names the column."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from catalogs.scenes import write_scene
+from flows.generate import generate
+from flows.physics import audit_physics, clip_columns, clip_facts, read_constants
+from tasks.conventions import TICK_CHANNELS
+from tasks.errors import InputError
+from tasks.eval.physics_audit import audit_clip
+from tests.toy_street import TOY_CAMERA, toy_street
+
+GRID = """
+name: laws
+scene: {folder}/scene
+camera: {folder}/camera.yaml
+frames: 31
+frame_rate_hz: 10
+axes:
+  weather:
+    dry: {{weather: dry}}
+    rain-50: {{weather: rain, precipitation_mm_h: 50}}
+    snow-1: {{weather: snow, precipitation_mm_h: 1, snow_accumulation_h: 1}}
+  drive:
+    stop: {{initial_speed_km_h: 25, peak_pressure_mpa: 2.3, brake_onset_s: 0.2}}
+    hump: {{initial_speed_km_h: 30, peak_pressure_mpa: 2.3, brake_onset_m: 6.0,
+            hazard_center_m: 8.0, hazard_length_m: 3.7, hazard_height_m: 0.075}}
+"""
+TRIALS = 300
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("laws")
+    write_scene(toy_street(), folder / "scene", {})
+    (folder / "camera.yaml").write_text(TOY_CAMERA)
+    (folder / "grid.yaml").write_text(GRID.format(folder=folder))
+    generate(str(folder / "grid.yaml"), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    return folder / "made"
+
+
+def test_sound_telemetry_keeps_every_law(dataset: Path, tmp_path: Path) -> None:
+    result = audit_physics(str(dataset), out=str(tmp_path))
+    assert result["verified"], [(row["label"], row["broken"]) for row in result["clips"]]
+    assert result["laws_checked"] > 80 * result["clips_checked"]
+    assert (tmp_path / "physics.json").is_file()
+
+
+def test_one_per_cent_in_any_column_is_caught_and_the_column_named(
+    dataset: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    constants = read_constants(dataset)
+    clips = [
+        (clip_columns(dataset, "ticks", facts), clip_columns(dataset, "frames", facts), facts)
+        for facts in clip_facts(dataset)
+    ]
+    draw = np.random.Generator(np.random.Philox(20260725))
+    caught = named = suspected = 0
+    done = 0
+    while done < TRIALS:
+        ticks, frames, facts = clips[draw.integers(len(clips))]
+        put = _put_fault(draw, ticks, frames)
+        if put is None:
+            continue
+        column, *tables = put
+        verdict = audit_clip(*tables, facts, constants)
+        done += 1
+        caught += not verdict.passed
+        named += verdict.column == column
+        suspected += column in (verdict.column, *verdict.also)
+    with capsys.disabled():
+        print(f"\n1 % faults: {caught}/{TRIALS} caught, {named} named first, {suspected} among the suspects")
+    assert caught >= 0.99 * TRIALS
+    assert named >= 0.93 * TRIALS
+    assert suspected >= 0.97 * TRIALS
+
+
+def _put_fault(
+    draw: np.random.Generator, ticks: dict[str, np.ndarray], frames: dict[str, np.ndarray]
+) -> tuple[Any, ...] | None:
+    """A share of a column's value or range, over all of it or a stretch, as its maker or one table's writer would."""
+    names = [c.name for c in TICK_CHANNELS if ticks[c.name].dtype != np.bool_]
+    name = names[draw.integers(len(names))]
+    whose = ("maker", "ticks", "frames")[draw.integers(3)]
+    values = ticks[name].astype(float)
+    count = len(values)
+    begin = draw.integers(count - 300) if draw.random() < 0.5 else 0
+    end = begin + draw.integers(200, 1000) if begin else count
+    share = draw.choice([-0.01, 0.01])
+    change = np.zeros(count)
+    change[begin:end] = share * (values[begin:end] if draw.random() < 0.5 else np.ptp(values))
+    shown = change if whose != "frames" else change[frames["tick"]]
+    if np.abs(shown).max() <= 1e-12 * np.abs(values).max():
+        return None  # one per cent of nothing is no fault
+    faulty = {**ticks, name: values + change} if whose != "frames" else ticks
+    rows = {**frames, name: frames[name] + change[frames["tick"]]} if whose != "ticks" else frames
+    return f"{'frames' if whose == 'frames' else 'ticks'}.{name}", faulty, rows
+
+
+@pytest.mark.parametrize(
+    "name", ["film_depth_mm", "surface_friction", "tyre_peak", "stopping_distance", "peak_pitch", "static_pitch",
+             "initial_speed_km_h", "peak_pressure_mpa", "hazard_height_m", "check_pitch_rmse_deg"],
+)  # fmt: skip
+def test_one_per_cent_in_a_clips_row_is_caught(dataset: Path, name: str) -> None:
+    facts = next(
+        f
+        for f in clip_facts(dataset)
+        if f["label"] == ("dry/stop" if name == "stopping_distance" else "rain-50/hump")
+    )
+    tables = clip_columns(dataset, "ticks", facts), clip_columns(dataset, "frames", facts)
+    verdict = audit_clip(*tables, {**facts, name: facts[name] * 1.01}, read_constants(dataset))
+    assert f"clips.{name}" in (verdict.column, *verdict.also)
+
+
+def test_a_pose_that_does_not_follow_the_station_is_named(dataset: Path) -> None:
+    facts = clip_facts(dataset)[0]
+    ticks, frames = clip_columns(dataset, "ticks", facts), clip_columns(dataset, "frames", facts)
+    poses = frames["T_world_rig"].copy()
+    poses[:, 3] *= 1.01
+    verdict = audit_clip(ticks, {**frames, "T_world_rig": poses}, facts, read_constants(dataset))
+    assert verdict.column == "frames.T_world_rig"
+
+
+def test_a_folder_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"vehicle\.yaml: no such file"):
+        audit_physics(str(tmp_path))
+
+
+def test_a_table_without_a_column_is_refused(dataset: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(dataset, copy, ignore=shutil.ignore_patterns("frames.zarr"))
+    for path in (copy / "telemetry" / "ticks").rglob("*.parquet"):
+        table: pa.Table = pq.read_table(path, partitioning=None)
+        pq.write_table(table.drop_columns(["speed"]), path)
+    with pytest.raises(InputError, match="lacks speed"):
+        audit_physics(str(copy))
