@@ -52,6 +52,31 @@ def contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz: flo
     return sheet
 
 
+def picture_sheet(rows: Sequence[Sequence[tuple[str, NDArray[np.uint8]]]]) -> NDArray[np.uint8]:
+    """Captioned pictures in rows.
+
+    Parameters
+    ----------
+    rows : caption and picture uint8 [H, W, 3] of each column; rows may be of different length
+
+    Returns
+    -------
+    uint8 [H, W, 3] RGB
+    """
+    height, width = rows[0][0][1].shape[:2]
+    tile = (TILE_WIDTH, round(TILE_WIDTH * height / width))
+    step_x, step_y = tile[0] + MARGIN, tile[1] + MARGIN + CAPTION
+    columns = max(len(row) for row in rows)
+    sheet = np.full((len(rows) * step_y + MARGIN, columns * step_x + MARGIN, 3), PAPER, np.uint8)
+    for i, row in enumerate(rows):
+        for j, (caption, picture) in enumerate(row):
+            top, left = i * step_y + MARGIN, j * step_x + MARGIN
+            small = cv2.resize(picture, tile, interpolation=cv2.INTER_AREA)
+            sheet[top + CAPTION : top + CAPTION + tile[1], left : left + tile[0]] = small
+            _text(sheet, caption, (left, top + CAPTION - 6))
+    return sheet
+
+
 def encode_png(picture: NDArray[np.uint8]) -> bytes:
     """PNG bytes of an RGB picture."""
     done, content = cv2.imencode(".png", picture[..., ::-1])
