@@ -183,6 +183,26 @@ def schema(as_json: Json = False) -> None:
 
 
 @app.command()
+def explain(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    clip: Annotated[str, typer.Argument(help="Label or id of a clip.")],
+    frame: Annotated[int, typer.Argument(help="Frame number, from 0.")],
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Follow one frame from the weather to the pixel, every number computed again beside the stored one."""
+    result = _call("explain", False, dataset, clip, frame, out=out)
+    if as_json:
+        _show(result, as_json)
+    else:
+        from flows.explain import as_text
+
+        typer.echo(as_text(result), nl=False)
+    if not result["agrees"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
 def preview(
     dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
     out: Annotated[str, typer.Option(help="Folder for the films.")],
@@ -508,7 +528,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
 
     module = {
         "generate": "generate", "audit": "audit", "verify": "verify", "gc": "verify", "repair": "repair",
-        "sql": "query", "schema": "query",
+        "sql": "query", "schema": "query", "explain": "explain",
         "describe": "describe", "validate": "describe",
         "preview": "previews", "sheets": "sheets", "replay_audit": "replay",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",

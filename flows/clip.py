@@ -132,30 +132,14 @@ def drive(
     scenario: Scenario, catalogue: Catalogue, mode: Mode, duration_s: float
 ) -> tuple[dict[str, Any], Rollout]:
     """Weather to surface state to friction to vehicle motion."""
-    weather = Weather(
-        kind=scenario.weather,
-        precipitation_mm_h=scenario.precipitation_mm_h,
-        snow_accumulation_h=scenario.snow_accumulation_h,
-    )
+    weather = weather_of(scenario)
     state = surface_state(weather, catalogue.surface)
     friction = surface_friction(weather, state, catalogue.surface)
-    controls = Controls(
-        initial_speed=scenario.initial_speed_km_h / 3.6,
-        brake=BrakeCommand(
-            peak_pressure_mpa=scenario.peak_pressure_mpa,
-            ramp_s=scenario.ramp_s,
-            hold_s=scenario.hold_s,
-            release_s=scenario.release_s,
-            onset_s=scenario.brake_onset_s,
-            onset_station_m=scenario.brake_onset_m,
-        ),
-        hold_speed_until_brake=False,
-    )
     ride = rollout(
         catalogue.vehicle,
         scenario.weather,
         friction,
-        controls,
+        controls_of(scenario),
         hazard_of(scenario),
         mode=mode,
         duration_s=duration_s,
@@ -168,6 +152,31 @@ def drive(
         "tyre_peak": ride.tyre_peak,
     }
     return facts, ride
+
+
+def weather_of(scenario: Scenario) -> Weather:
+    """What falls on the road in the scenario."""
+    return Weather(
+        kind=scenario.weather,
+        precipitation_mm_h=scenario.precipitation_mm_h,
+        snow_accumulation_h=scenario.snow_accumulation_h,
+    )
+
+
+def controls_of(scenario: Scenario) -> Controls:
+    """What the driver does in the scenario."""
+    return Controls(
+        initial_speed=scenario.initial_speed_km_h / 3.6,
+        brake=BrakeCommand(
+            peak_pressure_mpa=scenario.peak_pressure_mpa,
+            ramp_s=scenario.ramp_s,
+            hold_s=scenario.hold_s,
+            release_s=scenario.release_s,
+            onset_s=scenario.brake_onset_s,
+            onset_station_m=scenario.brake_onset_m,
+        ),
+        hold_speed_until_brake=False,
+    )
 
 
 def hazard_of(scenario: Scenario) -> RoadHazard:
