@@ -143,7 +143,10 @@ def fit(
         objective = float(by_run.sum() + np.sum(prior * s**2))
         if abs(before - objective) < 0.3 and expected < 0.5:
             break
-    covariance = np.asarray(np.linalg.pinv(normal)[:k, :k], dtype=np.float64)
+    # scaled first: in their own units the parameters' information spans more than double precision can invert
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse = np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size)
+    covariance = np.asarray(inverse[:k, :k], dtype=np.float64)
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective, by_run=by_run,
         covariance=covariance, residuals=tuple(residuals), offsets=offsets,

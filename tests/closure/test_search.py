@@ -1,6 +1,7 @@
 """What the search stands on: forked runs, numerical doubt, nuisances taken over, experiments, look-alikes."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,21 @@ def test_a_free_parameter_takes_its_session_nuisance_over() -> None:
     )  # fmt: skip
     assert abs(fitted.session[SESSION.index("pressure_gain")]) < 1e-12
     assert fitted.values[0] == pytest.approx(0.1, abs=0.01)
+
+
+def test_an_interval_does_not_depend_on_the_unit_of_its_parameter() -> None:
+    evidence = evidence_of(np.zeros(len(ALL_PARAMETERS)), "progressive_spring")
+    spring = library_hypothesis(LIBRARY["progressive_spring"])
+    build = spring.build
+    scaled = replace(
+        spring, build=lambda x: build(1e9 * x), **{
+            key: getattr(spring, key) / 1e9 for key in ("lower", "upper", "step", "start")
+        },
+    )  # fmt: skip
+    sigmas = [
+        np.sqrt(fit(evidence.train, (h,), evidence.session_sigma).covariance[0, 0]) for h in (spring, scaled)
+    ]
+    assert sigmas[0] > 0.0 and sigmas[0] == pytest.approx(1e9 * sigmas[1], rel=1e-3)
 
 
 def test_effects_of_one_shape_are_look_alikes_and_others_are_not() -> None:
