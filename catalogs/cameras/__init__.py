@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
 from tasks.render.camera import Camera
+from tasks.render.sensor import Sensor
 
 FOLDER = Path(__file__).parent
 
@@ -33,6 +34,13 @@ class CameraEntry(CatalogueEntry):
     exposure: Annotated[Scalar, checked("s", above=0, maximum=0.1)]
     pitch_down: Annotated[Scalar, checked("deg", minimum=-45, maximum=45)] = Field(
         default=Scalar(value=0.0, unit="deg", source="level mount")
+    )
+    exposure_compensation: Annotated[Scalar, checked("EV", minimum=-8, maximum=8)] = Field(
+        default=Scalar(value=0.0, unit="EV", source="as the clear clip")
+    )
+    full_well: Annotated[Scalar, checked("e-", above=0)] | None = None
+    read_noise: Annotated[Scalar, checked("e-", minimum=0)] = Field(
+        default=Scalar(value=0.0, unit="e-", source="no noise")
     )
 
 
@@ -73,4 +81,9 @@ def load_camera(name_or_path: str | Path) -> Camera:
         K=np.array([[f, 0.0, width / 2], [0.0, f, height / 2], [0.0, 0.0, 1.0]]),
         T_rig_camera=mount,
         exposure_s=entry.exposure.value,
+        sensor=Sensor(
+            exposure_ev=entry.exposure_compensation.value,
+            full_well=None if entry.full_well is None else entry.full_well.value,
+            read_noise=entry.read_noise.value,
+        ),
     )

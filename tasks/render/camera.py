@@ -1,10 +1,11 @@
 """The camera: intrinsics, mount, and where heave and pitch put it (paper, Eq. camera_pose)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.sensor import Sensor
 from tasks.scene.route import Route
 
 
@@ -19,6 +20,7 @@ class Camera:
     K : float64 [3, 3] intrinsics; pixel centres lie at +0.5 [px]
     T_rig_camera : float64 [4, 4] camera axes (x right, y down, z forward) to rig axes
     exposure_s : how long the shutter is open; sets the length of rain streaks [s]
+    sensor : exposure and noise
     """
 
     name: str
@@ -27,6 +29,7 @@ class Camera:
     K: NDArray[np.float64]
     T_rig_camera: NDArray[np.float64]
     exposure_s: float
+    sensor: Sensor = field(default_factory=Sensor)
 
 
 def body_poses(

@@ -9,6 +9,7 @@ from tasks.render.composition import compose, encode_8bit, round_depth
 from tasks.render.environment import environment_view
 from tasks.render.labels import clip_flow, frame_labels
 from tasks.render.road_edit import Profile
+from tasks.render.sensor import photographed
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter
@@ -73,7 +74,7 @@ def render_clip(
         clear = compose(gbuffer, sky, gaussians.display_encoded)
         finished = apply_weather(clip_weather, clear, gbuffer, shutter)
         buffers: dict[str, NDArray[np.generic]] = {
-            "rgb": encode_8bit(finished.picture),
+            "rgb": encode_8bit(photographed(finished.picture, camera.sensor, seed, frame)),
             "depth": round_depth(gbuffer.depth),
             "class": gbuffer.class_id,
         }
