@@ -4,7 +4,7 @@ BIN := .venv/bin
 READY := .venv/.ready
 DEMO ?= datasets/demo
 
-.PHONY: demo test check study bench clean
+.PHONY: demo test check study study-schedule bench clean
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -25,6 +25,9 @@ check: $(READY)
 
 study: $(READY)
 	$(BIN)/musync sensitivity --out datasets/study
+
+study-schedule: $(READY)
+	$(BIN)/python -m benchmarks.scheduled_runs
 
 bench: $(READY)
 	$(BIN)/musync bench --out datasets/bench

@@ -84,6 +84,21 @@ def audit(
 
 
 @app.command()
+def schedule(
+    grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")],
+    every: Annotated[str, typer.Option(help='Cron expression, UTC: "0 3 * * *" is every night at three.')],
+    out: Annotated[str, typer.Option(help="Folder in which each run makes its dated dataset.")],
+    runner: Runner = "dask",
+    workers: Workers = None,
+    notify: Annotated[
+        str | None, typer.Option(help="Command or http(s) address that is told of a failed run.")
+    ] = None,
+) -> None:
+    """Make a dataset of a grid again and again, as a Prefect deployment served from this process."""
+    _call("schedule", False, grid, every=every, out=out, runner=runner, workers=workers, notify=notify)
+
+
+@app.command()
 def verify(
     dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
     out: Out = None,
@@ -139,6 +154,20 @@ def audit_physics(
     _show(result if as_json else brief, as_json)
     if not result["verified"]:
         raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def evaluate(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Annotated[str, typer.Option(help="Folder for evaluation.json, .parquet and .html.")],
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Judge a dataset from its pixels: poses, motion, road edits and weather, beside the paper's figures."""
+    result = _call("evaluate", prefect, dataset, out=out)
+    keys = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
+    rows = [{key: row[key] for key in keys} for row in result["rows"] if not row["window"]]
+    _show(result if as_json else {**result, "rows": rows}, as_json)
 
 
 @app.command()
@@ -528,7 +557,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
 
     module = {
         "generate": "generate", "audit": "audit", "verify": "verify", "gc": "verify", "repair": "repair",
-        "sql": "query", "schema": "query", "explain": "explain",
+        "sql": "query", "schema": "query", "explain": "explain", "schedule": "scheduling",
         "describe": "describe", "validate": "describe",
         "preview": "previews", "sheets": "sheets", "replay_audit": "replay",
         "sensitivity": "studies", "agreement": "studies", "bench": "studies",
@@ -537,7 +566,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "stop_study": "stop_study", "diff": "dataset_diff",
         "bump_study": "bump_study", "close_loop": "closing",
         "close_loop_benchmark": "closing_benchmark",
-        "audit_physics": "physics",
+        "audit_physics": "physics", "evaluate": "evaluation",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

@@ -1,0 +1,113 @@
+"""Scheduled runs: dated folders, resuming, reports of failures, and parameters checked when the schedule is made."""
+
+import http.server
+import json
+import threading
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+import flows.generate
+from flows.clip import make_clip
+from flows.failures import ClipsFailed
+from flows.scheduling import checked_parameters, report_failure, scheduled_run
+from flows.store.layout import Layout
+from tasks.errors import InputError
+
+AT = datetime(2026, 3, 1, 3, 0, tzinfo=UTC)
+NIGHT = timedelta(days=1)
+
+
+@pytest.fixture
+def grid(toy_dataset, tmp_path) -> str:
+    text = (toy_dataset.root.parent / "grid.yaml").read_text()
+    (tmp_path / "grid.yaml").write_text(text.replace("frames: 11", "frames: 2"))
+    return str(tmp_path / "grid.yaml")
+
+
+def test_each_run_makes_its_own_dated_dataset_with_the_same_bytes(grid, tmp_path):
+    root = tmp_path / "root"
+    runs = [scheduled_run(grid, str(root), at=AT + i * NIGHT, runner="threads") for i in range(2)]
+    assert sorted(p.name for p in root.iterdir()) == ["toy-20260301T030000Z", "toy-20260302T030000Z"]
+    first, second = (Layout(p).manifest.read_bytes() for p in sorted(root.iterdir()))
+    assert first == second
+    assert [run["made"] for run in runs] == [4, 4]
+    assert {row["clip"] for row in runs[0]["verdicts"]} == {
+        "dry/flat",
+        "dry/hump",
+        "snow-3/flat",
+        "snow-3/hump",
+    }
+
+
+def lightning_at_two(root: str, index: int) -> dict:
+    if index == 2:
+        raise RuntimeError("lightning struck")
+    return make_clip(root, index)
+
+
+def test_an_unfinished_run_is_resumed_and_one_of_another_plan_left_alone(grid, tmp_path, monkeypatch):
+    root = tmp_path / "root"
+    monkeypatch.setattr(flows.generate, "make_clip", lightning_at_two)
+    with pytest.raises(ClipsFailed):
+        scheduled_run(grid, str(root), at=AT, runner="threads", workers=1)
+    monkeypatch.undo()
+    other = tmp_path / "other.yaml"
+    other.write_text((tmp_path / "grid.yaml").read_text().replace("frames: 2", "frames: 3"))
+    apart = scheduled_run(str(other), str(root), at=AT + NIGHT, runner="threads")
+    assert apart["dataset"].endswith("toy-20260302T030000Z") and apart["made"] == 4
+    resumed = scheduled_run(grid, str(root), at=AT + 2 * NIGHT, runner="threads")
+    assert resumed["dataset"].endswith("toy-20260301T030000Z") and 0 < resumed["made"] < 4
+    assert len(list(root.iterdir())) == 2
+
+
+def test_a_failure_leaves_a_report_and_runs_the_command_with_it(tmp_path):
+    (tmp_path / "hook.sh").write_text(
+        f'#!/bin/sh\ncp "$2" "{tmp_path}/told"; echo "$1" >> "{tmp_path}/told"\n'
+    )
+    (tmp_path / "hook.sh").chmod(0o755)
+    error = ClipsFailed("2 of 4 clips failed")
+    report = report_failure("demo", str(tmp_path), AT, error, f"{tmp_path}/hook.sh 'two words'")
+    text = report.read_text()
+    assert "2 of 4 clips failed" in text and "2026-03-01T03:00:00+00:00" in text
+    assert (tmp_path / "told").read_text() == text + "two words\n"
+
+
+def test_a_failure_is_posted_to_a_webhook(tmp_path):
+    told = []
+
+    class Hook(http.server.BaseHTTPRequestHandler):
+        def do_POST(self):
+            told.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            self.send_response(204)
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.HTTPServer(("127.0.0.1", 0), Hook) as server:
+        threading.Thread(target=server.handle_request, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_port}/hook"
+        report = report_failure("demo", str(tmp_path), AT, ClipsFailed("no luck"), address)
+    assert told[0]["error"] == "ClipsFailed: no luck" and told[0]["report"] == str(report)
+
+
+def test_a_hook_that_fails_is_noted_and_does_not_hide_the_failure(tmp_path):
+    report = report_failure("demo", str(tmp_path), AT, ClipsFailed("no luck"), "false")
+    assert "no luck" in report.read_text() and "notification false failed" in report.read_text()
+
+
+def test_everything_wrong_with_a_schedule_is_told_when_it_is_made(tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(InputError) as caught:
+        checked_parameters("nowhere", "every night", str(tmp_path / "taken"), "fish", None, "no-such-command")
+    text = str(caught.value)
+    assert len(caught.value.problems) == 5
+    for word in ("--every", "nowhere: no such grid", "--out", "--runner", "--notify"):
+        assert word in text
+
+
+def test_parameters_name_files_in_full_so_that_runs_find_them_from_anywhere(grid, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    parameters = checked_parameters("grid.yaml", "0 3 * * *", "root", "threads", 1, None)
+    assert (parameters["grid"], parameters["root"]) == (grid, str(tmp_path / "root"))
