@@ -1,0 +1,168 @@
+"""The evaluation as one HTML page that needs no other file: plots as SVG, tables, thumbnails."""
+
+import base64
+from collections.abc import Sequence
+from html import escape
+from io import StringIO
+from typing import Any
+
+import cv2
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from flows.judged_clip import METHODS, JudgedClip, Row
+
+COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
+STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #1b1b1b; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; border-bottom: 1px solid #ddd; }
+table { border-collapse: collapse; font-size: 12.5px; } th, td { padding: .15rem .6rem; border-bottom: 1px solid #eee; }
+td.n { text-align: right; font-variant-numeric: tabular-nums; } th { text-align: left; }
+svg { max-width: 100%; height: auto; } img { width: 240px; margin: 2px; }
+.none { color: #a33; } figure { margin: .5rem 0; } figcaption { font-size: 13px; color: #444; }
+"""
+SHOWN_CLIPS = 12
+MEANING = {
+    "pitch_rmse": "RMSE of recovered pitch against the telemetry, from frame 0",
+    "pitch_relative_error": "the same over the RMS of the claimed pitch",
+    "normalised_progress_rmse": "RMSE of progress over the whole way",
+    "progress_rmse": "RMSE of forward progress; only a method that knows the scale",
+    "e_weather": "Appendix A.5: change of normalised progress against the dry control",
+    "e_geometry_hump": "Appendix A.5: pitch in the event window, from the feature's near edge on",
+    "e_geometry_depression": "Appendix A.5: as above",
+    "e_path": "Appendix A.6: normalised lateral path against the dry control",
+    "localised_edit_rate": "Appendix A.6: active frames with a change where the feature is",
+    "anchor_error": "Appendix A.6: distance of centroids over the diagonal",
+    "temporal_iou": "Appendix A.6: overlap of masks along the optical flow",
+    "severity_rank_correlation": "Spearman of an image statistic with the rate; a stand-in for CLIP",
+    "severity_adjacent_accuracy": "neighbouring levels in that order; a stand-in for CLIP",
+}
+
+
+def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str) -> str:
+    """The whole page.
+
+    Parameters
+    ----------
+    clips : as their judges saw them
+    rows : every figure
+    run_id : of the dataset
+    """
+    names = list(dict.fromkeys(row["metric"] for row in rows))
+    parts = [
+        f"<h1>Judged from the pixels: {escape(run_id)}</h1>",
+        "<p>Smoothing acts on the estimate alone, so even a perfect pose scores its floor: read no figure without"
+        " it. Window 0 is none. The paper's figures come from VGGT on other videos.</p>",
+        "<h2>Summary</h2>", _summary(rows, names),
+        "<h2>Pitch: claimed and recovered</h2>", _figure(_pitch_plot(clips), "Claimed (black) and recovered [deg]."),
+        "<h2>E_geometry and its floor</h2>", _figure(_window_plot(rows), "Mean over clips; dashed: a perfect pose."),
+        "<h2>Clips</h2>", _thumbnails(clips),
+        "<h2>Every figure</h2>",
+        *(f"<h3>{escape(name)}</h3><p>{escape(MEANING.get(name, ''))}</p>"
+          f"{_table([row for row in rows if row['metric'] == name])}" for name in names),
+    ]  # fmt: skip
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>muSync evaluation</title>'
+        f"<style>{STYLE}</style></head><body>{''.join(parts)}</body></html>"
+    )
+
+
+def _summary(rows: Sequence[Row], names: Sequence[str]) -> str:
+    lines = []
+    for name in names:
+        for method in dict.fromkeys(row["method"] for row in rows if row["metric"] == name):
+            mine = [r for r in rows if r["metric"] == name and r["method"] == method and r["window"] == 0]
+            values = [r["value"] for r in mine if r["value"] is not None]
+            lines.append(
+                (name, method, float(np.mean(values)) if values else None, max(values) if values else None,
+                 mine[0]["unit"], mine[0]["paper"], f"{len(values)} of {len(mine)}",
+                 "" if values else mine[0]["note"])
+            )  # fmt: skip
+    head = ("metric", "method", "mean", "largest", "unit", "paper", "scored", "note")
+    return _html_table(head, lines)
+
+
+def _table(rows: Sequence[Row]) -> str:
+    head = ("condition", "method", "window", "value", "floor", "uncertainty", "unit", "paper", "note")
+    return _html_table(head, [tuple(row[key] for key in head) for row in rows])
+
+
+def _html_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    def cell(value: Any) -> str:
+        if value is None:
+            return '<td class="none">-</td>'
+        if isinstance(value, float):
+            return f'<td class="n">{value:.4g}</td>'
+        return f"<td>{escape(str(value))}</td>"
+
+    body = "".join(f"<tr>{''.join(cell(v) for v in row)}</tr>" for row in rows)
+    return f"<table><tr>{''.join(f'<th>{escape(h)}</th>' for h in head)}</tr>{body}</table>"
+
+
+def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
+    shown = clips[:SHOWN_CLIPS]
+    lines = -(-len(shown) // 3)
+    figure = Figure(figsize=(11, 2.1 * lines), layout="constrained")
+    axes = figure.subplots(lines, 3, squeeze=False, sharex=True).ravel()
+    for axis, clip in zip(axes, shown, strict=False):
+        claimed = np.rad2deg(clip.frames["pitch"] - clip.frames["pitch"][0])
+        axis.plot(clip.times, claimed, color="black", lw=1.6, label="claimed")
+        for method in METHODS:
+            axis.plot(
+                clip.times,
+                np.rad2deg(clip.motions[method].pitch),
+                color=COLOURS[method],
+                lw=0.8,
+                label=method,
+            )
+        axis.set_title(clip.facts["label"], fontsize=9)
+        axis.tick_params(labelsize=7)
+    for axis in axes[len(shown) :]:
+        axis.set_axis_off()
+    axes[0].legend(fontsize=6)
+    return figure
+
+
+def _window_plot(rows: Sequence[Row]) -> Figure:
+    figure = Figure(figsize=(9, 3), layout="constrained")
+    for axis, name in zip(figure.subplots(1, 2), ("e_geometry_hump", "e_geometry_depression"), strict=True):
+        mine = [r for r in rows if r["metric"] == name and r["value"] is not None]
+        windows = sorted({r["window"] for r in mine})
+        for method in METHODS:
+            means = [
+                np.mean([r["value"] for r in mine if (r["window"], r["method"]) == (w, method)])
+                for w in windows
+            ]
+            axis.plot(windows, means, "o-", color=COLOURS[method], ms=3, label=method)
+        floors = [np.mean([r["floor"] for r in mine if r["window"] == w]) for w in windows]
+        axis.plot(windows, floors, "--", color="black", label="perfect pose")
+        axis.set_title(name, fontsize=9)
+        axis.set_xlabel("smoothing window [frames]", fontsize=8)
+        axis.set_ylim(bottom=0)
+    axis.legend(fontsize=7)
+    return figure
+
+
+def _figure(figure: Figure, caption: str) -> str:
+    buffer = StringIO()
+    # a fixed salt and no date: the same figures, the same bytes
+    with matplotlib.rc_context({"svg.hashsalt": "musync", "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    drawing = buffer.getvalue()
+    return f"<figure>{drawing[drawing.index('<svg') :]}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def _thumbnails(clips: Sequence[JudgedClip]) -> str:
+    parts = []
+    for clip in clips[:SHOWN_CLIPS]:
+        pictures = []
+        for picture in clip.thumbnails:
+            coded = cv2.imencode(
+                ".jpg", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 80]
+            )[1]
+            pictures.append(
+                f'<img alt="" src="data:image/jpeg;base64,{base64.b64encode(coded.tobytes()).decode()}">'
+            )
+        parts.append(f"<p>{escape(clip.facts['label'])}<br>{''.join(pictures)}</p>")
+    return "".join(parts)

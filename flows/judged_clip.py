@@ -1,0 +1,72 @@
+"""One clip of a dataset as its judges see it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flows.clip import PIXEL_CENTRE, catalogue_of
+from flows.physics import clip_columns
+from flows.store.frames import read_clip
+from flows.store.layout import Layout
+from tasks.conventions import ROAD_CLASSES
+from tasks.eval.motion import RecoveredMotion
+from tasks.eval.pose_essential import recover_motion_essential
+from tasks.eval.pose_photometric import recover_motion_photometric
+from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.severity import image_statistics
+from tasks.eval.unusable import unusable_pixels
+
+Row = dict[str, Any]
+METHODS = ("photometric", "pnp", "essential")
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgedClip:
+    """A clip as its judges saw it.
+
+    Parameters
+    ----------
+    facts : the clip's row
+    frames : columns of the frame table
+    motions : recovered motion by method
+    statistics : of its pictures
+    thumbnails : three of its frames, uint8 [3, h, w, 3] sRGB
+    """
+
+    facts: Row
+    frames: dict[str, NDArray[Any]]
+    motions: dict[str, RecoveredMotion]
+    statistics: dict[str, float]
+    thumbnails: NDArray[np.uint8]
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Of the frames [s]."""
+        return np.asarray(self.frames["t_ns"] * 1e-9, np.float64)
+
+
+def judge_clip(root: Path, facts: Row) -> JudgedClip:
+    """All three pose checks and the image statistics of one clip."""
+    cv2.setNumThreads(1)
+    catalogue, layout = catalogue_of(root), Layout(root)
+    rgb, depth, kind = (read_clip(layout.frames, facts["index"], name) for name in ("rgb", "depth", "class"))
+    frames = clip_columns(root, "frames", facts)
+    K, mount = catalogue.camera.K - PIXEL_CENTRE, catalogue.camera.T_rig_camera
+    hidden = unusable_pixels(kind, facts["film_depth_mm"])
+    route = catalogue.scene.route.pose(frames["station"])[:, :3, :3]
+    small = rgb[[0, len(rgb) // 3, 2 * len(rgb) // 3]]
+    return JudgedClip(
+        facts=facts,
+        frames=frames,
+        motions={
+            "photometric": recover_motion_photometric(rgb, depth, K, mount, hidden, route),
+            "pnp": recover_motion_pnp(rgb, depth, K, mount, hidden, route),
+            "essential": recover_motion_essential(rgb, K, mount, route_rotations=route),
+        },
+        statistics=image_statistics(rgb, np.isin(kind, ROAD_CLASSES)),
+        thumbnails=np.stack([cv2.resize(p, (240, 240 * p.shape[0] // p.shape[1])) for p in small]),
+    )

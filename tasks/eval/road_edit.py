@@ -1,0 +1,206 @@
+"""Is a road feature visible where it should be, and only there? (paper, Appendix A.6)
+
+A feature clip is held against its flat control: registered by the background, compared in Lab, masked.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadEditSettings:
+    """The constants of Appendix A.6; the search region's borders are declared here, the paper prints none.
+
+    Parameters
+    ----------
+    active_px : target pixels from which a frame counts as showing the target [px]
+    dilation_px : target dilation left out of the background, and searched [px]
+    lower_share : lower part of the frame left out of the background [1]
+    ecc_iterations, ecc_tolerance, ecc_filter : of the affine registration [1], [1], [px]
+    floor, mads, mad_floor : residual threshold max(floor, median + mads max(MAD, mad_floor)), Lab over 255 [1]
+    opening, closing : width and height of the morphology's rectangles [px]
+    component_px : least size of a connected component [px]
+    coverage : least share of the target that must be detected [1]
+    search_top, search_side : lower-central search region: rows below, and columns off either side [1]
+    """
+
+    active_px: int = 80
+    dilation_px: int = 18
+    lower_share: float = 0.12
+    ecc_iterations: int = 70
+    ecc_tolerance: float = 1e-5
+    ecc_filter: int = 5
+    floor: float = 0.025
+    mads: float = 3.5
+    mad_floor: float = 0.004
+    opening: tuple[int, int] = (3, 3)
+    closing: tuple[int, int] = (7, 5)
+    component_px: int = 20
+    coverage: float = 0.05
+    search_top: float = 0.4
+    search_side: float = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadEditScore:
+    """One feature clip against its flat control.
+
+    Parameters
+    ----------
+    localised_edit_rate : share of active frames with a detection [1]
+    anchor_error : mean distance of detected and prescribed centroid over the diagonal, 1 where missing [1]
+    temporal_iou : mean IoU of each mask with the warped one before, 0 where missing [1]
+    active_frames : frames that show the target [1]
+    unregistered : frames whose registration did not converge and stayed as they were [1]
+    """
+
+    localised_edit_rate: float
+    anchor_error: float
+    temporal_iou: float
+    active_frames: int
+    unregistered: int
+
+
+def register_background(
+    moving: NDArray[np.uint8], fixed: NDArray[np.uint8], background: Mask, settings: RoadEditSettings
+) -> tuple[NDArray[np.uint8], bool]:
+    """The moving picture laid over the fixed one by affine ECC on the background (Evangelidis 2008).
+
+    Parameters
+    ----------
+    moving, fixed : uint8 [H, W, 3] sRGB pictures [1]
+    background : bool [H, W] pixels that count [1]
+    settings : iterations, tolerance, filter
+
+    Returns
+    -------
+    The moved picture, and whether the registration converged.
+    """
+    grey = [cv2.cvtColor(p, cv2.COLOR_RGB2GRAY) for p in (fixed, moving)]
+    end = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, settings.ecc_iterations, settings.ecc_tolerance)
+    warp = np.eye(2, 3, dtype=np.float32)
+    try:
+        _, warp = cv2.findTransformECC(
+            grey[0], grey[1], warp, cv2.MOTION_AFFINE, end, background.astype(np.uint8), settings.ecc_filter
+        )
+    except cv2.error:
+        return moving, False
+    size = fixed.shape[1], fixed.shape[0]
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return cv2.warpAffine(moving, warp, size, flags=flags, borderMode=cv2.BORDER_REPLICATE), True
+
+
+def paired_residual(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Mean absolute Lab difference of two pictures, 8-bit Lab over 255 [1].
+
+    Parameters
+    ----------
+    a, b : uint8 [H, W, 3] sRGB [1]
+    """
+    lab = [cv2.cvtColor(p, cv2.COLOR_RGB2LAB).astype(np.float64) / 255 for p in (a, b)]
+    return np.abs(lab[0] - lab[1]).mean(axis=2)
+
+
+def detected_edit(
+    feature: NDArray[np.uint8], flat: NDArray[np.uint8], target: Mask, settings: RoadEditSettings
+) -> tuple[Mask, bool]:
+    """What changed about the target between a feature frame and its flat control.
+
+    Parameters
+    ----------
+    feature, flat : uint8 [H, W, 3] sRGB pictures [1]
+    target : bool [H, W] where the feature is prescribed [1]
+    settings : constants
+
+    Returns
+    -------
+    The detected mask, empty where the change does not count as one; and whether the registration converged.
+    """
+    height, width = target.shape
+    reach = 2 * settings.dilation_px + 1
+    ball = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
+    wide = cv2.dilate(target.astype(np.uint8), ball) > 0
+    background = ~wide
+    background[round((1 - settings.lower_share) * height) :] = False
+    laid, converged = register_background(flat, feature, background, settings)
+    residual = paired_residual(feature, laid)
+    quiet = residual[background]
+    middle = float(np.median(quiet))
+    spread = max(float(np.median(np.abs(quiet - middle))), settings.mad_floor)
+    side = round(settings.search_side * width)
+    search = wide.copy()
+    search[round(settings.search_top * height) :, side : width - side] = True
+    changed = ((residual > max(settings.floor, middle + settings.mads * spread)) & search).astype(np.uint8)
+    changed = cv2.morphologyEx(changed, cv2.MORPH_OPEN, np.ones(settings.opening[::-1], np.uint8))
+    changed = cv2.morphologyEx(changed, cv2.MORPH_CLOSE, np.ones(settings.closing[::-1], np.uint8))
+    count, label, facts, _ = cv2.connectedComponentsWithStats(changed)
+    kept = [
+        i for i in range(1, count)
+        if facts[i, cv2.CC_STAT_AREA] >= settings.component_px and (wide & (label == i)).any()
+    ]  # fmt: skip
+    mask = np.isin(label, kept) & wide
+    if (mask & target).sum() < settings.coverage * target.sum():
+        mask[:] = False
+    return mask, converged
+
+
+def temporal_iou(
+    before: Mask, mask: Mask, picture_before: NDArray[np.uint8], picture: NDArray[np.uint8]
+) -> float:
+    """IoU of a mask with the one before, warped by Farneback backward flow (Farneback 2003) [1].
+
+    Parameters
+    ----------
+    before, mask : bool [H, W] [1]
+    picture_before, picture : uint8 [H, W, 3] sRGB [1]
+    """
+    if not (before.any() and mask.any()):
+        return 0.0
+    grey = [cv2.cvtColor(p, cv2.COLOR_RGB2GRAY) for p in (picture, picture_before)]
+    flow = cv2.calcOpticalFlowFarneback(grey[0], grey[1], None, 0.5, 4, 21, 4, 7, 1.5, 0)
+    y, x = np.mgrid[: mask.shape[0], : mask.shape[1]].astype(np.float32)
+    warped = cv2.remap(before.astype(np.uint8), x + flow[..., 0], y + flow[..., 1], cv2.INTER_NEAREST) > 0
+    return float((warped & mask).sum() / (warped | mask).sum())
+
+
+def score_road_edit(
+    feature: Sequence[NDArray[np.uint8]], flat: Sequence[NDArray[np.uint8]], targets: Sequence[Mask],
+    settings: RoadEditSettings | None = None,
+) -> RoadEditScore | None:  # fmt: skip
+    """Localised edit rate, anchor error and temporal IoU of one pair of clips; None if the target is never seen.
+
+    Parameters
+    ----------
+    feature, flat : F pictures each, uint8 [H, W, 3] sRGB [1]
+    targets : F masks, bool [H, W] [1]
+    settings : constants
+    """
+    chosen = settings or RoadEditSettings()
+    active = [k for k, target in enumerate(targets) if target.sum() >= chosen.active_px]
+    if not active:
+        return None
+    diagonal = float(np.hypot(*targets[0].shape))
+    masks, distances, unregistered = {}, [], 0
+    for k in active:
+        masks[k], converged = detected_edit(feature[k], flat[k], targets[k], chosen)
+        unregistered += not converged
+        if masks[k].any():
+            apart = np.argwhere(masks[k]).mean(axis=0) - np.argwhere(targets[k]).mean(axis=0)
+            distances.append(float(np.linalg.norm(apart)) / diagonal)
+        else:
+            distances.append(1.0)
+    pairs = [(k - 1, k) for k in active if k - 1 in masks]
+    overlaps = [temporal_iou(masks[i], masks[k], feature[i], feature[k]) for i, k in pairs]
+    return RoadEditScore(
+        localised_edit_rate=float(np.mean([masks[k].any() for k in active])),
+        anchor_error=float(np.mean(distances)),
+        temporal_iou=float(np.mean(overlaps)) if overlaps else float("nan"),
+        active_frames=len(active),
+        unregistered=unregistered,
+    )

@@ -1,0 +1,202 @@
+"""Motion metrics of a video against a reference trajectory (paper, Appendix A.5 and A.6), one function a step.
+
+The paper does not print its smoothing window. A window that smooths the estimate alone is itself an error, so each
+metric takes the window as an argument, and the same metric of a perfect estimate is its floor.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from tasks.errors import InputError
+from tasks.eval.rigid import Floats
+
+WINDOWS: tuple[int | None, ...] = (None, 5, 7, 9)
+"""Smoothing windows that figures are given at [frames]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionProtocol:
+    """The fixed choices of Appendix A.5.
+
+    Parameters
+    ----------
+    event : event window from its opening [s]
+    before, after : flanking intervals of the local baseline, from the same opening [s]
+    opening : when the event window opens in the paper's clips [s]
+    order : of the Savitzky-Golay polynomial [1]
+    grid : samples of the common progress grid of the path error [1]
+    """
+
+    event: tuple[float, float] = (0.0, 1.6)
+    before: tuple[float, float] = (-0.5, -0.05)
+    after: tuple[float, float] = (1.65, 2.1)
+    opening: float = 2.2
+    order: int = 2
+    grid: int = 101
+
+
+def smoothed(values: Floats, window: int | None, order: int = 2) -> Floats:
+    """Savitzky-Golay smoothing; without a window the values as they are.
+
+    Parameters
+    ----------
+    values : [F] [any]
+    window : odd, above the order, None for no smoothing [frames]
+    order : of the polynomial [1]
+    """
+    return values.copy() if window is None else savgol_filter(values, window, order)
+
+
+def normalised_progress(forward: Floats, window: int | None, order: int = 2) -> Floats:
+    """A monocular forward coordinate as braking progress in [0, 1].
+
+    Smoothed, turned so that it ends ahead, min-max normalised, smoothed again, made monotone by its running
+    maximum, clipped.
+
+    Parameters
+    ----------
+    forward : [F] recovered forward coordinate on the common frame grid, any scale and sign [1]
+    window, order : of the smoothing [frames], [1]
+
+    Raises
+    ------
+    InputError
+        If the car does not move.
+    """
+    x = smoothed(forward, window, order)
+    x = x * (1.0 if x[-1] >= x[0] else -1.0)
+    if not np.ptp(x) > 0:
+        raise InputError("Progress cannot be normalised: the recovered car does not move.")
+    x = smoothed((x - x.min()) / np.ptp(x), window, order)
+    return np.clip(np.maximum.accumulate(x), 0.0, 1.0)
+
+
+def reference_progress(station: Floats) -> Floats:
+    """The reference station, shifted to start at zero and divided by its maximum.
+
+    Parameters
+    ----------
+    station : [F] at the frame times [m]
+    """
+    way = station - station[0]
+    return way / way.max()
+
+
+def weather_error(
+    forward: Floats, control_forward: Floats, station: Floats, control_station: Floats, window: int | None
+) -> float:
+    """E_weather: RMSE of the change of normalised progress against the dry control [1].
+
+    Parameters
+    ----------
+    forward, control_forward : [F] recovered, of the condition and of its dry control [any]
+    station, control_station : [F] the reference's, at the same times [m]
+    window : smoothing of the recovered coordinates [frames]
+    """
+    seen = normalised_progress(forward, window) - normalised_progress(control_forward, window)
+    meant = reference_progress(station) - reference_progress(control_station)
+    return rms(seen - meant)
+
+
+def event_response(times: Floats, pitch: Floats, opening: float, protocol: MotionProtocol) -> Floats:
+    """Pitch in the event window less the line through its two flanks, [N] in the unit of `pitch`.
+
+    Parameters
+    ----------
+    times : [F] [s]
+    pitch : [F] [rad]
+    opening : when the event window opens [s]
+    protocol : windows and flanks
+
+    Raises
+    ------
+    InputError
+        If the clip does not hold the window and both flanks.
+    """
+    since = times - opening
+
+    def within(span: tuple[float, float]) -> NDArray[np.bool_]:
+        return (since >= span[0] - 1e-9) & (since <= span[1] + 1e-9)
+
+    before, after, event = within(protocol.before), within(protocol.after), within(protocol.event)
+    if before.sum() < 2 or after.sum() < 2 or event.sum() < 3:
+        raise InputError(
+            f"The event window opens at {opening:.2f} s; the clip must hold"
+            f" {opening + protocol.before[0]:.2f} to {opening + protocol.after[1]:.2f} s and ends at {times[-1]:.2f} s."
+        )
+    flanks = before | after
+    slope, level = np.polyfit(since[flanks], pitch[flanks], 1)
+    return pitch[event] - (level + slope * since[event])
+
+
+def geometry_error(
+    times: Floats, pitch: Floats, reference: Floats, opening: float, window: int | None,
+    protocol: MotionProtocol | None = None,
+) -> float:  # fmt: skip
+    """E_geometry: RMSE of the event's pitch over the RMS of the reference's; 1 without any response [1].
+
+    The baseline is taken from both, so that a perfect estimate scores 0 without smoothing; the reference is
+    neither smoothed nor shifted.
+
+    Parameters
+    ----------
+    times : [F] [s]
+    pitch, reference : [F] recovered and reference pitch, one sign convention [rad]
+    opening : when the event window opens [s]
+    window : smoothing of the recovered pitch [frames]
+    protocol : windows and flanks
+    """
+    chosen = protocol or MotionProtocol()
+    meant = event_response(times, reference, opening, chosen)
+    seen = event_response(times, smoothed(pitch, window, chosen.order), opening, chosen)
+    return rms(seen - meant) / rms(meant)
+
+
+def path_error(path: Floats, control: Floats, grid: int = 101) -> float:
+    """E_path: RMS difference of normalised lateral coordinates on a common grid of normalised progress [1].
+
+    Parameters
+    ----------
+    path, control : [F, 2] forward and lateral coordinate of a clip and of its dry control, any scale [1]
+    grid : samples of the progress grid [1]
+    """
+    u = np.linspace(0.0, 1.0, grid)
+    lateral = []
+    for track in (path, control):
+        way = np.maximum.accumulate(track[:, 0] - track[0, 0])
+        extent = way[-1]
+        moved = np.concatenate([[True], np.diff(way) > 0])
+        lateral.append(np.interp(u, way[moved] / extent, (track[moved, 1] - track[0, 1]) / extent))
+    return rms(lateral[0] - lateral[1])
+
+
+def motion_retention(
+    source: Floats, source_braking: Floats, edited: Floats, edited_braking: Floats,
+    event: tuple[int, int] = (16, 42),
+) -> float:  # fmt: skip
+    """Absolute correlation of the road event's pitch in an editor's input and output [1].
+
+    The matching braking pitch is taken off each, and the line through the frames outside the event.
+
+    Parameters
+    ----------
+    source, edited : [F] pitch recovered from input and output [rad]
+    source_braking, edited_braking : [F] the same of the flat-road braking clips [rad]
+    event : first and last frame of the event [1]
+    """
+    inside = slice(event[0], event[1] + 1)
+    curves = []
+    for pitch, braking in ((source, source_braking), (edited, edited_braking)):
+        change = pitch - braking
+        frame = np.arange(len(change))
+        outside = (frame < event[0]) | (frame > event[1])
+        curves.append((change - np.polyval(np.polyfit(frame[outside], change[outside], 1), frame))[inside])
+    return float(abs(np.corrcoef(curves[0], curves[1])[0, 1]))
+
+
+def rms(values: Floats) -> float:
+    """Root mean square [any]."""
+    return float(np.sqrt(np.mean(np.square(values))))

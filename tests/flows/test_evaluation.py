@@ -1,0 +1,72 @@
+"""`musync evaluate` end to end on a toy dataset: every figure is a number with its note, or says why not."""
+
+import json
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from catalogs.scenes import write_scene
+from flows.evaluation import NOT_RUN, evaluate
+from flows.generate import generate
+from tests.toy_street import TOY_CAMERA, toy_street
+
+GRID = """
+name: judged
+scene: {folder}/scene
+camera: {folder}/camera.yaml
+frames: 31
+frame_rate_hz: 10
+axes:
+  weather:
+    dry: {{weather: dry}}
+    snow-1: {{weather: snow, precipitation_mm_h: 1, snow_accumulation_h: 1}}
+    snow-3: {{weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1}}
+  road:
+    flat: {{initial_speed_km_h: 30}}
+    hump: {{initial_speed_km_h: 30, hazard_center_m: 9.0, hazard_length_m: 2.0, hazard_height_m: 0.08}}
+"""
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("judged")
+    write_scene(toy_street(), folder / "scene", {})
+    (folder / "camera.yaml").write_text(TOY_CAMERA)
+    (folder / "grid.yaml").write_text(GRID.format(folder=folder))
+    generate(str(folder / "grid.yaml"), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    evaluate(str(folder / "made"), out=str(folder / "out"))
+    return folder / "out"
+
+
+def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) -> None:
+    rows = json.loads((judged / "evaluation.json").read_text())["rows"]
+    names = {row["metric"] for row in rows}
+    assert {"pitch_rmse", "e_weather", "e_geometry_hump", "e_path", "localised_edit_rate", "temporal_iou",
+            "anchor_error", "severity_rank_correlation", *NOT_RUN} <= names  # fmt: skip
+    assert all(row["note"] for row in rows if row["value"] is None)
+    assert {row["method"] for row in rows if row["metric"] == "pitch_rmse"} == {
+        "photometric",
+        "pnp",
+        "essential",
+    }
+
+
+def test_geometry_stands_at_four_windows_beside_its_floor(judged: Path) -> None:
+    rows = json.loads((judged / "evaluation.json").read_text())["rows"]
+    mine = [row for row in rows if row["metric"] == "e_geometry_hump" and row["method"] == "pnp"]
+    assert {row["window"] for row in mine} == {0, 5, 7, 9}
+    assert all(row["paper"] == 0.316 for row in mine)
+    floors = {row["window"]: row["floor"] for row in mine}
+    assert floors[0] == 0 and floors[5] < floors[7] < floors[9]
+
+
+def test_the_table_and_the_page_hold_the_same_figures(judged: Path) -> None:
+    rows = json.loads((judged / "evaluation.json").read_text())["rows"]
+    table = pq.read_table(judged / "evaluation.parquet")
+    assert table.num_rows == len(rows)
+    assert table["value"].to_pylist() == [row["value"] for row in rows]
+    html = (judged / "evaluation.html").read_text()
+    assert html.count("<svg") == 2
+    assert 'src="http' not in html and "<link" not in html and "<script" not in html
+    assert "not run: checkpoint missing" in html
