@@ -147,7 +147,7 @@ def _first_difference(
     changed = [
         name
         for name in (*STAGED_TABLES, *arrays_of(plan.settings.labels))
-        if new[name] != clip["content"][name]
+        if new.get(name) != clip["content"].get(name)  # without frames no array has one
     ]
     if not changed:
         return None

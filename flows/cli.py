@@ -40,13 +40,14 @@ def generate(
         str | None,
         typer.Option(help="Vehicle name or file in place of the grid's; a frozen one in its own mode."),
     ] = None,
+    frames: Annotated[bool, typer.Option(help="Render frames; without them, telemetry alone.")] = True,
     prefect: Prefect = False,
     as_json: Json = False,
 ) -> None:
     """Make the dataset of a scenario grid, or what is missing of it."""
     report = _call(
         "generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend,
-        vehicle=vehicle,
+        vehicle=vehicle, pictures=frames,
     )  # fmt: skip
     layout = report.layout
     _show(
@@ -57,7 +58,7 @@ def generate(
             "pose_check_failed": list(report.doubtful),
             "dataset": str(layout.root),
             "manifest": str(layout.manifest),
-            "contact_sheet": str(layout.previews / "contact_sheet.png"),
+            "contact_sheet": str(layout.previews / "contact_sheet.png") if frames else None,
         },
         as_json,
     )
@@ -168,6 +169,37 @@ def evaluate(
     keys = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
     rows = [{key: row[key] for key in keys} for row in result["rows"] if not row["window"]]
     _show(result if as_json else {**result, "rows": rows}, as_json)
+
+
+@app.command()
+def controls(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Desynchronise a dataset's claims in seven ways and say which metric sees which fault."""
+    result = _call("controls", prefect, dataset, out=out)
+    rows = [{key: value for key, value in row.items() if key != "roc"} for row in result["rows"]]
+    _show(result if as_json else {**result, "rows": rows}, as_json)
+    if not result["all_detected"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def judge(
+    video: Annotated[str, typer.Argument(help="Any video file.")],
+    claim: Annotated[str, typer.Option(help="Telemetry Parquet with t_ns or time, pitch and station.")],
+    camera: Annotated[str, typer.Option(help="Camera YAML: a catalogue entry, or fx, fy, cx, cy.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Judge any video's motion against the telemetry claimed for it, from its pixels and intrinsics alone."""
+    result = _call("judge", prefect, video, claim=claim, camera=camera, out=out)
+    _show(result, as_json)
+    if not result["passed"]:
+        raise typer.Exit(CHECK_FAILED)
 
 
 @app.command()
@@ -566,7 +598,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "stop_study": "stop_study", "diff": "dataset_diff",
         "bump_study": "bump_study", "close_loop": "closing",
         "close_loop_benchmark": "closing_benchmark",
-        "audit_physics": "physics", "evaluate": "evaluation",
+        "audit_physics": "physics", "evaluate": "evaluation", "controls": "controls", "judge": "foreign",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

@@ -7,7 +7,7 @@ where the receipt exists, the clip is complete. Making a clip twice writes the s
 import resource
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from flows.store.layout import Layout, write_json
 from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
-from tasks.eval.motion_agreement import PoseThresholds, pose_verdict
+from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
 from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.eval.unusable import unusable_pixels
 from tasks.render.backend import select_backend
@@ -91,11 +91,15 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
 
     facts, ride = drive(clip.scenario, catalogue, plan.settings.vehicle_mode, plan.duration_s)
     frames = frame_rows(ride, plan, catalogue)
-    buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed))
-    frames |= judge(buffers, frames, facts["film_depth_mm"], catalogue)
+    buffers: dict[str, NDArray[Any]] = {}
+    if plan.settings.pictures:
+        buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed))
+        frames |= judge(buffers, frames, facts["film_depth_mm"], catalogue)
+        write_clip(layout.frames, index, buffers)
+    else:
+        frames |= nothing_to_judge(len(frames["frame"]))
     verdict = frames.pop("verdict")
 
-    write_clip(layout.frames, index, buffers)
     identity = {"clip_id": clip.clip_id, "label": clip.label, "weather": clip.scenario.weather}
     write_parquet(labelled_table(ride.columns, identity), layout.staged(clip.clip_id, "ticks"))
     write_parquet(labelled_table(frames, identity | facts), layout.staged(clip.clip_id, "frames"))
@@ -254,6 +258,16 @@ def judge(
         "recovered_pitch": recovered.pitch,
         "recovered_progress": recovered.progress,
         "verdict": _json_numbers(asdict(verdict) | {"reasons": list(verdict.reasons)}),
+    }
+
+
+def nothing_to_judge(frames: int) -> dict[str, Any]:
+    """What `judge` returns where there is no picture: everything not represented."""
+    verdict = {figure.name: None for figure in fields(PoseVerdict)}
+    return {
+        "recovered_pitch": np.full(frames, np.nan),
+        "recovered_progress": np.full(frames, np.nan),
+        "verdict": verdict | {"reasons": ["no frames were made"]},
     }
 
 

@@ -46,8 +46,11 @@ def generate(
     scheduler: str | None = None,
     backend: str = "auto",
     vehicle: str | None = None,
+    pictures: bool = True,
 ) -> RunReport:
     """Make the dataset of ``grid`` in ``out``, or what is missing of it; ``vehicle`` takes the grid's place.
+
+    Without ``pictures`` nothing is rendered: telemetry alone, of the same clips.
 
     Raises
     ------
@@ -57,7 +60,7 @@ def generate(
         If clips failed; run the same command again to make just those.
     """
     layout = Layout(Path(out).resolve())
-    plan = stage(prepare)(grid, layout, backend, vehicle)
+    plan = stage(prepare)(grid, layout, backend, vehicle, pictures)
     if layout.manifest.is_file():
         return _report(layout, plan, 0, {})
     with sole_writer(layout):
@@ -75,16 +78,18 @@ def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, flo
         run_id=plan.run_id,
         clips=len(plan.clips),
         made=made,
-        doubtful=tuple(clip["label"] for clip in clips if not clip["verdict"]["passed"]),
+        doubtful=tuple(clip["label"] for clip in clips if clip["verdict"]["passed"] is False),
         cost=cost,
     )
 
 
-def prepare(grid: str, layout: Layout, backend: str, vehicle: str | None = None) -> Plan:
+def prepare(
+    grid: str, layout: Layout, backend: str, vehicle: str | None = None, pictures: bool = True
+) -> Plan:
     """Check and freeze the plan, and lay out the folder; resumes a folder that holds the same plan."""
     from tasks.render.backend import select_backend
 
-    plan, inputs = make_plan(grid, select_backend(backend).name, vehicle)
+    plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
     if layout.plan.is_file():
         existing = read_plan(layout.root)
         if existing.run_id != plan.run_id:
@@ -107,7 +112,9 @@ def prepare(grid: str, layout: Layout, backend: str, vehicle: str | None = None)
 
 
 def create_frame_arrays(layout: Layout, plan: Plan) -> None:
-    """Create the empty Zarr arrays of a plan."""
+    """Create the empty Zarr arrays of a plan; none where it makes telemetry alone."""
+    if not plan.settings.pictures:
+        return
     from catalogs.cameras import load_camera
 
     camera = load_camera(layout.inputs / "camera.yaml")

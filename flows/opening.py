@@ -95,7 +95,15 @@ class Dataset:
 
     @property
     def frames(self) -> zarr.Group:
-        """The frames as lazy Zarr arrays ``[clip, frame, y, x(, channel)]``; ``index`` of a clip is its first axis."""
+        """The frames as lazy Zarr arrays ``[clip, frame, y, x(, channel)]``; ``index`` of a clip is its first axis.
+
+        Raises
+        ------
+        InputError
+            If the dataset was made without frames.
+        """
+        if not self.manifest["grid"].get("pictures", True):
+            raise InputError(f"{self.root}: the dataset was made without frames")
         return zarr.open_group(Layout(self.root).frames, mode="r")
 
     def xarray(self) -> Any:

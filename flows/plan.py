@@ -72,7 +72,9 @@ class Plan:
         }
 
 
-def make_plan(source: str | Path, backend: str, vehicle: str | None = None) -> tuple[Plan, dict[str, bytes]]:
+def make_plan(
+    source: str | Path, backend: str, vehicle: str | None = None, *, pictures: bool = True
+) -> tuple[Plan, dict[str, bytes]]:
     """Check a grid against its catalogue entries and scene, and freeze it.
 
     Parameters
@@ -80,6 +82,7 @@ def make_plan(source: str | Path, backend: str, vehicle: str | None = None) -> t
     source : grid file, or the name of one that ships
     backend : rasteriser
     vehicle : takes the place of the grid's; a frozen one runs in the mode it was fitted in
+    pictures : False makes telemetry alone, with the clip ids of the same grid with frames
 
     Returns
     -------
@@ -93,6 +96,8 @@ def make_plan(source: str | Path, backend: str, vehicle: str | None = None) -> t
     grid = load_grid(source)
     if vehicle is not None:
         grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
+    if not pictures:
+        grid = replace(grid, settings=grid.settings.model_copy(update={"pictures": False}))
     return freeze_grid(grid, str(source), backend)
 
 

@@ -38,6 +38,8 @@ def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: b
     if not layout.manifest.is_file():
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
     plan, rows = read_plan(layout.root), read_json(layout.manifest)["clips"]
+    if not plan.settings.pictures:
+        raise InputError(f"{dataset}: must be a dataset with frames; it was made with --no-frames")
     chosen = [row for row in rows if not clips or row["label"] in clips or row["clip_id"] in clips]
     unknown = set(clips or ()) - {row[key] for row in rows for key in ("label", "clip_id")}
     if unknown:

@@ -35,14 +35,14 @@ def seal(layout: Layout, plan: Plan) -> None:
     ]
     write_parquet(clips_table(receipts), layout.telemetry / "clips.parquet")
     write_parquet(pairs_table(receipts), layout.telemetry / "pairs.parquet")
-    write_atomically(
-        layout.previews / "contact_sheet.png", preview_sheet(layout, layout.frames, plan, receipts)
-    )
+    sheet = layout.previews / "contact_sheet.png"
+    if plan.settings.pictures:
+        write_atomically(sheet, preview_sheet(layout, layout.frames, plan, receipts))
     shared = [
         *tables,
         layout.telemetry / "clips.parquet",
         layout.telemetry / "pairs.parquet",
-        layout.previews / "contact_sheet.png",
+        *([sheet] if plan.settings.pictures else []),
         layout.plan,
         *sorted(path for path in layout.inputs.rglob("*") if path.is_file()),
         *sorted(layout.frames.rglob("zarr.json")),

@@ -50,6 +50,7 @@ class GridFile(BaseModel):
     frame_rate_hz: float = Field(default=10.0, gt=0, le=1000)
     seed: int = Field(default=2025, ge=0, lt=2**53)
     labels: bool = False
+    pictures: bool = True
     base: PartialScenario = PartialScenario()
     axes: dict[str, dict[str, PartialScenario]] = Field(min_length=1)
 

@@ -114,7 +114,18 @@ def test_parquet_fields_carry_unit_symbol_and_description(tmp_path):
 
 def test_channel_names_are_unique_and_described():
     assert len({c.name for c in TICK_CHANNELS}) == len(TICK_CHANNELS)
-    assert all(c.description and c.unit for c in CHANNELS_BY_NAME.values())
+    assert all(c.description for c in CHANNELS_BY_NAME.values())
+    texts = {
+        "clip_id",
+        "label",
+        "seed",
+        "weather",
+        "calibration_extrapolated",
+        "check_method",
+        "check_passed",
+    }
+    texts |= {"clip_id_a", "clip_id_b", "label_a", "label_b", "control", "differs"}
+    assert {c.name for c in CHANNELS_BY_NAME.values() if not c.unit} == texts, "every number has a unit"
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_partial_one(tmp_path, monkeypatch):

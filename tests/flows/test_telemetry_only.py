@@ -1,0 +1,65 @@
+"""A dataset without frames has the telemetry of one with them, and everything that reads datasets reads it."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import musync
+from flows.audit import audit
+from flows.describe import describe
+from flows.explain import explain
+from flows.generate import generate
+from flows.previews import preview
+from flows.query import sql
+from flows.repair import repair
+from flows.store.layout import Layout
+from flows.verify import verify
+from tasks.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def bare(toy_dataset, tmp_path_factory) -> Layout:
+    folder = tmp_path_factory.mktemp("bare")
+    grid = str(toy_dataset.root.parent / "grid.yaml")
+    report = generate(grid, str(folder / "data"), runner="threads", workers=1, pictures=False)
+    assert report.doubtful == ()
+    return report.layout
+
+
+def test_telemetry_is_that_of_the_same_grid_with_frames(toy_dataset, bare):
+    with_frames, without = (json.loads(x.manifest.read_bytes())["clips"] for x in (toy_dataset, bare))
+    assert [c["clip_id"] for c in without] == [c["clip_id"] for c in with_frames]
+    assert [c["content"]["ticks"] for c in without] == [c["content"]["ticks"] for c in with_frames]
+    ours, theirs = (pq.read_table(x.telemetry / "ticks") for x in (bare, toy_dataset))
+    assert ours.equals(theirs, check_metadata=True)
+
+
+def test_there_is_no_picture_and_no_verdict(bare):
+    assert not bare.frames.exists() and not bare.previews.exists()
+    rows = sql(str(bare.root), "SELECT count(*) n, count(check_passed) judged FROM verdicts")["rows"]
+    assert rows == [{"n": 4, "judged": 0}]
+    recovered = pq.read_table(bare.telemetry / "frames")["recovered_pitch"].to_numpy()
+    assert np.isnan(recovered).all()
+
+
+def test_readers_and_auditors_take_it(bare, tmp_path):
+    assert verify(str(bare.root))["verified"]
+    assert audit(str(bare.root), share=1.0, runner="threads", workers=1)["mismatches"] == []
+    assert explain(str(bare.root), "snow-3/hump", 6)["agrees"]
+    assert describe(str(bare.root))["clips"][0]["passed"] is None
+    data = musync.open(bare.root)
+    assert data.torch(window=3, columns=["speed"], arrays=[])[1]["telemetry"].shape == (3, 1)
+    with pytest.raises(InputError, match="without frames"):
+        _ = data.frames
+    with pytest.raises(InputError, match="--no-frames"):
+        preview(str(bare.root), str(tmp_path))
+
+
+def test_a_broken_table_is_repaired(bare):
+    path = bare.telemetry / "ticks" / "family=snow" / "part-0000.parquet"
+    before = path.read_bytes()
+    path.write_bytes(before[:-9])
+    assert repair(str(bare.root), runner="threads", workers=1)["repaired"]
+    assert path.read_bytes() == before
