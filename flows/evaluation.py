@@ -117,10 +117,8 @@ def geometry_rows(clips: list[JudgedClip]) -> Iterator[Row]:
         height = clip.facts["hazard_height_m"]
         if height == 0:
             continue
-        edge = clip.facts["hazard_center_m"] - clip.facts["hazard_length_m"] / 2
         claimed = clip.frames["pitch"]
-        reached = clip.frames["station"][-1] > edge
-        opening = float(np.interp(edge, clip.frames["station"], clip.times)) if reached else np.inf
+        opening = np.inf if clip.opening is None else clip.opening
         name = "e_geometry_hump" if height > 0 else "e_geometry_depression"
         failure = _failure(motion)
         for window in WINDOWS:

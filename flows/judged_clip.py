@@ -48,6 +48,14 @@ class JudgedClip:
         """Of the frames [s]."""
         return np.asarray(self.frames["t_ns"] * 1e-9, np.float64)
 
+    @property
+    def opening(self) -> float | None:
+        """When the front axle meets the road feature's near edge [s]; None if there is none or it never does."""
+        edge = self.facts["hazard_center_m"] - self.facts["hazard_length_m"] / 2
+        if self.facts["hazard_height_m"] == 0 or self.frames["station"][-1] <= edge:
+            return None
+        return float(np.interp(edge, self.frames["station"], self.times))
+
 
 def judge_clip(root: Path, facts: Row) -> JudgedClip:
     """All three pose checks and the image statistics of one clip."""

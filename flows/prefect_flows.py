@@ -29,9 +29,11 @@ from flows import bump_study as _bump_study  # noqa: E402
 from flows import calibration as _calibration  # noqa: E402
 from flows import closing as _closing  # noqa: E402
 from flows import closing_benchmark as _closing_benchmark  # noqa: E402
+from flows import controls as _controls  # noqa: E402
 from flows import dataset_diff as _dataset_diff  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import evaluation as _evaluation  # noqa: E402
+from flows import foreign as _foreign  # noqa: E402
 from flows import generate as _generate  # noqa: E402
 from flows import importing as _importing  # noqa: E402
 from flows import physics as _physics  # noqa: E402
@@ -61,6 +63,8 @@ verify = as_flow(_verify.verify)
 repair = as_flow(_repair.repair)
 gc = as_flow(_verify.gc)
 evaluate = as_flow(_evaluation.evaluate)
+controls = as_flow(_controls.controls)
+judge = as_flow(_foreign.judge)
 describe = as_flow(_describe.describe)
 validate = as_flow(_describe.validate)
 replay_audit = as_flow(_replay.replay_audit)

@@ -1,0 +1,232 @@
+"""A verdict on any video: its motion against claimed telemetry, from pixels and intrinsics alone."""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+from numpy.typing import NDArray
+
+from flows.store.layout import write_json
+from tasks.errors import InputError
+from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
+from tasks.eval.motion_agreement import PoseThresholds
+from tasks.eval.pose_essential import recover_motion_essential
+
+LIMITS = PoseThresholds(
+    pitch_rmse_deg=float("inf"),
+    pitch_relative_error=0.20,
+    pitch_correlation=0.98,
+    response_deg=0.20,
+    progress_rmse_m=None,
+    normalised_progress_rmse=0.02,
+)
+"""Camera-only limits: E0 at most 0.20 sees an amplitude 20 % wrong; drift over long clips is no reason alone."""
+MOST_FRAMES, LEAST_FRAMES = 3000, 5
+LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+"""A camera that looks level ahead, for a camera file without a mount."""
+NEEDS_DEPTH = (
+    "pose by photometric alignment",
+    "pose by points with depth",
+    "progress in metres",
+    "heave in metres",
+)
+
+
+def judge(video: str, *, claim: str, camera: str, out: str | None = None) -> dict[str, Any]:
+    """Recover a video's ego motion by the essential chain and hold it against the telemetry claimed for it.
+
+    Parameters
+    ----------
+    video : any file that FFmpeg reads
+    claim : Parquet with pitch [rad] and station [m] (or speed [m/s]) over t_ns or time [s]
+    camera : YAML with focal_length, width and height, or with fx, fy, cx, cy, width and height [px]
+    out : folder for judgement.json
+
+    Raises
+    ------
+    InputError
+        Every file that cannot be read, in one sentence each.
+    """
+    problems: list[str] = []
+    parts: list[Any] = []
+    for read, source in ((read_video, video), (read_claim, claim), (read_intrinsics, camera)):
+        try:
+            parts.append(read(Path(source)))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    (frames, times), told, (K, width, height, mount) = parts
+    K = resized_intrinsics(K, width, height, frames.shape[2], frames.shape[1])
+    at = claim_at(told, times)
+    used = frames[at.rows]
+    recovered = recover_motion_essential(used, K, mount)
+    verdict = judge_motion(recovered, at, LIMITS)
+    result = {
+        "video": Path(video).name,
+        "frames": len(frames),
+        "judged_frames": len(used),
+        "frame_rate_hz": float((len(times) - 1) / (times[-1] - times[0])),
+        "width": int(frames.shape[2]),
+        "height": int(frames.shape[1]),
+        "method": "essential",
+        **verdict,
+        "not_run": [f"{name}: needs depth" for name in NEEDS_DEPTH],
+    }
+    if out is not None:
+        write_json(Path(out) / "judgement.json", result)
+    return result
+
+
+def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Frames [F, H, W, 3] sRGB and their times [s].
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no video, breaks off, or has too few or too many frames.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; give a video.")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; give a video.")
+    stream = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    rate = stream.get(cv2.CAP_PROP_FPS)
+    frames: list[NDArray[Any]] = []
+    stamps: list[float] = []
+    while len(frames) <= MOST_FRAMES:
+        good, picture = stream.read()
+        if not good:
+            break
+        frames.append(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
+        stamps.append(stream.get(cv2.CAP_PROP_POS_MSEC))
+    announced = int(stream.get(cv2.CAP_PROP_FRAME_COUNT))
+    stream.release()
+    if not frames:
+        raise InputError(f"{path}: no frame can be read; the file is damaged or no video.")
+    if len(frames) > MOST_FRAMES:
+        raise InputError(f"{path}: at most {MOST_FRAMES} frames are judged at once; cut the video.")
+    if announced > len(frames) + 1:
+        raise InputError(
+            f"{path}: only {len(frames)} of {announced} frames can be read; the file breaks off."
+        )
+    if len(frames) < LEAST_FRAMES:
+        raise InputError(f"{path}: at least {LEAST_FRAMES} frames are needed; there are {len(frames)}.")
+    times = np.asarray(stamps) / 1000
+    if not (np.diff(times) > 0).all():
+        # a container without time stamps: the rate is all there is
+        if not rate > 0:
+            raise InputError(f"{path}: the video tells neither time stamps nor a frame rate.")
+        times = np.arange(len(frames)) / rate
+    return np.stack(frames), times - times[0]
+
+
+def read_claim(path: Path) -> VideoClaim:
+    """Claimed pitch and station over time.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or lacks or repeats what is needed.
+    """
+    try:
+        table = pq.read_table(path, partitioning=None)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"{path}: the claim must be a Parquet file; {str(error).splitlines()[0]}") from None
+    names = set(table.column_names)
+    problems = []
+    if not names & {"t_ns", "time"}:
+        problems.append(f"{path}: the claim lacks a column t_ns or time; it has {', '.join(sorted(names))}.")
+    if "pitch" not in names:
+        problems.append(f"{path}: the claim lacks the column pitch [rad].")
+    if not names & {"station", "speed"}:
+        problems.append(f"{path}: the claim lacks a column station [m] or speed [m/s].")
+    if "clip_id" in names and len(table["clip_id"].unique()) > 1:
+        problems.append(
+            f"{path}: the claim holds {len(table['clip_id'].unique())} clips; give one clip's rows."
+        )
+    if problems:
+        raise InputError(problems)
+
+    def column(name: str) -> NDArray[np.float64]:
+        return np.asarray(table[name].to_numpy(), np.float64)
+
+    time = column("t_ns") * 1e-9 if "t_ns" in names else column("time")
+    if len(time) < 2 or not (np.diff(time) > 0).all():
+        raise InputError(f"{path}: the claim's time must rise from row to row, over two rows at least.")
+    if "station" in names:
+        station = column("station")
+    else:
+        speed = column("speed")
+        station = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
+    told = VideoClaim(time=time - time[0], pitch=column("pitch"), station=station)
+    if not (np.isfinite(told.pitch).all() and np.isfinite(told.station).all()):
+        raise InputError(f"{path}: the claim's pitch and station must be finite throughout.")
+    return told
+
+
+def read_intrinsics(path: Path) -> tuple[NDArray[np.float64], int, int, NDArray[np.float64]]:
+    """Intrinsics with pixel centres at whole numbers, the size they hold for, and the mount.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or lacks a number.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(
+            f"{path}: the camera must be readable YAML; {' '.join(str(error).split())}"
+        ) from None
+    if not isinstance(content, dict):
+        raise InputError(
+            f"{path}: the camera must be a table of width, height and focal_length or fx, fy, cx, cy."
+        )
+    numbers: dict[str, Any] = {k: v.get("value") if isinstance(v, dict) else v for k, v in content.items()}
+    if "focal_length" in numbers and {"width", "height"} <= numbers.keys():
+        f = numbers["focal_length"]
+        half = {k: v / 2 - 0.5 if isinstance(v, (int, float)) else v for k, v in numbers.items()}
+        numbers = {"fx": f, "fy": f, "cx": half["width"], "cy": half["height"]} | numbers
+    wrong = [
+        f"{path}: the camera's {key} must be a number above 0; it is {numbers.get(key)}."
+        for key in ("width", "height", "fx", "fy", "cx", "cy")
+        if not isinstance(numbers.get(key), (int, float)) or not numbers[key] > 0
+    ]
+    if wrong:
+        raise InputError(wrong)
+    K = np.array(
+        [[numbers["fx"], 0, numbers["cx"]], [0, numbers["fy"], numbers["cy"]], [0, 0, 1]], np.float64
+    )
+    mount = LEVEL.copy()
+    mount[:3, 3] = [-float(numbers.get("behind_front_axle") or 0), float(numbers.get("left_of_centre") or 0),
+                    float(numbers.get("height_above_road") or 0)]  # fmt: skip
+    return K, int(numbers["width"]), int(numbers["height"]), mount
+
+
+def resized_intrinsics(
+    K: NDArray[np.float64], width: int, height: int, seen_width: int, seen_height: int
+) -> NDArray[np.float64]:
+    """Intrinsics for a video that was scaled from the camera's size.
+
+    Raises
+    ------
+    InputError
+        If the video was cropped or squeezed: then they are unknown.
+    """
+    across, down = seen_width / width, seen_height / height
+    if abs(across / down - 1) > 0.02:
+        raise InputError(
+            f"The video is {seen_width} x {seen_height} and the camera {width} x {height}: not the same shape, so"
+            " the intrinsics are unknown; give the camera of the video as it is."
+        )
+    scaled = K.copy()
+    scaled[:2, 2] += 0.5
+    scaled[0] *= across
+    scaled[1] *= down
+    scaled[:2, 2] -= 0.5
+    return scaled

@@ -1,0 +1,103 @@
+"""Any video's recovered motion against a claim that has its own clock."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.errors import InputError
+from tasks.eval.motion import RecoveredMotion
+from tasks.eval.motion_agreement import PoseThresholds, pose_verdict
+from tasks.eval.rigid import Floats
+
+LEAST_SHARED = 5
+"""Fewest frames within the claim's time that can be judged [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VideoClaim:
+    """Telemetry on its own clock, which starts with the video's.
+
+    Parameters
+    ----------
+    time : [N] rising from 0 [s]
+    pitch : [N] nose-down positive [rad]
+    station : [N] [m]
+    """
+
+    time: Floats
+    pitch: Floats
+    station: Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClaimAtFrames:
+    """A claim at the frames that it covers.
+
+    Parameters
+    ----------
+    rows : frames of the video within the claim's time [1]
+    pitch : at those [rad]
+    station : at those [m]
+    """
+
+    rows: NDArray[np.int64]
+    pitch: Floats
+    station: Floats
+
+
+def claim_at(claim: VideoClaim, times: Floats) -> ClaimAtFrames:
+    """The claim at the video's frames, linear between its rows.
+
+    Parameters
+    ----------
+    claim : on its own clock
+    times : [F] of the frames, from 0 [s]
+
+    Raises
+    ------
+    InputError
+        If too few frames lie within it.
+    """
+    # half a frame past the last row is still that row
+    slack = 0.5 * float(np.median(np.diff(times)))
+    rows = np.flatnonzero(times <= claim.time[-1] + slack)
+    if len(rows) < LEAST_SHARED:
+        raise InputError(
+            f"The claim lasts {claim.time[-1]:.3g} s and covers {len(rows)} of the video's {len(times)} frames;"
+            f" at least {LEAST_SHARED} are needed."
+        )
+    return ClaimAtFrames(
+        rows=rows,
+        pitch=np.interp(times[rows], claim.time, claim.pitch),
+        station=np.interp(times[rows], claim.time, claim.station),
+    )
+
+
+def judge_motion(recovered: RecoveredMotion, claim: ClaimAtFrames, limits: PoseThresholds) -> dict[str, Any]:
+    """Figures and verdict; None where a figure cannot be formed.
+
+    Parameters
+    ----------
+    recovered : from the pixels
+    claim : at the same frames
+    limits : what must be kept
+    """
+    if recovered.failed.all():
+        raise InputError("No frame of the video could be placed: it shows too little that can be followed.")
+    verdict = pose_verdict(recovered, claim.pitch, claim.station, limits)
+    figures = {
+        "pitch_rmse_deg": verdict.pitch_rmse_deg,
+        "pitch_relative_error": verdict.pitch_relative_error,
+        "pitch_correlation": verdict.pitch_correlation,
+        "claimed_pitch_rms_deg": verdict.claimed_pitch_rms_deg,
+        "normalised_progress_rmse": verdict.normalised_progress_rmse,
+        "pitch_uncertainty_deg": float(np.rad2deg(np.nanmedian(recovered.pitch_std))),
+    }
+    return {
+        "passed": verdict.passed,
+        "reasons": list(verdict.reasons),
+        "failed_frames": verdict.failed_frames,
+        **{name: value if np.isfinite(value) else None for name, value in figures.items()},
+    }

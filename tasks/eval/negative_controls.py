@@ -1,0 +1,146 @@
+"""Can a metric see a fault at all? Scores of sound and of desynchronised claims, and how well they part."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from tasks.errors import InputError
+from tasks.eval.motion import RecoveredMotion
+from tasks.eval.rigid import Floats
+from tasks.eval.video_motion import geometry_error, reference_progress, rms
+
+SEES, PARTLY = 0.9, 0.5
+"""Detection rates without a false alarm from which a metric sees a fault, and sees it partly [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """What telemetry says of a clip's frames.
+
+    Parameters
+    ----------
+    pitch : [F] nose-down positive [rad]
+    station : [F] [m]
+    """
+
+    pitch: Floats
+    station: Floats
+
+
+def delayed(claim: Claim, frames: int) -> Claim:
+    """The claim late by whole frames, its first value held.
+
+    Parameters
+    ----------
+    claim : to delay
+    frames : by how many [1]
+    """
+    rows = np.maximum(np.arange(len(claim.pitch)) - frames, 0)
+    return Claim(pitch=claim.pitch[rows], station=claim.station[rows])
+
+
+def scaled(claim: Claim, factor: float) -> Claim:
+    """The claim with its pitch, counted from frame 0, times a factor; -1 flips the sign.
+
+    Parameters
+    ----------
+    claim : to scale
+    factor : [1]
+    """
+    rest = claim.pitch[0]
+    return Claim(pitch=rest + factor * (claim.pitch - rest), station=claim.station)
+
+
+def differs(claim: Claim, other: Claim, least_pitch: float, least_way: float) -> bool:
+    """Whether two claims say something different enough to be told apart by anyone.
+
+    Parameters
+    ----------
+    claim, other : of one clip
+    least_pitch : largest pitch difference that is none [rad]
+    least_way : the same of the way [m]
+    """
+    pitch = (claim.pitch - claim.pitch[0]) - (other.pitch - other.pitch[0])
+    way = (claim.station - claim.station[0]) - (other.station - other.station[0])
+    return bool(np.abs(pitch).max() > least_pitch or np.abs(way).max() > least_way)
+
+
+def claim_scores(
+    recovered: RecoveredMotion, claim: Claim, response: float, times: Floats, opening: float | None
+) -> dict[str, float]:
+    """How badly a claim fits what was seen, by every metric that can be formed; larger is worse.
+
+    Parameters
+    ----------
+    recovered : from the pixels, with a pose in every frame
+    claim : to be judged
+    response : RMS of claimed pitch below which relative figures say nothing [rad]
+    times : [F] of the frames [s]
+    opening : when the road feature's event window opens; None without a feature [s]
+
+    Returns
+    -------
+    pitch_rmse [rad], pitch_relative_error, pitch_decorrelation, normalised_progress_rmse, e_geometry [1],
+    progress_rmse [m]
+    """
+    meant, way = claim.pitch - claim.pitch[0], claim.station - claim.station[0]
+    error = rms(recovered.pitch - meant)
+    scores = {"pitch_rmse": error}
+    if rms(meant) >= response:
+        scores["pitch_relative_error"] = error / rms(meant)
+        scores["pitch_decorrelation"] = 1.0 - float(np.corrcoef(recovered.pitch, meant)[0, 1])
+    if way[-1] > 0 and np.isfinite(recovered.normalised_path).all():
+        scores["normalised_progress_rmse"] = rms(
+            recovered.normalised_path[:, 0] - reference_progress(claim.station)
+        )
+    if np.isfinite(recovered.progress).all():
+        scores["progress_rmse"] = rms(recovered.progress - way)
+    if opening is not None:
+        with suppress(InputError):  # a clip that ends too early has no event to judge
+            scores["e_geometry"] = geometry_error(times, recovered.pitch, claim.pitch, opening, None)
+    return scores
+
+
+@dataclass(frozen=True, kw_only=True)
+class Separation:
+    """How a metric parts faulty from sound.
+
+    Parameters
+    ----------
+    threshold : smallest that accuses no sound clip; a fault above it is detected [the metric's unit]
+    detection_rate : share of faulty clips above it [1]
+    auc : area under the ROC, ties by half [1]
+    false_alarms, detections : the ROC at every threshold from high to low [1]
+    verdict : sees, partly or blind
+    """
+
+    threshold: float
+    detection_rate: float
+    auc: float
+    false_alarms: tuple[float, ...]
+    detections: tuple[float, ...]
+    verdict: str
+
+
+def separate(sound: Sequence[float], faulty: Sequence[float]) -> Separation:
+    """Threshold, ROC and verdict of one metric on one fault.
+
+    Parameters
+    ----------
+    sound, faulty : scores, at least one each; larger is worse [any]
+    """
+    good, bad = np.asarray(sound, float), np.asarray(faulty, float)
+    above = (bad[:, None] > good).mean() + 0.5 * (bad[:, None] == good).mean()
+    levels = np.unique(np.concatenate([good, bad]))[::-1]
+    threshold = float(good.max())
+    rate = float((bad > threshold).mean())
+    return Separation(
+        threshold=threshold,
+        detection_rate=rate,
+        auc=float(above),
+        false_alarms=(0.0, *(float((good >= x).mean()) for x in levels)),
+        detections=(0.0, *(float((bad >= x).mean()) for x in levels)),
+        verdict="sees" if rate >= SEES else "partly" if rate >= PARTLY else "blind",
+    )

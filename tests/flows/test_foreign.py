@@ -1,0 +1,102 @@
+"""Any video against a claim: other sizes, rates and codecs; damaged files in one clear line."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from benchmarks.synthetic_street import Clip, drive_clip
+from flows.foreign import judge, read_intrinsics, read_video, resized_intrinsics
+from tasks.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def street() -> Clip:
+    return drive_clip(frames=24, frame_rate=16.0, hump_at=0.2)
+
+
+def encode(path: Path, frames: np.ndarray, rate: float, codec: str) -> Path:
+    size = frames.shape[2], frames.shape[1]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), rate, size)
+    for frame in frames:
+        writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+    writer.release()
+    return path
+
+
+def write_inputs(folder: Path, clip: Clip, pitch: np.ndarray | None = None) -> dict[str, str]:
+    height, width = clip.frames.shape[1:3]
+    (folder / "K.yaml").write_text(
+        f"width: {width}\nheight: {height}\nfx: {clip.K[0, 0]}\nfy: {clip.K[1, 1]}\n"
+        f"cx: {clip.K[0, 2]}\ncy: {clip.K[1, 2]}\n"
+    )
+    times = np.arange(len(clip.frames)) / 16.0
+    table = {"time": times, "pitch": clip.pitch if pitch is None else pitch, "station": clip.station}
+    pq.write_table(pa.table(table), folder / "claim.parquet")
+    return {"claim": str(folder / "claim.parquet"), "camera": str(folder / "K.yaml")}
+
+
+@pytest.mark.parametrize(("suffix", "codec", "scale"), [("mp4", "mp4v", 1.0), ("avi", "MJPG", 0.75)])
+def test_a_true_claim_passes_in_other_codecs_and_sizes(
+    street: Clip, tmp_path: Path, suffix: str, codec: str, scale: float
+) -> None:
+    frames = np.stack(
+        [cv2.resize(f, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for f in street.frames]
+    )
+    video = encode(tmp_path / f"v.{suffix}", frames, 16.0, codec)
+    result = judge(str(video), **write_inputs(tmp_path, street), out=str(tmp_path / "out"))
+    assert result["passed"], result["reasons"]
+    assert result["failed_frames"] == 0 and result["frame_rate_hz"] == pytest.approx(16.0, rel=0.01)
+    assert (
+        all("needs depth" in line for line in result["not_run"])
+        and (tmp_path / "out" / "judgement.json").is_file()
+    )
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.7, -1.0])
+def test_a_false_pitch_is_refused(street: Clip, tmp_path: Path, factor: float) -> None:
+    video = encode(tmp_path / "v.mp4", street.frames, 16.0, "mp4v")
+    false = street.pitch.copy() * factor if factor else np.roll(street.pitch, 6)
+    assert not judge(str(video), **write_inputs(tmp_path, street, false))["passed"]
+
+
+def test_half_the_frames_at_half_the_rate_are_judged_by_their_own_times(street: Clip, tmp_path: Path) -> None:
+    video = encode(tmp_path / "v.mp4", street.frames[::2], 8.0, "mp4v")
+    result = judge(str(video), **write_inputs(tmp_path, street))
+    assert result["frame_rate_hz"] == pytest.approx(8.0, rel=0.01)
+    assert result["pitch_rmse_deg"] < 0.1
+
+
+def test_damaged_and_empty_files_get_one_line_each(street: Clip, tmp_path: Path) -> None:
+    (tmp_path / "empty.mp4").write_bytes(b"")
+    (tmp_path / "noise.mp4").write_bytes(np.random.Generator(np.random.Philox(1)).bytes(20_000))
+    whole = encode(tmp_path / "v.avi", street.frames, 16.0, "MJPG")
+    (tmp_path / "cut.avi").write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    for name, words in (("empty.mp4", "is empty"), ("noise.mp4", "no frame can be read"), ("none.mp4", "no such file"),
+                        ("cut.avi", "breaks off|no frame")):  # fmt: skip
+        with pytest.raises(InputError, match=words) as caught:
+            read_video(tmp_path / name)
+        assert len(caught.value.problems) == 1
+
+
+def test_all_wrong_inputs_are_told_at_once(tmp_path: Path) -> None:
+    (tmp_path / "K.yaml").write_text("width: 480\n")
+    pq.write_table(pa.table({"time": [0.0, 1.0]}), tmp_path / "claim.parquet")
+    with pytest.raises(InputError) as caught:
+        judge(
+            str(tmp_path / "none.mp4"), claim=str(tmp_path / "claim.parquet"), camera=str(tmp_path / "K.yaml")
+        )
+    told = "\n".join(caught.value.problems)
+    assert "no such file" in told and "lacks the column pitch" in told and "fx must be a number" in told
+
+
+def test_intrinsics_follow_the_size_and_refuse_another_shape(tmp_path: Path) -> None:
+    K = np.array([[400.0, 0, 239.5], [0, 400, 159.5], [0, 0, 1]])
+    half = resized_intrinsics(K, 480, 320, 240, 160)
+    np.testing.assert_allclose(half, [[200, 0, 119.5], [0, 200, 79.5], [0, 0, 1]])
+    with pytest.raises(InputError, match="not the same shape"):
+        resized_intrinsics(K, 480, 320, 320, 320)
+    assert read_intrinsics(Path("catalogs/cameras/dashcam-480x320.yaml"))[0] == pytest.approx(K)
