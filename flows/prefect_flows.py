@@ -33,12 +33,14 @@ from flows import controls as _controls  # noqa: E402
 from flows import dataset_diff as _dataset_diff  # noqa: E402
 from flows import describe as _describe  # noqa: E402
 from flows import evaluation as _evaluation  # noqa: E402
+from flows import explain as _explain  # noqa: E402
 from flows import foreign as _foreign  # noqa: E402
 from flows import generate as _generate  # noqa: E402
 from flows import importing as _importing  # noqa: E402
 from flows import physics as _physics  # noqa: E402
 from flows import previews as _previews  # noqa: E402
 from flows import protocol as _protocol  # noqa: E402
+from flows import query as _query  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
 from flows import repair as _repair  # noqa: E402
 from flows import replay as _replay  # noqa: E402
@@ -62,6 +64,9 @@ audit_physics = as_flow(_physics.audit_physics)
 verify = as_flow(_verify.verify)
 repair = as_flow(_repair.repair)
 gc = as_flow(_verify.gc)
+explain = as_flow(_explain.explain)
+sql = as_flow(_query.sql)
+schema = as_flow(_query.schema)
 evaluate = as_flow(_evaluation.evaluate)
 controls = as_flow(_controls.controls)
 judge = as_flow(_foreign.judge)
