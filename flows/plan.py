@@ -8,7 +8,7 @@ from typing import Any
 
 from catalogs.cameras import camera_source
 from catalogs.gates import GATES
-from catalogs.grids import Grid, GridFile, load_grid
+from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
 from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.surfaces import surface_source
@@ -93,7 +93,11 @@ def make_plan(
     InputError
         Listing every problem at once.
     """
-    grid = load_grid(source)
+    try:
+        grid = load_grid(source)
+    except FaultyGrid as faults:
+        entries = [] if faults.settings is None else _read_entries(faults.settings)[2]
+        raise InputError([*faults.problems, *(f"{source}: {problem}" for problem in entries)]) from None
     if vehicle is not None:
         grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
     if not pictures:
@@ -104,18 +108,9 @@ def make_plan(
 def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, bytes]]:
     """`make_plan` of a grid that is already read; ``source`` is what messages call it."""
     settings = grid.settings
-    inputs: dict[str, bytes] = {}
-    problems: list[str] = []
-    for name, lookup in input_sources(settings).items():
-        try:
-            inputs[name] = lookup().read_bytes()
-        except InputError as error:
-            problems += error.problems
-    try:
-        scene = {"name": settings.scene, "sha256": scene_identity(settings.scene)}
+    inputs, scene, problems = _read_entries(settings)
+    if scene:
         problems += _route_problems(grid)
-    except InputError as error:
-        problems += error.problems
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
     hashes = {name: sha256_of([content]) for name, content in inputs.items()}
@@ -201,6 +196,23 @@ def plan_differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], place: 
             short = isinstance(a, str | float | int) and isinstance(b, str | float | int)
             differences.append(f"{path} is {b!r} there and {a!r} here" if short else f"{path} differs")
     return differences
+
+
+def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
+    """The catalogue files that a grid names, its scene's identity, and what is wrong with them."""
+    inputs: dict[str, bytes] = {}
+    scene: dict[str, str] = {}
+    problems: list[str] = []
+    for name, lookup in input_sources(settings).items():
+        try:
+            inputs[name] = lookup().read_bytes()
+        except InputError as error:
+            problems += error.problems
+    try:
+        scene = {"name": settings.scene, "sha256": scene_identity(settings.scene)}
+    except InputError as error:
+        problems += error.problems
+    return inputs, scene, problems
 
 
 def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:

@@ -63,6 +63,20 @@ class Grid:
     scenarios: tuple[tuple[str, Scenario], ...]
 
 
+class FaultyGrid(InputError):
+    """A grid that breaks rules.
+
+    Parameters
+    ----------
+    problems : one sentence each
+    settings : what could be read all the same, so that the entries it names can be checked too; None if nothing
+    """
+
+    def __init__(self, problems: list[str], settings: GridFile | None):
+        super().__init__(problems)
+        self.settings = settings
+
+
 def grid_names() -> list[str]:
     """Names of the grids that ship with the project."""
     return sorted(path.stem for path in GRID_FOLDER.glob("*.yaml"))
@@ -74,6 +88,8 @@ def load_grid(source: str | Path) -> Grid:
     Raises
     ------
     InputError
+        The file cannot be read.
+    FaultyGrid
         Listing every problem of the file at once.
     """
     path = Path(source)
@@ -93,7 +109,7 @@ def load_grid(source: str | Path) -> Grid:
     except InputError as error:
         problems += error.problems
     if problems or grid is None:
-        raise InputError(problems)
+        raise FaultyGrid(problems, settings)
     return grid
 
 

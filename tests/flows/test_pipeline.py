@@ -251,3 +251,16 @@ def test_describe_lists_each_clip_with_its_stop_and_verdict(dataset):
         "snow-3/hump",
     ]
     assert all({"stopping_distance", "peak_pitch", "passed"} <= clip.keys() for clip in facts["clips"])
+
+
+def test_a_faulty_grid_s_missing_entries_are_listed_with_its_other_faults(tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_text(
+        "{name: bad, scene: nowhere, vehicle: tank, colour: red, axes: {w: {a: {precipitation_mm_h: -1}}}}"
+    )
+    with pytest.raises(InputError) as caught:
+        generate(str(path), str(tmp_path / "data"))
+    text = "\n".join(caught.value.problems)
+    for fault in ("colour: unknown key", "precipitation_mm_h must not be negative", "tank", "nowhere"):
+        assert fault in text
+    assert len(caught.value.problems) == 4
