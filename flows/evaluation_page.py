@@ -56,7 +56,7 @@ def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str) -> str:
         " it. Window 0 is none. The paper's figures come from VGGT on other videos.</p>",
         "<h2>Summary</h2>", _summary(rows, names),
         "<h2>Pitch: claimed and recovered</h2>", _figure(_pitch_plot(clips), "Claimed (black) and recovered [deg]."),
-        "<h2>E_geometry and its floor</h2>", _figure(_window_plot(rows), "Mean over clips; dashed: a perfect pose."),
+        *_geometry(rows),
         "<h2>Clips</h2>", _thumbnails(clips),
         "<h2>Every figure</h2>",
         *(f"<h3>{escape(name)}</h3><p>{escape(MEANING.get(name, ''))}</p>"
@@ -124,9 +124,22 @@ def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
     return figure
 
 
-def _window_plot(rows: Sequence[Row]) -> Figure:
-    figure = Figure(figsize=(9, 3), layout="constrained")
-    for axis, name in zip(figure.subplots(1, 2), ("e_geometry_hump", "e_geometry_depression"), strict=True):
+def _geometry(rows: Sequence[Row]) -> list[str]:
+    """The section on road features; nothing for a dataset without one that was scored."""
+    scored = [
+        name
+        for name in ("e_geometry_hump", "e_geometry_depression")
+        if any(row["metric"] == name and row["value"] is not None for row in rows)
+    ]
+    if not scored:
+        return []
+    caption = "Mean over clips; dashed: a perfect pose."
+    return ["<h2>E_geometry and its floor</h2>", _figure(_window_plot(rows, scored), caption)]
+
+
+def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
+    figure = Figure(figsize=(4.5 * len(names), 3), layout="constrained")
+    for axis, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
         mine = [r for r in rows if r["metric"] == name and r["value"] is not None]
         windows = sorted({r["window"] for r in mine})
         for method in METHODS:
