@@ -4,7 +4,7 @@ BIN := .venv/bin
 READY := .venv/.ready
 DEMO ?= datasets/demo
 
-.PHONY: demo test check study study-schedule bench clean
+.PHONY: demo test check study study-schedule study-crash bench clean
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -28,6 +28,9 @@ study: $(READY)
 
 study-schedule: $(READY)
 	$(BIN)/python -m benchmarks.scheduled_runs
+
+study-crash: $(READY)
+	$(BIN)/python -m benchmarks.crashes
 
 bench: $(READY)
 	$(BIN)/musync bench --out datasets/bench
