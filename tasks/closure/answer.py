@@ -5,13 +5,12 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from tasks.closure.attribution import Candidate
-from tasks.closure.campaign import SESSION
 from tasks.closure.disturbance import Disturbance
 from tasks.closure.experiment import Experiment
 from tasks.closure.forward import Slot
+from tasks.closure.intervals import Bounds
 
 VerdictName = Literal["FOUND", "SET", "UNKNOWN_FORM", "RETUNE", "SENSOR", "NOTHING"]
 
@@ -120,23 +119,17 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def named_effect(candidate: Candidate, share: float) -> NamedEffect:
-    """A candidate as it is reported: estimates with 95 % intervals, widened by the runs' disagreement.
-
-    Student's t with as many runs as inform the parameter, less one, since the runs' scatter is itself estimated.
+def named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:
+    """A candidate as it is reported.
 
     Parameters
     ----------
     candidate : refined and judged
     share : bootstrap win share
+    interval : ends of the parameters' 95 % intervals, float64 [K] each
     """
     h = candidate.hypothesis
-    k = len(h.names)
-    values = candidate.fitted.values[-k:]
-    variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation
-    # the session's own doubt about the same number belongs to the car's
-    doubt = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
-    sigma = np.sqrt(variance + np.square(doubt)) * student.ppf(0.975, max(candidate.informed - 1, 1))
+    values = candidate.fitted.values[-len(h.names) :]
     return NamedEffect(
         name=h.name,
         effect_class=h.effect_class,
@@ -144,10 +137,12 @@ def named_effect(candidate: Candidate, share: float) -> NamedEffect:
         variable=h.variable,
         parameters=tuple(
             Parameter(
-                name=n, value=float(v), ci_low=float(v - s), ci_high=float(v + s), lower=float(lo),
-                upper=float(hi), unit=u,
+                name=n, value=float(v), ci_low=float(low), ci_high=float(high), lower=float(lo), upper=float(hi),
+                unit=u,
             )
-            for n, v, s, lo, hi, u in zip(h.names, values, sigma, h.lower, h.upper, h.units, strict=True)
+            for n, v, low, high, lo, hi, u in zip(
+                h.names, values, *interval, h.lower, h.upper, h.units, strict=True
+            )
         ),
         score=candidate.score,
         gain=candidate.gain,

@@ -76,7 +76,8 @@ def judge(evidence: Evidence, base: Fit, base_held_out: Misfits, hypothesis: Hyp
             values=np.concatenate((base.values, np.where(first, share * hypothesis.start, hypothesis.start))),
             session=base.session,
             offsets=offsets,
-            iterations=4,
+            # parameters that can be traded for each other are found along a valley, in more steps
+            iterations=4 * len(hypothesis.names),
         )
         if fitted is None or trial.objective < fitted.objective:
             fitted = trial

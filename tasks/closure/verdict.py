@@ -13,6 +13,7 @@ from tasks.closure.experiment import next_experiment
 from tasks.closure.fit import fit
 from tasks.closure.held_out import held_out_error
 from tasks.closure.hypothesis import compose
+from tasks.closure.intervals import curvature_interval, profile_interval
 from tasks.closure.rivals import Compared, compare, detectable
 from tasks.closure.search import Found, search_all
 from tasks.surface.state import SurfaceParameters
@@ -82,10 +83,17 @@ def attribute(
         tried, compared, near_form = [r.accepted for r in found.rounds], [], None
         found = start
         error = held_out_error(start.evidence, start.base, start.base)
-    named = [named_effect(c.own, c.share) for c in compared]
-    near = [(c.own.hypothesis.name, named_effect(o, wins)) for c in compared for o, wins in c.near]
+    progress("intervals")
+    named = [named_effect(c.own, c.share, profile_interval(c.own, found.evidence)) for c in compared]
+    near = [
+        (c.own.hypothesis.name, named_effect(o, wins, profile_interval(o, found.evidence)))
+        for c in compared
+        for o, wins in c.near
+    ]
     if near_form is not None:
-        near.append((named[0].name, named_effect(near_form, 0.0)))
+        near.append(
+            (named[0].name, named_effect(near_form, 0.0, profile_interval(near_form, start.evidence)))
+        )
     kind = _kind(named, near)
     if kind == "SET":
         reasons.append(
@@ -107,7 +115,7 @@ def attribute(
         verdict=kind,
         effects=tuple(named),
         rivals=tuple(near),
-        tried=tuple(named_effect(c, 0.0) for c in tried[:6]),
+        tried=tuple(named_effect(c, 0.0, curvature_interval(c)) for c in tried[:6]),
         error=error,
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
         noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
