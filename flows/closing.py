@@ -16,7 +16,7 @@ from flows.grown_vehicle import grown_vehicle
 from flows.store.layout import write_atomically, write_json
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
-from tasks.closure.answer import NamedEffect, Parameter, Verdict
+from tasks.closure.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.closure.campaign import Campaign
 from tasks.closure.verdict import attribute
 
@@ -94,18 +94,17 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
             "between": list(experiment.between),
             "expected_d2": experiment.expected_d2,
         },
-        "error": {
+        "error": {channel: _error(e) for channel, e in verdict.error.items()},
+        "manoeuvre_error": {figure: _error(e) for figure, e in verdict.manoeuvre_error.items()},
+        "residual_input_correlation": {
             channel: {
-                **{
-                    key: getattr(e, key)
-                    for key in ("frozen", "retuned", "after", "ci_low", "ci_high", "unit")
-                },
-                "change_ci_low": e.change_low,
-                "change_ci_high": e.change_high,
-                "runs_better": e.wins,
-                "worst_run": e.worst_run,
+                "input": "brake_pressure",
+                "lag_s": c.lags.tolist(),
+                "frozen": c.frozen.tolist(),
+                "after": c.after.tolist(),
+                "band": c.band,
             }
-            for channel, e in verdict.error.items()
+            for channel, c in verdict.correlation.items()
         },
         "reasons": list(verdict.reasons),
         "tried": [effect_json(effect) for effect in verdict.tried],
@@ -124,6 +123,16 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "split_sha256": verdict.split_hash,
         "library_sha256": sha256_of_file(LIBRARY_FILE),
         "made_with": code_version(),
+    }
+
+
+def _error(e: ChannelError) -> dict[str, Any]:
+    return {
+        **{key: getattr(e, key) for key in ("frozen", "retuned", "after", "ci_low", "ci_high", "unit")},
+        "change_ci_low": e.change_low,
+        "change_ci_high": e.change_high,
+        "runs_better": e.wins,
+        "worst_run": e.worst_run,
     }
 
 

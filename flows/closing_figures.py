@@ -128,6 +128,22 @@ def leftovers(trace: Trace) -> str:
     return picture(figure)
 
 
+def correlations(trace: Trace) -> str:
+    """Correlation of residual and brake pressure on the held-out runs, with the band of independence."""
+    items = trace.verdict.correlation
+    figure = Figure(figsize=(10, 2.8))
+    axes = figure.subplots(1, len(items), sharey=True)
+    for axis, (channel, c) in zip(axes, items.items(), strict=True):
+        axis.axhspan(-c.band, c.band, color="#dddddd", label="95 % band")
+        axis.plot(c.lags, c.frozen, color=FROZEN, lw=1.0, label="frozen")
+        axis.plot(c.lags, c.after, color=AFTER, lw=1.0, label="after")
+        axis.set_title(channel.replace("_", " "))
+        axis.set_xlabel("lag [s]")
+    axes[0].set_ylabel("correlation [1]")
+    axes[0].legend(fontsize=7)
+    return picture(figure)
+
+
 def pulls(trace: Trace) -> str:
     """Pulls of the session's nuisances, before and after."""
     items = trace.verdict.session_pulls

@@ -19,6 +19,10 @@ th:first-child, td:first-child { text-align: left; }
 img { max-width: 100%; } code { font-size: 12px; overflow-wrap: anywhere; }
 .pair { display: flex; flex-wrap: wrap; gap: 1rem; }
 """
+CORRELATION = (
+    "<p>Correlation of the held-out residual with brake pressure, both whitened by the channel's noise, by the time"
+    " that the residual follows the pressure. Inside the band they have nothing to do with each other.</p>"
+)
 MEANING = {
     "FOUND": "the model lacks this",
     "SET": "one of several explanations that these runs cannot tell apart",
@@ -40,12 +44,16 @@ def report_html(trace: Trace, result: Mapping[str, Any], campaign: Campaign) -> 
     """
     parts = [
         _verdict(result),
-        _section("Error on held-out runs", _errors(result["error"])),
+        _section("Error on held-out runs", _errors({**result["error"], **result["manoeuvre_error"]})),
         _section("What was tried", _ladder(trace)),
         _section("Residual force of the training runs", _image(figures.residual_force(trace))),
         _section(
             "What the frozen model leaves over, and what is left after",
             f'<div class="pair">{_image(figures.spline(trace))}{_image(figures.leftovers(trace))}</div>',
+        ),
+        _section(
+            "What is left that goes with the brake pressure",
+            _image(figures.correlations(trace)) + CORRELATION,
         ),
         _section("Held-out runs", _image(figures.traces(trace))),
         _section("Pulls of the session", _image(figures.pulls(trace))),
@@ -137,7 +145,9 @@ def _errors(error: Mapping[str, Mapping[str, Any]]) -> str:
         "worst run",
     )
     return _table(head, rows) + (
-        "<p>Re-tuned: no effect, the session's tolerances widened tenfold. Intervals: bootstrap over held-out runs.</p>"
+        "<p>Re-tuned: no effect, the session's tolerances widened tenfold. Intervals: bootstrap over held-out runs."
+        " Stopping distance: from the first brake pressure to the lowest speed that all reach; peak pitch: of 0.1 s"
+        " means; both over the runs that brake.</p>"
     )
 
 

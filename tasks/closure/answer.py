@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.closure.attribution import Candidate
+from tasks.closure.correlation import Correlation
 from tasks.closure.disturbance import Disturbance
 from tasks.closure.experiment import Experiment
 from tasks.closure.forward import Slot
@@ -54,7 +55,7 @@ class NamedEffect:
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelError:
-    """RMSE of one channel over the held-out runs: as delivered, re-tuned, and with the effects.
+    """RMSE of one channel or figure over the held-out runs: as delivered, re-tuned, and with the effects.
 
     Parameters
     ----------
@@ -88,6 +89,8 @@ class Verdict:
     rivals : effects that cannot be told from the named ones, with the effect each rivals
     tried : best candidates of the last round that were not accepted
     error : by channel, on held-out runs
+    manoeuvre_error : the same of stopping distance [m] and peak pitch [deg], on held-out runs that brake
+    correlation : by channel, of the residual with brake pressure, on held-out runs
     session_pulls : session nuisances in prior sigmas, before and after
     noise : AR(1) coefficient and sigma by channel
     disturbance : scales and times of the smooth disturbances
@@ -105,6 +108,8 @@ class Verdict:
     rivals: tuple[tuple[str, NamedEffect], ...]
     tried: tuple[NamedEffect, ...]
     error: dict[str, ChannelError]
+    manoeuvre_error: dict[str, ChannelError]
+    correlation: dict[str, Correlation]
     session_pulls: dict[str, tuple[float, float]]
     noise: dict[str, tuple[float, float]]
     disturbance: Disturbance

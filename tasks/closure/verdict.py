@@ -8,6 +8,7 @@ import numpy as np
 from tasks.closure.answer import NamedEffect, Verdict, VerdictName, named_effect
 from tasks.closure.attribution import RIVAL_SPAN
 from tasks.closure.campaign import CHANNELS, SESSION, Campaign
+from tasks.closure.correlation import residual_input_correlation
 from tasks.closure.derivation import prepare
 from tasks.closure.experiment import next_experiment
 from tasks.closure.fit import fit
@@ -71,7 +72,7 @@ def attribute(
     progress("rivals")
     compared = compare(found.evidence, found.base, found.rounds)
     progress("held-out error")
-    error = held_out_error(start.evidence, start.base, found.base)
+    error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     worse = [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
     tried = list(found.tried)
     if compared and worse:
@@ -82,7 +83,7 @@ def attribute(
         )
         tried, compared, near_form = [r.accepted for r in found.rounds], [], None
         found = start
-        error = held_out_error(start.evidence, start.base, start.base)
+        error, manoeuvres = held_out_error(start.evidence, start.base, start.base)
     progress("intervals")
     named = [named_effect(c.own, c.share, profile_interval(c.own, found.evidence)) for c in compared]
     near = [
@@ -109,6 +110,7 @@ def attribute(
         second = other.fitted if other is not None else start.base
         experiment = next_experiment(start.evidence, first.own.fitted, second, vehicle, surface)
     theta, slots = compose(found.base.parts, found.base.values, np.zeros(len(SESSION)))
+    grown = compose(found.base.parts, found.base.values, found.base.session)
     sigma, lead = evidence.session_sigma, evidence.train[0]
     pulls = zip(SESSION, start.base.session / sigma, found.base.session / sigma, strict=True)
     verdict = Verdict(
@@ -117,6 +119,8 @@ def attribute(
         rivals=tuple(near),
         tried=tuple(named_effect(c, 0.0, curvature_interval(c)) for c in tried[:6]),
         error=error,
+        manoeuvre_error=manoeuvres,
+        correlation=residual_input_correlation(start.evidence.held_out, *grown),
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
         noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
         disturbance=start.evidence.disturbance,

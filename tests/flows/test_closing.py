@@ -101,11 +101,20 @@ def test_a_lag_in_the_data_is_named_with_its_value_and_better_predictions(closed
     assert lag["ci_low"] <= 0.1 <= lag["ci_high"] and lag["ci_high"] - lag["ci_low"] < 0.03
     speed = verdict["error"]["speed"]
     assert speed["after"] < 0.5 * speed["frozen"] and speed["ci_low"] <= speed["after"] <= speed["ci_high"]
+    distance = verdict["manoeuvre_error"]["stopping_distance"]
+    assert distance["unit"] == "m" and distance["after"] < 0.5 * distance["frozen"]
+
+
+def test_a_lag_leaves_a_residual_that_goes_with_the_pressure_until_it_is_named(closed: Path) -> None:
+    c = json.loads((closed / "verdict.json").read_text())["residual_input_correlation"]
+    left = c["longitudinal_acceleration"]
+    frozen, after = (np.abs(left[key]).max() for key in ("frozen", "after"))
+    assert frozen > 2.0 * after and frozen > 3.0 * left["band"]
 
 
 def test_the_report_needs_no_other_file_and_the_split_is_on_disk(closed: Path) -> None:
     page = (closed / "report.html").read_text()
-    assert "brake_lag" in page and page.count("data:image/png;base64,") == 5
+    assert "brake_lag" in page and page.count("data:image/png;base64,") == 6
     assert 'src="http' not in page and "href=" not in page
     split = json.loads((closed / "split.json").read_text())
     assert split["split_sha256"] == json.loads((closed / "verdict.json").read_text())["split_sha256"]
@@ -141,6 +150,7 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
     )  # fmt: skip
     return Verdict(
         verdict="FOUND", effects=effects, rivals=(), tried=(), error=dict.fromkeys(CHANNELS, error),
+        manoeuvre_error={"peak_pitch": error}, correlation={},
         session_pulls=dict.fromkeys(SESSION, (0.0, 0.0)), noise=dict.fromkeys(CHANNELS, (0.0, 1.0)),
         disturbance=Disturbance(), detectable={"bump_stop": float("inf")}, campaign="toy", content_hash="c" * 64,
         split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, torn=(), reasons=(),
