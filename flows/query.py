@@ -67,7 +67,9 @@ def _columns(layout: Layout, table: str) -> str:
     """All columns, with NaN as NULL: SQL's aggregates leave NULL out, and would return NaN for NaN."""
     if table == "ticks":  # every tick has every number
         return "*"
-    first = next(layout.root.glob(str(Path(table_files(layout, table)).relative_to(layout.root))))
+    first = next(layout.root.glob(str(Path(table_files(layout, table)).relative_to(layout.root))), None)
+    if first is None:
+        raise InputError(f"{layout.root}: the files of {table} are missing: musync repair makes them again")
     floats = [field.name for field in pq.read_schema(first) if str(field.type) == "double"]
     nulls = ", ".join(f'nullif("{name}", \'nan\'::DOUBLE) AS "{name}"' for name in floats)
     return f"* REPLACE ({nulls})"

@@ -1,6 +1,7 @@
 """The same dataset in every library: one value, whichever way it is read; and the SQL views."""
 
 import json
+import shutil
 from itertools import pairwise
 
 import numpy as np
@@ -89,6 +90,13 @@ def test_pairs_are_those_of_the_grid_and_join_with_clips(data):
 def test_a_query_that_is_no_sql_is_one_sentence_with_the_views(toy_dataset):
     with pytest.raises(InputError, match="views are clips, ticks, frames, verdicts, pairs"):
         sql(str(toy_dataset.root), "SELECT nothing FROM nowhere")
+
+
+def test_a_missing_table_is_told_with_what_to_do(toy_dataset, tmp_path):
+    shutil.copytree(toy_dataset.root, tmp_path / "copy")
+    (tmp_path / "copy" / "telemetry" / "pairs.parquet").unlink()
+    with pytest.raises(InputError, match="files of pairs are missing: musync repair"):
+        sql(str(tmp_path / "copy"), "SELECT 1")
 
 
 def test_an_unknown_table_names_those_that_exist(data):
