@@ -21,7 +21,8 @@ img { max-width: 100%; } code { font-size: 12px; overflow-wrap: anywhere; }
 """
 CORRELATION = (
     "<p>Correlation of the held-out residual with brake pressure, both whitened by the channel's noise, by the time"
-    " that the residual follows the pressure. Inside the band they have nothing to do with each other.</p>"
+    " that the residual follows the pressure. Inside the band they have nothing to do with each other. The runs'"
+    " offsets and smooth disturbances are not taken out, so that a right model, too, can leave the band a little.</p>"
 )
 MEANING = {
     "FOUND": "the model lacks this",
