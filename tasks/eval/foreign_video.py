@@ -10,6 +10,12 @@ from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
 from tasks.eval.motion_agreement import PoseThresholds, pose_verdict
 from tasks.eval.rigid import Floats
+from tasks.eval.video_motion import geometry_error
+
+EVENT_PITCH = np.deg2rad(0.3)
+"""Claimed swing from which there is an event to judge, ten times the chain's error over a second [rad]."""
+EVENT_LEAD = 0.6
+"""From the opening of the event window to the largest swing [s]."""
 
 LEAST_SHARED = 5
 """Fewest frames within the claim's time that can be judged [1]."""
@@ -38,11 +44,13 @@ class ClaimAtFrames:
     Parameters
     ----------
     rows : frames of the video within the claim's time [1]
+    times : of those [s]
     pitch : at those [rad]
     station : at those [m]
     """
 
     rows: NDArray[np.int64]
+    times: Floats
     pitch: Floats
     station: Floats
 
@@ -70,9 +78,22 @@ def claim_at(claim: VideoClaim, times: Floats) -> ClaimAtFrames:
         )
     return ClaimAtFrames(
         rows=rows,
+        times=times[rows],
         pitch=np.interp(times[rows], claim.time, claim.pitch),
         station=np.interp(times[rows], claim.time, claim.station),
     )
+
+
+def _event_error(recovered: RecoveredMotion, claim: ClaimAtFrames) -> float | None:
+    """E_geometry about the largest claimed swing: drift over a long clip does not hide a short response."""
+    swing = np.abs(claim.pitch - np.median(claim.pitch))
+    if recovered.failed.any() or swing.max() < EVENT_PITCH:
+        return None
+    opening = float(claim.times[int(np.argmax(swing))]) - EVENT_LEAD
+    try:
+        return geometry_error(claim.times, recovered.pitch, claim.pitch, opening, None)
+    except InputError:
+        return None
 
 
 def judge_motion(recovered: RecoveredMotion, claim: ClaimAtFrames, limits: PoseThresholds) -> dict[str, Any]:
@@ -95,9 +116,17 @@ def judge_motion(recovered: RecoveredMotion, claim: ClaimAtFrames, limits: PoseT
         "normalised_progress_rmse": verdict.normalised_progress_rmse,
         "pitch_uncertainty_deg": float(np.rad2deg(np.nanmedian(recovered.pitch_std))),
     }
+    reasons = list(verdict.reasons)
+    event = _event_error(recovered, claim)
+    if event is not None and not event <= limits.pitch_relative_error:
+        reasons.append(
+            f"event pitch error is {event:.4g}, at most {limits.pitch_relative_error:g} is allowed"
+        )
+    figures["event_pitch_error"] = np.nan if event is None else event
     return {
-        "passed": verdict.passed,
-        "reasons": list(verdict.reasons),
+        "passed": not reasons,
+        "pitch_judged": event is not None or verdict.claimed_pitch_rms_deg >= limits.response_deg,
+        "reasons": reasons,
         "failed_frames": verdict.failed_frames,
         **{name: value if np.isfinite(value) else None for name, value in figures.items()},
     }

@@ -9,8 +9,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from benchmarks.synthetic_street import Clip, drive_clip
-from flows.foreign import judge, read_intrinsics, read_video, resized_intrinsics
+from flows.foreign import LIMITS, judge, read_intrinsics, read_video, resized_intrinsics
 from tasks.errors import InputError
+from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
+from tasks.eval.motion import RecoveredMotion
 
 
 @pytest.fixture(scope="module")
@@ -100,3 +102,20 @@ def test_intrinsics_follow_the_size_and_refuse_another_shape(tmp_path: Path) -> 
     with pytest.raises(InputError, match="not the same shape"):
         resized_intrinsics(K, 480, 320, 320, 320)
     assert read_intrinsics(Path("catalogs/cameras/dashcam-480x320.yaml"))[0] == pytest.approx(K)
+
+
+def test_a_short_wrong_swing_is_not_hidden_by_a_long_quiet_clip() -> None:
+    times = np.arange(81) * 0.1
+    swing = 0.015 * np.exp(-((times - 3.0) ** 2) / 0.05)
+    nothing = np.zeros(81)
+    drifting = RecoveredMotion(
+        method="exact", T_rig0_rig=np.tile(np.eye(4), (81, 1, 1)), pitch=swing + 5e-4 * times, heave=nothing,
+        lateral=nothing, progress=np.full(81, np.nan), normalised_path=np.stack([times / 8, nothing, nothing], 1),
+        pitch_std=nothing, progress_std=nothing, inliers=np.full(81, 100), failed=nothing > 0, failures=(),
+    )  # fmt: skip
+    for factor, good in ((1.0, True), (0.7, False), (-1.0, False)):
+        claim = VideoClaim(time=times, pitch=factor * swing, station=10 * times)
+        verdict = judge_motion(drifting, claim_at(claim, times), LIMITS)
+        assert verdict["pitch_judged"] and verdict["passed"] == good
+    quiet = VideoClaim(time=times, pitch=nothing, station=10 * times)
+    assert not judge_motion(drifting, claim_at(quiet, times), LIMITS)["pitch_judged"]
