@@ -4,25 +4,11 @@ import av
 import numpy as np
 import pytest
 
-from catalogs.scenes import write_scene
-from flows.generate import generate
 from flows.previews import preview, write_film
 from flows.store.frames import read_clip
-from flows.store.layout import Layout, read_json
+from flows.store.layout import read_json
 from tasks.errors import InputError
 from tasks.render.traces import STRIP_HEIGHT
-from tests.flows.test_pipeline import GRID
-from tests.toy_street import TOY_CAMERA, toy_street
-
-
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory) -> Layout:
-    folder = tmp_path_factory.mktemp("films")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    grid = folder / "grid.yaml"
-    grid.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=4))
-    return generate(str(grid), str(folder / "data"), runner="threads", workers=2).layout
 
 
 def frames_of(path: str) -> np.ndarray:
@@ -30,20 +16,20 @@ def frames_of(path: str) -> np.ndarray:
         return np.stack([frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)])
 
 
-def test_a_film_shows_every_frame_of_its_clip_over_the_traces(dataset, tmp_path):
-    films = preview(str(dataset.root), str(tmp_path / "films"), clips=["snow-3/hump"])["films"]
+def test_a_film_shows_every_frame_of_its_clip_over_the_traces(toy_dataset, tmp_path):
+    films = preview(str(toy_dataset.root), str(tmp_path / "films"), clips=["snow-3/hump"])["films"]
     assert [film.rsplit("/", 1)[1] for film in films] == ["snow-3_hump.mp4"]
-    row = next(r for r in read_json(dataset.manifest)["clips"] if r["label"] == "snow-3/hump")
-    wanted = read_clip(dataset.frames, row["index"], "rgb").astype(float)
+    row = next(r for r in read_json(toy_dataset.manifest)["clips"] if r["label"] == "snow-3/hump")
+    wanted = read_clip(toy_dataset.frames, row["index"], "rgb").astype(float)
     shown = frames_of(films[0]).astype(float)
     height = wanted.shape[1]
-    assert shown.shape == (4, height + STRIP_HEIGHT + height % 2, *wanted.shape[2:])
+    assert shown.shape == (len(wanted), height + STRIP_HEIGHT + height % 2, *wanted.shape[2:])
     assert np.sqrt(np.mean((shown[:, :height] - wanted) ** 2)) < 8
 
 
-def test_a_film_without_traces_has_the_size_of_the_picture(dataset, tmp_path):
-    films = preview(str(dataset.root), str(tmp_path), clips=["dry/flat"], traces=False)["films"]
-    assert frames_of(films[0]).shape[1:] == read_clip(dataset.frames, 0, "rgb").shape[1:]
+def test_a_film_without_traces_has_the_size_of_the_picture(toy_dataset, tmp_path):
+    films = preview(str(toy_dataset.root), str(tmp_path), clips=["dry/flat"], traces=False)["films"]
+    assert frames_of(films[0]).shape[1:] == read_clip(toy_dataset.frames, 0, "rgb").shape[1:]
 
 
 def test_the_same_pictures_give_the_same_film(tmp_path):
@@ -53,8 +39,8 @@ def test_the_same_pictures_give_the_same_film(tmp_path):
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
 
-def test_clips_and_datasets_that_are_not_there_are_named(dataset, tmp_path):
+def test_clips_and_datasets_that_are_not_there_are_named(toy_dataset, tmp_path):
     with pytest.raises(InputError, match="no clip 'fog'"):
-        preview(str(dataset.root), str(tmp_path), clips=["fog", "dry/flat"])
+        preview(str(toy_dataset.root), str(tmp_path), clips=["fog", "dry/flat"])
     with pytest.raises(InputError, match="must be a finished dataset"):
         preview(str(tmp_path), str(tmp_path))

@@ -1,0 +1,142 @@
+"""Holding a dataset against its manifest, its laws and another dataset."""
+
+from typing import Annotated
+
+import typer
+
+from flows.commands.console import CHECK_FAILED, Json, Out, Prefect, Runner, Scheduler, Workers, call, show
+
+app = typer.Typer()
+
+
+@app.command()
+def audit(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    share: Annotated[float, typer.Option(help="Share of the clips to make again.")] = 0.1,
+    out: Out = None,
+    runner: Runner = "dask",
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Verify every hash of a dataset and make a share of it again."""
+    result = call(
+        "audit", prefect, dataset, share=share, out=out, runner=runner, workers=workers, scheduler=scheduler
+    )
+    show(result, as_json)
+    if not result["verified"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def verify(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Verify every hash of a dataset and the seal of its manifest; make nothing."""
+    result = call("verify", prefect, dataset, out=out)
+    show(result, as_json)
+    if not result["verified"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def repair(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Out = None,
+    runner: Runner = "dask",
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Make again what is broken or missing in a dataset; only the recorded bytes are put in place."""
+    result = call("repair", prefect, dataset, out=out, runner=runner, workers=workers, scheduler=scheduler)
+    show(result, as_json)
+    if not result["repaired"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def gc(
+    dataset: Annotated[str, typer.Argument(help="A dataset folder, finished or not.")],
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Name the left-overs and leave them.")] = False,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Remove what killed runs left in a dataset and beside it; committed clips stay."""
+    show(call("gc", prefect, dataset, dry_run=dry_run), as_json)
+
+
+@app.command("audit-physics")
+def audit_physics(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Work every telemetry column out again from the others, and name the one that breaks a law."""
+    result = call("audit_physics", prefect, dataset, out=out)
+    keys = ("label", "passed", "laws", "column", "tightest")
+    brief = result | {"clips": [{key: row[key] for key in keys} for row in result["clips"]]}
+    show(result if as_json else brief, as_json)
+    if not result["verified"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def diff(
+    a: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    b: Annotated[str, typer.Argument(help="Another, of the same scenarios.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Compare two datasets: which clips differ, how far their labels moved, and which input can be why."""
+    result = call("diff", prefect, a, b, out=out)
+    if as_json:
+        show(result, as_json)
+    else:
+        from flows.dataset_diff import as_text
+
+        typer.echo(as_text(result), nl=False)
+
+
+@app.command()
+def explain(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    clip: Annotated[str, typer.Argument(help="Label or id of a clip.")],
+    frame: Annotated[int, typer.Argument(help="Frame number, from 0.")],
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Follow one frame from the weather to the pixel, every number computed again beside the stored one."""
+    result = call("explain", False, dataset, clip, frame, out=out)
+    if as_json:
+        show(result, as_json)
+    else:
+        from flows.explain import as_text
+
+        typer.echo(as_text(result), nl=False)
+    if not result["agrees"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command("replay-audit")
+def replay_audit(
+    grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")] = "severity",
+    seeds: Annotated[int, typer.Option(help="Visual seeds a scenario.")] = 3,
+    frames: Annotated[int, typer.Option(help="Frames drawn a run.")] = 2,
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Prove that visual seeds move the weather in the picture and nothing in the motion."""
+    result = call("replay_audit", prefect, grid, seeds=seeds, frames=frames, out=out)
+    brief = {key: value for key, value in result.items() if key != "largest_difference"}
+    show(result if as_json else brief, as_json)
+    if not result["verified"]:
+        raise typer.Exit(CHECK_FAILED)

@@ -1,0 +1,85 @@
+"""What every command shares: its options, how it reaches its function, and how it prints what came back."""
+
+import json
+import os
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+DONE, CHECK_FAILED, INPUT_WRONG, BROKEN = 0, 1, 2, 3
+
+Json = Annotated[bool, typer.Option("--json", help="Print the JSON instead of text.")]
+Out = Annotated[str | None, typer.Option(help="Folder for the JSON this command writes.")]
+Runner = Annotated[str, typer.Option(help="threads, processes or dask.")]
+Workers = Annotated[int | None, typer.Option(help="How many at once; by default one a processor.", min=1)]
+Scheduler = Annotated[str | None, typer.Option(help="tcp:// or tls:// address of a running Dask scheduler.")]
+Prefect = Annotated[
+    bool, typer.Option("--prefect", help="Run as a Prefect flow; implied by PREFECT_API_URL.")
+]
+
+
+def one_thread() -> None:
+    # many small linear systems: the threads of a BLAS spend more time waiting for each other than computing
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def call(name: str, prefect: bool, /, *args: Any, **kwargs: Any) -> Any:
+    """Call a pipeline function, as a Prefect flow where one is asked for."""
+    return _function(name, prefect or "PREFECT_API_URL" in os.environ)(*args, **kwargs)
+
+
+def _function(name: str, as_flow: bool) -> Callable[..., Any]:
+    # imports are late so that each command loads only the libraries it needs
+    if as_flow:
+        from flows import prefect_flows
+
+        if hasattr(prefect_flows, name):
+            function: Callable[..., Any] = getattr(prefect_flows, name)
+            return function
+    from importlib import import_module
+
+    module = {
+        "generate": "generate", "audit": "audit", "verify": "verify", "gc": "verify", "repair": "repair",
+        "sql": "query", "schema": "query", "explain": "explain", "schedule": "scheduling",
+        "describe": "describe", "validate": "describe",
+        "preview": "previews", "sheets": "sheets", "replay_audit": "replay",
+        "sensitivity": "studies", "agreement": "studies", "bench": "studies",
+        "calibrate": "calibration",
+        "import_measurements": "importing", "brake_protocol": "protocol", "synthetic_drives": "bus_drives",
+        "stop_study": "stop_study", "diff": "dataset_diff",
+        "bump_study": "bump_study", "close_loop": "closing",
+        "close_loop_benchmark": "closing_benchmark",
+        "audit_physics": "physics", "evaluate": "evaluation", "controls": "controls", "judge": "foreign",
+        "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
+    }[name]  # fmt: skip
+    function = getattr(import_module(f"flows.{module}"), name)
+    return function
+
+
+def show(value: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(value, indent=1))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, soft_wrap=True)
+    for key, entry in value.items():
+        if isinstance(entry, list) and entry and isinstance(entry[0], dict):
+            table = Table(title=key, title_justify="left")
+            for column in entry[0]:
+                table.add_column(column, overflow="fold")
+            for row in entry:
+                table.add_row(*(_text(row.get(column)) for column in entry[0]))
+            Console(highlight=False).print(table)
+        else:
+            console.print(f"{key}: {_text(entry)}")
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    if isinstance(value, list):
+        return ", ".join(_text(item) for item in value)
+    return "-" if value is None else str(value)

@@ -1,0 +1,116 @@
+"""Making datasets and looking into them."""
+
+from typing import Annotated
+
+import typer
+
+from flows.commands.console import Json, Prefect, Runner, Scheduler, Workers, call, show
+
+app = typer.Typer()
+
+
+@app.command()
+def generate(
+    grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")],
+    out: Annotated[
+        str, typer.Option(help="Dataset folder: new, empty, or an unfinished run of the same grid.")
+    ],
+    runner: Runner = "dask",
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    backend: Annotated[str, typer.Option(help="Rasteriser: auto, cpu or gsplat.")] = "auto",
+    vehicle: Annotated[
+        str | None,
+        typer.Option(help="Vehicle name or file in place of the grid's; a frozen one in its own mode."),
+    ] = None,
+    frames: Annotated[bool, typer.Option(help="Render frames; without them, telemetry alone.")] = True,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Make the dataset of a scenario grid, or what is missing of it."""
+    report = call(
+        "generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend,
+        vehicle=vehicle, pictures=frames,
+    )  # fmt: skip
+    layout = report.layout
+    show(
+        {
+            "run_id": report.run_id,
+            "clips": report.clips,
+            "made": report.made,
+            "pose_check_failed": list(report.doubtful),
+            "dataset": str(layout.root),
+            "manifest": str(layout.manifest),
+            "contact_sheet": str(layout.previews / "contact_sheet.png") if frames else None,
+        },
+        as_json,
+    )
+
+
+@app.command()
+def schedule(
+    grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")],
+    every: Annotated[str, typer.Option(help='Cron expression, UTC: "0 3 * * *" is every night at three.')],
+    out: Annotated[str, typer.Option(help="Folder in which each run makes its dated dataset.")],
+    runner: Runner = "dask",
+    workers: Workers = None,
+    notify: Annotated[
+        str | None, typer.Option(help="Command or http(s) address that is told of a failed run.")
+    ] = None,
+) -> None:
+    """Make a dataset of a grid again and again, as a Prefect deployment served from this process."""
+    call("schedule", False, grid, every=every, out=out, runner=runner, workers=workers, notify=notify)
+
+
+@app.command()
+def validate(grid: Annotated[str, typer.Argument()], as_json: Json = False) -> None:
+    """Check a grid without making anything."""
+    show(call("validate", False, grid), as_json)
+
+
+@app.command()
+def describe(dataset: Annotated[str, typer.Argument()], as_json: Json = False) -> None:
+    """Say what is in a dataset."""
+    show(call("describe", False, dataset), as_json)
+
+
+@app.command()
+def sql(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    query: Annotated[str, typer.Argument(help="DuckDB SQL over clips, ticks, frames, verdicts and pairs.")],
+    as_json: Json = False,
+) -> None:
+    """Answer an SQL query over a dataset's views."""
+    result = call("sql", False, dataset, query)
+    show(result if as_json else {"rows": result["rows"]}, as_json)
+
+
+@app.command()
+def schema(as_json: Json = False) -> None:
+    """List every column of every view: unit, paper symbol, CF standard name and meaning."""
+    show(call("schema", False), as_json)
+
+
+@app.command()
+def preview(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Annotated[str, typer.Option(help="Folder for the films.")],
+    clip: Annotated[
+        list[str] | None, typer.Option(help="Label or id of a clip, more than once; by default all.")
+    ] = None,
+    traces: Annotated[bool, typer.Option(help="Run the vehicle's traces below the picture.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Make an MP4 film of each clip, with speed, slip, pitch, load and brake pressure below it."""
+    show(call("preview", False, dataset, out, clips=clip, traces=traces), as_json)
+
+
+@app.command()
+def sheets(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Annotated[str, typer.Option(help="Folder for weather.png and hazards.png.")],
+    station: Annotated[float, typer.Option(help="Where the weathers are shown [m].")] = 12.0,
+    as_json: Json = False,
+) -> None:
+    """Draw one place in every weather, and each road feature before, at and after contact."""
+    show(call("sheets", False, dataset, out, station=station), as_json)

@@ -1,0 +1,54 @@
+"""Judging pixels."""
+
+from typing import Annotated
+
+import typer
+
+from flows.commands.console import CHECK_FAILED, Json, Out, Prefect, call, show
+
+app = typer.Typer()
+
+
+@app.command()
+def evaluate(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Annotated[str, typer.Option(help="Folder for evaluation.json, .parquet and .html.")],
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Judge a dataset from its pixels: poses, motion, road edits and weather, beside the paper's figures."""
+    result = call("evaluate", prefect, dataset, out=out)
+    keys = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
+    rows = [{key: row[key] for key in keys} for row in result["rows"] if not row["window"]]
+    show(result if as_json else {**result, "rows": rows}, as_json)
+
+
+@app.command()
+def controls(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Desynchronise a dataset's claims in seven ways and say which metric sees which fault."""
+    result = call("controls", prefect, dataset, out=out)
+    rows = [{key: value for key, value in row.items() if key != "roc"} for row in result["rows"]]
+    show(result if as_json else {**result, "rows": rows}, as_json)
+    if not result["all_detected"]:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def judge(
+    video: Annotated[str, typer.Argument(help="Any video file.")],
+    claim: Annotated[str, typer.Option(help="Telemetry Parquet with t_ns or time, pitch and station.")],
+    camera: Annotated[str, typer.Option(help="Camera YAML: a catalogue entry, or fx, fy, cx, cy.")],
+    out: Out = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Judge any video's motion against the telemetry claimed for it, from its pixels and intrinsics alone."""
+    result = call("judge", prefect, video, claim=claim, camera=camera, out=out)
+    show(result, as_json)
+    if not result["passed"]:
+        raise typer.Exit(CHECK_FAILED)
