@@ -12,12 +12,13 @@ from catalogs.gates import load_gates
 from catalogs.paper_metrics import paper_values
 from flows.clip import PIXEL_CENTRE, Catalogue, catalogue_of
 from flows.evaluation_page import page
-from flows.judged_clip import METHODS, JudgedClip, Row, judge_clip
+from flows.judged_clip import JudgedClip, Row, judge_clip
 from flows.orchestration import stage
 from flows.physics import clip_facts
 from flows.store.frames import read_clip
 from flows.store.layout import Layout, read_json, write_atomically, write_json
 from flows.store.telemetry import write_parquet
+from flows.trajectories import trajectory_files
 from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
@@ -43,22 +44,27 @@ LOOK_AHEAD = 40.0
 """Way before a road feature from which its mask is looked for [m]."""
 
 
-def evaluate(dataset: str, *, out: str) -> dict[str, Any]:
+def evaluate(
+    dataset: str, *, out: str, trajectories: str | None = None, metric: bool = False
+) -> dict[str, Any]:
     """Judge a finished dataset from its pixels and write every figure with its unit and the paper's value.
 
     Parameters
     ----------
     dataset : a finished dataset folder
     out : folder for evaluation.json, evaluation.parquet and evaluation.html
+    trajectories : folder with METHOD/CLIP_ID.txt in the TUM format, scored beside our own checks
+    metric : whether their lengths are metres
 
     Raises
     ------
     InputError
-        If the folder is no finished dataset.
+        If the folder is no finished dataset, or a trajectory cannot be used.
     """
     root = Path(dataset).resolve()
     facts = clip_facts(root)
-    clips = [stage(judge_clip)(root, row) for row in facts]
+    told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
+    clips = [stage(judge_clip)(root, row, told.get(row["clip_id"]), metric=metric) for row in facts]
     rows = [*pose_rows(clips), *weather_rows(clips), *geometry_rows(clips), *severity_rows(clips)]
     rows += stage(road_edit_rows)(root, clips)
     rows += [_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
@@ -80,7 +86,7 @@ def pose_rows(clips: list[JudgedClip]) -> Iterator[Row]:
         label = clip.facts["label"]
         error = None if failure else float(np.rad2deg(rms(motion.pitch - claimed)))
         yield _row("pitch_rmse", method, label, error, "deg", note=failure,
-                   uncertainty=float(np.rad2deg(np.nanmedian(motion.pitch_std))))  # fmt: skip
+                   uncertainty=float(np.rad2deg(motion.typical_pitch_std)))  # fmt: skip
         if np.rad2deg(rms(claimed)) >= responds:
             share = None if failure else rms(motion.pitch - claimed) / rms(claimed)
             yield _row("pitch_relative_error", method, label, share, "1", note=failure)
@@ -97,7 +103,9 @@ def weather_rows(clips: list[JudgedClip]) -> Iterator[Row]:
         control = _control(clip, clips, weather=True)
         if control is None:
             continue
-        other, label = control.motions[method], clip.facts["label"]
+        other, label = control.motions.get(method), clip.facts["label"]
+        if other is None:
+            continue
         failure = _failure(motion) or _failure(other)
         station, control_station = clip.frames["station"], control.frames["station"]
         forward = motion.normalised_path, other.normalised_path
@@ -211,15 +219,15 @@ def _row(
         "paper": paper_values().get(metric),
         "window": window or 0,
         "floor": floor,
-        "uncertainty": uncertainty,
+        "uncertainty": uncertainty if uncertainty is not None and np.isfinite(uncertainty) else None,
         "note": note if finite or note else "not a number",
     }
 
 
 def _seen(clips: list[JudgedClip]) -> Iterator[tuple[JudgedClip, str, RecoveredMotion]]:
     for clip in clips:
-        for method in METHODS:
-            yield clip, method, clip.motions[method]
+        for method, motion in clip.motions.items():
+            yield clip, method, motion
 
 
 def _failure(motion: RecoveredMotion) -> str:

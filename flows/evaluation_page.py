@@ -11,7 +11,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from flows.judged_clip import METHODS, JudgedClip, Row
+from flows.judged_clip import JudgedClip, Row
 
 COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
 STYLE = """
@@ -108,14 +108,8 @@ def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
     for axis, clip in zip(axes, shown, strict=False):
         claimed = np.rad2deg(clip.frames["pitch"] - clip.frames["pitch"][0])
         axis.plot(clip.times, claimed, color="black", lw=1.6, label="claimed")
-        for method in METHODS:
-            axis.plot(
-                clip.times,
-                np.rad2deg(clip.motions[method].pitch),
-                color=COLOURS[method],
-                lw=0.8,
-                label=method,
-            )
+        for method, motion in clip.motions.items():
+            axis.plot(clip.times, np.rad2deg(motion.pitch), color=COLOURS.get(method), lw=0.8, label=method)
         axis.set_title(clip.facts["label"], fontsize=9)
         axis.tick_params(labelsize=7)
     for axis in axes[len(shown) :]:
@@ -142,12 +136,12 @@ def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
     for axis, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
         mine = [r for r in rows if r["metric"] == name and r["value"] is not None]
         windows = sorted({r["window"] for r in mine})
-        for method in METHODS:
+        for method in dict.fromkeys(r["method"] for r in mine):
             means = [
                 np.mean([r["value"] for r in mine if (r["window"], r["method"]) == (w, method)])
                 for w in windows
             ]
-            axis.plot(windows, means, "o-", color=COLOURS[method], ms=3, label=method)
+            axis.plot(windows, means, "o-", color=COLOURS.get(method), ms=3, label=method)
         floors = [np.mean([r["floor"] for r in mine if r["window"] == w]) for w in windows]
         axis.plot(windows, floors, "--", color="black", label="perfect pose")
         axis.set_title(name, fontsize=9)

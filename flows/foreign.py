@@ -1,4 +1,4 @@
-"""A verdict on any video: its motion against claimed telemetry, from pixels and intrinsics alone."""
+"""A verdict on any video or trajectory: its motion against claimed telemetry, without a renderer's data."""
 
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,11 @@ import yaml
 from numpy.typing import NDArray
 
 from flows.store.layout import write_json
+from flows.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
 from tasks.eval.motion_agreement import PoseThresholds
+from tasks.eval.outside_trajectory import motion_from_trajectory
 from tasks.eval.pose_essential import recover_motion_essential
 
 LIMITS = PoseThresholds(
@@ -36,46 +38,58 @@ NEEDS_DEPTH = (
 )
 
 
-def judge(video: str, *, claim: str, camera: str, out: str | None = None) -> dict[str, Any]:
-    """Recover a video's ego motion by the essential chain and hold it against the telemetry claimed for it.
+def judge(
+    video: str, *, claim: str, camera: str, out: str | None = None, metric: bool = False
+) -> dict[str, Any]:
+    """Hold a video's ego motion, by the essential chain, or a trajectory against the telemetry claimed for it.
 
     Parameters
     ----------
-    video : any file that FFmpeg reads
+    video : any file that FFmpeg reads, or a trajectory in the TUM format (.txt, .tum)
     claim : Parquet with pitch [rad] and station [m] (or speed [m/s]) over t_ns or time [s]
     camera : YAML with focal_length, width and height, or with fx, fy, cx, cy, width and height [px]
     out : folder for judgement.json
+    metric : whether a trajectory's lengths are metres
 
     Raises
     ------
     InputError
         Every file that cannot be read, in one sentence each.
     """
+    source = Path(video)
     problems: list[str] = []
     parts: list[Any] = []
-    for read, source in ((read_video, video), (read_claim, claim), (read_intrinsics, camera)):
+    see = read_trajectory if source.suffix in SUFFIXES else read_video
+    for read, path in ((see, source), (read_claim, Path(claim)), (read_intrinsics, Path(camera))):
         try:
-            parts.append(read(Path(source)))
+            parts.append(read(path))
         except InputError as error:
             problems += error.problems
     if problems:
         raise InputError(problems)
-    (frames, times), told, (K, width, height, mount) = parts
-    K = resized_intrinsics(K, width, height, frames.shape[2], frames.shape[1])
-    at = claim_at(told, times)
-    used = frames[at.rows]
-    recovered = recover_motion_essential(used, K, mount)
+    seen, told, (K, width, height, mount) = parts
+    size: dict[str, int | None] = {"width": None, "height": None}
+    if see is read_video:
+        frames, times = seen
+        size = {"width": int(frames.shape[2]), "height": int(frames.shape[1])}
+        K = resized_intrinsics(K, width, height, frames.shape[2], frames.shape[1])
+        at = claim_at(told, times)
+        recovered = recover_motion_essential(frames[at.rows], K, mount)
+    else:
+        stamps, poses = seen
+        times = stamps - stamps[0]
+        at = claim_at(told, times)
+        recovered = motion_from_trajectory(source.stem, at.times, times, poses, mount, metric=metric)
     verdict = judge_motion(recovered, at, LIMITS)
     result = {
-        "video": Path(video).name,
-        "frames": len(frames),
-        "judged_frames": len(used),
+        "video": source.name,
+        "frames": len(times),
+        "judged_frames": len(at.rows),
         "frame_rate_hz": float((len(times) - 1) / (times[-1] - times[0])),
-        "width": int(frames.shape[2]),
-        "height": int(frames.shape[1]),
-        "method": "essential",
+        **size,
+        "method": recovered.method,
         **verdict,
-        "not_run": [f"{name}: needs depth" for name in NEEDS_DEPTH],
+        "not_run": [f"{name}: needs depth" for name in NEEDS_DEPTH] if see is read_video else [],
     }
     if out is not None:
         write_json(Path(out) / "judgement.json", result)

@@ -1,5 +1,6 @@
 """One clip of a dataset as its judges see it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,10 @@ from flows.clip import PIXEL_CENTRE, catalogue_of
 from flows.physics import clip_columns
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
+from flows.trajectories import read_trajectory
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.motion import RecoveredMotion
+from tasks.eval.outside_trajectory import motion_from_trajectory
 from tasks.eval.pose_essential import recover_motion_essential
 from tasks.eval.pose_photometric import recover_motion_photometric
 from tasks.eval.pose_pnp import recover_motion_pnp
@@ -57,8 +60,23 @@ class JudgedClip:
         return float(np.interp(edge, self.frames["station"], self.times))
 
 
-def judge_clip(root: Path, facts: Row) -> JudgedClip:
-    """All three pose checks and the image statistics of one clip."""
+def judge_clip(
+    root: Path, facts: Row, outside: Mapping[str, Path] | None = None, *, metric: bool = False
+) -> JudgedClip:
+    """All three pose checks and the image statistics of one clip, and what others recovered of it.
+
+    Parameters
+    ----------
+    root : a finished dataset
+    facts : the clip's row
+    outside : trajectory files by the name of what made them
+    metric : whether their lengths are metres
+
+    Raises
+    ------
+    InputError
+        For a trajectory that cannot be read or does not cover the clip.
+    """
     cv2.setNumThreads(1)
     catalogue, layout = catalogue_of(root), Layout(root)
     rgb, depth, kind = (read_clip(layout.frames, facts["index"], name) for name in ("rgb", "depth", "class"))
@@ -66,6 +84,8 @@ def judge_clip(root: Path, facts: Row) -> JudgedClip:
     K, mount = catalogue.camera.K - PIXEL_CENTRE, catalogue.camera.T_rig_camera
     hidden = unusable_pixels(kind, facts["film_depth_mm"])
     route = catalogue.scene.route.pose(frames["station"])[:, :3, :3]
+    times = np.asarray(frames["t_ns"] * 1e-9, np.float64)
+    others = {name: read_trajectory(path) for name, path in (outside or {}).items()}
     small = rgb[[0, len(rgb) // 3, 2 * len(rgb) // 3]]
     return JudgedClip(
         facts=facts,
@@ -74,6 +94,10 @@ def judge_clip(root: Path, facts: Row) -> JudgedClip:
             "photometric": recover_motion_photometric(rgb, depth, K, mount, hidden, route),
             "pnp": recover_motion_pnp(rgb, depth, K, mount, hidden, route),
             "essential": recover_motion_essential(rgb, K, mount, route_rotations=route),
+        }
+        | {
+            name: motion_from_trajectory(name, times, *told, mount, metric=metric, route_rotations=route)
+            for name, told in others.items()
         },
         statistics=image_statistics(rgb, np.isin(kind, ROAD_CLASSES)),
         thumbnails=np.stack([cv2.resize(p, (240, 240 * p.shape[0] // p.shape[1])) for p in small]),

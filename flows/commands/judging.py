@@ -13,11 +13,15 @@ app = typer.Typer()
 def evaluate(
     dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
     out: Annotated[str, typer.Option(help="Folder for evaluation.json, .parquet and .html.")],
+    trajectories: Annotated[
+        str | None, typer.Option(help="Folder with METHOD/CLIP_ID.txt (TUM format) to score as well.")
+    ] = None,
+    metric: Annotated[bool, typer.Option(help="The trajectories' lengths are metres.")] = False,
     prefect: Prefect = False,
     as_json: Json = False,
 ) -> None:
     """Judge a dataset from its pixels: poses, motion, road edits and weather, beside the paper's figures."""
-    result = call("evaluate", prefect, dataset, out=out)
+    result = call("evaluate", prefect, dataset, out=out, trajectories=trajectories, metric=metric)
     keys = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
     rows = [{key: row[key] for key in keys} for row in result["rows"] if not row["window"]]
     show(result if as_json else {**result, "rows": rows}, as_json)
@@ -40,15 +44,16 @@ def controls(
 
 @app.command()
 def judge(
-    video: Annotated[str, typer.Argument(help="Any video file.")],
+    video: Annotated[str, typer.Argument(help="Any video file, or a trajectory (TUM format, .txt or .tum).")],
     claim: Annotated[str, typer.Option(help="Telemetry Parquet with t_ns or time, pitch and station.")],
     camera: Annotated[str, typer.Option(help="Camera YAML: a catalogue entry, or fx, fy, cx, cy.")],
+    metric: Annotated[bool, typer.Option(help="The trajectory's lengths are metres.")] = False,
     out: Out = None,
     prefect: Prefect = False,
     as_json: Json = False,
 ) -> None:
     """Judge any video's motion against the telemetry claimed for it, from its pixels and intrinsics alone."""
-    result = call("judge", prefect, video, claim=claim, camera=camera, out=out)
+    result = call("judge", prefect, video, claim=claim, camera=camera, out=out, metric=metric)
     show(result, as_json)
     if not result["passed"]:
         raise typer.Exit(CHECK_FAILED)

@@ -114,7 +114,7 @@ def judge_motion(recovered: RecoveredMotion, claim: ClaimAtFrames, limits: PoseT
         "pitch_correlation": verdict.pitch_correlation,
         "claimed_pitch_rms_deg": verdict.claimed_pitch_rms_deg,
         "normalised_progress_rmse": verdict.normalised_progress_rmse,
-        "pitch_uncertainty_deg": float(np.rad2deg(np.nanmedian(recovered.pitch_std))),
+        "pitch_uncertainty_deg": float(np.rad2deg(recovered.typical_pitch_std)),
     }
     reasons = list(verdict.reasons)
     event = _event_error(recovered, claim)

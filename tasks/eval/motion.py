@@ -56,6 +56,12 @@ class RecoveredMotion:
     failures: tuple[str, ...]
 
     @property
+    def typical_pitch_std(self) -> float:
+        """Median of `pitch_std` over the frames that have one; NaN where none has [rad]."""
+        known = self.pitch_std[np.isfinite(self.pitch_std)]
+        return float(np.median(known)) if len(known) else float("nan")
+
+    @property
     def T_previous_rig(self) -> Floats:
         """[F, 4, 4] rig poses in the rig frame of the frame before [m]; the identity in frame 0."""
         before = np.concatenate([self.T_rig0_rig[:1], self.T_rig0_rig[:-1]])

@@ -7,8 +7,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.scenes import write_scene
+from flows.clip import catalogue_of
 from flows.evaluation import NOT_RUN, evaluate
 from flows.generate import generate
+from flows.physics import clip_columns, clip_facts
+from tests.flows.test_trajectories import tum_lines
 from tests.toy_street import TOY_CAMERA, toy_street
 
 GRID = """
@@ -35,8 +38,19 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "camera.yaml").write_text(TOY_CAMERA)
     (folder / "grid.yaml").write_text(GRID.format(folder=folder))
     generate(str(folder / "grid.yaml"), str(folder / "made"), runner="threads", workers=1, backend="cpu")
-    evaluate(str(folder / "made"), out=str(folder / "out"))
+    write_true_trajectories(folder / "made", folder / "told" / "truth")
+    evaluate(str(folder / "made"), out=str(folder / "out"), trajectories=str(folder / "told"), metric=True)
     return folder / "out"
+
+
+def write_true_trajectories(dataset: Path, told: Path) -> None:
+    told.mkdir(parents=True)
+    mount = catalogue_of(dataset.resolve()).camera.T_rig_camera
+    for facts in clip_facts(dataset):
+        frames = clip_columns(dataset, "frames", facts)
+        poses = frames["T_world_rig"].reshape(-1, 4, 4) @ mount
+        lines = tum_lines(frames["t_ns"] * 1e-9, poses)
+        (told / f"{facts['clip_id']}.txt").write_text(lines)
 
 
 def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) -> None:
@@ -49,7 +63,19 @@ def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) 
         "photometric",
         "pnp",
         "essential",
+        "truth",
     }
+
+
+def test_a_trajectory_from_outside_is_scored_by_the_same_code(judged: Path) -> None:
+    rows = [r for r in json.loads((judged / "evaluation.json").read_text())["rows"] if r["method"] == "truth"]
+    assert {"pitch_rmse", "progress_rmse", "e_weather", "e_path", "e_geometry_hump"} <= {
+        r["metric"] for r in rows
+    }
+    assert max(r["value"] for r in rows if r["metric"] == "pitch_rmse") < 1e-4
+    exact = [r for r in rows if r["metric"] == "e_geometry_hump"]
+    assert exact and all(r["value"] == pytest.approx(r["floor"], abs=1e-3) for r in exact)
+    assert all(r["uncertainty"] is None for r in rows)
 
 
 def test_geometry_stands_at_four_windows_beside_its_floor(judged: Path) -> None:
