@@ -44,6 +44,7 @@ from flows import query as _query  # noqa: E402
 from flows import reconstruction as _reconstruction  # noqa: E402
 from flows import repair as _repair  # noqa: E402
 from flows import replay as _replay  # noqa: E402
+from flows import report as _report  # noqa: E402
 from flows import scenes as _scenes  # noqa: E402
 from flows import sheets as _sheets  # noqa: E402
 from flows import stop_study as _stop_study  # noqa: E402
@@ -74,6 +75,7 @@ describe = as_flow(_describe.describe)
 validate = as_flow(_describe.validate)
 replay_audit = as_flow(_replay.replay_audit)
 preview = as_flow(_previews.preview)
+report = as_flow(_report.report)
 sheets = as_flow(_sheets.sheets)
 sensitivity = as_flow(_studies.sensitivity)
 agreement = as_flow(_studies.agreement)

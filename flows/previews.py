@@ -1,5 +1,6 @@
 """Films of a dataset's clips, with the vehicle's traces below the picture."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +41,7 @@ def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: b
     plan, rows = read_plan(layout.root), read_json(layout.manifest)["clips"]
     if not plan.settings.pictures:
         raise InputError(f"{dataset}: must be a dataset with frames; it was made with --no-frames")
-    chosen = [row for row in rows if not clips or row["label"] in clips or row["clip_id"] in clips]
-    unknown = set(clips or ()) - {row[key] for row in rows for key in ("label", "clip_id")}
-    if unknown:
-        raise InputError(
-            [f"{dataset}: no clip {name!r}; musync describe lists them" for name in sorted(unknown)]
-        )
+    chosen = named_clips(rows, clips, dataset) if clips else rows
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     films = []
@@ -56,6 +52,22 @@ def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: b
             films.append(str(film))
             advance(row["label"])
     return {"films": films}
+
+
+def named_clips(rows: Sequence[dict[str, Any]], names: Sequence[str], dataset: str) -> list[dict[str, Any]]:
+    """The clips of these labels or ids, in the dataset's order.
+
+    Raises
+    ------
+    InputError
+        Listing every name that no clip has.
+    """
+    unknown = set(names) - {row[key] for row in rows for key in ("label", "clip_id")}
+    if unknown:
+        raise InputError(
+            [f"{dataset}: no clip {name!r}; musync describe lists them" for name in sorted(unknown)]
+        )
+    return [row for row in rows if row["label"] in names or row["clip_id"] in names]
 
 
 def _pictures(layout: Layout, row: dict[str, Any], traces: bool) -> list[NDArray[np.uint8]]:

@@ -106,6 +106,22 @@ def preview(
 
 
 @app.command()
+def report(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    out: Annotated[
+        str | None, typer.Option(help="Folder for the page; by default beside the dataset, DIR-report.")
+    ] = None,
+    clip: Annotated[
+        list[str] | None, typer.Option(help="Label or id of a clip whose traces and film to bring.")
+    ] = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Make a page that opens without a server: clips to filter, films beside traces, siblings, the manifest."""
+    show(call("report", prefect, dataset, out=out, clips=clip), as_json)
+
+
+@app.command()
 def sheets(
     dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
     out: Annotated[str, typer.Option(help="Folder for weather.png and hazards.png.")],

@@ -1,0 +1,265 @@
+/* global REPORT, Traces, Player, telemetryOf, asCsv */
+"use strict";
+// The page: filters, the table of clips, the chosen clip with its sibling, and the facts of the run.
+
+const MOST_ROWS = 500;
+const $ = (id) => document.getElementById(id);
+const clips = REPORT.clips;
+
+function el(tag, properties = {}, ...children) {
+  const { dataset = {}, ...rest } = properties;
+  const node = Object.assign(document.createElement(tag), rest);
+  Object.assign(node.dataset, dataset);
+  node.append(...children);
+  return node;
+}
+
+const number = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits));
+const signed = (value, digits) => (value > 0 ? "+" : value < 0 ? "−" : "±") + Math.abs(value).toFixed(digits);
+const degrees = (radians) => (radians === null || radians === undefined ? null : (radians * 180) / Math.PI);
+
+const roadOf = ({ scenario: s }) => (s.hazard_height_m > 0 ? "hump" : s.hazard_height_m < 0 ? "depression" : "flat");
+const verdictOf = ({ verdict: v }) => (v.passed === null ? "unjudged" : v.passed ? "passed" : "failed");
+
+const COLUMNS = [
+  { head: "clip", unit: "", key: (c) => c.label, text: (c) => c.label },
+  { head: "rate", unit: "mm/h", key: (c) => c.scenario.precipitation_mm_h, text: (c) => String(c.scenario.precipitation_mm_h) },
+  { head: "speed", unit: "km/h", key: (c) => c.scenario.initial_speed_km_h, text: (c) => number(c.scenario.initial_speed_km_h, 0) },
+  { head: "μ", unit: "", key: (c) => c.figures.surface_friction, text: (c) => number(c.figures.surface_friction, 3) },
+  { head: "stop", unit: "m", key: (c) => c.figures.stopping_distance, text: (c) => number(c.figures.stopping_distance, 1) },
+  { head: "pitch", unit: "deg", key: (c) => c.figures.peak_pitch, text: (c) => number(degrees(c.figures.peak_pitch), 2) },
+  { head: "check", unit: "", key: verdictOf, text: (c) => ({ passed: "✓", failed: "✗", unjudged: "–" })[verdictOf(c)] },
+];
+
+// ---- filters
+
+const CHIPS = { weather: (c) => c.scenario.weather, hazard: roadOf, verdict: verdictOf };
+const chosen = { weather: new Set(), hazard: new Set(), verdict: new Set() };
+let order = { column: null, rising: true };
+
+function drawChips() {
+  for (const [name, of] of Object.entries(CHIPS)) {
+    const values = [...new Set(clips.map(of))];
+    $(name).hidden = values.length < 2;
+    for (const value of values) {
+      const chip = el("button", { type: "button", className: "chip", textContent: value, dataset: { value } });
+      chip.setAttribute("aria-pressed", "false");
+      chip.onclick = () => {
+        chosen[name][chosen[name].has(value) ? "delete" : "add"](value);
+        chip.setAttribute("aria-pressed", String(chosen[name].has(value)));
+        drawRows();
+      };
+      $(name).append(chip);
+    }
+  }
+}
+
+function clearFilters() {
+  $("filters").reset();
+  Object.values(chosen).forEach((set) => set.clear());
+  document.querySelectorAll(".chip").forEach((chip) => chip.setAttribute("aria-pressed", "false"));
+  drawRows();
+}
+
+function kept() {
+  const from = $("speed-from").valueAsNumber, to = $("speed-to").valueAsNumber;
+  const words = $("search").value.toLowerCase().split(/\s+/).filter(Boolean);
+  const list = clips.filter((c) =>
+    Object.entries(CHIPS).every(([name, of]) => chosen[name].size === 0 || chosen[name].has(of(c)))
+    && !(c.scenario.initial_speed_km_h < from) && !(c.scenario.initial_speed_km_h > to)
+    && words.every((word) => c.label.toLowerCase().includes(word)));
+  if (order.column === null) return list;
+  const { key } = COLUMNS[order.column];
+  const sign = order.rising ? 1 : -1;
+  const missing = (v) => v === null || v === undefined;
+  return list.sort((p, q) => {
+    const a = key(p), b = key(q);
+    if (missing(a) || missing(b)) return missing(a) - missing(b);
+    return sign * (typeof a === "string" ? a.localeCompare(b, undefined, { numeric: true }) : a - b);
+  });
+}
+
+// ---- table
+
+function drawHead() {
+  $("clips").tHead.append(el("tr", {}, ...COLUMNS.map(({ head, unit }, k) => {
+    const cell = el("th", { scope: "col", tabIndex: 0 }, head, el("small", { textContent: unit || "\u00a0" }));
+    const sort = () => {
+      order = { column: k, rising: order.column === k ? !order.rising : true };
+      [...cell.parentNode.cells].forEach((c, i) => c.setAttribute("aria-sort", i !== k ? "none" : order.rising ? "ascending" : "descending"));
+      drawRows();
+    };
+    cell.onclick = sort;
+    cell.onkeydown = (event) => event.key === "Enter" && sort();
+    return cell;
+  })));
+}
+
+function drawRows() {
+  const list = kept();
+  $("clips").tBodies[0].replaceChildren(...list.slice(0, MOST_ROWS).map((clip) => {
+    const row = el("tr", { tabIndex: 0, dataset: { clip: clip.clip_id } },
+      ...COLUMNS.map(({ text }) => el("td", { textContent: text(clip) })));
+    row.lastChild.className = row.lastChild.ariaLabel = verdictOf(clip);
+    row.onclick = () => select(clip);
+    row.onkeydown = (event) => {
+      const next = { ArrowDown: row.nextSibling, ArrowUp: row.previousSibling, Enter: row }[event.key];
+      if (!next) return;
+      event.preventDefault();
+      next.focus();
+      next.click();
+    };
+    return row;
+  }));
+  const rest = list.length > MOST_ROWS ? `; the first ${MOST_ROWS} are listed` : "";
+  $("count").textContent = `${list.length} of ${clips.length} clips${rest}`;
+  markRows();
+}
+
+function markRows() {
+  for (const row of $("clips").tBodies[0].rows) {
+    row.setAttribute("aria-selected", String(row.dataset.clip === current.clip?.clip_id));
+    row.classList.toggle("sibling", row.dataset.clip === current.sibling?.clip_id);
+  }
+}
+
+// ---- the chosen clip and its sibling
+
+const current = { clip: null, sibling: null };
+
+/** Siblings of a clip: those that differ in exactly one control. */
+function siblingsOf(clip) {
+  const place = clips.indexOf(clip);
+  return REPORT.pairs.filter(([i, j]) => i === place || j === place)
+    .map(([i, j, control]) => ({ clip: clips[i === place ? j : i], control }));
+}
+
+function select(clip) {
+  const siblings = siblingsOf(clip);
+  const options = [el("option", { value: "", textContent: siblings.length ? "nothing" : "no sibling" })];
+  for (const control of new Set(siblings.map((s) => s.control))) {
+    options.push(el("optgroup", { label: `other ${control}` }, ...siblings.filter((s) => s.control === control)
+      .map((s) => el("option", { value: s.clip.clip_id, textContent: s.clip.label }))));
+  }
+  $("sibling").replaceChildren(...options);
+  // what was shown beside the last clip stays if it is a sibling of this one too; else the farthest in friction
+  const apart = (s) => Math.abs(s.clip.figures.surface_friction - clip.figures.surface_friction);
+  const same = siblings.find((s) => s.clip === current.sibling);
+  const far = siblings.filter((s) => s.control === "weather").sort((p, q) => apart(q) - apart(p))[0];
+  return beside(clip, (same ?? far ?? siblings[0])?.clip ?? null);
+}
+
+async function beside(clip, sibling) {
+  Object.assign(current, { clip, sibling });
+  $("sibling").value = sibling?.clip_id ?? "";
+  $("label").textContent = clip.label;
+  $("badge").className = `badge ${verdictOf(clip)}`;
+  $("badge").textContent = { passed: "pose check passed", failed: "pose check failed", unjudged: "not judged: no frames" }[verdictOf(clip)];
+  $("changes").textContent = sibling ? changes(clip, sibling) : "";
+  history.replaceState(null, "", `#${clip.clip_id}${sibling ? `+${sibling.clip_id}` : ""}`);
+  markRows();
+  drawClipFacts(clip);
+  const pair = [clip, sibling].filter(Boolean);
+  const films = pair.map((c) => c.film).filter(Boolean);
+  $("films").hidden = films.length === 0;
+  $("films").classList.toggle("alone", films.length < 2);
+  document.querySelector("figure.b").hidden = films.length < 2;
+  document.querySelectorAll("figcaption").forEach((caption, k) => { caption.textContent = pair[k]?.label ?? ""; });
+  player.load(films);
+  const traced = pair.filter((c) => c.traced);
+  $("player").hidden = !clip.traced;
+  $("untraced").hidden = traced.length === pair.length;
+  $("untraced").textContent = `No traces of ${pair.filter((c) => !c.traced).map((c) => c.label).join(" and ")} in this report: `
+    + "musync report with --clip brings those that you name.";
+  const columns = await Promise.all(traced.map(telemetryOf));
+  if (current.clip !== clip || current.sibling !== sibling) return;
+  await traces.show(traced.map((c, k) => ({ label: c.label, columns: columns[k] })));
+  traces.point(player.time);
+}
+
+/** What the sibling changes, in words: only figures that both have. */
+function changes(clip, sibling) {
+  const parts = [["friction", "surface_friction", 3, "", 1], ["stop", "stopping_distance", 1, " m", 1], ["peak pitch", "peak_pitch", 2, "°", 180 / Math.PI]]
+    .filter(([, key]) => typeof clip.figures[key] === "number" && typeof sibling.figures[key] === "number")
+    .map(([name, key, digits, unit, factor]) => `${name} ${signed((sibling.figures[key] - clip.figures[key]) * factor, digits)}${unit}`);
+  const fields = Object.keys(clip.scenario).filter((key) => clip.scenario[key] !== sibling.scenario[key]);
+  return `${sibling.label} differs in ${fields.join(", ")}: ${parts.join(", ") || "no figure that both have"}.`;
+}
+
+// ---- facts
+
+const facts = (rows) => el("dl", {}, ...rows.flatMap(([key, value, hash]) =>
+  [el("dt", { textContent: key }), el("dd", { textContent: value ?? "–", className: hash ? "hash" : "" })]));
+
+function drawClipFacts(clip) {
+  const rows = (values) => Object.entries(values).map(([key, value]) => [key, typeof value === "number" ? String(value) : value]);
+  $("clip-facts").lastElementChild.replaceChildren(
+    facts([["clip_id", clip.clip_id, true], ["seed", clip.seed, true]]),
+    el("h3", { textContent: "Scenario" }), facts(rows(clip.scenario)),
+    el("h3", { textContent: "Outcome" }), facts(rows(clip.figures)),
+    el("h3", { textContent: "Pose check" }), facts(rows({ ...clip.verdict, reasons: clip.verdict.reasons.join("; ") || "none" })),
+    el("h3", { textContent: "SHA-256 of the content" }), facts(Object.entries(clip.content).map(([k, v]) => [k, v, true])));
+}
+
+function drawRunFacts() {
+  $("run-facts").lastElementChild.replaceChildren(...REPORT.manifest.flatMap(({ title, rows }) =>
+    [el("h3", { textContent: title }), facts(rows)]));
+}
+
+// ---- one time for all
+
+const player = new Player([$("film-a"), $("film-b")], (time) => {
+  $("time").value = time;
+  $("clock").textContent = `${time.toFixed(2)} s of ${REPORT.duration_s.toFixed(1)} s`;
+  $("play").textContent = player.running ? "Pause" : "Play";
+  $("play").ariaLabel = $("play").textContent;
+  traces.point(time);
+});
+const traces = new Traces($("traces"), (time) => scrub(time));
+
+function scrub(time) {
+  if (player.running) player.pause();
+  player.seek(time);
+}
+
+async function saveCsv() {
+  const { clip } = current;
+  const text = asCsv(clip, await telemetryOf(clip));
+  const link = el("a", { href: URL.createObjectURL(new Blob([text], { type: "text/csv" })), download: `${clip.label.replaceAll("/", "_")}.csv` });
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+// ---- start
+
+document.title = `${REPORT.name} – muSync report`;
+$("title").textContent = REPORT.name;
+$("facts").textContent = REPORT.summary;
+$("time").max = REPORT.duration_s;
+const speeds = clips.map((c) => c.scenario.initial_speed_km_h);
+$("speed-from").placeholder = Math.min(...speeds);
+$("speed-to").placeholder = Math.max(...speeds);
+drawChips();
+drawHead();
+drawRunFacts();
+$("filters").addEventListener("input", drawRows);
+$("reset").onclick = clearFilters;
+$("sibling").onchange = () => beside(current.clip, clips.find((c) => c.clip_id === $("sibling").value) ?? null);
+$("play").onclick = () => (player.running ? player.pause() : player.play());
+$("time").oninput = () => scrub($("time").valueAsNumber);
+$("csv").title = "Every telemetry column of this clip, a row a millisecond";
+$("csv").onclick = saveCsv;
+addEventListener("keydown", (event) => {
+  if (event.target.closest("input, select, button, table, summary")) return;
+  const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+  if (step) scrub(player.time + step / REPORT.frame_rate_hz);
+  else if (event.key === " ") $("play").click();
+  else return;
+  event.preventDefault();
+});
+// #CLIP+SIBLING opens the page at a pair
+const [first, second] = location.hash.slice(1).split("+").map((id) => clips.find((c) => c.clip_id === id));
+drawRows();
+select(first ?? clips[0])
+  .then(() => second && beside(first, second))
+  .finally(() => { document.body.dataset.ready = "true"; });

@@ -1,0 +1,194 @@
+"""The report page, in a real browser: what an analyst clicks, drags and downloads works from the disk."""
+
+import csv
+import json
+import shutil
+import struct
+import zlib
+from base64 import b64decode
+
+import numpy as np
+import pytest
+
+from flows.generate import generate
+from flows.report import packed, report
+from flows.store.telemetry import read_columns
+from tasks.conventions import TICK_CHANNELS
+from tasks.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def page_folder(toy_dataset, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report") / "page"
+    result = report(str(toy_dataset.root), out=str(folder))
+    assert (result["clips"], result["traced"], result["films_made"]) == (4, 4, 4)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def browser():
+    api = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed: pip install playwright"
+    )
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if found is None:
+        pytest.skip("no Chromium on the path: install one to test the report page")
+    with api.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def page(browser, page_folder):
+    yield from opened(browser, page_folder)
+
+
+def opened(browser, folder):
+    """The page, ready; what it says on the console is an error."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    tab, complaints = context.new_page(), []
+    tab.on("console", lambda message: complaints.append(message.text))
+    tab.on("pageerror", lambda error: complaints.append(str(error)))
+    tab.goto(f"file://{folder}/index.html")
+    tab.wait_for_selector("body[data-ready]")
+    yield tab
+    context.close()
+    assert complaints == []
+
+
+def labels(page) -> list[str]:
+    return page.locator("#clips tbody tr td:first-child").all_inner_texts()
+
+
+def cursor_s(page) -> float:
+    """The time at which the cursor stands on the axis of the plot [s]."""
+    return page.evaluate(
+        "(({ xaxis }) => xaxis.p2l(parseFloat(traces.cursor.style.left) - xaxis._offset))(traces.plot._fullLayout)"
+    )
+
+
+def test_the_page_lists_every_clip_and_each_filter_reduces_them(page):
+    assert labels(page) == ["dry/flat", "dry/hump", "snow-3/flat", "snow-3/hump"]
+    page.click("#weather .chip[data-value=snow]")
+    assert labels(page) == ["snow-3/flat", "snow-3/hump"]
+    page.click("#hazard .chip[data-value=hump]")
+    assert labels(page) == ["snow-3/hump"]
+    page.click("#reset")
+    page.fill("#speed-from", "50")
+    assert labels(page) == []
+    page.fill("#speed-from", "40")
+    page.fill("#search", "HUMP")
+    assert labels(page) == ["dry/hump", "snow-3/hump"]
+    assert page.inner_text("#count") == "2 of 4 clips"
+
+
+def test_a_click_on_a_head_sorts_and_another_turns_the_order(page, toy_dataset):
+    clips = json.loads(toy_dataset.manifest.read_bytes())["clips"]
+    by_pitch = [c["label"] for c in sorted(clips, key=lambda c: c["figures"]["peak_pitch"])]
+    page.click("#clips th:nth-child(6)")
+    assert labels(page) == by_pitch
+    page.click("#clips th:nth-child(6)")
+    assert labels(page) == by_pitch[::-1]
+
+
+def test_the_sibling_stands_beside_with_its_film_its_traces_and_what_it_changes(page, toy_dataset):
+    clips = {c["label"]: c["figures"] for c in json.loads(toy_dataset.manifest.read_bytes())["clips"]}
+    page.click("#clips tbody tr:nth-child(2)")
+    page.wait_for_function("traces.shown[0]?.label === 'dry/hump'")
+    assert page.locator("#sibling option:checked").inner_text() == "snow-3/hump"
+    assert page.locator("video:visible").count() == 2
+    assert page.evaluate("traces.plot.data.length") == 2 * page.evaluate("REPORT.panels.length")
+    change = clips["snow-3/hump"]["surface_friction"] - clips["dry/hump"]["surface_friction"]
+    assert f"friction −{-change:.3f}" in page.inner_text("#changes")
+    page.select_option("#sibling", "")
+    page.wait_for_function("traces.shown.length === 1")
+    assert page.locator("video:visible").count() == 1
+
+
+def test_the_cursor_follows_the_film_and_the_readout_is_the_telemetry_of_that_moment(page, toy_dataset):
+    clip = json.loads(toy_dataset.manifest.read_bytes())["clips"][0]
+    columns = read_columns(toy_dataset.telemetry / "ticks" / "family=dry", clip["clip_id"])
+    before = cursor_s(page)
+    page.click("#play")
+    page.wait_for_function("!player.running && player.time > 0.85", timeout=10_000)
+    time = page.evaluate("player.time")
+    assert before == pytest.approx(0, abs=0.01)
+    assert cursor_s(page) == pytest.approx(time, abs=0.01)
+    assert page.evaluate("player.films[0].currentTime") == pytest.approx(time, abs=0.11)
+    shown = float(page.locator(".panel-head output.a").first.inner_text())
+    assert shown == pytest.approx(3.6 * columns["speed"][round(1000 * time)], abs=0.051)
+
+
+def test_dragging_in_the_traces_moves_the_cursor_and_both_films(page):
+    box = page.locator("#plot .nsewdrag").first.bounding_box()
+    page.mouse.move(box["x"] + 5, box["y"] + 30)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 30, steps=4)
+    page.mouse.up()
+    assert cursor_s(page) == pytest.approx(0.7, abs=0.01)
+    films = page.evaluate("player.films.map((film) => film.currentTime)")
+    assert films == pytest.approx([0.725, 0.725])
+
+
+def test_the_csv_is_the_stored_telemetry_to_the_last_bit(page, toy_dataset, tmp_path):
+    clip = json.loads(toy_dataset.manifest.read_bytes())["clips"][2]
+    page.click("#clips tbody tr:nth-child(3)")
+    with page.expect_download() as download:
+        page.click("#csv")
+    assert download.value.suggested_filename == "snow-3_flat.csv"
+    download.value.save_as(tmp_path / "clip.csv")
+    head, *rows = csv.reader((tmp_path / "clip.csv").open())
+    assert head == ["clip_id", "label", "weather", *(channel.name for channel in TICK_CHANNELS)]
+    assert len(rows) == 1001
+    assert rows[0][:3] == [clip["clip_id"], "snow-3/flat", "snow"]
+    stored = read_columns(toy_dataset.telemetry / "ticks" / "family=snow", clip["clip_id"])
+    for k, channel in enumerate(TICK_CHANNELS, start=3):
+        np.testing.assert_array_equal([float(row[k]) for row in rows], stored[channel.name].astype(float))
+
+
+def test_the_manifest_s_facts_stand_on_the_page(page, toy_dataset):
+    manifest = json.loads(toy_dataset.manifest.read_bytes())
+    page.click("#run-facts summary")
+    text = page.inner_text("#run-facts")
+    for fact in (manifest["run_id"], manifest["seal"], manifest["made_with"]["code"]["source_sha256"]):
+        assert fact in text
+
+
+def test_telemetry_alone_gets_the_page_without_films(browser, toy_dataset, tmp_path):
+    grid = str(toy_dataset.root.parent / "grid.yaml")
+    bare = generate(grid, str(tmp_path / "bare"), runner="threads", workers=1, pictures=False).layout
+    result = report(str(bare.root), clips=["dry/hump"])
+    assert result["page"] == str(tmp_path / "bare-report" / "index.html")
+    assert (result["traced"], result["films_made"]) == (1, 0)
+    for page in opened(browser, tmp_path / "bare-report"):
+        assert page.locator("video:visible").count() == 0
+        page.click("#clips tbody tr:nth-child(2)")
+        page.wait_for_function("traces.shown[0]?.label === 'dry/hump'")
+        page.click("#play")
+        page.wait_for_function("player.time > 0.3")
+        assert cursor_s(page) > 0.25
+        assert "No traces of snow-3/hump" in page.inner_text("#untraced")
+
+
+def test_a_second_report_keeps_the_films(toy_dataset, page_folder):
+    assert report(str(toy_dataset.root), out=str(page_folder))["films_made"] == 0
+
+
+def test_packed_columns_read_back_bit_for_bit():
+    columns = {"x": np.array([0.1, -0.0, np.nan]), "on": np.array([True, False, True])}
+    content = packed(columns, ["x", "on"])
+    planes = zlib.decompress(b64decode(content["packed"]))
+    read = [struct.unpack("<d", planes[i : 8 * 3 : 3])[0] for i in range(3)]
+    np.testing.assert_array_equal(np.array(read).view(np.uint64), columns["x"].view(np.uint64))
+    assert content["columns"] == ["x", "on"] and len(planes) == 2 * 8 * 3
+
+
+def test_the_page_does_not_go_among_other_files_nor_into_the_dataset(toy_dataset, tmp_path):
+    (tmp_path / "letter.txt").write_text("mine")
+    with pytest.raises(InputError, match="holds other files"):
+        report(str(toy_dataset.root), out=str(tmp_path))
+    with pytest.raises(InputError, match="outside the dataset"):
+        report(str(toy_dataset.root), out=str(toy_dataset.root / "report"))
+    with pytest.raises(InputError, match="no clip 'moon'"):
+        report(str(toy_dataset.root), clips=["moon"])
