@@ -18,6 +18,10 @@ REFINED = 5
 """Candidates of each screening that are refined through the simulation."""
 BOOTSTRAP = 400
 ALIKE_REFINED = 4
+DECIDED = 0.1
+"""Share of the best gain so far below which the linear screen is taken at its word and nothing is refined."""
+REACHED = 0.8
+"""Share of the linear gain that a refined one reaches where the start did not matter."""
 
 Misfits = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -51,15 +55,22 @@ class Candidate:
         return self.score > ACCEPT_SCORE and self.held_out_gain > HELD_OUT_GAIN and not self.fitted.at_bound
 
 
-def judge(evidence: Evidence, base: Fit, base_held_out: Misfits, hypothesis: Hypothesis) -> Candidate:
+def judge(
+    evidence: Evidence,
+    base: Fit,
+    base_held_out: Misfits | None,
+    hypothesis: Hypothesis,
+    foreseen: float = np.inf,
+) -> Candidate:
     """Refine a hypothesis on top of ``base`` and judge it on training and held-out runs.
 
     Parameters
     ----------
     evidence : the runs
     base : fit of what is accepted so far
-    base_held_out : `misfit_by_run` of the held-out runs under ``base``
+    base_held_out : `misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
     hypothesis : what may be added
+    foreseen : gain by the linear screen: a first fit that reaches it needs no other start
     """
     first = np.arange(len(hypothesis.names)) == 0
     if hypothesis.names[0] in SESSION:
@@ -81,9 +92,8 @@ def judge(evidence: Evidence, base: Fit, base_held_out: Misfits, hypothesis: Hyp
         )
         if fitted is None or trial.objective < fitted.objective:
             fitted = trial
-        worthwhile = (
-            0.5 * (base.objective - fitted.objective) > ACCEPT_SCORE or hypothesis.names[0] in SESSION
-        )
+        gain = 0.5 * (base.objective - fitted.objective)
+        worthwhile = (ACCEPT_SCORE < gain < REACHED * foreseen) or hypothesis.names[0] in SESSION
         if fitted.objective < base.objective and not (offsets is base.offsets and worthwhile):
             break
     assert fitted is not None
@@ -93,7 +103,7 @@ def judge(evidence: Evidence, base: Fit, base_held_out: Misfits, hypothesis: Hyp
 def assess(
     evidence: Evidence,
     base: Fit,
-    base_held_out: Misfits,
+    base_held_out: Misfits | None,
     hypothesis: Hypothesis,
     fitted: Fit,
 ) -> Candidate:
@@ -103,7 +113,7 @@ def assess(
     ----------
     evidence : the runs, with derivatives that hold at the fit
     base : fit of what is accepted so far
-    base_held_out : `misfit_by_run` of the held-out runs under ``base``
+    base_held_out : `misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
     hypothesis : what was added; its parameters come last
     fitted : the joint fit
     """
@@ -111,12 +121,12 @@ def assess(
     own = _own_scores(evidence, fitted, hypothesis)
     factor = inflation(evidence, fitted, own)
     penalty = float(len(hypothesis.names) * np.log(evidence.samples))
-    if gain / factor - penalty > ACCEPT_SCORE:
+    if gain / factor - penalty > ACCEPT_SCORE and base_held_out is not None:
         # what the base reaches from here as well is no merit of the hypothesis
         gain = min(gain, 0.5 * (_back(evidence, base, hypothesis, fitted).objective - fitted.objective))
     score = gain / factor - penalty
     held_out = 0.0
-    if score > ACCEPT_SCORE:
+    if score > ACCEPT_SCORE and base_held_out is not None:
         held_out = fall(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
     return Candidate(
         hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
@@ -151,7 +161,7 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
     return np.array(scores)
 
 
-def ladder(evidence: Evidence, base: Fit, count: int = REFINED, *, alike: bool = True) -> list[Candidate]:
+def ladder(evidence: Evidence, base: Fit, count: int = REFINED, *, gated: bool = True) -> list[Candidate]:
     """The best candidates to add to ``base``, refined and sorted by score, best first.
 
     Parameters
@@ -159,18 +169,22 @@ def ladder(evidence: Evidence, base: Fit, count: int = REFINED, *, alike: bool =
     evidence : the runs
     base : fit of what is accepted so far
     count : how many of the screening are refined
-    alike : refine what looks like the best of them too
+    gated : judge them on held-out runs as well, and refine what looks like the best of them too
     """
     gains, estimates = screen(evidence, base)
-    held_out = misfit_by_run(evidence.held_out, base)
+    held_out = misfit_by_run(evidence.held_out, base) if gated else None
     order = [int(j) for j in np.argsort(-gains, kind="stable") if gains[j] > 0.3 * ACCEPT_SCORE][:count]
 
     def judged(j: int) -> Candidate:
-        return judge(evidence, base, held_out, library_hypothesis(evidence.effects[j], float(estimates[j])))
+        hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]))
+        return judge(evidence, base, held_out, hypothesis, float(gains[j]))
 
-    candidates = [judged(j) for j in order]
-    if candidates and alike:
-        best = max(range(len(order)), key=lambda i: candidates[i].score)
+    candidates: list[Candidate] = []
+    for j in order:
+        if gains[j] > DECIDED * max((c.gain for c in candidates), default=0.0):
+            candidates.append(judged(j))
+    if candidates and gated:
+        best = max(range(len(candidates)), key=lambda i: candidates[i].score)
         if candidates[best].score > ACCEPT_SCORE:
             near = [j for j in look_alikes(evidence, order[best]) if j not in order and gains[j] > 0.0]
             candidates += [judged(j) for j in near[:ALIKE_REFINED]]

@@ -14,13 +14,15 @@ from scipy.linalg import cholesky, solve_triangular
 
 from tasks.closure.campaign import CHANNELS, SESSION, Tolerances
 from tasks.closure.disturbance import DISTURBED, KNOT_SPACING, N_OFFSETS, Disturbance, prior_precision
-from tasks.closure.forward import RunModel, Slot, instruments, roll
+from tasks.closure.forward import COARSE_SUBSTEPS, SUBSTEPS, RunModel, Slot, instruments, roll
 from tasks.closure.noise import whiten
 from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
 BROKEN = 1e4
 """Whitened residual of a trial that the integration does not survive: no fit goes there."""
+STEADY = 20.0
+"""Misfit by the longer step below which derivatives are taken with it."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 
 
@@ -40,6 +42,7 @@ class RunEvidence:
     factor : Cholesky factor (lower) of information + prior precision
     session_q : float64 [D, 7] factor^-1 nuisance' session
     library_q : float64 [D, E] factor^-1 nuisance' library
+    substeps : integration steps between samples with which derivatives are taken
     """
 
     model: RunModel
@@ -53,6 +56,7 @@ class RunEvidence:
     factor: NDArray[np.float64]
     session_q: NDArray[np.float64]
     library_q: NDArray[np.float64]
+    substeps: int
 
     def residual(
         self,
@@ -89,11 +93,9 @@ class RunEvidence:
         y[:, CHANNELS.index("pitch")] += offsets[3]
         return whiten(self.model.measured - y, self.rho, self.sigma) + self.nuisance @ offsets
 
-    def offsets(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Posterior mean of the run's offsets and disturbance knots given a whitened residual, float64 [D]."""
-        return solve_triangular(
-            self.factor, self.project(residual), lower=True, trans="T", check_finite=False
-        )
+    def offsets(self, projected: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Posterior mean of the run's offsets and disturbance knots given a residual's `project`, float64 [D]."""
+        return solve_triangular(self.factor, projected, lower=True, trans="T", check_finite=False)
 
     def project(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """factor^-1 nuisance' x: what the nuisances can take from x."""
@@ -122,13 +124,18 @@ def run_evidence(
     disturbance : prior of the disturbances
     slots : forms that belong to the base point
     """
+    substeps = SUBSTEPS
     out, states = roll(model, base, slots=slots)
     y = instruments(model, base, out)
+    coarse, coarse_states = roll(model, base, slots=slots, substeps=COARSE_SUBSTEPS)
+    coarse_y = instruments(model, base, coarse)
+    if np.sum(whiten(y - coarse_y, rho, sigma) ** 2) < STEADY:
+        substeps, out, states, y = COARSE_SUBSTEPS, coarse, coarse_states, coarse_y
 
     def slope(
         theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
     ) -> NDArray[np.float64]:
-        moved, _ = roll(model, theta, slots=(*slots, *extra), **options)
+        moved, _ = roll(model, theta, slots=(*slots, *extra), substeps=substeps, **options)
         return (instruments(model, theta, moved) - y) / step
 
     columns = [
@@ -183,6 +190,7 @@ def run_evidence(
         factor=np.empty(0),
         session_q=np.empty(0),
         library_q=np.empty(0),
+        substeps=substeps,
     )
     return with_disturbance(evidence, tolerances, disturbance)
 

@@ -1,12 +1,13 @@
 """Fitting a hypothesis through the simulation: Gauss-Newton with every nuisance integrated out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.closure.campaign import SESSION
 from tasks.closure.evidence import SESSION_INDEX, RunEvidence
+from tasks.closure.forward import Slot
 from tasks.closure.hypothesis import Hypothesis, compose
 
 SETTLING = 4
@@ -15,6 +16,33 @@ HELD = 1e18
 """Prior precision that holds a nuisance at 0."""
 SLACK = 1.0
 """Rise of a run's misfit that is taken for rounding when its point of linearisation moves."""
+SETTLED = 0.05
+"""Change of a run's misfit by a full move of its point of linearisation below which it is moved no further."""
+STRAYED = 0.2
+"""Relative change of a parameter, or miss of the foreseen fall, from which derivatives are taken anew."""
+
+Slopes = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Derivatives by parameters and session, float64 [M, K + 7], and what the nuisances can take from them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A run at some parameters, linearised about its own offsets.
+
+    Parameters
+    ----------
+    offsets : float64 [D] about which it is linearised
+    residual : float64 [M] whitened
+    projected : float64 [D] what the nuisances can take from it
+    misfit : marginalised
+    doubt : by how much the last full move of the offsets changed the misfit: 0 where the linearisation holds
+    """
+
+    offsets: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    projected: NDArray[np.float64]
+    misfit: float
+    doubt: float = np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,88 +105,122 @@ def fit(
     values, session, offsets : where to start
     iterations : at most so many Gauss-Newton steps
     """
-    lower = np.concatenate([p.lower for p in parts]) if parts else np.empty(0)
-    upper = np.concatenate([p.upper for p in parts]) if parts else np.empty(0)
-    steps = np.concatenate([p.step for p in parts]) if parts else np.empty(0)
-    x = (
-        (np.concatenate([p.start for p in parts]) if parts else np.empty(0))
-        if values is None
-        else values.copy()
+    lower, upper, steps, first = (
+        np.concatenate([np.empty(0), *(getattr(p, field) for p in parts)])
+        for field in ("lower", "upper", "step", "start")
     )
+    x = first if values is None else values.copy()
     s = np.zeros(len(SESSION_INDEX)) if session is None else session.copy()
     prior = 1.0 / np.square(session_sigma)
     # a free parameter that is also a session nuisance is the same number: the nuisance rests at 0
     taken = [SESSION.index(name) for part in parts for name in part.names if name in SESSION]
     s[taken], prior[taken] = 0.0, HELD
     k = len(x)
-    if offsets is None:
-        offsets, by_run, residuals, _ = _settled(evidence, parts, x, s)
-        objective = float(by_run.sum() + np.sum(prior * s**2))
-    else:
-        objective, by_run, residuals = _misfit(evidence, parts, x, s, prior, offsets)
+    places = _settled(evidence, parts, x, s) if offsets is None else _places(evidence, parts, x, s, offsets)
+    objective = _objective(places, prior, s)
+    slopes: list[Slopes] = []
     normal = np.eye(k + len(s))
+    differentiated, fell, foreseen = x, np.inf, np.inf
     for _ in range(iterations):
-        normal = np.diag(np.concatenate((np.zeros(k), prior)))
+        strayed = np.abs(x - differentiated) > STRAYED * np.maximum(np.abs(x), 0.3 * steps)
+        if not slopes or np.any(strayed) or (k and abs(fell - foreseen) > STRAYED * foreseen + 1.0):
+            span = np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps
+            slopes = _slopes(evidence, parts, x, s, places, span)
+            differentiated = x
+            normal = np.diag(np.concatenate((np.zeros(k), prior)))
+            for columns, q in slopes:
+                normal += columns.T @ columns - q.T @ q
         right = np.concatenate((np.zeros(k), -prior * s))
-        for run, r, d in zip(evidence, residuals, offsets, strict=True):
-            a = np.empty((len(r), k))
-            for j in range(k):
-                step = steps[j] * 0.3
-                if x[j] + step > upper[j]:
-                    step = -step
-                moved = x.copy()
-                moved[j] += step
-                a[:, j] = (r - run.residual(*compose(parts, moved, s), d)) / step
-            columns = np.column_stack((a, run.session))
-            q = np.column_stack((run.project(a), run.session_q)) if k else run.session_q
-            qr = run.project(r)
-            normal += columns.T @ columns - q.T @ q
-            right += columns.T @ r - q.T @ qr
-        free = np.ones(k + len(s), dtype=bool)
-        for _ in range(k + 1):
-            move = np.zeros(k + len(s))
-            move[free] = np.linalg.solve(
-                normal[np.ix_(free, free)] + 1e-12 * np.diag(np.diag(normal)[free] + 1e-30), right[free]
-            )
-            outside = (x + move[:k] < lower) & (x <= lower) | (x + move[:k] > upper) & (x >= upper)
-            if not np.any(outside & free[:k]):
-                break
-            free[:k] &= ~outside
-        expected = float(move @ right)
-        share = 1.0
-        better = False
-        for _ in range(4):
-            x_try = np.clip(x + share * move[:k], lower, upper)
-            s_try = s + share * move[k:]
-            trial = _misfit(evidence, parts, x_try, s_try, prior, offsets)
-            if trial[0] < objective:
-                better = True
-                break
-            share *= 0.4
-        if not better:
+        for place, (columns, q) in zip(places, slopes, strict=True):
+            right += columns.T @ place.residual - q.T @ place.projected
+        move = _move(normal, right, x, lower, upper)
+        foreseen = float(move @ right)
+        if foreseen < 0.1 and abs(fell) < 3.0:
             break
         before = objective
-        x, s = x_try, s_try
-        offsets, by_run, residuals, _ = _relinearised(evidence, parts, x, s, offsets, trial[1], trial[2])
-        objective = float(by_run.sum() + np.sum(prior * s**2))
-        if abs(before - objective) < 0.3 and expected < 0.5:
+        # parameters and each run's own offsets move together; where that does not help, one after the other
+        x_try, s_try = np.clip(x + move[:k], lower, upper), s + move[k:]
+        ahead = tuple(
+            run.offsets(place.projected - q @ move)
+            for run, place, (_, q) in zip(evidence, places, slopes, strict=True)
+        )
+        trial = _places(evidence, parts, x_try, s_try, ahead)
+        if _objective(trial, prior, s_try) >= objective:
+            own = tuple(place.offsets for place in places)
+            for share in (1.0, 0.4, 0.16, 0.064):
+                x_try, s_try = np.clip(x + share * move[:k], lower, upper), s + share * move[k:]
+                trial = _places(evidence, parts, x_try, s_try, own)
+                if _objective(trial, prior, s_try) < objective or foreseen < 0.5:
+                    break
+            if _objective(trial, prior, s_try) >= objective:
+                break
+            trial = _relinearised(evidence, parts, x_try, s_try, trial)
+        x, s, places = x_try, s_try, trial
+        objective = _objective(places, prior, s)
+        fell = before - objective
+        if abs(fell) < 0.3 and foreseen < 0.5:
             break
     # scaled first: in their own units the parameters' information spans more than double precision can invert
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size)
     covariance = np.asarray(inverse[:k, :k], dtype=np.float64)
     return Fit(
-        parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective, by_run=by_run,
-        covariance=covariance, residuals=tuple(residuals), offsets=offsets,
+        parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
+        by_run=_misfits(places), covariance=covariance,
+        residuals=tuple(place.residual for place in places), offsets=tuple(place.offsets for place in places),
     )  # fmt: skip
+
+
+def _slopes(
+    evidence: tuple[RunEvidence, ...],
+    parts: tuple[Hypothesis, ...],
+    x: NDArray[np.float64],
+    s: NDArray[np.float64],
+    places: tuple[Place, ...],
+    steps: NDArray[np.float64],
+) -> list[Slopes]:
+    """Derivatives of every run by parameters and session, and what its nuisances can take from them."""
+    slopes = []
+    moved = [compose(parts, x + step * unit, s) for step, unit in zip(steps, np.eye(len(x)), strict=True)]
+    for run, place in zip(evidence, places, strict=True):
+        a = [
+            (place.residual - run.residual(*there, place.offsets)) / step
+            for there, step in zip(moved, steps, strict=True)
+        ]
+        columns = np.column_stack((*a, run.session))
+        q = np.column_stack((run.project(columns[:, : len(x)]), run.session_q)) if a else run.session_q
+        slopes.append((columns, q))
+    return slopes
+
+
+def _move(
+    normal: NDArray[np.float64],
+    right: NDArray[np.float64],
+    x: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The Gauss-Newton step of parameters and session, what sits on a bound and pushes beyond it left out."""
+    k = len(x)
+    free = np.ones(len(right), dtype=bool)
+    move = np.zeros(len(right))
+    for _ in range(k + 1):
+        move = np.zeros(len(right))
+        block = normal[np.ix_(free, free)]
+        move[free] = np.linalg.solve(block + 1e-12 * np.diag(np.diag(block) + 1e-30), right[free])
+        outside = (x + move[:k] < lower) & (x <= lower) | (x + move[:k] > upper) & (x >= upper)
+        if not np.any(outside & free[:k]):
+            break
+        free[:k] &= ~outside
+    return move
 
 
 def misfit_by_run(
     evidence: tuple[RunEvidence, ...], fitted: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Marginalised misfit of runs under a fit made on other runs, and how far it is from settled; float64 [R]."""
-    _, by_run, _, doubt = _settled(evidence, fitted.parts, fitted.values, fitted.session)
-    return by_run, doubt
+    places = _settled(evidence, fitted.parts, fitted.values, fitted.session)
+    return _misfits(places), np.array([place.doubt for place in places])
 
 
 def fall(
@@ -180,15 +242,11 @@ def _settled(
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
-) -> tuple[
-    tuple[NDArray[np.float64], ...], NDArray[np.float64], list[NDArray[np.float64]], NDArray[np.float64]
-]:
-    offsets = tuple(np.zeros(run.nuisance.shape[1]) for run in evidence)
-    _, by_run, residuals = _misfit(evidence, parts, x, s, np.zeros_like(s), None)
-    doubt = np.zeros_like(by_run)
+) -> tuple[Place, ...]:
+    places = _places(evidence, parts, x, s, (None,) * len(evidence))
     for _ in range(SETTLING):
-        offsets, by_run, residuals, doubt = _relinearised(evidence, parts, x, s, offsets, by_run, residuals)
-    return offsets, by_run, residuals, doubt
+        places = _relinearised(evidence, parts, x, s, places)
+    return places
 
 
 def _relinearised(
@@ -196,45 +254,52 @@ def _relinearised(
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
-    offsets: tuple[NDArray[np.float64], ...],
-    by_run: NDArray[np.float64],
-    residuals: list[NDArray[np.float64]],
-) -> tuple[
-    tuple[NDArray[np.float64], ...], NDArray[np.float64], list[NDArray[np.float64]], NDArray[np.float64]
-]:
-    """Move every run's point of linearisation towards its posterior, as far as the run does not fit worse.
-
-    Last comes by how much the full move changes each run's misfit: 0 where the linearisation holds.
-    """
+    places: tuple[Place, ...],
+) -> tuple[Place, ...]:
+    """Move every run's point of linearisation towards its posterior, as far as the run does not fit worse."""
     theta, slots = compose(parts, x, s)
-    places, misfits, fresh = list(offsets), by_run.copy(), list(residuals)
-    doubt = np.zeros_like(by_run)
-    for i, run in enumerate(evidence):
-        move = run.offsets(residuals[i]) - offsets[i]
+    after = list(places)
+    for i, (run, place) in enumerate(zip(evidence, places, strict=True)):
+        if place.doubt < SETTLED:
+            continue
+        move = run.offsets(place.projected) - place.offsets
+        doubt = np.inf
         for share in (1.0, 0.4):
-            trial = offsets[i] + share * move
-            r = run.residual(theta, slots, trial)
-            q = run.project(r)
-            misfit = float(r @ r - q @ q)
+            trial = _place(run, theta, slots, place.offsets + share * move)
             if share == 1.0:
-                doubt[i] = abs(misfit - by_run[i])
-            if misfit <= by_run[i] + SLACK:
-                places[i], misfits[i], fresh[i] = trial, misfit, r
+                doubt = abs(trial.misfit - place.misfit)
+            after[i] = replace(place, doubt=doubt)
+            if trial.misfit <= place.misfit + SLACK:
+                after[i] = replace(trial, doubt=doubt)
                 break
-    return tuple(places), misfits, fresh, doubt
+    return tuple(after)
 
 
-def _misfit(
+def _places(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
-    values: NDArray[np.float64],
-    session: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    offsets: tuple[NDArray[np.float64], ...] | None,
-) -> tuple[float, NDArray[np.float64], list[NDArray[np.float64]]]:
-    theta, slots = compose(parts, values, session)
-    own = offsets if offsets is not None else (None,) * len(evidence)
-    residuals = [run.residual(theta, slots, d) for run, d in zip(evidence, own, strict=True)]
-    projected = [run.project(r) for run, r in zip(evidence, residuals, strict=True)]
-    by_run = np.array([float(r @ r - q @ q) for r, q in zip(residuals, projected, strict=True)])
-    return float(by_run.sum() + np.sum(prior * session**2)), by_run, residuals
+    x: NDArray[np.float64],
+    s: NDArray[np.float64],
+    offsets: tuple[NDArray[np.float64] | None, ...],
+) -> tuple[Place, ...]:
+    theta, slots = compose(parts, x, s)
+    return tuple(_place(run, theta, slots, d) for run, d in zip(evidence, offsets, strict=True))
+
+
+def _place(
+    run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64] | None
+) -> Place:
+    residual = run.residual(theta, slots, offsets)
+    projected = run.project(residual)
+    return Place(
+        offsets=np.zeros(run.nuisance.shape[1]) if offsets is None else offsets, residual=residual,
+        projected=projected, misfit=float(residual @ residual - projected @ projected),
+    )  # fmt: skip
+
+
+def _misfits(places: tuple[Place, ...]) -> NDArray[np.float64]:
+    return np.array([place.misfit for place in places])
+
+
+def _objective(places: tuple[Place, ...], prior: NDArray[np.float64], session: NDArray[np.float64]) -> float:
+    return float(_misfits(places).sum() + np.sum(prior * session**2))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tasks.closure.evidence import RunEvidence
 from tasks.closure.fit import Fit
-from tasks.closure.forward import Slot, instruments, roll
+from tasks.closure.forward import Slot, predict
 from tasks.closure.hypothesis import Hypothesis, compose
 from tasks.closure.noise import whiten
 from tasks.closure.screening import Evidence, inflation
@@ -113,7 +113,7 @@ def scan(evidence: Evidence, at: Fit) -> list[Leftover]:
 def _hats(
     run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], keys: list[tuple[str, str]]
 ) -> NDArray[np.float64]:
-    y = instruments(run.model, theta, roll(run.model, theta, slots=slots)[0])
+    y = predict(run.model, theta, slots=slots, substeps=run.substeps)
     columns = []
     for port, variable in keys:
         low, high = RANGE[variable]
@@ -123,7 +123,7 @@ def _hats(
             extra = Slot(
                 port=port, variable=variable, origin=low, spacing=(high - low) / (KNOTS - 1), values=hat
             )
-            moved = instruments(run.model, theta, roll(run.model, theta, slots=(*slots, extra))[0])
+            moved = predict(run.model, theta, slots=(*slots, extra), substeps=run.substeps)
             columns.append((moved - y) / PORT_STEP[port])
     return whiten(np.stack(columns, axis=-1), run.rho, run.sigma)
 

@@ -24,6 +24,8 @@ RESTING_PRESSURE = 0.02
 """Mean over 0.07 s below which the brake is taken to be off [MPa]."""
 SUBSTEPS = 10
 """Integration steps between samples at 100 Hz; halving the step is a check of its own."""
+COARSE_SUBSTEPS = 5
+"""The same for the derivatives of runs that the longer step hardly changes."""
 
 
 @dataclass(frozen=True, kw_only=True)

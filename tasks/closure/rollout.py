@@ -34,6 +34,7 @@ from tasks.vehicle.effects.ports import (
     _SLIP,
     _SLOPE,
     _STIFF,
+    LOOSE,
     brake_factor,
     friction_factor,
     resistance,
@@ -67,7 +68,7 @@ def _road(station: float, center: float, length: float, height: float) -> tuple[
     return 0.5 * height * (1.0 - cos(w * u)), 0.5 * height * w * sin(w * u)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=LOOSE)
 def drive(
     constants: NDArray[np.float64],
     theta: NDArray[np.float64],

@@ -21,7 +21,7 @@ from tasks.closure.disturbance import Disturbance
 from tasks.closure.fit import Fit, fall, fit, misfit_by_run
 from tasks.closure.forms import form_hypotheses, scan
 from tasks.closure.hypothesis import library_hypothesis
-from tasks.closure.screening import Evidence
+from tasks.closure.screening import Evidence, inflation
 
 MAX_EFFECTS = 3
 RETUNE_PULL = 4.0
@@ -36,17 +36,23 @@ NEAR = 0.1
 """Relative change of the parameters below which derivatives need not be taken anew once more."""
 EXPLORED = 3
 """Candidates that are refined while only the disturbances are to be scaled: any that explains as much will do."""
+WORTHY = 0.3
+"""Share of the gain of what is named that a form alone must have, linearly, to be held against it."""
 SETTLED = 2
 """Candidates of a round that are settled, if their gain is large."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Round:
-    """One round of the search: what was tried on top of ``base`` and which candidate was accepted."""
+    """One round of the search: what was tried on top of ``base`` and which candidate was accepted.
+
+    ``evidence`` has its derivatives at the accepted one.
+    """
 
     base: Fit
     tried: tuple[Candidate, ...]
     accepted: Candidate
+    evidence: Evidence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +73,9 @@ class Found:
     tried: tuple[Candidate, ...] = ()
 
 
-def settle(evidence: Evidence, base: Fit, candidate: Candidate) -> tuple[Evidence, Candidate]:
+def settle(
+    evidence: Evidence, base: Fit, candidate: Candidate, *, gated: bool = True, known: Evidence | None = None
+) -> tuple[Evidence, Candidate]:
     """Take derivatives anew at a candidate whose gain is large, refit it and judge it there.
 
     Parameters
@@ -75,6 +83,8 @@ def settle(evidence: Evidence, base: Fit, candidate: Candidate) -> tuple[Evidenc
     evidence : the runs as differentiated for ``base``
     base : fit of what is accepted so far
     candidate : judged with them
+    gated : judge it on held-out runs as well
+    known : derivatives that were taken at the candidate before
 
     Returns
     -------
@@ -84,7 +94,8 @@ def settle(evidence: Evidence, base: Fit, candidate: Candidate) -> tuple[Evidenc
         return evidence, candidate
     here, fitted = evidence, candidate.fitted
     for _ in range(2):
-        here = rederived(here, fitted, library=True)
+        here = known or rederived(here, fitted, library=True)
+        known = None
         again = fit(
             here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
         )  # fmt: skip
@@ -92,7 +103,7 @@ def settle(evidence: Evidence, base: Fit, candidate: Candidate) -> tuple[Evidenc
         fitted = again
         if np.all(shift < NEAR):
             break
-    base_held_out = misfit_by_run(evidence.held_out, base)
+    base_held_out = misfit_by_run(evidence.held_out, base) if gated else None
     return here, assess(here, base, base_held_out, candidate.hypothesis, fitted)
 
 
@@ -108,12 +119,16 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
     state = start
     for _ in range(MAX_EFFECTS):
         count = REFINED if gated else EXPLORED
-        tried = ladder(state.evidence, state.base, count, alike=gated)
+        tried = ladder(state.evidence, state.base, count, gated=gated)
         places: dict[str, Evidence] = {}
         for i, candidate in enumerate(tried[:SETTLED] if gated else tried[:1]):
             if candidate.score > max(ACCEPT_SCORE, 0.3 * tried[0].score):
-                near = _met_before(explored, candidate) if explored else candidate
-                places[candidate.hypothesis.name], tried[i] = settle(state.evidence, state.base, near)
+                near, known = candidate, None
+                if explored and candidate.gain >= LARGE_GAIN:
+                    near, known = _met_before(explored, candidate)
+                places[candidate.hypothesis.name], tried[i] = settle(
+                    state.evidence, state.base, near, gated=gated, known=known
+                )
         tried.sort(key=lambda c: -c.score)
         passing = [c for c in tried if (c.passes if gated else c.score > ACCEPT_SCORE)]
         if not passing:
@@ -134,22 +149,24 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
         state = Found(
             evidence=here,
             base=best.fitted,
-            rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best)),
+            rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best, evidence=here)),
         )
     return state
 
 
-def _met_before(explored: Found, candidate: Candidate) -> Candidate:
-    """The candidate at the values that an earlier search settled it at."""
+def _met_before(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
+    """The candidate at the values that an earlier search settled it at, and its derivatives there."""
     k = len(candidate.hypothesis.names)
     for earlier in explored.rounds:
         known = earlier.accepted
         if known.hypothesis.name == candidate.hypothesis.name:
             values = np.concatenate((candidate.fitted.values[:-k], known.fitted.values[-k:]))
-            return replace(
+            near = replace(
                 candidate, fitted=replace(candidate.fitted, values=values, session=known.fitted.session)
             )
-    return candidate
+            alone = len(known.fitted.values) == len(values) and known.gain >= LARGE_GAIN
+            return near, earlier.evidence if alone else None
+    return candidate, None
 
 
 def scale_disturbances(explored: Found) -> Disturbance:
@@ -192,7 +209,11 @@ def retuned(start: Found, reasons: list[str]) -> Found:
     if not accepted:
         return start
     best = max(accepted, key=lambda c: c.gain)
-    return replace(start, base=best.fitted, rounds=(Round(base=null, tried=tuple(judged), accepted=best),))
+    return replace(
+        start,
+        base=best.fitted,
+        rounds=(Round(base=null, tried=tuple(judged), accepted=best, evidence=evidence),),
+    )
 
 
 def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candidate | None]:
@@ -213,7 +234,7 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
     over = left is not None and left.passes
     torn = any(r.accepted.inflation > AT_ODDS for r in state.rounds)
     if state.rounds and (over or torn):
-        alone = best_form(null.evidence, null.base)
+        alone = best_form(null.evidence, null.base, WORTHY * sum(r.accepted.gain for r in state.rounds))
         ahead = -np.inf
         if alone is not None and alone.passes:
             # a form has no direction of its own to be judged by, so both sides take the larger inflation
@@ -232,7 +253,7 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
             state = Found(
                 evidence=null.evidence,
                 base=alone.fitted,
-                rounds=(Round(base=null.base, tried=(), accepted=alone),),
+                rounds=(Round(base=null.base, tried=(), accepted=alone, evidence=null.evidence),),
             )
         elif alone is not None and ahead > -RIVAL_SPAN:
             elsewhere = alone.hypothesis.port != first.port
@@ -240,20 +261,25 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
     if left is not None and over and state is start and len(state.rounds) < MAX_EFFECTS:
         reasons.append(f"something is left over: {left.hypothesis.name}")
         state = replace(
-            state, base=left.fitted, rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left))
+            state,
+            base=left.fitted,
+            rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left, evidence=state.evidence)),
         )
     return state, near
 
 
-def best_form(evidence: Evidence, base: Fit) -> Candidate | None:
+def best_form(evidence: Evidence, base: Fit, least: float = 0.0) -> Candidate | None:
     """The form that explains most of what a fit leaves over, refined and judged; None if nothing is left.
 
     Parameters
     ----------
     evidence : the runs
     base : the fit
+    least : gain in log likelihood from which a spline is followed up
     """
-    leftovers = [x for x in scan(evidence, base)[:2] if x.gain > ACCEPT_SCORE + np.log(evidence.samples)]
+    level = inflation(evidence, base, None)
+    enough = max(ACCEPT_SCORE + float(np.log(evidence.samples)), least / level)
+    leftovers = [x for x in scan(evidence, base)[:2] if x.gain > enough]
     if not leftovers:
         return None
     held_out = misfit_by_run(evidence.held_out, base)
@@ -281,7 +307,11 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
         evidence = rederived(evidence, null, library=True)
         null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search(Found(evidence=evidence, base=null), gated=False)
-    evidence = rescaled(evidence, scale_disturbances(explored))
+    scales = scale_disturbances(explored)
+    evidence = rescaled(evidence, scales)
+    explored = replace(
+        explored, rounds=tuple(replace(r, evidence=rescaled(r.evidence, scales)) for r in explored.rounds)
+    )
     null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     start = Found(evidence=evidence, base=null)
     found = search(start, gated=True, explored=explored)

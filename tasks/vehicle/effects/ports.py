@@ -40,13 +40,16 @@ VARIABLE_UNITS = ("s", "m/s", "MPa", "K", "MPa/s", "1", "m", "m/s", "m/s^2")
  _BIASP, _RELAX, _LOADS, _HEAT, _WETV, _WETT, _MUV, _ASYM, _COUL, _PROG,
  _STOPK, _STOPC, _DIVE, _LIFT, _AEROM, _AEROL) = range(len(PARAMETERS))  # fmt: skip
 
+LOOSE = {"contract", "arcp", "nsz", "reassoc"}
+"""Freedoms of the compiler that move the last digits only: not the one to take nan and infinity for impossible."""
+
 AIR_DENSITY = 1.2
 """Air at 20 degrees and sea level [kg/m^3]."""
 COULOMB_SPEED = 0.01
 """Suspension speed over which dry friction turns sign [m/s]."""
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, inline="always", error_model="numpy", fastmath=LOOSE)
 def table_value(table: NDArray[np.float64], origin: float, spacing: float, x: float) -> float:
     """Piecewise-linear table on a uniform grid, held constant beyond its ends."""
     last = table.shape[0] - 1
@@ -59,7 +62,7 @@ def table_value(table: NDArray[np.float64], origin: float, spacing: float, x: fl
     return float(table[i] + (u - i) * (table[i + 1] - table[i]))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=LOOSE)
 def slot_sum(
     port: int,
     states: NDArray[np.float64],
@@ -75,7 +78,7 @@ def slot_sum(
     return total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=LOOSE)
 def resistance(
     theta: NDArray[np.float64], speed: float, direction: float, weight: float, snow_depth_mm: float
 ) -> float:
@@ -92,7 +95,7 @@ def resistance(
     return force
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=LOOSE)
 def brake_factor(theta: NDArray[np.float64], pressure: float, speed: float, disc_rise: float) -> float:
     """Pad friction and hydraulics as a factor on the linear pressure-to-torque law [1]."""
     factor = 1.0 + theta[_CURVE] * pressure
@@ -101,7 +104,7 @@ def brake_factor(theta: NDArray[np.float64], pressure: float, speed: float, disc
     return max(factor, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=LOOSE)
 def friction_factor(
     theta: NDArray[np.float64], speed: float, load_ratio: float, slip_energy: float, wet: float
 ) -> float:
@@ -114,7 +117,7 @@ def friction_factor(
     return max(factor, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=LOOSE)
 def strut_force(
     theta: NDArray[np.float64], stiffness: float, damping: float, travel: float, rate: float
 ) -> float:
