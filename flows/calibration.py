@@ -23,7 +23,7 @@ from tasks.calibration.scalars import calibration_scalars, scalar_value, with_sc
 from tasks.calibration.staged import Procedure
 from tasks.calibration.staged import calibrate as run_stages
 from tasks.errors import InputError
-from tasks.vehicle.effects.chassis import CHASSIS_EFFECTS, EFFECT_UNITS
+from tasks.vehicle.effects.numbers import EFFECT_UNITS, NUMBERS_OF_EFFECTS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode
 
@@ -140,7 +140,7 @@ def _without(
     A vehicle that no longer stops without an effect has no figures, and a sentence instead.
     """
     rows: list[dict[str, Any]] = []
-    for effect, numbers in CHASSIS_EFFECTS.items():
+    for effect, numbers in NUMBERS_OF_EFFECTS.items():
         if any(vehicle.effects.get(number) for number in numbers):
             off = replace(vehicle, effects={**vehicle.effects, **dict.fromkeys(numbers, 0.0)})
             try:

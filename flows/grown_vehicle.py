@@ -10,7 +10,7 @@ from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
 from tasks.closure.answer import NamedEffect, Parameter, Verdict
-from tasks.vehicle.effects.chassis import EFFECT_UNITS
+from tasks.vehicle.effects.numbers import EFFECT_UNITS
 
 SCALED = {
     "pressure_gain": ("brake_gain",),

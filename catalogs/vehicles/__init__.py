@@ -3,14 +3,14 @@
 from itertools import pairwise
 from math import radians
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
+from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
-from tasks.vehicle.effects.chassis import EFFECT_UNITS
 from tasks.vehicle.parameters import TyreFamily, Vehicle
 
 FOLDER = Path(__file__).parent
@@ -99,21 +99,12 @@ class VehicleEntry(CatalogueEntry):
     gravity: Annotated[Scalar, checked("m s-2", above=0)]
     families: FamiliesEntry
     effects: dict[str, Scalar] = Field(default_factory=dict)
+    forms: tuple[FormEntry, ...] = ()
     provenance: Provenance | None = None
 
     @model_validator(mode="after")
-    def _effects_exist(self) -> "VehicleEntry":
-        known = ", ".join(EFFECT_UNITS)
-        problems = [
-            f"effects: no effect has the number {name}; there are: {known}"
-            for name in self.effects
-            if name not in EFFECT_UNITS
-        ]
-        problems += [
-            f"effects.{name}: unit must be {unit}; it is {self.effects[name].unit}"
-            for name, unit in EFFECT_UNITS.items()
-            if name in self.effects and self.effects[name].unit != unit
-        ]
+    def _effects_keep_their_rules(self) -> "VehicleEntry":
+        problems = effect_problems(self.effects, self.provenance.bounds if self.provenance else {})
         if problems:
             raise ValueError("; ".join(problems))
         return self
@@ -160,7 +151,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     """
     source = vehicle_source(name_or_path)
     entry = _read(source)
-    values = {
+    values: dict[str, Any] = {
         name: quantity.value
         for name in VehicleEntry.model_fields
         if isinstance(quantity := getattr(entry, name), Scalar)
@@ -171,7 +162,8 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     }
     values["static_pitch"] = radians(values["static_pitch"])
     effects = {name: number.value for name, number in entry.effects.items()}
-    return Vehicle(name=source.stem, families=families, effects=effects, **values)
+    forms = tuple(form.form for form in entry.forms)
+    return Vehicle(name=source.stem, families=families, effects=effects, forms=forms, **values)
 
 
 def _read(source: Path) -> VehicleEntry:

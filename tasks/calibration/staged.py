@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from tasks.calibration.residual import CalibrationCase, Phase, Response, Yardstick, driven, residuals
 from tasks.calibration.scalars import CalibrationScalar, calibration_scalars, scalar_value, with_scalars
-from tasks.vehicle.effects.chassis import EFFECT_UNITS
+from tasks.vehicle.effects.numbers import EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle, surface_response
 from tasks.vehicle.rollout import Mode
 

@@ -99,7 +99,14 @@ def suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
 
 @njit(cache=True, nogil=True)
 def half_car_rates(
-    x: HalfCarState, load_f: float, load_r: float, force_f: float, force_r: float, moment: float, car: HalfCar
+    x: HalfCarState,
+    load_f: float,
+    load_r: float,
+    force_f: float,
+    force_r: float,
+    moment: float,
+    lift: float,
+    car: HalfCar,
 ) -> HalfCarState:
     """Rate of the half-car state (paper, Eq. app_half_car_complete).
 
@@ -109,6 +116,7 @@ def half_car_rates(
     load_f, load_r : contact loads [N]
     force_f, force_r : suspension forces [N]
     moment : pitch moment on the body, nose-down positive [N m]
+    lift : upward force on the body's centre of gravity beyond the equations' own [N]
     car : its values
     """
     return (
@@ -116,7 +124,7 @@ def half_car_rates(
         x[5],
         x[6],
         x[7],
-        (-force_f - force_r) / car.sprung_mass,
+        (-force_f - force_r + lift) / car.sprung_mass,
         (car.to_front * force_f - car.to_rear * force_r + moment) / car.pitch_inertia,
         (force_f + load_f - car.static_f) / car.unsprung_f,
         (force_r + load_r - car.static_r) / car.unsprung_r,
@@ -144,7 +152,7 @@ def forced_rates(x: HalfCarState, road_f: float, road_r: float, moment: float, c
     load_f = contact_load(road_f, x[2], car.tyre_f, car.static_f)
     load_r = contact_load(road_r, x[3], car.tyre_r, car.static_r)
     force_f, force_r = suspension_forces(x, car)
-    return half_car_rates(x, load_f, load_r, force_f, force_r, moment, car)
+    return half_car_rates(x, load_f, load_r, force_f, force_r, moment, 0.0, car)
 
 
 @njit(cache=True, nogil=True)

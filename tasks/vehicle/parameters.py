@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.tyre import TyreCurve, tyre_curve
 
 
@@ -62,7 +63,8 @@ class Vehicle:
     lock_speed : in coupled mode, wheel speed below which brake friction turns proportional to it [rad/s]
     gravity : g [m/s2]
     families : tyre family of each kind of weather
-    effects : numbers of ``tasks.vehicle.effects.chassis`` that coupled mode adds; none in the paper's model
+    effects : numbers of ``tasks.vehicle.effects.numbers`` that coupled mode adds; none in the paper's model
+    forms : what coupled mode adds that no effect of the library has; none in the paper's model
     """
 
     name: str
@@ -97,6 +99,7 @@ class Vehicle:
     gravity: float
     families: Mapping[str, TyreFamily]
     effects: Mapping[str, float] = field(default_factory=dict)
+    forms: tuple[Form, ...] = ()
 
     @property
     def mass(self) -> float:
@@ -129,6 +132,7 @@ class SurfaceResponse:
     pitch_scale : gamma_theta [1]
     hold_s, release_s : tau_h and tau_r [s]
     extrapolated : the surface friction lies outside the knots, so the end values hold
+    wet : water lies on the road
     """
 
     tyre: TyreCurve
@@ -137,6 +141,7 @@ class SurfaceResponse:
     hold_s: float
     release_s: float
     extrapolated: bool
+    wet: bool
 
 
 def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> SurfaceResponse:
@@ -164,4 +169,5 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
         hold_s=at(table.hold_s),
         release_s=at(table.release_s),
         extrapolated=not knots[0] - rounding <= surface_friction <= knots[-1] + rounding,
+        wet=family == "rain",
     )

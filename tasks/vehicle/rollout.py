@@ -88,6 +88,7 @@ def rollout(
     *,
     mode: Mode,
     duration_s: float,
+    snow_depth_mm: float = 0.0,
     step_s: float = INTERNAL_STEP_S,
 ) -> Rollout:
     """Drive one scenario; after a stop the vehicle rests and its body comes to rest too.
@@ -101,6 +102,7 @@ def rollout(
     hazard : road feature
     mode : paper follows the publication, coupled is the physical model
     duration_s : length of the telemetry, whole milliseconds [s]
+    snow_depth_mm : of the snow on the road, which wheels plough where the vehicle has that effect [mm]
     step_s : internal step, a whole fraction of a millisecond [s]
 
     Raises
@@ -117,7 +119,9 @@ def rollout(
     if mode == "paper":
         history = history_of(run_paper_mode(*arguments, steps=steps, step=step_s), step_s, per_tick)
     else:
-        history = run_coupled_mode(*arguments, steps=steps, step=step_s, per_tick=per_tick)
+        history = run_coupled_mode(
+            *arguments, snow_depth_mm=snow_depth_mm, steps=steps, step=step_s, per_tick=per_tick
+        )
     columns: dict[str, NDArray[Any]] = dict(history.columns)
     columns["t_ns"] = np.arange(len(columns["speed"]), dtype=np.int64) * TICK_NS
     columns["contact_f"] = columns["axle_load_f"] > 0

@@ -6,11 +6,16 @@ from math import exp
 import numpy as np
 import pytest
 
-from tasks.vehicle.effects.brake_line import DISC_COOLING, acting_pressure, disc_rise_after, line_after
-from tasks.vehicle.effects.chassis import ChassisEffects, added_strut_force, air_drag, grip_share
+from tasks.vehicle.effects.brake_line import DISC_COOLING, acting_pressure, disc_rate, line_after
+from tasks.vehicle.effects.numbers import effect_numbers
+from tasks.vehicle.effects.ports import friction_factor, resistance, strut_force
 from tests.vehicle.conftest import command
 
 STOP = command(1.5)
+
+
+def theta(**values):
+    return effect_numbers(values)[0]
 
 
 @pytest.fixture
@@ -22,23 +27,23 @@ def coupled(drive, vehicle):
 
 
 def test_with_no_numbers_the_acting_pressure_is_the_commanded_one():
-    assert acting_pressure(2.345, 17.0, 300.0, ChassisEffects()) == 2.345
-    assert line_after(1.0, 2.345, 5e-4, ChassisEffects()) == 2.345
-    assert grip_share(30.0, 1.4, ChassisEffects()) == 1.0
+    assert acting_pressure(2.345, 17.0, 300.0, theta()) == 2.345
+    assert line_after(1.0, 2.345, 5e-4, theta()) == 2.345
+    assert friction_factor(theta(), 30.0, 1.4, 1e5, 1.0) == 1.0
 
 
 def test_each_number_of_the_line_does_what_it_says():
-    assert acting_pressure(2.0, 20.0, 0.0, ChassisEffects(push_out=0.1)) == pytest.approx(1.9)
-    assert acting_pressure(2.0, 20.0, 200.0, ChassisEffects(fade=0.06)) == pytest.approx(2.0 * 0.88)
-    assert acting_pressure(2.0, 20.0, 0.0, ChassisEffects(pressure_curve=0.04)) == pytest.approx(2.16)
-    pads = ChassisEffects(pad_speed=0.006, pad_speed_reference=15.0)
+    assert acting_pressure(2.0, 20.0, 0.0, theta(push_out=0.1)) == pytest.approx(1.9)
+    assert acting_pressure(2.0, 20.0, 200.0, theta(fade=0.06)) == pytest.approx(2.0 * 0.88)
+    assert acting_pressure(2.0, 20.0, 0.0, theta(pressure_curve=0.04)) == pytest.approx(2.16)
+    pads = theta(pad_speed=0.006, pad_speed_reference=15.0)
     assert acting_pressure(2.0, 20.0, 0.0, pads) == pytest.approx(2.0 * 0.97)
-    assert line_after(0.0, 1.0, 0.1, ChassisEffects(lag=0.1)) == pytest.approx(1.0 - exp(-1.0))
+    assert line_after(0.0, 1.0, 0.1, theta(lag=0.1)) == pytest.approx(1.0 - exp(-1.0))
 
 
 def test_discs_take_the_heat_and_give_it_to_the_air():
-    assert disc_rise_after(0.0, 12000.0, 1.0) == pytest.approx(1.0)
-    assert disc_rise_after(50.0, 50.0 * DISC_COOLING, 1.0) == 50.0
+    assert disc_rate(0.0, 7400.0, 7400.0) == 1.0
+    assert disc_rate(50.0, 50.0 * DISC_COOLING, 7400.0) == 0.0
 
 
 def test_a_lag_and_a_dead_time_delay_the_torque_by_as_much(coupled):
@@ -77,18 +82,18 @@ def test_wind_creep_rubbing_pads_and_rolling_by_speed_change_coasting_by_their_f
             vehicle.mass + turning
         )
         assert got == pytest.approx(force, rel=0.02), effects
-    assert air_drag(10.0, ChassisEffects(drag_area=1.0, wind_speed=-10.0)) == 0.0
+    assert resistance(theta(drag_area=1.0, wind_speed=-10.0), 10.0, 1.0, 0.0, 0.0) == 0.0
 
 
 def test_struts_meet_friction_and_a_stop():
-    dry = ChassisEffects(coulomb_friction=80.0)
-    assert added_strut_force(0.0, 0.5, 0.0, dry) == pytest.approx(80.0)
-    assert added_strut_force(0.0, -0.5, 0.0, dry) == pytest.approx(-80.0)
-    stop = ChassisEffects(stop_stiffness=1e5, stop_clearance=0.04)
-    assert added_strut_force(-0.03, 0.0, 0.0, stop) == 0.0
-    assert added_strut_force(-0.05, 0.0, 0.0, stop) == pytest.approx(-1000.0)
+    dry = theta(coulomb_friction=80.0)
+    assert strut_force(dry, 0.0, 0.0, 0.0, 0.5) == pytest.approx(80.0)
+    assert strut_force(dry, 0.0, 0.0, 0.0, -0.5) == pytest.approx(-80.0)
+    stop = theta(stop_stiffness=1e5, stop_clearance=0.04)
+    assert strut_force(stop, 0.0, 0.0, -0.03, 0.0) == 0.0
+    assert strut_force(stop, 0.0, 0.0, -0.05, 0.0) == pytest.approx(-1000.0)
 
 
 def test_friction_falls_with_speed_and_load():
-    effects = ChassisEffects(friction_speed=0.01, load_sensitivity=0.15)
-    assert grip_share(20.0, 1.2, effects) == pytest.approx(0.8 * 0.97)
+    effects = theta(friction_speed=0.01, load_sensitivity=0.15)
+    assert friction_factor(effects, 20.0, 1.2, 0.0, 0.0) == pytest.approx(0.8 * 0.97)

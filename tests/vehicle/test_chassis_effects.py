@@ -6,17 +6,15 @@ import pytest
 
 from tasks.errors import InputError
 from tasks.vehicle.effects.chassis import (
-    CHASSIS_EFFECTS,
-    EFFECT_UNITS,
     ChassisEffects,
-    chassis_effects,
     effective_friction,
     effective_slope,
     footprint,
     grip_reserve,
     stick_share,
 )
-from tasks.vehicle.effects.ports import AIR_DENSITY
+from tasks.vehicle.effects.numbers import EFFECT_UNITS, NUMBERS_OF_EFFECTS, effect_numbers
+from tasks.vehicle.effects.ports import AIR_DENSITY, INDEX
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.road import height_at, road_feature
 from tests.vehicle.conftest import HUMP, command
@@ -34,13 +32,14 @@ def coupled(drive, vehicle):
 
 
 def test_every_number_has_a_unit_and_belongs_to_one_effect():
-    numbers = [number for effect in CHASSIS_EFFECTS.values() for number in effect]
-    assert sorted(numbers) == sorted(EFFECT_UNITS) == sorted(ChassisEffects._fields)
+    numbers = [number for effect in NUMBERS_OF_EFFECTS.values() for number in effect]
+    assert sorted(numbers) == sorted(EFFECT_UNITS)
+    assert set(EFFECT_UNITS) - set(INDEX) == set(ChassisEffects._fields)
 
 
 def test_an_effect_that_is_none_is_named_and_those_that_exist_are_listed():
     with pytest.raises(InputError, match=r"effect turbo: coupled mode has no such number.*drag_area"):
-        chassis_effects({"turbo": 1.0})
+        effect_numbers({"turbo": 1.0})
 
 
 def test_coasting_loses_what_air_and_rolling_resistance_take(vehicle, coupled):

@@ -9,10 +9,12 @@ from scipy.integrate import solve_ivp
 
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle import reference
-from tasks.vehicle.coupled_mode import body_rates, motion_rates
+from tasks.vehicle.chassis import chassis_of
+from tasks.vehicle.coupled_step import body_rates, motion_rates
 from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.ports import Motion, chassis_of, ports_at
+from tasks.vehicle.ports import ports_at
 from tasks.vehicle.road import road_feature
+from tasks.vehicle.states import AT_REST, Instant, Memory, Motion
 from tests.vehicle.conftest import HUMP, command
 
 COAST = command(0.0, onset=None)
@@ -30,7 +32,8 @@ def work(columns, power):
 
 @pytest.mark.parametrize("pressure", [0.0, 0.7, 2.3])
 def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
-    response, chassis = surface_response(vehicle, "rain", 0.4), chassis_of(vehicle)
+    response = surface_response(vehicle, "rain", 0.4)
+    chassis = chassis_of(vehicle, response, 0.0)
     rng = np.random.default_rng(2)
     for _ in range(200):
         speed, station = rng.uniform(0.1, 30), rng.uniform(17, 25)
@@ -39,13 +42,13 @@ def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
         motion = Motion(station, speed, *omega)
         ports = ports_at(
             motion,
+            Memory(AT_REST, AT_REST),
             tuple(x),
-            pressure,
+            Instant(0.0, pressure, 0.0, 0.0, False, False),
             1.0,
             1.0,
             1.0,
-            False,
-            False,
+            None,
             chassis,
             response.tyre,
             road_feature(HUMP),

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from tasks.errors import InputError
 from tasks.vehicle import reference
+from tasks.vehicle.axle_ports import lock_share, signed_friction, signed_slip
 from tasks.vehicle.brake import BrakeCommand, abs_command, abs_update, brake_pressure, onset_by_position
-from tasks.vehicle.effects.chassis import chassis_effects
+from tasks.vehicle.effects.chassis import ChassisEffects
 from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.ports import lock_share, signed_friction, signed_slip
 from tasks.vehicle.tyre import braking_slip, tyre_friction, tyre_slope
 
 SURFACES = [("dry", 0.82), ("rain", 0.347126), ("rain", 0.5), ("snow", 0.24), ("snow", 0.51)]
@@ -41,7 +41,7 @@ def test_target_slips_are_those_of_the_base_curves_over_the_slip_stiffness(vehic
 def test_tyre_agrees_with_its_twin(vehicle, family, friction):
     response = surface_response(vehicle, family, friction)
     slips = np.linspace(-1, 1, 101)
-    plain = chassis_effects({})
+    plain = ChassisEffects()
     kernel = [signed_friction(slip, 0.0, response.tyre, plain) for slip in slips]
     np.testing.assert_allclose(kernel, reference.burckhardt(slips, vehicle, family, response), atol=1e-6)
 

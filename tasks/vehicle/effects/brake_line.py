@@ -5,18 +5,21 @@ With every number 0 the acting pressure is the commanded one, bit for bit.
 
 from math import exp
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from tasks.vehicle.effects.chassis import ChassisEffects
+from tasks.vehicle.effects.ports import INDEX, brake_factor
 
-DISC_CAPACITY = 12000.0
-"""Heat capacity of all discs: 26 kg of cast iron at 460 J/(kg K) (Limpert, SAE R-398) [J/K]."""
-DISC_COOLING = 60.0
-"""Convective loss of all discs [W/K]."""
+DISC_CAPACITY_F, DISC_CAPACITY_R = 7400.0, 4600.0
+"""Heat capacity of an axle's discs: 16 and 10 kg of cast iron at 460 J/(kg K) (Limpert, SAE R-398) [J/K]."""
+DISC_COOLING = 30.0
+"""Convective loss of an axle's discs [W/K]."""
+_LAG, _PUSH = INDEX["lag"], INDEX["push_out"]
 
 
-@njit(cache=True, nogil=True)
-def line_after(line: float, commanded: float, step: float, effects: ChassisEffects) -> float:
+@njit(cache=True, nogil=True, error_model="numpy")
+def line_after(line: float, commanded: float, step: float, theta: NDArray[np.float64]) -> float:
     """Pressure at the pads one step on: first-order lag behind the command, exact for a constant one [MPa].
 
     Parameters
@@ -24,15 +27,15 @@ def line_after(line: float, commanded: float, step: float, effects: ChassisEffec
     line : pressure at the pads now [MPa]
     commanded : at the end of the step, dead time taken off [MPa]
     step : [s]
-    effects : the numbers
+    theta : effects, in the order of `PARAMETERS`
     """
-    if effects.lag <= 0.0:
+    if theta[_LAG] <= 0.0:
         return commanded
-    return line + (1.0 - exp(-step / effects.lag)) * (commanded - line)
+    return line + (1.0 - exp(-step / theta[_LAG])) * (commanded - line)
 
 
-@njit(cache=True, nogil=True)
-def acting_pressure(line: float, speed: float, disc_rise: float, effects: ChassisEffects) -> float:
+@njit(cache=True, nogil=True, error_model="numpy")
+def acting_pressure(line: float, speed: float, disc_rise: float, theta: NDArray[np.float64]) -> float:
     """Pressure that would give the same torque under the linear law of the paper [MPa].
 
     Parameters
@@ -40,22 +43,19 @@ def acting_pressure(line: float, speed: float, disc_rise: float, effects: Chassi
     line : pressure at the pads [MPa]
     speed : of the vehicle [m/s]
     disc_rise : temperature of the discs above ambient [K]
-    effects : the numbers
+    theta : effects, in the order of `PARAMETERS`
     """
-    factor = 1.0 + effects.pressure_curve * line
-    factor *= 1.0 - effects.fade * disc_rise / 100.0
-    factor *= 1.0 - effects.pad_speed * (speed - effects.pad_speed_reference)
-    return max(line - effects.push_out, 0.0) * max(factor, 0.0)
+    return max(line - theta[_PUSH], 0.0) * brake_factor(theta, line, speed, disc_rise)
 
 
-@njit(cache=True, nogil=True)
-def disc_rise_after(disc_rise: float, power: float, step: float) -> float:
-    """Temperature of the discs above ambient one step on [K].
+@njit(cache=True, nogil=True, error_model="numpy")
+def disc_rate(disc_rise: float, power: float, capacity: float) -> float:
+    """Rate of the temperature of an axle's discs above ambient [K/s].
 
     Parameters
     ----------
     disc_rise : now [K]
     power : that the brakes turn into heat [W]
-    step : [s]
+    capacity : of the discs [J/K]
     """
-    return disc_rise + step * (power - DISC_COOLING * disc_rise) / DISC_CAPACITY
+    return (power - DISC_COOLING * disc_rise) / capacity

@@ -1,0 +1,88 @@
+"""Forms that no effect of the library has: a simple shape of one variable at one port."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.vehicle.effects.ports import VARIABLE_UNITS, VARIABLES
+from tasks.vehicle.effects.slots import Slot
+
+TABLE = 65
+"""Points of a form's piecewise-linear table."""
+
+Shape = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+SHAPES: dict[str, Shape] = {
+    "a": lambda u: np.ones_like(u)[:, None],
+    "a x": lambda u: u[:, None],
+    "a x|x|": lambda u: (u * np.abs(u))[:, None],
+    "a x^3": lambda u: (u**3)[:, None],
+    "a tanh(4x)": lambda u: np.tanh(4.0 * u)[:, None],
+    "a exp(-4|x|)": lambda u: np.exp(-4.0 * np.abs(u))[:, None],
+    "a max(x - 1/3, 0)": lambda u: np.maximum(u - 1.0 / 3.0, 0.0)[:, None],
+    "a max(x - 2/3, 0)": lambda u: np.maximum(u - 2.0 / 3.0, 0.0)[:, None],
+    "a + b x": lambda u: np.column_stack((np.ones_like(u), u)),
+}
+"""The grammar, in x = variable / scale; linear in its one or two coefficients."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """A shape of one variable at one port, held constant beyond the range in which it was seen.
+
+    Parameters
+    ----------
+    port, variable : one of `PORTS` and `VARIABLES`
+    shape : one of `SHAPES`
+    coefficients : a, or a and b [unit of the port]
+    scale : magnitude of the variable at which x is 1 [unit of the variable]
+    low, high : range of the variable in which the form was seen [unit of the variable]
+    """
+
+    port: str
+    variable: str
+    shape: str
+    coefficients: tuple[float, ...]
+    scale: float
+    low: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        """Port, shape and what x is."""
+        return form_name(self.port, self.variable, self.shape, self.scale)
+
+    @property
+    def slot(self) -> Slot:
+        """The form as a table."""
+        grid = np.linspace(self.low, self.high, TABLE)
+        return Slot(
+            port=self.port,
+            variable=self.variable,
+            origin=self.low,
+            spacing=(self.high - self.low) / (TABLE - 1),
+            values=SHAPES[self.shape](grid / self.scale) @ np.array(self.coefficients),
+        )
+
+
+def coefficient_count(shape: str) -> int:
+    """How many coefficients a shape has.
+
+    Parameters
+    ----------
+    shape : one of `SHAPES`
+    """
+    return SHAPES[shape](np.zeros(1)).shape[1]
+
+
+def form_name(port: str, variable: str, shape: str, scale: float) -> str:
+    """What a form is called: its port, its shape, and what x is.
+
+    Parameters
+    ----------
+    port, variable : one of `PORTS` and `VARIABLES`
+    shape : one of `SHAPES`
+    scale : magnitude of the variable at which x is 1 [unit of the variable]
+    """
+    return f"{port} ~ {shape}, x = {variable}/{scale:g} {VARIABLE_UNITS[VARIABLES.index(variable)]}"

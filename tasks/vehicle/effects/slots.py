@@ -1,0 +1,60 @@
+"""Slots: piecewise-linear tables of one state variable at one port, for any form that no library effect has."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.vehicle.effects.ports import PORTS, VARIABLES
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slot:
+    """A piecewise-linear table of one variable at one port.
+
+    Parameters
+    ----------
+    port, variable : one of `PORTS` and `VARIABLES`
+    origin, spacing : of the grid [unit of the variable]
+    values : float64 [K] at the grid points [unit of the port]
+    """
+
+    port: str
+    variable: str
+    origin: float
+    spacing: float
+    values: NDArray[np.float64]
+
+
+class SlotTables(NamedTuple):
+    """Slots as the kernels take them.
+
+    Parameters
+    ----------
+    keys : int64 [N, 2] place of port and variable in `PORTS` and `VARIABLES`
+    grids : float64 [N, 2] origin and spacing [unit of the variable]
+    tables : float64 [N, K] values; short tables go on with their last one [unit of the port]
+    """
+
+    keys: NDArray[np.int64]
+    grids: NDArray[np.float64]
+    tables: NDArray[np.float64]
+
+
+def slot_tables(slots: Sequence[Slot]) -> SlotTables:
+    """Pack slots for the kernels.
+
+    Parameters
+    ----------
+    slots : none or more
+    """
+    keys = np.array([(PORTS.index(s.port), VARIABLES.index(s.variable)) for s in slots], dtype=np.int64)
+    grids = np.array([(s.origin, s.spacing) for s in slots])
+    width = max((len(s.values) for s in slots), default=1)
+    tables = np.zeros((len(slots), width))
+    for table, slot in zip(tables, slots, strict=True):
+        table[:] = slot.values[-1]
+        table[: len(slot.values)] = slot.values
+    return SlotTables(keys.reshape(-1, 2), grids.reshape(-1, 2), tables)
