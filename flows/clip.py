@@ -7,7 +7,7 @@ where the receipt exists, the clip is complete. Making a clip twice writes the s
 import resource
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -89,7 +89,9 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
     clip = plan.clips[index]
     catalogue = catalogue_of(layout.root)
 
-    facts, ride = drive(clip.scenario, catalogue, plan.settings.vehicle_mode, plan.duration_s)
+    facts, ride = drive(
+        clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
+    )
     frames = frame_rows(ride, plan, catalogue)
     buffers: dict[str, NDArray[Any]] = {}
     if plan.settings.pictures:
@@ -133,17 +135,23 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
 
 
 def drive(
-    scenario: Scenario, catalogue: Catalogue, mode: Mode, duration_s: float
+    scenario: Scenario,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    mode: Mode,
+    duration_s: float,
+    *,
+    hold_speed_until_brake: bool = False,
 ) -> tuple[dict[str, Any], Rollout]:
     """Weather to surface state to friction to vehicle motion."""
     weather = weather_of(scenario)
-    state = surface_state(weather, catalogue.surface)
-    friction = surface_friction(weather, state, catalogue.surface)
+    state = surface_state(weather, surface)
+    friction = surface_friction(weather, state, surface)
     ride = rollout(
-        catalogue.vehicle,
+        vehicle,
         scenario.weather,
         friction,
-        controls_of(scenario),
+        replace(controls_of(scenario), hold_speed_until_brake=hold_speed_until_brake),
         hazard_of(scenario),
         mode=mode,
         duration_s=duration_s,

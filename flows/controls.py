@@ -1,13 +1,13 @@
 """Negative controls: desynchronised copies of a dataset's claims, and which metric sees which."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from catalogs.gates import load_gates
+from catalogs.studies.ablation import VARIANTS, Variant, cut
 from flows.clip import TICK_RATE_HZ, Catalogue, catalogue_of, drive
 from flows.judged_clip import METHODS, JudgedClip, judge_clip
 from flows.orchestration import stage
@@ -17,17 +17,15 @@ from flows.store.layout import write_json
 from tasks.errors import InputError
 from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
 
-CONTROLS = {
-    "appearance-only": "the drive of the dry twin under the weather's look",
-    "vertical-only": "the road moves the body, nobody brakes",
-    "fixed-mu": "one friction for all rain, one for all snow",
+CUTS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu")
+"""The paper's ablations, as false claims."""
+CONTROLS: dict[str, str] = {
+    **{name: VARIANTS[name] for name in CUTS},
     "one-frame-delay": "telemetry a frame late",
     "amplitude-0.8": "pitch at 80 %",
     "sign-flip": "pitch upside down",
     "other-clip": "telemetry of another clip",
 }
-FAMILY_RATES = {"rain": (10.0, 0.0), "snow": (1.0, 1.0)}
-"""Rate [mm/h] and accumulation [h] that stand for a whole family under fixed-mu: the paper's light levels."""
 LEAST_PITCH, LEAST_WAY = np.deg2rad(0.05), 0.2
 """A copy that differs by less in pitch [rad] and way [m] is no fault."""
 
@@ -115,20 +113,18 @@ def _copies(
 ) -> Iterator[tuple[str, Claim]]:
     """Faulty claims of one clip; those that say what the true one says are left out."""
     scenario = next(c.scenario for c in plan.clips if c.clip_id == clips[k].facts["clip_id"])
-    dry = {"weather": "dry", "precipitation_mm_h": 0.0, "snow_accumulation_h": 0.0}
-    still = dry | {"peak_pressure_mpa": 0.0, "brake_onset_s": None, "brake_onset_m": None}
-    changes: dict[str, dict[str, Any]] = {"appearance-only": dry, "vertical-only": still}
-    if scenario.weather in FAMILY_RATES:
-        rate, hours = FAMILY_RATES[scenario.weather]
-        changes["fixed-mu"] = {"precipitation_mm_h": rate, "snow_accumulation_h": hours}
     made = {"one-frame-delay": delayed(true[k], 1), "amplitude-0.8": scaled(true[k], 0.8),
             "sign-flip": scaled(true[k], -1.0), "other-clip": true[(k + 1) % len(true)]}  # fmt: skip
-    for name, change in changes.items():
-        _, ride = drive(replace(scenario, **change), catalogue, plan.settings.vehicle_mode, plan.duration_s)
-        ticks = np.rint(np.arange(plan.settings.frames) * TICK_RATE_HZ / plan.settings.frame_rate_hz).astype(
-            int
+    ticks = np.rint(np.arange(plan.settings.frames) * TICK_RATE_HZ / plan.settings.frame_rate_hz).astype(int)
+    for variant in CUTS:
+        _, ride = drive(
+            cut(scenario, variant),
+            catalogue.vehicle,
+            catalogue.surface,
+            plan.settings.vehicle_mode,
+            plan.duration_s,
         )
-        made[name] = Claim(pitch=ride.columns["pitch"][ticks], station=ride.columns["station"][ticks])
+        made[variant] = Claim(pitch=ride.columns["pitch"][ticks], station=ride.columns["station"][ticks])
     for name, claim in made.items():
         if differs(claim, true[k], LEAST_PITCH, LEAST_WAY):
             yield name, claim

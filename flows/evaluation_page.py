@@ -3,14 +3,13 @@
 import base64
 from collections.abc import Sequence
 from html import escape
-from io import StringIO
 from typing import Any
 
 import cv2
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from flows.drawing import as_svg
 from flows.judged_clip import JudgedClip, Row
 
 COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
@@ -152,12 +151,7 @@ def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
 
 
 def _figure(figure: Figure, caption: str) -> str:
-    buffer = StringIO()
-    # a fixed salt and no date: the same figures, the same bytes
-    with matplotlib.rc_context({"svg.hashsalt": "musync", "svg.fonttype": "none"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    drawing = buffer.getvalue()
-    return f"<figure>{drawing[drawing.index('<svg') :]}<figcaption>{escape(caption)}</figcaption></figure>"
+    return f"<figure>{as_svg(figure)}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 def _thumbnails(clips: Sequence[JudgedClip]) -> str:

@@ -104,7 +104,9 @@ def replay_audit(
 
 
 def _run(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Replay:
-    facts, ride = drive(clip.scenario, catalogue, plan.settings.vehicle_mode, plan.duration_s)
+    facts, ride = drive(
+        clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
+    )
     rows = frame_rows(ride, plan, catalogue)
     shown = {name: column[:frames] for name, column in rows.items()}
     buffers = picture(clip.scenario, facts, shown, plan, catalogue, int(clip.seed))

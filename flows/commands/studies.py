@@ -20,6 +20,22 @@ def sensitivity(out: Out = None, as_json: Json = False) -> None:
 
 
 @app.command()
+def ablation(
+    out: Annotated[str, typer.Option(help="Folder for ablation.json, .parquet and .svg.")],
+    vehicle: Annotated[str, typer.Option(help="Vehicle name or file.")] = "multibody-grown",
+    mode: Annotated[
+        str | None,
+        typer.Option(help="paper or coupled; by default what a frozen vehicle was fitted in, or paper."),
+    ] = None,
+    traces: Annotated[str | None, typer.Option(help="Reference traces; their pitch is the oracle's.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Cut one coupling at a time (the paper's Section 4.4): stops over the weather, pitch at a hump."""
+    result = call("ablation", False, out=out, vehicle=vehicle, mode=mode, traces=traces)
+    show(result if as_json else {key: result[key] for key in ("pitch", "reference")}, as_json)
+
+
+@app.command()
 def agreement(
     traces: Annotated[str, typer.Argument(help="Folder with cases.json and the traces as Parquet.")],
     vehicle: Annotated[str, typer.Option(help="Vehicle name or file.")] = "paper-reference",

@@ -1,0 +1,99 @@
+"""The paper's ablation: which coupling each variant cuts, and where the variants are compared."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+
+from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
+from catalogs.scenario import Scenario, Weather
+from catalogs.studies import Condition, load_conditions, load_sensitivity_study
+
+Variant = Literal["appearance-only", "vertical-only", "fixed-mu", "full"]
+VARIANTS: dict[Variant, str] = {
+    "appearance-only": "the weather is seen and not felt: dry friction",
+    "vertical-only": "the road moves the body, nobody brakes",
+    "fixed-mu": "one friction for all rain, one for all snow",
+    "full": "nothing is cut",
+}
+"""What each variant does (paper, Section 4.4)."""
+
+Rate = Annotated[Scalar, checked("mm h-1", above=0)]
+
+
+class FamilyRates(CatalogueEntry):
+    """The rate that stands for all rates of a kind of weather."""
+
+    rain: Rate
+    snow: Rate
+
+
+class AblationEntry(CatalogueEntry):
+    """What the file must hold."""
+
+    family_rates: FamilyRates
+    stop_condition: Text
+    pitch_condition: Text
+    reference_pitch_rmse: Annotated[Scalar, checked("deg", above=0)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ablation:
+    """Where the variants are compared.
+
+    Parameters
+    ----------
+    stops : the braking condition at every rate, dry first, by kind of weather
+    pitch : the condition whose pitch is compared
+    reference_pitch_rmse_deg : printed distance of the full model from its reference [deg]
+    """
+
+    stops: dict[Weather, tuple[Scenario, ...]]
+    pitch: Condition
+    reference_pitch_rmse_deg: float
+
+
+def load_ablation() -> Ablation:
+    """The study of the paper's Section 4.4."""
+    entry, protocol = _entry(), load_sensitivity_study()[0]
+    conditions = {condition.name: condition for condition in load_conditions()}
+    dry = conditions[entry.stop_condition].scenario
+    stops: dict[Weather, tuple[Scenario, ...]] = {}
+    for study in (protocol.rain, protocol.snow):
+        hours = protocol.snow_accumulation_h if study.kind == "snow" else 0.0
+        rates = np.linspace(0.0, study.highest_rate, study.nominal_rates)[1:]
+        stops[study.kind] = (
+            dry,
+            *(replace(dry, weather=study.kind, precipitation_mm_h=float(rate), snow_accumulation_h=hours)
+              for rate in rates),
+        )  # fmt: skip
+    return Ablation(
+        stops=stops,
+        pitch=conditions[entry.pitch_condition],
+        reference_pitch_rmse_deg=entry.reference_pitch_rmse.value,
+    )
+
+
+def cut(scenario: Scenario, variant: Variant) -> Scenario:
+    """The scenario that a variant drives; what is seen stays that of the scenario itself.
+
+    Parameters
+    ----------
+    scenario : as it is seen
+    variant : which coupling is cut
+    """
+    dry = replace(scenario, weather="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0)
+    if variant == "appearance-only":
+        return dry
+    if variant == "vertical-only":
+        return replace(dry, peak_pressure_mpa=0.0, brake_onset_s=None, brake_onset_m=None)
+    if variant == "fixed-mu" and scenario.weather != "dry":
+        rate: Scalar = getattr(_entry().family_rates, scenario.weather)
+        hours = load_sensitivity_study()[0].snow_accumulation_h if scenario.weather == "snow" else 0.0
+        return replace(scenario, precipitation_mm_h=rate.value, snow_accumulation_h=hours)
+    return scenario
+
+
+def _entry() -> AblationEntry:
+    return read_entry(AblationEntry, Path(__file__).with_name("ablation.yaml"), "study")
