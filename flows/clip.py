@@ -35,8 +35,9 @@ from tasks.eval.unusable import unusable_pixels
 from tasks.render.backend import select_backend
 from tasks.render.camera import Camera, body_poses
 from tasks.render.clip import render_clip
-from tasks.render.road_edit import apply_road_profile
+from tasks.render.road_edit import RoadRelief, apply_road_profile
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
+from tasks.scene.route import Route
 from tasks.scene.scene import Scene
 from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
@@ -200,6 +201,17 @@ def hazard_of(scenario: Scenario) -> RoadHazard:
     )
 
 
+def relief_of(hazard: RoadHazard, route: Route) -> RoadRelief:
+    """The road feature on its route, as the renderer takes it."""
+    return RoadRelief(
+        route=route,
+        elevation=lambda station: road_elevation(station, hazard),
+        slope=lambda station: road_slope(station, hazard),
+        near=hazard.center_m - hazard.length_m / 2,
+        far=hazard.center_m + hazard.length_m / 2,
+    )
+
+
 def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:
     """The tick that each frame shows, and the rig pose at it."""
     frame = np.arange(plan.settings.frames)
@@ -231,17 +243,14 @@ def picture(
         snow_coverage=facts["snow_coverage"],
     )
     scene = catalogue.scene
-    gaussians = scene.gaussians
+    gaussians, relief = scene.gaussians, None
     if hazard.height_m != 0:
-        gaussians, _ = apply_road_profile(
-            gaussians, scene.route,
-            lambda station: road_elevation(station, hazard), lambda station: road_slope(station, hazard),
-            scene.carriageway_left, scene.carriageway_right,
-        )  # fmt: skip
+        relief = relief_of(hazard, scene.route)
+        gaussians, _ = apply_road_profile(gaussians, relief, scene.carriageway_left, scene.carriageway_right)
     return render_clip(
         gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
         frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
-        backend=select_backend(plan.backend),
+        backend=select_backend(plan.backend), relief=relief,
         labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
     )  # fmt: skip
 

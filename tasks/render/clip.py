@@ -8,7 +8,7 @@ from tasks.render.camera import Camera, viewmat
 from tasks.render.composition import compose, encode_8bit, round_depth
 from tasks.render.environment import environment_view
 from tasks.render.labels import clip_flow, frame_labels
-from tasks.render.road_edit import Profile
+from tasks.render.road_edit import Profile, RoadRelief
 from tasks.render.sensor import photographed
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
@@ -29,6 +29,7 @@ def render_clip(
     looks: WeatherParameters,
     seed: int,
     backend: Backend,
+    relief: RoadRelief | None = None,
     labelled: Profile | None = None,
 ) -> dict[str, NDArray[np.generic]]:
     """Render every frame of a clip.
@@ -45,6 +46,7 @@ def render_clip(
     looks : how that looks
     seed : visual seed; it moves particles and snow, and nothing else [1]
     backend : the rasteriser
+    relief : the road feature, as the light meets it; None for a flat road
     labelled : H_g(s) of the clip; with it the clip gets the labels of `tasks.render.labels` too
 
     Returns
@@ -53,7 +55,7 @@ def render_clip(
     ``class`` uint8 [F, H, W] `SemanticClass`; with labels ``normal``, ``road``, ``marks`` and ``flow``
     """
     focal_px = float(camera.K[0, 0])
-    scene, clip_weather = weather_scene(gaussians, environment, weather, looks, focal_px, seed, route)
+    scene, clip_weather = weather_scene(gaussians, environment, weather, looks, focal_px, seed, route, relief)
     prepared = backend.prepare(scene)
     T_world_camera = T_world_rig @ camera.T_rig_camera
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / frame_rate_hz, axis=0)

@@ -1,7 +1,7 @@
 """The visible half of the road-elevation profile: H_g moves and tilts the road's Gaussians."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,26 @@ STANDING_HEIGHT = 4.0
 Profile = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
+@dataclass(frozen=True, kw_only=True)
+class RoadRelief:
+    """A road feature on its route, for what shapes, paints or lights it.
+
+    Parameters
+    ----------
+    route : the undisturbed route; gives station, lateral position and the local normal
+    elevation, slope : H_g(s) [m] and H_g'(s) [1] at stations [m]
+    near, far : stations between which H_g is not 0 [m]
+    """
+
+    route: Route
+    elevation: Profile
+    slope: Profile
+    near: float
+    far: float
+
+
 def apply_road_profile(
-    gaussians: Gaussians,
-    route: Route,
-    elevation: Profile,
-    slope: Profile,
-    carriageway_left: float,
-    carriageway_right: float,
+    gaussians: Gaussians, relief: RoadRelief, carriageway_left: float, carriageway_right: float
 ) -> tuple[Gaussians, NDArray[np.bool_]]:
     """Lift the road along the route's normal by H_g(s) and turn its Gaussians by the slope.
 
@@ -35,16 +48,15 @@ def apply_road_profile(
     Parameters
     ----------
     gaussians : the street
-    route : gives station, lateral position and the local normal
-    elevation, slope : H_g(s) [m] and H_g'(s) [1] at stations [m]
+    relief : the road feature
     carriageway_left, carriageway_right : lateral extent within which things stand on the road [m]
 
     Returns
     -------
     The edited Gaussians, and bool [N] which of them moved; the others are bitwise unchanged.
     """
-    station, lateral, height = route.project(gaussians.means)
-    lift = elevation(station)
+    station, lateral, height = relief.route.project(gaussians.means)
+    lift = relief.elevation(station)
     within = (lateral <= carriageway_left) & (lateral >= carriageway_right) & (height <= STANDING_HEIGHT)
     rides = np.isin(gaussians.class_id, ROAD_CLASSES) | (
         np.isin(gaussians.class_id, STANDING_CLASSES) & within
@@ -52,10 +64,10 @@ def apply_road_profile(
     moved = rides & (lift != 0)
     if not moved.any():
         return gaussians, moved
-    frame = route.pose(np.clip(station[moved], 0, route.length))[:, :3, :3]
+    frame = relief.route.pose(np.clip(station[moved], 0, relief.route.length))[:, :3, :3]
     left, up = frame[:, :, 1], frame[:, :, 2]
     # a climbing road turns its normal backward: a negative rotation about the leftward axis
-    turn = Rotation.from_rotvec(-np.arctan(slope(station[moved]))[:, None] * left)
+    turn = Rotation.from_rotvec(-np.arctan(relief.slope(station[moved]))[:, None] * left)
     means, quats, normals = gaussians.means.copy(), gaussians.quats_wxyz.copy(), gaussians.normals.copy()
     means[moved] = means[moved] + lift[moved, None] * up
     quats[moved] = (turn * Rotation.from_quat(quats[moved], scalar_first=True)).as_quat(scalar_first=True)

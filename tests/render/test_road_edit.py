@@ -4,21 +4,28 @@ import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
-from tasks.render.road_edit import apply_road_profile
+from tasks.render.road_edit import RoadRelief, apply_road_profile
 from tasks.scene.gaussians import Gaussians
-from tasks.scene.route import route_from_positions
+from tasks.scene.route import Route, route_from_positions
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tests.toy_street import toy_street
 
 SCENE = toy_street()
 
 
+def relief_of(hazard: RoadHazard, route: Route = SCENE.route) -> RoadRelief:
+    return RoadRelief(
+        route=route,
+        elevation=lambda s: road_elevation(s, hazard),
+        slope=lambda s: road_slope(s, hazard),
+        near=hazard.center_m - hazard.length_m / 2,
+        far=hazard.center_m + hazard.length_m / 2,
+    )
+
+
 def edited(height: float) -> tuple[Gaussians, np.ndarray, RoadHazard]:
     hazard = RoadHazard(center_m=10.0, length_m=3.7, height_m=height)
-    cloud, moved = apply_road_profile(
-        SCENE.gaussians, SCENE.route,
-        lambda s: road_elevation(s, hazard), lambda s: road_slope(s, hazard), 4.0, -4.0,
-    )  # fmt: skip
+    cloud, moved = apply_road_profile(SCENE.gaussians, relief_of(hazard), 4.0, -4.0)
     return cloud, moved, hazard
 
 
@@ -61,9 +68,7 @@ def test_what_stands_on_the_carriageway_rides_and_what_stands_beside_it_does_not
     label = np.where(cloud.class_id == SemanticClass.ROAD, SemanticClass.VEHICLE, SemanticClass.BUILDING)
     cars = Gaussians(**{**vars(cloud), "class_id": label.astype(np.uint8)})
     hazard = RoadHazard(center_m=10.0, length_m=3.7, height_m=0.1)
-    _, moved = apply_road_profile(
-        cars, SCENE.route, lambda s: road_elevation(s, hazard), lambda s: road_slope(s, hazard), 2.0, -2.0
-    )
+    _, moved = apply_road_profile(cars, relief_of(hazard), 2.0, -2.0)
     inside = np.abs(cloud.means[:, 1]) <= 2
     assert moved[above & inside & (label == SemanticClass.VEHICLE)].all()
     assert not moved[~inside].any()
@@ -75,9 +80,7 @@ def test_what_hangs_above_the_tallest_vehicle_stays():
     means = cloud.means + np.float32([0, 0, 5.0])
     wires = replace(cloud, means=means, class_id=np.full(len(cloud), SemanticClass.OTHER, np.uint8))
     hazard = RoadHazard(center_m=10.0, length_m=3.7, height_m=0.1)
-    _, moved = apply_road_profile(
-        wires, SCENE.route, lambda s: road_elevation(s, hazard), lambda s: road_slope(s, hazard), 4.0, -4.0
-    )
+    _, moved = apply_road_profile(wires, relief_of(hazard), 4.0, -4.0)
     assert not moved.any()
 
 
@@ -98,9 +101,7 @@ def test_on_a_climbing_bend_the_road_moves_along_the_route_s_own_normal():
         class_id=np.full(400, SemanticClass.ROAD, np.uint8),
     )
     hazard = RoadHazard(center_m=20.0, length_m=4.0, height_m=0.1)
-    lifted, moved = apply_road_profile(
-        cloud, route, lambda s: road_elevation(s, hazard), lambda s: road_slope(s, hazard), 4.0, -4.0
-    )
+    lifted, moved = apply_road_profile(cloud, relief_of(hazard, route), 4.0, -4.0)
     up, forward = frame[:, :3, 2], frame[:, :3, 0]
     height = road_elevation(station, hazard)[:, None]
     np.testing.assert_allclose(lifted.means, on_road + height * up, atol=1e-4)

@@ -1,7 +1,7 @@
 """Weather over a clear clip. Call order, once for the clip and then for every frame:
 
-1. ``gaussians, weather = weather_scene(gaussians, environment, state, parameters, focal_px, seed, route)``
-   with the clip's road edit already in the Gaussians; rasterise the Gaussians that come back;
+1. ``gaussians, weather = weather_scene(gaussians, environment, state, parameters, focal_px, seed, route,
+   relief)`` with the clip's road edit already in the Gaussians' shape; rasterise the Gaussians that come back;
 2. ``picture = compose(gbuffer, clear sky)``: the clear linear picture, sky included, as in dry weather;
 3. ``frame = apply_weather(weather, picture, gbuffer, shutter)``, then encode ``frame.picture``.
 
@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.gbuffer import GBuffer
+from tasks.render.road_edit import RoadRelief
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
 from tasks.render.weather.layer import Layer, recompose
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter, visible_streaks
 from tasks.render.weather.precipitation import Population, population
+from tasks.render.weather.relief import clear_light, overcast_light, relit
 from tasks.render.weather.scene_light import appended, ground_light, without, without_sun
 from tasks.render.weather.sky import (
     SkyLight,
@@ -119,8 +121,9 @@ def weather_scene(
     focal_px: float,
     seed: int,
     route: Route | None = None,
+    relief: RoadRelief | None = None,
 ) -> tuple[Gaussians, ClipWeather]:
-    """Bring a clip's weather into its scene: softened shadows, and snow where it lies.
+    """Bring a clip's weather into its scene: softened shadows, snow where it lies, the light on a road feature.
 
     Parameters
     ----------
@@ -131,6 +134,7 @@ def weather_scene(
     focal_px : focal length of the camera [px]
     seed : visual seed of the clip [1]
     route : where wheels have left tracks in the snow; None leaves it untouched
+    relief : the clip's road feature, lit by the weather's light as it is turned to it; None for a flat road
 
     Returns
     -------
@@ -146,9 +150,12 @@ def weather_scene(
     if problems:
         raise InputError(problems)
     if state.kind == "dry":
-        return gaussians, ClipWeather(
+        dry = ClipWeather(
             state=state, parameters=parameters, seed=seed, clear_environment=environment, falling=None
         )
+        if relief is None:
+            return gaussians, dry
+        return relit(gaussians, relief, clear_light(gaussians, environment, parameters.sky)), dry
     p = parameters
     falls = population(p.rain if state.kind == "rain" else p.snowfall, state.precipitation_mm_h)
     air = precipitating_air(falls, p.air.near, focal_px, p.air.haze_visual_range_m)
@@ -173,13 +180,20 @@ def weather_scene(
         environment=overcast_environment(environment, sky, air.extinction, p.sky, seed),
         snow=field,
     )
+    if relief is not None:
+        scene = relit(scene, relief, overcast_light(falling.environment, sky))
     return scene, ClipWeather(
         state=state, parameters=p, seed=seed, clear_environment=environment, falling=falling
     )
 
 
 def apply_weather(
-    weather: ClipWeather, picture: NDArray[np.float32], gbuffer: GBuffer, shutter: Shutter
+    weather: ClipWeather,
+    picture: NDArray[np.float32],
+    gbuffer: GBuffer,
+    shutter: Shutter,
+    *,
+    particles: bool = True,
 ) -> WeatherFrame:
     """The picture of one frame in its weather.
 
@@ -189,6 +203,8 @@ def apply_weather(
     picture : float32 [H, W, 3] linear picture of its scene before the clear environment [1]
     gbuffer : the rasterisation it was made from
     shutter : pose, motion, time and exposure of the frame
+    particles : False leaves them to `particle_layer`, for a sensor that sees the rest of the scene through a lens
+        or row by row: streaks are drawn as it sees them, with their own way during the exposure
 
     Returns
     -------
@@ -209,12 +225,26 @@ def apply_weather(
             )
         )  # fmt: skip
     layers.append(air_layer(gbuffer, falling.environment, air, sky, rays))
-    layers.append(particle_layer(weather, falling, gbuffer, shutter))
+    if particles:
+        layers.append(particle_layer(weather, falling, gbuffer.depth, shutter))
     return WeatherFrame(base=picture, layers=tuple(layers), picture=recompose(picture, layers))
 
 
-def particle_layer(weather: ClipWeather, falling: Falling, gbuffer: GBuffer, shutter: Shutter) -> Layer:
-    """The drops or flakes near the camera, lit by the sky and the ground about them."""
+def particle_layer(
+    weather: ClipWeather, falling: Falling, depth: NDArray[np.float32], shutter: Shutter
+) -> Layer:
+    """The drops or flakes near the camera, lit by the sky and the ground about them.
+
+    Parameters
+    ----------
+    weather, falling : from `weather_scene`
+    depth : float32 [H, W] camera z of the scene; NaN where there is none [m]
+    shutter : pose, motion, time and exposure of the frame
+
+    Returns
+    -------
+    Layer
+    """
     p = weather.parameters
     kind = falling.population.parameters
     wind = np.array(p.air.wind_m_s)
@@ -222,7 +252,7 @@ def particle_layer(weather: ClipWeather, falling: Falling, gbuffer: GBuffer, shu
     up = streaks["direction"][:, 2]
     beyond, before = light_from(falling.sky, up, p.sky), light_from(falling.sky, -up, p.sky)
     light = kind.scattering * (kind.backlit_share * beyond + (1 - kind.backlit_share) * before)
-    drawn = draw_streaks(streaks, light, gbuffer.depth, shutter.K, 1e-3 * p.air.near.aperture_mm)
+    drawn = draw_streaks(streaks, light, depth, shutter.K, 1e-3 * p.air.near.aperture_mm)
     return Layer(name="particles", gain=(1 - drawn.alpha)[..., None], add=drawn.rgb)
 
 
