@@ -33,7 +33,7 @@ from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdic
 from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.eval.unusable import unusable_pixels
 from tasks.render.backend import select_backend
-from tasks.render.camera import Camera, body_poses
+from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
 from tasks.render.clip import render_clip
 from tasks.render.road_edit import RoadRelief, apply_road_profile
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
@@ -96,7 +96,8 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
     frames = frame_rows(ride, plan, catalogue)
     buffers: dict[str, NDArray[Any]] = {}
     if plan.settings.pictures:
-        buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed))
+        rig_at = rig_of(ride, frames, catalogue)
+        buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed), rig_at)
         frames |= judge(buffers, frames, facts["film_depth_mm"], catalogue)
         write_clip(layout.frames, index, buffers)
     else:
@@ -113,6 +114,8 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
         "label": clip.label,
         "seed": clip.seed,
         "scenario": clip.scenario.as_row(),
+        "split": clip.split,
+        "calibration": clip.calibration,
         "artifacts": {layout.relative(path): sha256_of_file(path) for path in shards.values()},
         "content": {name: buffer_hash(values) for name, values in buffers.items()}
         | {"ticks": columns_hash(ride.columns, [channel.name for channel in TICK_CHANNELS]),
@@ -225,6 +228,16 @@ def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDA
     return rows | {"T_world_rig": poses.reshape(len(frame), 16)}
 
 
+def rig_of(ride: Rollout, frames: Mapping[str, NDArray[Any]], catalogue: Catalogue) -> RigAt:
+    """Rig poses about every frame, for a camera that moves while it sees one."""
+    vehicle, tick_s = catalogue.vehicle, 1 / TICK_RATE_HZ
+    return continuous_rig(
+        catalogue.scene.route, np.arange(len(ride.columns["station"])) * tick_s,
+        ride.columns["station"], ride.columns["heave"], ride.columns["pitch"], frames["tick"] * tick_s,
+        cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
+    )  # fmt: skip
+
+
 def picture(
     scenario: Scenario,
     facts: Mapping[str, Any],
@@ -232,6 +245,7 @@ def picture(
     plan: Plan,
     catalogue: Catalogue,
     seed: int,
+    rig_at: RigAt,
 ) -> dict[str, NDArray[Any]]:
     """The clip's finished frames, depth and class."""
     hazard = hazard_of(scenario)
@@ -252,6 +266,7 @@ def picture(
         frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
         backend=select_backend(plan.backend), relief=relief,
         labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
+        rig_at=rig_at,
     )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -24,13 +24,15 @@ PLAN_FORMAT = "musync-plan/1"
 
 @dataclass(frozen=True, kw_only=True)
 class ClipPlan:
-    """One clip to be made."""
+    """One clip to be made; ``calibration`` is its place in the calibrated range."""
 
     index: int
     clip_id: str
     label: str
     seed: str
     scenario: Scenario
+    split: str
+    calibration: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +68,8 @@ class Plan:
                     "label": clip.label,
                     "seed": clip.seed,
                     "scenario": clip.scenario.as_row(),
+                    "split": clip.split,
+                    "calibration": clip.calibration,
                 }
                 for clip in self.clips
             ],
@@ -122,8 +126,7 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         "frames": settings.frames,
         "frame_rate_hz": settings.frame_rate_hz,
     }
-    clips = tuple(_clip_plan(index, label, scenario, asked, settings.seed)
-                  for index, (label, scenario) in enumerate(grid.scenarios))  # fmt: skip
+    clips = tuple(_clip_plans(grid, asked))
     repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()
     if repeated:
         raise InputError(
@@ -221,14 +224,24 @@ def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:
     return settings.model_copy(update={"vehicle": vehicle, "vehicle_mode": mode})
 
 
-def _clip_plan(
-    index: int, label: str, scenario: Scenario, asked: Mapping[str, Any], grid_seed: int
-) -> ClipPlan:
-    row = scenario.as_row()
-    # the seed follows the scenario, not its place in the grid, so that a longer grid repeats its clips
-    seed = str(int(sha256_of([f"{grid_seed}/{content_id(row)}".encode()])[:16], 16))
-    clip_id = content_id([asked, row, seed])
-    return ClipPlan(index=index, clip_id=clip_id, label=label, seed=seed, scenario=scenario)
+def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
+    """The clips of a grid: its scenarios, each under every visual seed."""
+    seeds = range(grid.settings.seed, grid.settings.seed + grid.settings.visual_seeds)
+    named = [(label, scenario, tags, seed) for (label, scenario), tags in zip(grid.scenarios, grid.tags, strict=True)
+             for seed in seeds]  # fmt: skip
+    for index, (label, scenario, (split, calibration), grid_seed) in enumerate(named):
+        row = scenario.as_row()
+        # the seed follows the scenario, not its place in the grid, so that a longer grid repeats its clips
+        seed = str(int(sha256_of([f"{grid_seed}/{content_id(row)}".encode()])[:16], 16))
+        yield ClipPlan(
+            index=index,
+            clip_id=content_id([asked, row, seed]),
+            label=label if len(seeds) == 1 else f"{label}/seed-{grid_seed}",
+            seed=seed,
+            scenario=scenario,
+            split=split,
+            calibration=calibration,
+        )
 
 
 def _route_problems(grid: Grid) -> list[str]:

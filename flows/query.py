@@ -2,11 +2,12 @@
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import duckdb
 import pyarrow.parquet as pq
 
+from catalogs.grids.schema import grid_schema
 from flows.audit import read_manifest
 from flows.store.layout import Layout
 from tasks.conventions import (
@@ -104,8 +105,15 @@ def sql(dataset: str, query: str) -> dict[str, Any]:
     return {"columns": names, "rows": [dict(zip(names, map(_plain, row), strict=True)) for row in rows]}
 
 
-def schema() -> dict[str, Any]:
-    """Every view's columns: name, unit, paper symbol, CF standard name and description, from the one table."""
+def schema(of: Literal["views", "grid"] = "views") -> dict[str, Any]:
+    """Every view's columns: name, unit, paper symbol, CF standard name and description, from the one table.
+
+    Parameters
+    ----------
+    of : ``grid`` gives the JSON Schema of a grid file instead
+    """
+    if of == "grid":
+        return grid_schema()
     return {
         view: [
             {

@@ -171,6 +171,8 @@ def plan_of(manifest: Mapping[str, Any]) -> Plan:
                 label=clip["label"],
                 seed=clip["seed"],
                 scenario=Scenario(**clip["scenario"]),
+                split=clip["split"],
+                calibration=clip["calibration"],
             )
             for clip in clips
         ),

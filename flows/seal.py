@@ -76,7 +76,7 @@ def write_part(layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -
 def clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
     """One row a clip: controls, surface, outcome and verdict."""
     rows = [
-        {"clip_id": r["clip_id"], "index": r["index"], "label": r["label"], "seed": r["seed"]}
+        {name: r[name] for name in ("clip_id", "index", "label", "seed", "split", "calibration")}
         | r["scenario"]
         | r["figures"]
         | {f"check_{key}": value for key, value in r["verdict"].items() if key != "reasons"}

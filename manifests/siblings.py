@@ -18,11 +18,11 @@ ALL_PAIRS_UP_TO = 32
 
 
 def sibling_pairs(clips: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Every pair that differs in exactly one control, in the order of the dataset.
+    """Every pair that differs in exactly one control, in the order of the dataset; visual seeds make no pair.
 
     Parameters
     ----------
-    clips : records with ``clip_id``, ``label``, ``scenario`` and ``figures``; no two of one scenario
+    clips : records with ``clip_id``, ``label``, ``scenario`` and ``figures``
 
     Returns
     -------
@@ -33,6 +33,7 @@ def sibling_pairs(clips: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         for control in CONTROLS
         for group in _groups(clips, control)
         for i, j in _chosen(group)
+        if _differing(clips[i], clips[j], control)
     ]
     return [_pair(clips[i], clips[j], control) for i, j, control in sorted(places)]
 
@@ -52,15 +53,18 @@ def _chosen(group: Sequence[int]) -> list[tuple[int, int]]:
     return sorted({(group[0], other) for other in group[1:]} | set(pairwise(group)))
 
 
+def _differing(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> list[str]:
+    return [name for name in CONTROLS[control] if a["scenario"][name] != b["scenario"][name]]
+
+
 def _pair(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> dict[str, Any]:
-    differs = [name for name in CONTROLS[control] if a["scenario"][name] != b["scenario"][name]]
     names = {
         "clip_id_a": a["clip_id"],
         "clip_id_b": b["clip_id"],
         "label_a": a["label"],
         "label_b": b["label"],
         "control": control,
-        "differs": ", ".join(differs),
+        "differs": ", ".join(_differing(a, b, control)),
     }
     changes = {f"{name}_change": _change(a["figures"][name], b["figures"][name]) for name in FIGURES}
     return names | changes

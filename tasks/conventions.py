@@ -110,6 +110,8 @@ IDENTITY_CHANNELS: tuple[Channel, ...] = (
     Channel(name="index", unit="1", symbol="", description="number of the clip in the dataset, and in the Zarr arrays"),
     Channel(name="label", unit="", symbol="", description="the clip's levels of the grid's axes"),
     Channel(name="seed", unit="", symbol="", description="visual seed, 64 bit, as text"),
+    Channel(name="split", unit="", symbol="", description="the grid's split that the clip belongs to; empty where it names none"),
+    Channel(name="calibration", unit="", symbol="", description="in-grid, interpolated, off-grid or beyond-calibration, as the paper's Appendix C says it"),
     Channel(name="weather", unit="", symbol="w", description="dry, rain or snow; also the tyre family"),
     Channel(name="calibration_extrapolated", unit="", symbol="", description="mu_c lies outside the calibrated knots, whose end values hold"),
 )  # fmt: skip

@@ -38,8 +38,9 @@ def test_make_targets_in_the_documents_exist():
     assert named <= targets
 
 
-def test_the_grid_in_the_readme_is_sound(tmp_path):
-    block = re.search(r"```yaml\n(.*?)```", (SOURCE_ROOT / "README.md").read_text(), flags=re.S)
+@pytest.mark.parametrize(("document", "clips"), [("README.md", 4), ("docs/grids.md", 88)])
+def test_the_grid_in_a_document_is_sound(document, clips, tmp_path):
+    block = re.search(r"```yaml\n(.*?)```", (SOURCE_ROOT / document).read_text(), flags=re.S)
     assert block is not None
     (tmp_path / "grid.yaml").write_text(block.group(1))
-    assert len(load_grid(Path(tmp_path / "grid.yaml")).scenarios) == 4
+    assert len(load_grid(Path(tmp_path / "grid.yaml")).scenarios) == clips

@@ -1,44 +1,23 @@
-"""Scenario grids: a YAML file of named axes whose product is a list of scenarios."""
+"""Scenario grids: a YAML file of blocks whose product is a list of scenarios."""
 
 from copy import deepcopy
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
+from catalogs.grids.blocks import Blocks, PartialScenario, combinations
+from catalogs.grids.selection import CALIBRATION, Condition, facts_of, split_of
 from catalogs.scenario import Scenario, scenario_problems
 from tasks.errors import InputError
 
 GRID_FOLDER = Path(__file__).parent
 
 
-class PartialScenario(BaseModel):
-    """The scenario fields that one level of an axis sets; the rest keep their defaults."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-    weather: Literal["dry", "rain", "snow"] | None = None
-    precipitation_mm_h: float | None = None
-    snow_accumulation_h: float | None = None
-    initial_speed_km_h: float | None = None
-    peak_pressure_mpa: float | None = None
-    ramp_s: float | None = None
-    hold_s: float | None = None
-    release_s: float | None = None
-    brake_onset_s: float | None = None
-    brake_onset_m: float | None = None
-    hazard_center_m: float | None = None
-    hazard_length_m: float | None = None
-    hazard_height_m: float | None = None
-
-
-class GridFile(BaseModel):
+class GridFile(Blocks):
     """A grid as written in YAML."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     name: str = Field(min_length=1)
     scene: str = "street"
@@ -49,18 +28,36 @@ class GridFile(BaseModel):
     frames: int = Field(default=81, ge=2)
     frame_rate_hz: float = Field(default=10.0, gt=0, le=1000)
     seed: int = Field(default=2025, ge=0, lt=2**53)
+    visual_seeds: int = Field(
+        default=1, ge=1, le=1000, description="Clips of each scenario, with visual seeds from seed upward."
+    )
     labels: bool = False
     pictures: bool = True
     base: PartialScenario = PartialScenario()
-    axes: dict[str, dict[str, PartialScenario]] = Field(min_length=1)
+    exclude: list[Condition] = Field(
+        default=[], description="Combinations to leave out: those that keep any of these."
+    )
+    splits: dict[str, Condition] = Field(
+        default={}, description="Name to condition; a clip belongs to the first that it keeps."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Grid:
-    """A validated grid: what all clips share, and the labelled scenarios in order."""
+    """A validated grid: what all clips share, and the labelled scenarios in order.
+
+    Parameters
+    ----------
+    settings : what all clips share
+    scenarios : labelled, in order
+    tags : of each, its split (empty without splits) and its place in the calibrated range
+    left_out : combinations that ``exclude`` took out [1]
+    """
 
     settings: GridFile
     scenarios: tuple[tuple[str, Scenario], ...]
+    tags: tuple[tuple[str, str], ...]
+    left_out: int = 0
 
 
 class FaultyGrid(InputError):
@@ -137,24 +134,35 @@ def _leave_out(content: Any, place: tuple[int | str, ...]) -> None:
 
 
 def expand_grid(settings: GridFile, place: str) -> Grid:
-    """The product of the axes, later axes over earlier ones over ``base``, each scenario checked."""
+    """The product of the blocks, later ones over earlier ones over ``base``, less what is excluded, each checked."""
     base = settings.base.model_dump(exclude_none=True)
     problems: dict[str, list[str]] = {}
-    scenarios = []
-    for combination in product(*(levels.items() for levels in settings.axes.values())):
+    scenarios, tags, left_out = [], [], 0
+    for combination in combinations(settings):
         label = "/".join(level for level, _ in combination)
         merged: dict[str, Any] = dict(base)
         for _, partial in combination:
-            merged |= partial.model_dump(exclude_none=True)
+            merged |= partial
         scenario = Scenario(**merged)
+        facts = facts_of(scenario)
+        if any(condition.holds(facts) for condition in settings.exclude):
+            left_out += 1
+            continue
+        split = split_of(facts, settings.splits)
         scenarios.append((label, scenario))
-        for problem in scenario_problems(scenario):
+        tags.append((split or "", facts[CALIBRATION]))
+        found = scenario_problems(scenario)
+        if settings.splits and split is None:
+            found.append("belongs to no split: end them with one whose condition is {}")
+        for problem in found:
             problems.setdefault(problem, []).append(label)
+    if not scenarios:
+        problems["exclude leaves nothing to make"] = ["all"]
     if problems:
         raise InputError(
             [f"{place}: scenario {_some(labels)}: {problem}" for problem, labels in problems.items()]
         )
-    return Grid(settings=settings, scenarios=tuple(scenarios))
+    return Grid(settings=settings, scenarios=tuple(scenarios), tags=tuple(tags), left_out=left_out)
 
 
 def _some(labels: list[str]) -> str:
@@ -168,4 +176,6 @@ def _sentence(path: Path, problem: Any) -> str:
         return f"{path}: {place}: unknown key; known here are {', '.join(known)}"
     if problem["type"] == "missing":
         return f"{path}: {place}: this key is required; it is missing"
+    if problem["type"] == "value_error":
+        return f"{path}: {place}: {problem['msg'].removeprefix('Value error, ')}"
     return f"{path}: {place}: {problem['msg'].removeprefix('Input ').lower()}; it is {problem['input']!r}"

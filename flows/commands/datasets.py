@@ -86,9 +86,14 @@ def sql(
 
 
 @app.command()
-def schema(as_json: Json = False) -> None:
+def schema(
+    as_json: Json = False,
+    grid: Annotated[
+        bool, typer.Option("--grid", help="The JSON Schema of a grid file, for editors.")
+    ] = False,
+) -> None:
     """List every column of every view: unit, paper symbol, CF standard name and meaning."""
-    show(call("schema", False), as_json)
+    show(call("schema", False, of="grid" if grid else "views"), as_json or grid)
 
 
 @app.command()

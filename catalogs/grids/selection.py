@@ -1,0 +1,75 @@
+"""Conditions on scenarios: which combinations a grid leaves out, and to which split a clip belongs."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from pydantic import Field, RootModel, model_validator
+
+from catalogs.calibrated_range import CALIBRATION_TAGS, calibration_tag, load_calibrated_range
+from catalogs.grids.blocks import Strict
+from catalogs.scenario import SCENARIO_FIELDS, Scenario
+
+CALIBRATION = "calibration"
+Value = str | float
+
+
+class Between(Strict):
+    """A closed interval; an end that is left out is open."""
+
+    min: float | None = None
+    max: float | None = None
+
+    @model_validator(mode="after")
+    def _holds_something(self) -> "Between":
+        if self.min is None and self.max is None:
+            raise ValueError("an interval needs min, max or both; it has neither")
+        return self
+
+    def holds(self, value: Any) -> bool:
+        return (
+            isinstance(value, int | float)
+            and (self.min is None or value >= self.min)
+            and (self.max is None or value <= self.max)
+        )
+
+
+class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_length=1)] | Between]]):
+    """Scenario fields, or ``calibration``, to a value, a list of values or an interval; all have to hold."""
+
+    @model_validator(mode="after")
+    def _names_are_known(self) -> "Condition":
+        known = (*SCENARIO_FIELDS, CALIBRATION)
+        problems = [
+            f"{name}: no such field; there are {', '.join(known)}" for name in self.root if name not in known
+        ]
+        asked = self.root.get(CALIBRATION, [])
+        tags = asked if isinstance(asked, list) else [asked]
+        problems += [
+            f"{CALIBRATION}: must be of {', '.join(CALIBRATION_TAGS)}; it is {tag}"
+            for tag in tags
+            if tag not in CALIBRATION_TAGS
+        ]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+    def holds(self, facts: Mapping[str, Any]) -> bool:
+        """Whether the facts of a scenario keep every line."""
+        return all(_keeps(facts[name], wanted) for name, wanted in self.root.items())
+
+
+def facts_of(scenario: Scenario) -> dict[str, Any]:
+    """What conditions are held against: the scenario's fields and its place in the calibrated range."""
+    return asdict(scenario) | {CALIBRATION: calibration_tag(scenario, load_calibrated_range())}
+
+
+def split_of(facts: Mapping[str, Any], splits: Mapping[str, Condition]) -> str | None:
+    """The first split whose condition holds; None if none does."""
+    return next((name for name, condition in splits.items() if condition.holds(facts)), None)
+
+
+def _keeps(value: Any, wanted: Any) -> bool:
+    if isinstance(wanted, Between):
+        return wanted.holds(value)
+    return value in wanted if isinstance(wanted, list) else value == wanted
