@@ -8,9 +8,9 @@ import numpy as np
 import yaml
 
 from catalogs.effects import load_effects
-from tasks.closure.forward import Slot
 from tasks.errors import InputError
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
+from tasks.vehicle.effects.slots import Slot
 
 TRUTHS_FILE = Path(__file__).with_name("truths.yaml")
 

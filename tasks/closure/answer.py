@@ -10,8 +10,8 @@ from tasks.closure.attribution import Candidate
 from tasks.closure.correlation import Correlation
 from tasks.closure.disturbance import Disturbance
 from tasks.closure.experiment import Experiment
-from tasks.closure.forward import Slot
 from tasks.closure.intervals import Bounds
+from tasks.vehicle.effects.slots import Slot
 
 VerdictName = Literal["FOUND", "SET", "UNKNOWN_FORM", "RETUNE", "SENSOR", "NOTHING"]
 

@@ -16,9 +16,10 @@ from tasks.closure.answer import Verdict
 from tasks.closure.campaign import Campaign, Run, Tolerances
 from tasks.closure.drives import RICH, TRAINING, Drive, planned_run
 from tasks.closure.evidence import SESSION_INDEX
-from tasks.closure.forward import SUBSTEPS, Slot, instruments, roll, run_model
+from tasks.closure.forward import SUBSTEPS, instruments, roll, run_model
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import PARAMETER_INDEX, parameter_vector
+from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.parameters import Vehicle
 
 NOISE_SIGMA = np.array([0.03, 0.05, 0.09, 0.09, 0.015, 0.1, 0.1])

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tasks.closure.campaign import CHANNELS
 from tasks.closure.evidence import RunEvidence
-from tasks.closure.forward import Slot, predict
+from tasks.closure.forward import predict
 from tasks.closure.noise import whiten
+from tasks.vehicle.effects.slots import Slot
 
 MOST_LAG = 1.0
 """Lags up to this are looked at [s]."""

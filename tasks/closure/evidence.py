@@ -14,9 +14,10 @@ from scipy.linalg import cholesky, solve_triangular
 
 from tasks.closure.campaign import CHANNELS, SESSION, Tolerances
 from tasks.closure.disturbance import DISTURBED, KNOT_SPACING, N_OFFSETS, Disturbance, prior_precision
-from tasks.closure.forward import COARSE_SUBSTEPS, SUBSTEPS, RunModel, Slot, instruments, roll
+from tasks.closure.forward import COARSE_SUBSTEPS, SUBSTEPS, RunModel, instruments, roll
 from tasks.closure.noise import whiten
 from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
+from tasks.vehicle.effects.slots import Slot
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
 BROKEN = 1e4

@@ -1,6 +1,5 @@
 """What is left over: port by variable splines, and the simple shape that a spline has."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,15 +7,17 @@ from numpy.typing import NDArray
 
 from tasks.closure.evidence import RunEvidence
 from tasks.closure.fit import Fit
-from tasks.closure.forward import Slot, predict
+from tasks.closure.forward import predict
 from tasks.closure.hypothesis import Hypothesis, compose
 from tasks.closure.noise import whiten
 from tasks.closure.screening import Evidence, inflation
+from tasks.errors import InputError
+from tasks.vehicle.effects.forms import SHAPES, Form, form_name
 from tasks.vehicle.effects.library import ALL_PARAMETERS
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
+from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
+from tasks.vehicle.effects.slots import Slot
 
 KNOTS = 5
-TABLE = 65
 PORT_STEP = {
     "longitudinal_force": 30.0,
     "brake_torque": 0.02,
@@ -128,21 +129,6 @@ def _hats(
     return whiten(np.stack(columns, axis=-1), run.rho, run.sigma)
 
 
-Shape = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-SHAPES: dict[str, Shape] = {
-    "a": lambda u: np.ones_like(u)[:, None],
-    "a x": lambda u: u[:, None],
-    "a x|x|": lambda u: (u * np.abs(u))[:, None],
-    "a x^3": lambda u: (u**3)[:, None],
-    "a tanh(4x)": lambda u: np.tanh(4.0 * u)[:, None],
-    "a exp(-4|x|)": lambda u: np.exp(-4.0 * np.abs(u))[:, None],
-    "a max(x - 1/3, 0)": lambda u: np.maximum(u - 1.0 / 3.0, 0.0)[:, None],
-    "a max(x - 2/3, 0)": lambda u: np.maximum(u - 2.0 / 3.0, 0.0)[:, None],
-    "a + b x": lambda u: np.column_stack((np.ones_like(u), u)),
-}
-"""The grammar, in x = variable / its largest magnitude; linear in its one or two coefficients."""
-
-
 def form_hypotheses(leftover: Leftover, samples: int, count: int = 2) -> list[Hypothesis]:
     """The grammar's shapes that fit a spline best, as hypotheses for the simulation.
 
@@ -177,22 +163,48 @@ def curve(form: Hypothesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return slot.origin + slot.spacing * np.arange(len(slot.values), dtype=np.float64), slot.values
 
 
+def form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: float) -> Form:
+    """A form that was found, held constant beyond the range of its variable that the runs reached.
+
+    Parameters
+    ----------
+    name : of its hypothesis
+    coefficients : a, or a and b [unit of the port]
+    low, high : what the runs reached [unit of the variable]; the scanned range bounds it
+
+    Raises
+    ------
+    InputError
+        If no hypothesis of the grammar has that name.
+    """
+    for port, variables in SCANNED.items():
+        for variable in variables:
+            first, last = RANGE[variable]
+            scale = max(abs(first), abs(last))
+            for shape in SHAPES:
+                if form_name(port, variable, shape, scale) == name:
+                    return Form(
+                        port=port, variable=variable, shape=shape, coefficients=coefficients, scale=scale,
+                        low=max(first, low), high=min(last, high),
+                    )  # fmt: skip
+    raise InputError(f"form {name}: no port, variable and shape of the grammar have that name")
+
+
 def _form(leftover: Leftover, name: str, start: NDArray[np.float64], scale: float) -> Hypothesis:
-    grid = np.linspace(leftover.grid[0], leftover.grid[-1], TABLE)
-    basis = SHAPES[name](grid / scale)
     port, variable = leftover.port, leftover.variable
+    low, high = RANGE[variable]
 
     def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
-        slot = Slot(
-            port=port, variable=variable, origin=grid[0], spacing=grid[1] - grid[0], values=basis @ values
-        )
-        return np.zeros(len(ALL_PARAMETERS)), (slot,)
+        form = Form(
+            port=port, variable=variable, shape=name, coefficients=tuple(values.tolist()), scale=scale, low=low,
+            high=high,
+        )  # fmt: skip
+        return np.zeros(len(ALL_PARAMETERS)), (form.slot,)
 
-    k = basis.shape[1]
+    k = len(start)
     step = np.full(k, PORT_STEP[port])
-    unit = VARIABLE_UNITS[VARIABLES.index(variable)]
     return Hypothesis(
-        name=f"{port} ~ {name}, x = {variable}/{scale:g} {unit}", effect_class="form", port=port, variable=variable,
+        name=form_name(port, variable, name, scale), effect_class="form", port=port, variable=variable,
         names=("a", "b")[:k], units=(PORT_UNITS[PORTS.index(port)],) * k, lower=-100.0 * step, upper=100.0 * step,
         step=step, start=start.copy(), build=build,
     )  # fmt: skip

@@ -10,14 +10,12 @@ from tasks.closure.campaign import CHANNELS, Run
 from tasks.closure.rollout import CONSTANTS, N_STATES, OUTPUTS, drive
 from tasks.surface.friction import surface_friction
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, DISC_COOLING
 from tasks.vehicle.effects.library import ALL_PARAMETERS, PARAMETER_INDEX
-from tasks.vehicle.effects.ports import PARAMETERS, PORTS, VARIABLES
+from tasks.vehicle.effects.ports import PARAMETERS
+from tasks.vehicle.effects.slots import Slot, slot_tables
 from tasks.vehicle.parameters import Vehicle, surface_response
 
-DISC_CAPACITY_F, DISC_CAPACITY_R = 7400.0, 4600.0
-"""Heat capacity of an axle's discs: 16 and 10 kg of cast iron at 460 J/(kg K) (Limpert, SAE R-398) [J/K]."""
-DISC_COOLING = 30.0
-"""Convective loss of an axle's discs [W/K]."""
 MASKED_SPEED = 2.0
 """Below it the pitch rule and the slip denominator are not force-consistent: runs end there [m/s]."""
 RESTING_PRESSURE = 0.02
@@ -26,24 +24,6 @@ SUBSTEPS = 10
 """Integration steps between samples at 100 Hz; halving the step is a check of its own."""
 COARSE_SUBSTEPS = 5
 """The same for the derivatives of runs that the longer step hardly changes."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Slot:
-    """A piecewise-linear table of one variable at one port.
-
-    Parameters
-    ----------
-    port, variable : one of `PORTS` and `VARIABLES`
-    origin, spacing : of the grid [unit of the variable]
-    values : float64 [K] at the grid points [unit of the port]
-    """
-
-    port: str
-    variable: str
-    origin: float
-    spacing: float
-    values: NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,15 +147,7 @@ def roll(
     outputs float64 [samples, len(OUTPUTS)] and states float64 [samples, N_STATES]
     """
     motion = np.ascontiguousarray(theta[: len(PARAMETERS)])
-    keys = np.array(
-        [(PORTS.index(s.port), VARIABLES.index(s.variable)) for s in slots], dtype=np.int64
-    ).reshape(-1, 2)
-    grids = np.array([(s.origin, s.spacing) for s in slots]).reshape(-1, 2)
-    width = max((len(s.values) for s in slots), default=1)
-    tables = np.zeros((len(slots), width))
-    for table, slot in zip(tables, slots, strict=True):
-        table[:] = slot.values[-1]
-        table[: len(slot.values)] = slot.values
+    keys, grids, tables = slot_tables(slots)
     if start is None:
         first, out, states = 0, np.zeros((model.samples, len(OUTPUTS))), np.zeros((model.samples, N_STATES))
         v0 = model.initial_speed if initial_speed is None else initial_speed

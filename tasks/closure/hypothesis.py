@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.closure.evidence import SESSION_INDEX
-from tasks.closure.forward import Slot
 from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
+from tasks.vehicle.effects.slots import Slot
 
 Build = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], tuple[Slot, ...]]]
 

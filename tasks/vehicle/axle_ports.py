@@ -8,7 +8,8 @@ from tasks.vehicle.brake import abs_command, abs_update
 from tasks.vehicle.chassis import Chassis
 from tasks.vehicle.effects.brake_line import acting_pressure, disc_rate
 from tasks.vehicle.effects.chassis import ChassisEffects, effective_friction, grip_reserve, stick_share
-from tasks.vehicle.effects.ports import INDEX, PORTS, friction_factor, slot_sum
+from tasks.vehicle.effects.exact import friction_factor, slot_sum
+from tasks.vehicle.effects.ports import INDEX, PORTS
 from tasks.vehicle.effects.slots import SlotTables
 from tasks.vehicle.states import AxleMemory, Instant
 from tasks.vehicle.tyre import TyreCurve

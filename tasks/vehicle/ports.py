@@ -11,7 +11,8 @@ from numba import njit
 from tasks.vehicle.axle_ports import AxlePorts, reserve_of, rolling_axle, senses_of, standing_axle, with_links
 from tasks.vehicle.chassis import Chassis
 from tasks.vehicle.effects.chassis import link_lift, stick_share
-from tasks.vehicle.effects.ports import INDEX, PORTS, resistance, slot_sum
+from tasks.vehicle.effects.exact import resistance, slot_sum
+from tasks.vehicle.effects.ports import INDEX, PORTS
 from tasks.vehicle.effects.slots import SlotTables
 from tasks.vehicle.half_car import HalfCarState
 from tasks.vehicle.road import RoadFeature

@@ -6,7 +6,7 @@ from numba import njit
 
 from tasks.vehicle.chassis import Chassis
 from tasks.vehicle.effects.chassis import ChassisEffects, footprint
-from tasks.vehicle.effects.ports import strut_force
+from tasks.vehicle.effects.exact import strut_force
 from tasks.vehicle.half_car import HalfCarState, contact_load
 from tasks.vehicle.road import RoadFeature
 

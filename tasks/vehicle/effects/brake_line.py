@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tasks.vehicle.effects.ports import INDEX, brake_factor
+from tasks.vehicle.effects.exact import brake_factor
+from tasks.vehicle.effects.ports import INDEX
 
 DISC_CAPACITY_F, DISC_CAPACITY_R = 7400.0, 4600.0
 """Heat capacity of an axle's discs: 16 and 10 kg of cast iron at 460 J/(kg K) (Limpert, SAE R-398) [J/K]."""

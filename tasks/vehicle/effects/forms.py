@@ -61,7 +61,7 @@ class Form:
             port=self.port,
             variable=self.variable,
             origin=self.low,
-            spacing=(self.high - self.low) / (TABLE - 1),
+            spacing=float(grid[1] - grid[0]),
             values=SHAPES[self.shape](grid / self.scale) @ np.array(self.coefficients),
         )
 
