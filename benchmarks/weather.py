@@ -96,7 +96,7 @@ def _stages(
     stages: dict[str, Callable[[], object]] = {
         "light": lambda: light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays),
         "air": lambda: air_layer(gbuffer, cloudy, air, sky, rays),
-        "particles": lambda: particle_layer(weather, falling, gbuffer, shutter),
+        "particles": lambda: particle_layer(weather, falling, gbuffer.depth, shutter),
     }
     if weather.state.kind == "rain":
         stages["wet road with reflection"] = lambda: wet_layer(

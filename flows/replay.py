@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.grids import load_grid
-from flows.clip import Catalogue, drive, frame_rows, load_catalogue, picture
+from flows.clip import Catalogue, drive, frame_rows, load_catalogue, picture, rig_of
 from flows.plan import ClipPlan, Plan, freeze_grid
 from flows.progress import progress_bar
 from flows.store.frames import buffer_hash
@@ -109,7 +109,8 @@ def _run(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Repla
     )
     rows = frame_rows(ride, plan, catalogue)
     shown = {name: column[:frames] for name, column in rows.items()}
-    buffers = picture(clip.scenario, facts, shown, plan, catalogue, int(clip.seed))
+    rig_at = rig_of(ride, shown, catalogue)
+    buffers = picture(clip.scenario, facts, shown, plan, catalogue, int(clip.seed), rig_at)
     columns = {channel.name: ride.columns[channel.name] for channel in TICK_CHANNELS}
     columns |= {name: np.array([value]) for name, value in facts.items()} | {
         "T_world_rig": rows["T_world_rig"]

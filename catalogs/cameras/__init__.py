@@ -10,12 +10,16 @@ from scipy.spatial.transform import Rotation
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
 from tasks.render.camera import Camera
+from tasks.render.lens import Lens
+from tasks.render.readout import sensor_field
 from tasks.render.sensor import Sensor
 
 FOLDER = Path(__file__).parent
 
 Pixels = Annotated[Scalar, checked("px", above=0)]
 Metres = Annotated[Scalar, checked("m")]
+Distortion = Annotated[Scalar, checked("1", minimum=-2, maximum=2)]
+NO_DISTORTION = Field(default=Scalar(value=0.0, unit="1", source="no distortion"))
 
 LOOKING_FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Camera axes (x right, y down, z forward) in rig axes (x forward, y left, z up)."""
@@ -42,6 +46,15 @@ class CameraEntry(CatalogueEntry):
     read_noise: Annotated[Scalar, checked("e-", minimum=0)] = Field(
         default=Scalar(value=0.0, unit="e-", source="no noise")
     )
+    k1: Distortion = NO_DISTORTION
+    k2: Distortion = NO_DISTORTION
+    p1: Distortion = NO_DISTORTION
+    p2: Distortion = NO_DISTORTION
+    k3: Distortion = NO_DISTORTION
+    line_delay: Annotated[Scalar, checked("s", minimum=0, maximum=0.001)] = Field(
+        default=Scalar(value=0.0, unit="s", source="one shutter for all rows")
+    )
+    motion_blur: bool = False
 
 
 def camera_source(name_or_path: str | Path) -> Path:
@@ -74,7 +87,8 @@ def load_camera(name_or_path: str | Path) -> Camera:
         Rotation.from_euler("y", entry.pitch_down.value, degrees=True).as_matrix() @ LOOKING_FORWARD
     )
     mount[:3, 3] = (-entry.behind_front_axle.value, entry.left_of_centre.value, entry.height_above_road.value)
-    return Camera(
+    k = {name: getattr(entry, name).value for name in ("k1", "k2", "p1", "p2", "k3")}
+    camera = Camera(
         name=entry.name,
         width=width,
         height=height,
@@ -86,4 +100,11 @@ def load_camera(name_or_path: str | Path) -> Camera:
             full_well=None if entry.full_well is None else entry.full_well.value,
             read_noise=entry.read_noise.value,
         ),
+        lens=Lens(**k) if any(k.values()) else None,
+        line_delay_s=entry.line_delay.value,
+        motion_blur=entry.motion_blur,
     )
+    sensor_field(
+        camera
+    )  # a lens that does not spread the whole picture is refused here, not in the first clip
+    return camera

@@ -1,17 +1,22 @@
 """The camera: intrinsics, mount, and where heave and pitch put it (paper, Eq. camera_pose)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.lens import Lens
 from tasks.render.sensor import Sensor
 from tasks.scene.route import Route
+
+RigAt = Callable[[int, NDArray[np.float64]], NDArray[np.float64]]
+"""Rig poses [N, 4, 4] [m] about a frame, at times [N] from its own [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """A pinhole camera on the vehicle body.
+    """A camera on the vehicle body: a pinhole with one shutter for all rows, unless more is asked for.
 
     Parameters
     ----------
@@ -19,8 +24,12 @@ class Camera:
     width, height : picture size [px]
     K : float64 [3, 3] intrinsics; pixel centres lie at +0.5 [px]
     T_rig_camera : float64 [4, 4] camera axes (x right, y down, z forward) to rig axes
-    exposure_s : how long the shutter is open; sets the length of rain streaks [s]
+    exposure_s : how long a row is exposed; sets the length of rain streaks and of motion blur [s]
     sensor : exposure and noise
+    lens : distortion; None for a pinhole
+    line_delay_s : from one row's exposure to the next one's, top to bottom; 0 for one shutter for all rows. A
+        frame's time is that of the middle of the picture, in the middle of its exposure [s]
+    motion_blur : what moves in the picture is averaged over the exposure; streaks always are
     """
 
     name: str
@@ -30,6 +39,26 @@ class Camera:
     T_rig_camera: NDArray[np.float64]
     exposure_s: float
     sensor: Sensor = field(default_factory=Sensor)
+    lens: Lens | None = None
+    line_delay_s: float = 0.0
+    motion_blur: bool = False
+
+    @property
+    def plain(self) -> bool:
+        """A pinhole whose rows are all exposed at once, at one pose: what is drawn is what it sees."""
+        return self.lens is None and not self.moves
+
+    @property
+    def moves(self) -> bool:
+        """A frame sees more than one pose."""
+        return self.line_delay_s != 0 or self.motion_blur
+
+    @property
+    def row_times(self) -> NDArray[np.float64]:
+        """Beginning, middle and end of each row's exposure from the frame's time, float64 [3, height] [s]."""
+        middle = (np.arange(self.height) + 0.5 - self.height / 2) * self.line_delay_s
+        half = 0.5 * self.exposure_s if self.motion_blur else 0.0
+        return np.stack((middle - half, middle, middle + half))
 
 
 def body_poses(
@@ -63,6 +92,51 @@ def body_poses(
     motion[:, :3, 3] = centre - motion[:, :3, :3] @ centre
     motion[:, 2, 3] += heave
     return route.pose(station) @ motion
+
+
+def continuous_rig(
+    route: Route,
+    time: NDArray[np.float64],
+    station: NDArray[np.float64],
+    heave: NDArray[np.float64],
+    pitch: NDArray[np.float64],
+    frame_time: NDArray[np.float64],
+    *,
+    cg_behind_front_axle: float,
+    cg_height: float,
+) -> RigAt:
+    """Rig poses at any time of a clip, for rows and exposures between its ticks.
+
+    Before the first tick and after the last the body goes on as it did within: the motion is turned about the
+    clip's end pose, T(-t) = T(0) T(t)^-1 T(0), which is exact for a steady motion.
+
+    Parameters
+    ----------
+    route, cg_behind_front_axle, cg_height : as `body_poses` takes them
+    time : [N] of the ticks, rising [s]
+    station, heave, pitch : [N] at the ticks, as `body_poses` takes them; linear in between [m, m, rad]
+    frame_time : [F] of the frames [s]
+
+    Returns
+    -------
+    Callable
+        Frame number and times from the frame's own to poses.
+    """
+
+    def inside(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        at = (np.interp(t, time, column) for column in (station, heave, pitch))
+        return body_poses(route, *at, cg_behind_front_axle=cg_behind_front_axle, cg_height=cg_height)
+
+    def rig_at(frame: int, since: NDArray[np.float64]) -> NDArray[np.float64]:
+        t = frame_time[frame] + since
+        end = np.clip(t, time[0], time[-1])
+        beyond = t != end
+        if not beyond.any():
+            return inside(t)
+        turn = inside(end)
+        return np.where(beyond[:, None, None], turn @ np.linalg.inv(inside(2 * end - t)) @ turn, turn)
+
+    return rig_at
 
 
 def viewmat(T_world_camera: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,13 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.errors import InputError
 from tasks.render.backend import Backend
-from tasks.render.camera import Camera, viewmat
+from tasks.render.camera import Camera, RigAt, viewmat
 from tasks.render.composition import compose, encode_8bit, round_depth
 from tasks.render.environment import environment_view
-from tasks.render.labels import clip_flow, frame_labels
+from tasks.render.labels import clip_flow, forward_flow, frame_labels, row_flow
+from tasks.render.readout import sensor_field
 from tasks.render.road_edit import Profile, RoadRelief
 from tasks.render.sensor import photographed
+from tasks.render.sight import as_drawn, through_sensor
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter
@@ -31,6 +34,7 @@ def render_clip(
     backend: Backend,
     relief: RoadRelief | None = None,
     labelled: Profile | None = None,
+    rig_at: RigAt | None = None,
 ) -> dict[str, NDArray[np.generic]]:
     """Render every frame of a clip.
 
@@ -39,7 +43,7 @@ def render_clip(
     gaussians : the street with the clip's road edit in it
     environment : float32 [He, We, 3] clear sky and far field, as in `Scene.environment` [1]
     route : along which wheels have left tracks in the snow
-    camera : intrinsics, mount and exposure
+    camera : intrinsics, mount, lens and shutter
     T_world_rig : float64 [F, 4, 4] rig poses with heave and pitch
     frame_rate_hz : frames per second [Hz]
     weather : what falls, and what lies on the road
@@ -48,6 +52,7 @@ def render_clip(
     backend : the rasteriser
     relief : the road feature, as the light meets it; None for a flat road
     labelled : H_g(s) of the clip; with it the clip gets the labels of `tasks.render.labels` too
+    rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
 
     Returns
     -------
@@ -57,34 +62,68 @@ def render_clip(
     focal_px = float(camera.K[0, 0])
     scene, clip_weather = weather_scene(gaussians, environment, weather, looks, focal_px, seed, route, relief)
     prepared = backend.prepare(scene)
+    field = sensor_field(camera)
     T_world_camera = T_world_rig @ camera.T_rig_camera
+    T_world_rows = _row_poses(camera, T_world_camera, rig_at)
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / frame_rate_hz, axis=0)
     frames: list[dict[str, NDArray[np.generic]]] = []
     for frame, pose in enumerate(T_world_camera):
         view = viewmat(pose)
-        gbuffer = backend.rasterise(prepared, view, camera.K, camera.width, camera.height)
-        sky = environment_view(environment, view, camera.K, camera.width, camera.height)
+        gbuffer = backend.rasterise(prepared, view, field.K, field.width, field.height)
+        sky = environment_view(environment, view, field.K, field.width, field.height)
         shutter = Shutter(
             T_world_camera=pose,
-            K=camera.K,
-            width=camera.width,
-            height=camera.height,
+            K=field.K,
+            width=field.width,
+            height=field.height,
             velocity=velocity[frame],
             time_s=frame / frame_rate_hz,
             exposure_s=camera.exposure_s,
         )
         clear = compose(gbuffer, sky, gaussians.display_encoded)
-        finished = apply_weather(clip_weather, clear, gbuffer, shutter)
+        finished = apply_weather(clip_weather, clear, gbuffer, shutter, particles=camera.plain)
+        of_frame = (clip_weather, finished, gbuffer, shutter)
+        if T_world_rows is None:
+            seen = as_drawn(*of_frame, labelled is not None)
+        else:
+            seen = through_sensor(*of_frame, camera, field, T_world_rows[frame], labelled is not None)
         buffers: dict[str, NDArray[np.generic]] = {
-            "rgb": encode_8bit(photographed(finished.picture, camera.sensor, seed, frame)),
-            "depth": round_depth(gbuffer.depth),
-            "class": gbuffer.class_id,
+            "rgb": encode_8bit(photographed(seen.picture, camera.sensor, seed, frame)),
+            "depth": round_depth(seen.depth),
+            "class": seen.class_id,
         }
-        if labelled is not None:
-            buffers |= frame_labels(clip_weather, finished, gbuffer, shutter, route, labelled)
+        if labelled is not None and seen.points is not None and seen.changes is not None:
+            buffers |= frame_labels(seen.normal, seen.class_id, seen.points, seen.changes, route, labelled)
         frames.append(buffers)
     clip = {name: np.stack([buffers[name] for buffers in frames]) for name in frames[0]}
     if labelled is not None:
-        clip["flow"], occluded = clip_flow(clip["depth"], camera.K, T_world_camera)
+        depth = clip["depth"]
+
+        def flow_from(k: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+            pair = depth[k], depth[k + 1]
+            if T_world_rows is None:
+                return forward_flow(*pair, camera.K, T_world_camera[k], T_world_camera[k + 1])
+            return row_flow(*pair, field.directions, camera, T_world_rows[k][1], T_world_rows[k + 1][1])
+
+        clip["flow"], occluded = clip_flow(depth, flow_from)
         clip["marks"] |= occluded
     return clip
+
+
+def _row_poses(
+    camera: Camera, T_world_camera: NDArray[np.float64], rig_at: RigAt | None
+) -> list[NDArray[np.float64]] | None:
+    """Camera poses [3, H, 4, 4] of each frame at its rows' times; None where one pose says it all."""
+    if camera.plain:
+        return None
+    if not camera.moves:
+        return [np.broadcast_to(pose, (3, camera.height, 4, 4)) for pose in T_world_camera]
+    if rig_at is None:
+        raise InputError(
+            f"camera: {camera.name} moves during a frame; rendering needs rig poses between frames"
+        )
+    times = camera.row_times
+    return [
+        rig_at(k, times.ravel()).reshape(*times.shape, 4, 4) @ camera.T_rig_camera
+        for k in range(len(T_world_camera))
+    ]

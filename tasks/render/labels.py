@@ -1,15 +1,17 @@
 """Ground truth of a frame beyond depth and class: where on the road, where it moves to, and what changed it."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES
+from tasks.render.camera import Camera
 from tasks.render.composition import round_depth
-from tasks.render.gbuffer import GBuffer
+from tasks.render.readout import project_by_rows
 from tasks.render.road_edit import Profile
-from tasks.render.weather.attribution import LAYER_BITS, attribution
-from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
-from tasks.render.weather.particles import Shutter
+from tasks.render.sight import row_points
+from tasks.render.weather.attribution import LAYER_BITS
 from tasks.scene.route import Route
 
 OCCLUDED, HAZARD = 32, 64
@@ -48,7 +50,56 @@ def forward_flow(
     T = np.linalg.inv(next_T_world_camera) @ T_world_camera
     x, y, z = np.moveaxis((rays * depth[..., None]) @ T[:3, :3].T + T[:3, 3], -1, 0)
     z = np.where(z > 0, z, np.nan)
-    there_u, there_v = K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]
+    return landing(depth, next_depth, K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2], z)
+
+
+def row_flow(
+    depth: NDArray[np.float32],
+    next_depth: NDArray[np.float32],
+    directions: NDArray[np.float64],
+    camera: Camera,
+    T_world_rows: NDArray[np.float64],
+    next_T_world_rows: NDArray[np.float64],
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """`forward_flow` of a camera behind a lens or read out row by row, between pixels as they are stored.
+
+    Parameters
+    ----------
+    depth, next_depth : float32 [H, W] z in the camera at the pixel's own time; NaN where nothing is seen [m]
+    directions : float64 [H, W, 2] right and down per forward of the pixels [1]
+    camera : intrinsics and lens
+    T_world_rows, next_T_world_rows : float64 [H, 4, 4] camera poses at the rows' times [m]
+
+    Returns
+    -------
+    As `forward_flow`.
+    """
+    points = row_points(directions, depth, T_world_rows)
+    there = project_by_rows(points, next_T_world_rows, camera)
+    return landing(depth, next_depth, there[..., 0], there[..., 1], there[..., 2])
+
+
+def landing(
+    depth: NDArray[np.float32],
+    next_depth: NDArray[np.float32],
+    there_u: NDArray[np.float64],
+    there_v: NDArray[np.float64],
+    z: NDArray[np.float64],
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Flow and occlusion of points that are known to lie at (there_u, there_v) of the next frame, z deep.
+
+    Parameters
+    ----------
+    depth, next_depth : as `forward_flow` takes them
+    there_u, there_v : [H, W] places in the next frame; NaN where there is none [px]
+    z : [H, W] camera z there [m]
+
+    Returns
+    -------
+    As `forward_flow`.
+    """
+    height, width = depth.shape
+    u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     with np.errstate(invalid="ignore"):
         inside = (there_u >= 0) & (there_u < width) & (there_v >= 0) & (there_v < height)
         column, row = (np.where(inside, np.floor(there), 0).astype(np.int64) for there in (there_u, there_v))
@@ -58,24 +109,23 @@ def forward_flow(
 
 
 def road_coordinates(
-    gbuffer: GBuffer, rays: NDArray[np.float32], eye: NDArray[np.float64], route: Route
+    class_id: NDArray[np.uint8], points: NDArray[np.floating], route: Route
 ) -> NDArray[np.float32]:
     """Station along the route and lateral position of every road pixel.
 
     Parameters
     ----------
-    gbuffer : one view
-    rays : float32 [H, W, 3] world directions of its pixels, camera z 1 [1]
-    eye : [3] camera centre [m]
+    class_id : uint8 [H, W] classes of one view
+    points : [H, W, 3] what its pixels see, world frame; NaN where nothing is seen [m]
     route : the undisturbed route
 
     Returns
     -------
     float32 [H, W, 2] station and lateral, leftward positive; NaN off the road [m]
     """
-    road = np.isin(gbuffer.class_id, ROAD_CLASSES) & np.isfinite(gbuffer.depth)
+    road = np.isin(class_id, ROAD_CLASSES) & np.isfinite(points[..., 2])
     place = np.full((*road.shape, 2), np.nan, np.float32)
-    station, lateral, _ = route.project(eye + gbuffer.depth[road, None] * rays[road])
+    station, lateral, _ = route.project(points[road])
     place[road] = np.stack((station, lateral), axis=-1)
     return place
 
@@ -88,10 +138,10 @@ def hazard_mark(place: NDArray[np.float32], elevation: Profile) -> NDArray[np.ui
 
 
 def frame_labels(
-    weather: ClipWeather,
-    finished: WeatherFrame,
-    gbuffer: GBuffer,
-    shutter: Shutter,
+    normal: NDArray[np.float32],
+    class_id: NDArray[np.uint8],
+    points: NDArray[np.floating],
+    changes: NDArray[np.uint8],
     route: Route,
     elevation: Profile,
 ) -> dict[str, NDArray[np.generic]]:
@@ -99,32 +149,33 @@ def frame_labels(
 
     Parameters
     ----------
-    weather, finished, gbuffer, shutter : as `attribution` takes them
-    route : the undisturbed route
+    normal : float32 [H, W, 3] world normals, zero where nothing is seen [1]
+    class_id, points, route : as `road_coordinates` takes them
+    changes : uint8 [H, W] `LAYER_BITS` of the layers that changed each pixel
     elevation : H_g(s) [m] at stations [m]
 
     Returns
     -------
-    ``normal`` int8 [H, W, 3] world normal in steps of 1/127, zero where nothing is seen; ``road`` float32 [H, W, 2]
-    station and lateral of road pixels, else NaN [m]; ``marks`` uint8 [H, W] `MARK_BITS` without ``occluded``
+    ``normal`` int8 [H, W, 3] world normal in steps of 1/127; ``road`` float32 [H, W, 2] station and lateral of road
+    pixels, else NaN [m]; ``marks`` uint8 [H, W] `MARK_BITS` without ``occluded``
     """
-    place = road_coordinates(gbuffer, pixel_rays(shutter), shutter.T_world_camera[:3, 3], route)
+    place = road_coordinates(class_id, points, route)
     return {
-        "normal": np.rint(gbuffer.normal * NORMAL_STEPS).astype(np.int8),
+        "normal": np.rint(normal * NORMAL_STEPS).astype(np.int8),
         "road": round_depth(place),
-        "marks": attribution(weather, finished, gbuffer, shutter) | hazard_mark(place, elevation),
+        "marks": changes | hazard_mark(place, elevation),
     }
 
 
 def clip_flow(
-    depth: NDArray[np.float32], K: NDArray[np.float64], T_world_camera: NDArray[np.float64]
+    depth: NDArray[np.float32], flow_from: Callable[[int], tuple[NDArray[np.float32], NDArray[np.bool_]]]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     """Flow of every frame to its next, and the mark of what is out of sight there; the last frame has neither.
 
     Parameters
     ----------
     depth : float32 [F, H, W] camera z [m]
-    K, T_world_camera : as `forward_flow` takes them, poses [F, 4, 4]
+    flow_from : frame number to flow and occlusion, as `forward_flow` and `row_flow` return them
 
     Returns
     -------
@@ -133,7 +184,7 @@ def clip_flow(
     flow = np.full((*depth.shape, 2), np.nan, np.float32)
     marks = np.zeros(depth.shape, np.uint8)
     for k in range(len(depth) - 1):
-        moved, occluded = forward_flow(depth[k], depth[k + 1], K, T_world_camera[k], T_world_camera[k + 1])
+        moved, occluded = flow_from(k)
         flow[k] = round_depth(moved)
         marks[k] = np.where(occluded, OCCLUDED, 0)
     return flow, marks

@@ -52,7 +52,9 @@ def test_what_a_nearer_thing_covers_in_the_next_frame_is_occluded():
 def test_the_sky_has_no_flow_and_the_last_frame_none_at_all():
     depth = np.full((3, *SHAPE), 9.0, np.float32)
     depth[:, :10] = np.nan
-    flow, marks = clip_flow(depth, K, np.stack([advanced(0.5 * k) for k in range(3)]))
+    flow, marks = clip_flow(
+        depth, lambda k: forward_flow(depth[k], depth[k + 1], K, advanced(0.5 * k), advanced(0.5 * k + 0.5))
+    )
     assert np.isnan(flow[:2, :10]).all() and np.isfinite(flow[:2, 10:]).all()
     assert np.isnan(flow[2]).all() and not marks[2].any()
     assert not marks[:, :10].any()
@@ -75,10 +77,10 @@ def test_road_pixels_know_their_station_and_side():
     poses = np.tile(np.eye(4), (351, 1, 1))
     poses[:, 0, 3] = station
     route = Route(station=station + 50, T_world_rig=poses)
-    place = road_coordinates(gbuffer, pixel_rays(view), view.T_world_camera[:3, 3], route)
+    points = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
+    place = road_coordinates(gbuffer.class_id, points, route)
     road = gbuffer.class_id == SemanticClass.ROAD
     assert np.isfinite(place[road]).all() and np.isnan(place[~road]).all()
-    points = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
     np.testing.assert_allclose(place[road], points[road][:, :2] + (50, 0), atol=2e-3)
 
 

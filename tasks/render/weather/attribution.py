@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from tasks.conventions import ROAD_CLASSES
 from tasks.render.composition import encode_8bit, to_display
 from tasks.render.gbuffer import GBuffer
-from tasks.render.weather.layer import recompose
+from tasks.render.weather.layer import Layer, recompose
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
 from tasks.render.weather.particles import Shutter
 from tasks.render.weather.snow_field import coverage_rank, tracks_at
@@ -35,10 +35,21 @@ def attribution(
     picture = frame.base
     for layer in frame.layers:
         after = recompose(picture, (layer,))
-        step = np.abs(to_display(after) - to_display(picture)).max(axis=-1)
-        bits |= np.where(step >= 0.5 / 255, LAYER_BITS[layer.name], 0).astype(np.uint8)
+        bits |= changed(picture, after, layer)
         picture = after
     return bits
+
+
+def changed(before: NDArray[np.float32], after: NDArray[np.float32], layer: Layer) -> NDArray[np.uint8]:
+    """The layer's bit where it changed a pixel by at least half an 8-bit step, uint8 [H, W] [1].
+
+    Parameters
+    ----------
+    before, after : float32 [H, W, 3] linear pictures below the layer and with it [1]
+    layer : that changed them
+    """
+    step = np.abs(to_display(after) - to_display(before)).max(axis=-1)
+    return np.where(step >= 0.5 / 255, LAYER_BITS[layer.name], 0).astype(np.uint8)
 
 
 def snow_on_road(weather: ClipWeather, gbuffer: GBuffer, shutter: Shutter) -> NDArray[np.bool_]:

@@ -13,6 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.lens import Lens, distorted, undistorted
 from tasks.render.weather.precipitation import NearField, Population, drawn_reach
 from tasks.render.weather.random_streams import philox, stream_key, unit
 
@@ -32,6 +33,8 @@ drawn (the rest is mean extinction) [1] and the direction from the camera in the
 MOST_PER_CELL = 32
 NEAREST_Z_SHARE = 0.3
 """Particles are cut at this share of the nearest distance along the optical axis."""
+ROW_STEPS, MOST_LONGER = 8, 4.0
+"""Steps by which a particle's row is found, and the most that a row-by-row shutter lengthens a streak [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +49,9 @@ class Shutter:
     velocity : float64 [3] velocity of the camera in the world [m s-1]
     time_s : time of the middle of the exposure [s]
     exposure_s : how long the shutter is open [s]
+    lens : distortion; None for a pinhole
+    line_delay_s : from one row's exposure to the next one's; the pose and time are those of the middle row, about
+        which the camera goes on at its velocity [s]
     """
 
     T_world_camera: NDArray[np.float64]
@@ -55,6 +61,8 @@ class Shutter:
     velocity: NDArray[np.float64]
     time_s: float
     exposure_s: float
+    lens: Lens | None = None
+    line_delay_s: float = 0.0
 
 
 def visible_streaks(
@@ -78,8 +86,8 @@ def visible_streaks(
     p = population.parameters
     K = np.ascontiguousarray(shutter.K, dtype=np.float64)
     R = np.ascontiguousarray(shutter.T_world_camera[:3, :3].T, dtype=np.float64)
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * (shutter.width, shutter.height)
-    rays = np.column_stack(((corners - K[:2, 2]) / K[[0, 1], [0, 1]], np.ones(4)))
+    rays = _corner_rays(shutter, K)
+    coefficients = np.zeros(5) if shutter.lens is None else shutter.lens.coefficients
     planes = _frustum_planes(rays)
     reach = drawn_reach(population, near, K[0, 0])
     key = np.uint64(stream_key(seed, p.kind))
@@ -100,9 +108,23 @@ def visible_streaks(
                 velocity, p.flutter_m, 2 * pi * p.flutter_hz, shutter.time_s,
                 seat, R, planes, K, shutter.velocity, shutter.exposure_s,
                 near.nearest_m, reach[index], near.fade_share * reach[index],
+                coefficients, shutter.line_delay_s, shutter.height,
             )
         )  # fmt: skip
     return np.concatenate(found) if found else np.empty(0, dtype=STREAK)
+
+
+def _corner_rays(shutter: Shutter, K: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners [4, 3] of the view, or of the rectangle around what a lens spreads it to, camera z 1."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    if shutter.lens is not None:
+        around = np.vstack((corners, ((0.5, 0.0), (0.5, 1.0), (0.0, 0.5), (1.0, 0.5))))
+        x, y = ((around * (shutter.width, shutter.height) - K[:2, 2]) / K[[0, 1], [0, 1]]).T
+        edge = np.stack(undistorted(x, y, shutter.lens), axis=-1)
+        low, high = edge.min(axis=0), edge.max(axis=0)
+        return np.column_stack((low + corners * (high - low), np.ones(4)))
+    corners = corners * (shutter.width, shutter.height)
+    return np.column_stack(((corners - K[:2, 2]) / K[[0, 1], [0, 1]], np.ones(4)))
 
 
 def _frustum_planes(rays: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -164,9 +186,40 @@ def _expose(streak, place, motion, exposure, K):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
+def _seen_at(place, motion, time, K, coefficients):  # type: ignore[no-untyped-def]
+    """Where the lens shows a particle at a time from the middle of the frame [px]."""
+    z = max(place[2] + time * motion[2], NEAREST_Z_SHARE * place[2])
+    x, y = (place[0] + time * motion[0]) / z, (place[1] + time * motion[1]) / z
+    x, y = distorted(x, y, coefficients)
+    return K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
+
+
+@numba.njit(cache=True, nogil=True)
+def _expose_by_rows(streak, place, motion, exposure, K, coefficients, line_delay, height):  # type: ignore[no-untyped-def]
+    """`_expose` behind a lens, by a shutter that opens for one row after the other.
+
+    A particle is seen at the time t of the row that it is in, t = line_delay (row(t) - middle). One that falls
+    with the rows stays in them longer, 1 / (1 - line_delay row'), and leaves so much more light.
+    """
+    half = 0.5 * abs(line_delay) * height
+    time = 0.0
+    for _ in range(ROW_STEPS if line_delay != 0 else 0):
+        _, row = _seen_at(place, motion, time, K, coefficients)
+        time = min(max(line_delay * (row - 0.5 * height), -half), half)
+    _, above = _seen_at(place, motion, time - 0.5 * exposure, K, coefficients)
+    _, below = _seen_at(place, motion, time + 0.5 * exposure, K, coefficients)
+    longer = 1 / max(1 - line_delay * (below - above) / exposure, 1 / MOST_LONGER)
+    streak.begin[0], streak.begin[1] = _seen_at(
+        place, motion, time - 0.5 * longer * exposure, K, coefficients
+    )
+    streak.end[0], streak.end[1] = _seen_at(place, motion, time + 0.5 * longer * exposure, K, coefficients)
+    return longer
+
+
+@numba.njit(cache=True, nogil=True)
 def _streaks_of_class(  # type: ignore[no-untyped-def]
     low, high, cell, mean, key, index, sizes, size_scale, velocity, flutter, flutter_rate, time,
-    seat, R, planes, K, camera_velocity, exposure, nearest, reach, fade,
+    seat, R, planes, K, camera_velocity, exposure, nearest, reach, fade, coefficients, line_delay, height,
 ):  # fmt: skip
     """The streaks of one size class: cells ``low`` to ``high``, each with its own counter."""
     streaks = np.empty(256, dtype=STREAK)
@@ -174,6 +227,8 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
     offset, moving, place, motion = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     word32 = np.uint64(0xFFFFFFFF)
     around = 0.87 * cell + flutter + 0.5 * exposure * sqrt((camera_velocity**2).sum())
+    around += 0.5 * abs(line_delay) * height * sqrt(((velocity - camera_velocity) ** 2).sum())
+    by_rows = line_delay != 0 or (coefficients != 0).any()
     for kx in range(low[0], high[0] + 1):
         for ky in range(low[1], high[1] + 1):
             for kz in range(low[2], high[2] + 1):
@@ -218,11 +273,16 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
                         longer[:found] = streaks
                         streaks = longer
                     streak = streaks[found]
-                    _expose(streak, place, motion, exposure, K)
+                    streak.share = min(1.0, (reach - distance) / fade)
+                    if by_rows:
+                        streak.share *= _expose_by_rows(
+                            streak, place, motion, exposure, K, coefficients, line_delay, height
+                        )
+                    else:
+                        _expose(streak, place, motion, exposure, K)
                     for i in range(3):
                         streak.direction[i] = offset[i] / distance
                     streak.z = place[2]
                     streak.diameter = diameter
-                    streak.share = min(1.0, (reach - distance) / fade)
                     found += 1
     return streaks[:found]

@@ -1,0 +1,352 @@
+"""What a sensor's rows see: lens, rolling shutter and motion blur, resampled from one wide pinhole picture.
+
+A frame is drawn once, by a pinhole with a wider field, at the pose of the middle row. Every pixel then looks along
+its own ray (the lens), from the pose at its own row's time (the rolling shutter), a few times during the exposure
+(motion blur), for the nearest surface that the wide picture's depth shows there; the light found is averaged. What
+the wide picture does not show, a strip beside a near edge as wide as the edge moves during the readout, takes the
+surface beside it.
+"""
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.render.camera import Camera, viewmat
+from tasks.render.lens import distorted, pixel_directions
+
+MARGIN = 0.05
+"""Share of the picture's larger side by which the wide picture reaches beyond a moving camera's field [1]."""
+TILE = 16
+"""Side of the tiles over which the nearest and farthest surfaces are noted; no point may move farther [px]."""
+KINK = 0.1
+"""Spread of inverse depth over a pixel's neighbours from which they are two surfaces [1]."""
+ROW_STEPS = 6
+"""Steps by which the row that shows a point is found; each shrinks the error by the share of a row per row's time."""
+ALONE = 1.0
+"""Parallax about a ray up to which it sees one surface during the whole exposure [px]."""
+MOST_SAMPLES = 32
+"""Of the light of one pixel during the exposure; they lie a pixel apart or less up to there [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """A camera's rays and the wide pinhole that covers them.
+
+    Parameters
+    ----------
+    directions : float64 [H, W, 2] right and down per forward of the camera's pixels [1]
+    K : float64 [3, 3] intrinsics of the wide pinhole, of the camera's focal length [px]
+    width, height : its picture size [px]
+    """
+
+    directions: NDArray[np.float64]
+    K: NDArray[np.float64]
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Readout:
+    """What the sensor saw.
+
+    Parameters
+    ----------
+    picture : float32 [H, W, 3] linear light, averaged over the exposure [1]
+    depth : float32 [H, W] z in the camera at the pixel's row time, in the middle of its exposure; NaN where
+        nothing is seen [m]
+    source : int64 [H, W] pixel of the wide picture, counted by rows, seen in the middle of the exposure [1]
+    """
+
+    picture: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    source: NDArray[np.int64]
+
+
+def sensor_field(camera: Camera) -> Field:
+    """The rays of a camera's pixels and the wide pinhole around them; once a clip.
+
+    Raises
+    ------
+    InputError
+        The lens does not spread the whole picture.
+    """
+    directions = pixel_directions(camera.K, camera.width, camera.height, camera.lens)
+    margin = MARGIN * max(camera.width, camera.height) if camera.moves else 0.0
+    f = np.array((camera.K[0, 0], camera.K[1, 1]))
+    low, high = directions.min(axis=(0, 1)) * f - 0.5 - margin, directions.max(axis=(0, 1)) * f + 0.5 + margin
+    # whole pixels are added on each side: a pixel that the lens leaves alone stays the pixel it was
+    K = camera.K.copy()
+    K[:2, 2] += np.ceil(-low - K[:2, 2] - 1e-6)
+    width, height = (int(n) for n in np.ceil(K[:2, 2] + high - 1e-6))
+    return Field(directions=directions, K=K, width=width, height=height)
+
+
+def read_out(
+    picture: NDArray[np.float32],
+    depth: NDArray[np.float32],
+    field: Field,
+    T_wide_rows: NDArray[np.float64],
+    blurs: bool,
+) -> Readout:
+    """The picture and depth of a sensor whose rows are exposed one after the other, behind a lens.
+
+    Parameters
+    ----------
+    picture : float32 [h, w, 3] wide picture, linear light [1]
+    depth : float32 [h, w] its camera z; NaN where nothing is seen [m]
+    field : from `sensor_field`
+    T_wide_rows : float64 [3, H, 4, 4] pose in the wide camera of the camera at the beginning, the middle and the
+        end of each row's exposure [m]
+    blurs : the light is averaged over the exposure, else taken in its middle
+
+    Returns
+    -------
+    Readout
+    """
+    height, width = field.directions.shape[:2]
+    near = np.divide(1, depth, out=np.zeros_like(depth), where=np.isfinite(depth))
+    begin, middle, end = (np.ascontiguousarray(poses[:, :3]) for poses in T_wide_rows)
+    seen = Readout(
+        picture=np.empty((height, width, 3), np.float32),
+        depth=np.empty((height, width), np.float32),
+        source=np.empty((height, width), np.int64),
+    )
+    K = np.array((field.K[0, 0], field.K[1, 1], field.K[0, 2], field.K[1, 2]))
+    _read(
+        picture, near, *_bounds(near), field.directions, K, middle, end - begin, blurs,
+        seen.picture, seen.depth, seen.source,
+    )  # fmt: skip
+    return seen
+
+
+def _bounds(near: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Least and largest inverse depth of each tile and the eight around it [m-1]."""
+    rows, columns = (-(-n // TILE) for n in near.shape)
+    padded = np.pad(
+        near, ((0, rows * TILE - near.shape[0]), (0, columns * TILE - near.shape[1])), mode="edge"
+    )
+    tiles = padded.reshape(rows, TILE, columns, TILE)
+    bounds = []
+    for extreme in (np.min, np.max):
+        around = np.pad(extreme(tiles, axis=(1, 3)), 1, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3))
+        bounds.append(extreme(windows, axis=(2, 3)))
+    return bounds[0], bounds[1]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _inverse_depth(near, u, v):  # type: ignore[no-untyped-def]
+    """Inverse depth at a place of the picture: bilinear, exact on planes; the nearest pixel's at an edge [m-1]."""
+    height, width = near.shape
+    x = min(max(u - 0.5, 0.0), width - 1.001)
+    y = min(max(v - 0.5, 0.0), height - 1.001)
+    c, r = int(x), int(y)
+    a, b, d, e = near[r, c], near[r, c + 1], near[r + 1, c], near[r + 1, c + 1]
+    most = max(max(a, b), max(d, e))
+    tx, ty = x - c, y - r
+    if most - min(min(a, b), min(d, e)) > KINK * most:
+        return np.float64(near[r + int(ty + 0.5), c + int(tx + 0.5)])
+    return (1 - ty) * ((1 - tx) * a + tx * b) + ty * ((1 - tx) * d + tx * e)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _place(K, ray, shift, w):  # type: ignore[no-untyped-def]
+    """Where the wide picture shows the point of inverse depth w on a row's ray [px]."""
+    z = ray[2] + w * shift[2]
+    return K[0] * (ray[0] + w * shift[0]) / z + K[2], K[1] * (ray[1] + w * shift[1]) / z + K[3]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _on_ray(q, ray, shift):  # type: ignore[no-untyped-def]
+    """Inverse depth in the row's camera of the ray's point whose inverse depth in the wide camera is q [m-1]."""
+    return ray[2] * q / max(1 - shift[2] * q, 0.1)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _about(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+    """Inverse depths in the row's camera of a ray's points at the nearest and the farthest depth hereabouts [m-1]."""
+    u, v = _place(K, ray, shift, 0.0)
+    row = min(max(int(v), 0), near.shape[0] - 1) // TILE
+    column = min(max(int(u), 0), near.shape[1] - 1) // TILE
+    return (
+        _on_ray(np.float64(nearest[row, column]), ray, shift),
+        _on_ray(np.float64(farthest[row, column]), ray, shift),
+    )
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _parallax(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+    """How far apart in the wide picture those two points lie [px]."""
+    w, last = _about(near, nearest, farthest, K, ray, shift)
+    u, v = _place(K, ray, shift, w)
+    far_u, far_v = _place(K, ray, shift, last)
+    return max(abs(far_u - u), abs(far_v - v))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _find(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+    """The nearest surface on a ray: its place in the wide picture [px] and inverse depth in the row's camera [m-1]."""
+    w, last = _about(near, nearest, farthest, K, ray, shift)
+    u, v = _place(K, ray, shift, w)
+    far_u, far_v = _place(K, ray, shift, last)
+    way = max(abs(far_u - u), abs(far_v - v))
+    found = w
+    if way > 0.05:
+        # from the nearest that there is about here to the farthest, half a pixel at a time
+        steps = int(2 * way) + 1
+        step = (w - last) / steps
+        beside_u, beside_v, beside = u, v, last
+        hit = False
+        for k in range(steps + 1):
+            here = w - k * step
+            u, v = _place(K, ray, shift, here)
+            found = _on_ray(_inverse_depth(near, u, v), ray, shift)
+            if found >= here - 1e-9:
+                # far in front of the ray's point is another thing, behind which the ray passes
+                if found <= here + 2 * step + KINK * found:
+                    hit = True
+                    break
+            else:
+                beside_u, beside_v, beside = u, v, found
+        if not hit:
+            return beside_u, beside_v, beside
+    else:
+        found = _on_ray(_inverse_depth(near, u, v), ray, shift)
+    for _ in range(2):
+        next_u, next_v = _place(K, ray, shift, found)
+        again = _on_ray(_inverse_depth(near, next_u, next_v), ray, shift)
+        if abs(again - found) > KINK * found:
+            break
+        u, v, found = next_u, next_v, again
+    return u, v, found
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _cubic(t, weights):  # type: ignore[no-untyped-def]
+    """Weights of the four neighbours at t between the middle two (R. G. Keys 1981, DOI 10.1109/TASSP.1981.1163711)."""
+    weights[0] = np.float32(t * (-0.5 + t * (1 - 0.5 * t)))
+    weights[1] = np.float32(1 + t * t * (-2.5 + 1.5 * t))
+    weights[2] = np.float32(t * (0.5 + t * (2 - 1.5 * t)))
+    weights[3] = np.float32(t * t * (-0.5 + 0.5 * t))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _add_light(picture, u, v, across, down, light):  # type: ignore[no-untyped-def]
+    """Add the picture's light at a place, by cubic convolution: linear interpolation would blur half a pixel's way."""
+    height, width = picture.shape[:2]
+    x = min(max(u - 0.5, 1.0), width - 2.001)
+    y = min(max(v - 0.5, 1.0), height - 2.001)
+    c, r = int(x), int(y)
+    _cubic(x - c, across)
+    _cubic(y - r, down)
+    red = green = blue = np.float32(0)
+    for i in range(4):
+        for j in range(4):
+            weight = down[i] * across[j]
+            pixel = picture[r - 1 + i, c - 1 + j]
+            red += weight * pixel[0]
+            green += weight * pixel[1]
+            blue += weight * pixel[2]
+    light[0] += max(red, np.float32(0))
+    light[1] += max(green, np.float32(0))
+    light[2] += max(blue, np.float32(0))
+
+
+def project_by_rows(
+    points: NDArray[np.float64], T_world_rows: NDArray[np.float64], camera: Camera
+) -> NDArray[np.float64]:
+    """Where a camera that is read out row by row shows points of a street that stands still.
+
+    Parameters
+    ----------
+    points : float64 [..., 3] world frame [m]
+    T_world_rows : float64 [H, 4, 4] camera pose at each row's time [m]
+    camera : intrinsics and lens
+
+    Returns
+    -------
+    float64 [..., 3]
+        Right and down [px], and z in the camera at that row's time [m]; NaN behind the camera.
+    """
+    places = np.empty(points.shape)
+    coefficients = np.zeros(5) if camera.lens is None else camera.lens.coefficients
+    views = np.stack([viewmat(pose)[:3] for pose in T_world_rows])
+    _project(points.reshape(-1, 3), views, camera.K, coefficients, places.reshape(-1, 3))
+    return places
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _project(points, views, K, coefficients, places):  # type: ignore[no-untyped-def]
+    rows = len(views)
+    camera = np.empty(3)
+    for k in range(len(points)):
+        u, v = np.nan, 0.5 * rows
+        for _ in range(ROW_STEPS):
+            at = min(max(v - 0.5, 0.0), rows - 1.001)
+            row = int(at)
+            for i in range(3):
+                camera[i] = 0.0
+                for share, view in ((1 - at + row, views[row, i]), (at - row, views[row + 1, i])):
+                    seen = view[3]
+                    for j in range(3):
+                        seen += view[j] * points[k, j]
+                    camera[i] += share * seen
+            if not camera[2] > 0:
+                u, v = np.nan, np.nan
+                break
+            x, y = distorted(camera[0] / camera[2], camera[1] / camera[2], coefficients)
+            u, v = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
+        places[k, 0], places[k, 1] = u, v
+        places[k, 2] = camera[2] if v == v else np.nan
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _look(pose, span, share, direction, ray, shift):  # type: ignore[no-untyped-def]
+    """Ray and shift of a pixel at a share of its exposure; rotation is small enough to go along a line."""
+    for i in range(3):
+        x, y = pose[i, 0] + share * span[i, 0], pose[i, 1] + share * span[i, 1]
+        ray[i] = x * direction[0] + y * direction[1] + pose[i, 2] + share * span[i, 2]
+        shift[i] = pose[i, 3] + share * span[i, 3]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _read(picture, near, farthest, nearest, directions, K, poses, spans, blurs, out, depth, source):  # type: ignore[no-untyped-def]
+    height, width = directions.shape[:2]
+    ray, shift, light = np.empty(3), np.empty(3), np.empty(3, dtype=np.float32)
+    across, down = np.empty(4, dtype=np.float32), np.empty(4, dtype=np.float32)
+    for row in range(height):
+        pose, span = poses[row], spans[row]
+        for column in range(width):
+            direction = directions[row, column]
+            _look(pose, span, 0.0, direction, ray, shift)
+            u, v, w = _find(near, nearest, farthest, K, ray, shift)
+            depth[row, column] = 1 / w if w > 0 else np.nan
+            r = min(max(int(v), 0), near.shape[0] - 1)
+            source[row, column] = r * near.shape[1] + min(max(int(u), 0), near.shape[1] - 1)
+            light[:] = 0
+            if not blurs:
+                _add_light(picture, u, v, across, down, light)
+                for i in range(3):
+                    out[row, column, i] = light[i]
+                continue
+            _look(pose, span, -0.5, direction, ray, shift)
+            first_u, first_v = _place(K, ray, shift, w)
+            parallax = _parallax(near, nearest, farthest, K, ray, shift)
+            _look(pose, span, 0.5, direction, ray, shift)
+            last_u, last_v = _place(K, ray, shift, w)
+            parallax = max(parallax, _parallax(near, nearest, farthest, K, ray, shift))
+            alone = parallax <= ALONE
+            way = max(abs(last_u - first_u), abs(last_v - first_v), 0.0 if alone else parallax)
+            samples = max(min(int(np.ceil(way + 0.9)), MOST_SAMPLES), 1)
+            for k in range(samples):
+                share = (k + 0.5) / samples
+                if samples > 1:
+                    u, v = first_u + share * (last_u - first_u), first_v + share * (last_v - first_v)
+                    if not alone:
+                        _look(pose, span, share - 0.5, direction, ray, shift)
+                        u, v, _ = _find(near, nearest, farthest, K, ray, shift)
+                _add_light(picture, u, v, across, down, light)
+            for i in range(3):
+                out[row, column, i] = light[i] / samples
