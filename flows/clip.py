@@ -36,6 +36,7 @@ from tasks.render.backend import select_backend
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
 from tasks.render.clip import render_clip
 from tasks.render.road_edit import RoadRelief, apply_road_profile
+from tasks.render.road_refinement import refined_road
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene
@@ -260,7 +261,9 @@ def picture(
     gaussians, relief = scene.gaussians, None
     if hazard.height_m != 0:
         relief = relief_of(hazard, scene.route)
-        gaussians, _ = apply_road_profile(gaussians, relief, scene.carriageway_left, scene.carriageway_right)
+        gaussians, _ = apply_road_profile(
+            refined_road(scene.gaussians, relief), relief, scene.carriageway_left, scene.carriageway_right
+        )
     return render_clip(
         gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
         frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
