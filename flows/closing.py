@@ -18,6 +18,7 @@ from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
 from tasks.closure.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.closure.campaign import Campaign
+from tasks.closure.excitation import reached
 from tasks.closure.verdict import attribute
 
 
@@ -54,7 +55,10 @@ def close_loop(
         result["reasons"].append(
             f"the held-out runs of this campaign have been read {earlier} time(s) before: this is no first look"
         )
-    text, missing = grown_vehicle(name, trace.verdict)
+    verdict, runs = trace.verdict, [run.model for run in trace.end.evidence.train]
+    forms = {effect.variable for effect in verdict.effects if effect.effect_class == "form"}
+    ranges = {variable: reached(runs, verdict.theta, verdict.slots, variable) for variable in forms}
+    text, missing = grown_vehicle(name, verdict, ranges)
     result["vehicle_file"] = None
     if text is not None:
         path = folder / f"{Path(name).stem}-grown.yaml"

@@ -109,7 +109,7 @@ def _verdict(result: Mapping[str, Any]) -> str:
         for name in result["runs_left_out"]
     ]
     notes += [
-        f"<li>not yet carried by coupled mode, so not in the grown vehicle: {escape(name)}</li>"
+        f"<li>no part of the vehicle, so not in the grown one: {escape(name)}</li>"
         for name in result["not_carried_by_coupled_mode"]
     ]
     return (

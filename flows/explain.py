@@ -66,7 +66,7 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
     surface = load_surface(layout.inputs / "surface.yaml")
     ride = rollout(
         vehicle, scenario.weather, float(row["surface_friction"]), controls_of(scenario), hazard,
-        mode=mode, duration_s=plan.duration_s,
+        mode=mode, duration_s=plan.duration_s, snow_depth_mm=float(row["snow_depth_mm"]),
     )  # fmt: skip
     response = surface_response(vehicle, scenario.weather, float(row["surface_friction"]))
     steps = [
@@ -83,7 +83,7 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
         "frame": frame,
         "t_s": int(row["t_ns"]) / 1e9,
         "vehicle_mode": mode,
-        "effects": sorted(vehicle.effects),
+        "effects": sorted(vehicle.effects) + [form.name for form in vehicle.forms],
         "asked": _asked(scenario),
         "steps": [asdict(step) | {"agrees": step.agrees} for step in steps],
         "agrees": all(step.agrees for step in steps),

@@ -1,16 +1,21 @@
 """The vehicle with what a verdict adds, as a catalogue entry that names where it comes from."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import yaml
 
 from catalogs.effects import LIBRARY_FILE
 from catalogs.vehicles import vehicle_source
+from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
 from tasks.closure.answer import NamedEffect, Parameter, Verdict
+from tasks.closure.forms import form_in_range
+from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
 
 SCALED = {
     "pressure_gain": ("brake_gain",),
@@ -26,15 +31,19 @@ TABLES = {"friction": "efficiency", "slip_stiffness": "slip_stiffness"}
 """Parameters that are a relative change of a table of every tyre family."""
 
 
-def grown_vehicle(name: str, verdict: Verdict) -> tuple[str | None, list[str]]:
+def grown_vehicle(
+    name: str, verdict: Verdict, reached: Mapping[str, tuple[float, float]]
+) -> tuple[str | None, list[str]]:
     """The text of the grown vehicle's file.
 
-    Sensor faults are no part of the car; what coupled mode does not carry is left out and named.
+    Sensor faults are no part of the car. What else is none, as the grade of the proving ground, is left out and
+    named.
 
     Parameters
     ----------
     name : catalogue name or file of the vehicle that was judged
     verdict : what was found
+    reached : of the variable of each form, the range that the runs reached [unit of the variable]
 
     Returns
     -------
@@ -43,19 +52,26 @@ def grown_vehicle(name: str, verdict: Verdict) -> tuple[str | None, list[str]]:
     source = vehicle_source(name)
     entry: dict[str, Any] = yaml.safe_load(source.read_text(encoding="utf-8"))
     entry.pop("provenance", None)
-    added: list[Parameter] = []
+    bounds: dict[str, dict[str, Any]] = {}
     missing: list[str] = []
     for effect in verdict.effects:
         if effect.effect_class == "sensor":
             continue
-        fits = effect.effect_class != "form" and all(_carried(p.name) for p in effect.parameters)
-        if not fits:
+        if effect.effect_class == "form":
+            form = form_in_range(
+                effect.name, tuple(p.value for p in effect.parameters), *reached[effect.variable]
+            )
+            sources = "; ".join(_source(effect, p, verdict) for p in effect.parameters)
+            entry["forms"] = [*entry.get("forms", ()), _form_entry(form, sources, verdict.campaign)]
+            bounds |= {f"{effect.name}: {p.name}": _limits(p) for p in effect.parameters}
+            continue
+        if not all(_carried(p.name) for p in effect.parameters):
             missing += [f"{effect.name}: {p.name}" for p in effect.parameters]
             continue
         for parameter in effect.parameters:
-            _apply(entry, parameter, _source(effect, parameter, verdict))
-            added.append(parameter)
-    if not added:
+            _apply(entry, parameter, _source(effect, parameter, verdict), again=parameter.name in bounds)
+            bounds[parameter.name] = _limits(parameter)
+    if not bounds:
         return None, missing
     provenance = {
         "mode": "coupled",
@@ -67,7 +83,7 @@ def grown_vehicle(name: str, verdict: Verdict) -> tuple[str | None, list[str]]:
         "split": f"train of {verdict.campaign}",
         "data_sha256": {"campaign": verdict.content_hash, "split": verdict.split_hash},
         "stages": [],
-        "bounds": {p.name: {"unit": p.unit, "lower": p.lower, "upper": p.upper} for p in added},
+        "bounds": bounds,
     }
     title = f"{source.stem} with what the campaign {verdict.campaign} shows it lacks. Frozen: do not edit."
     return frozen_text(entry, provenance, title), missing
@@ -77,6 +93,30 @@ def _carried(name: str) -> bool:
     return name in EFFECT_UNITS or name in SCALED or name in SHIFTED or name in TABLES
 
 
+def _limits(p: Parameter) -> dict[str, Any]:
+    return {"unit": p.unit, "lower": p.lower, "upper": p.upper}
+
+
+def _form_entry(form: Form, source: str, campaign: str) -> dict[str, Any]:
+    unit = VARIABLE_UNITS[form.variable]
+    return {
+        "port": form.port,
+        "variable": form.variable,
+        "shape": form.shape,
+        "coefficients": {
+            "value": list(form.coefficients),
+            "unit": PORT_UNITS[PORTS.index(form.port)],
+            "source": source,
+        },
+        "scale": {"value": form.scale, "unit": unit, "source": "where x of the shape is 1: by the grammar"},
+        "range": {
+            "value": [form.low, form.high],
+            "unit": unit,
+            "source": f"what the runs of {campaign} reached; beyond it the form is held constant",
+        },
+    }
+
+
 def _source(effect: NamedEffect, p: Parameter, verdict: Verdict) -> str:
     return (
         f"close-loop on {verdict.campaign}, verdict {verdict.verdict}: {effect.name}, {p.name} {p.value:.6g} {p.unit},"
@@ -84,7 +124,8 @@ def _source(effect: NamedEffect, p: Parameter, verdict: Verdict) -> str:
     )
 
 
-def _apply(entry: dict[str, Any], p: Parameter, source: str) -> None:
+def _apply(entry: dict[str, Any], p: Parameter, source: str, *, again: bool) -> None:
+    # two effects that share a number, as air drag and headwind do, add up; what the base had is found anew
     if p.name in SCALED or p.name in SHIFTED:
         for key in SCALED.get(p.name, ()) or SHIFTED[p.name]:
             value = entry[key]["value"]
@@ -100,4 +141,5 @@ def _apply(entry: dict[str, Any], p: Parameter, source: str) -> None:
             }
     else:
         effects = entry.setdefault("effects", {})
-        effects[p.name] = {"value": float(p.value), "unit": EFFECT_UNITS[p.name], "source": source}
+        value = p.value + effects[p.name]["value"] if again else p.value
+        effects[p.name] = {"value": float(value), "unit": EFFECT_UNITS[p.name], "source": source}

@@ -176,7 +176,7 @@ def test_the_grown_vehicle_has_the_effect_the_retuned_number_and_where_they_come
         named("retuned_pressure_gain", "retune", parameter("pressure_gain", 0.1)),
         named("retuned_friction_level", "retune", parameter("friction", -0.05)),
     )
-    text, missing = grown_vehicle("paper-reference", verdict)
+    text, missing = grown_vehicle("paper-reference", verdict, {})
     assert text is not None and missing == []
     path = tmp_path / "grown.yaml"
     path.write_text(text)
@@ -194,13 +194,15 @@ def test_the_grown_vehicle_has_the_effect_the_retuned_number_and_where_they_come
 def test_sensor_faults_do_not_change_the_car_and_what_is_not_carried_is_named() -> None:
     sensor = named("sensor_pitch_scale", "sensor", parameter("pitch_scale", 0.05))
     unheard = named("unheard_of", "effect", parameter("no_such_number", 0.05))
-    assert grown_vehicle("paper-reference", verdict_of(sensor)) == (None, [])
-    assert grown_vehicle("paper-reference", verdict_of(unheard)) == (None, ["unheard_of: no_such_number"])
+    assert grown_vehicle("paper-reference", verdict_of(sensor), {}) == (None, [])
+    assert grown_vehicle("paper-reference", verdict_of(unheard), {}) == (None, ["unheard_of: no_such_number"])
 
 
 def test_a_dataset_is_planned_with_the_grown_vehicle_in_coupled_mode(tmp_path: Path) -> None:
     text, _ = grown_vehicle(
-        "paper-reference", verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m^2")))
+        "paper-reference",
+        verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m^2"))),
+        {},
     )
     assert text is not None
     path = tmp_path / "grown.yaml"
