@@ -160,6 +160,7 @@ def drive(
         hazard_of(scenario),
         mode=mode,
         duration_s=duration_s,
+        snow_depth_mm=state.snow_depth_mm,
     )
     facts = {
         "film_depth_mm": state.film_depth_mm,
