@@ -6,23 +6,19 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from catalogs.gates import load_gates
-from catalogs.paper_metrics import paper_values
-from flows.clip import PIXEL_CENTRE, Catalogue, catalogue_of
 from flows.evaluation_page import page
+from flows.evaluation_rows import control_of, figure_row
 from flows.judged_clip import JudgedClip, Row, judge_clip
 from flows.orchestration import stage
 from flows.physics import clip_facts
-from flows.store.frames import read_clip
+from flows.road_edit_rows import road_edit_rows
 from flows.store.layout import Layout, read_json, write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from flows.trajectories import trajectory_files
-from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
-from tasks.eval.road_edit import score_road_edit
 from tasks.eval.severity import severity_agreement
 from tasks.eval.video_motion import (
     WINDOWS,
@@ -40,8 +36,6 @@ NOT_RUN = {
     "temporal_lpips": "not run: checkpoint missing",
     "motion_retention": "not run: a dataset holds no editor's input and output pair",
 }
-LOOK_AHEAD = 40.0
-"""Way before a road feature from which its mask is looked for [m]."""
 
 
 def evaluate(
@@ -66,8 +60,9 @@ def evaluate(
     told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
     clips = [stage(judge_clip)(root, row, told.get(row["clip_id"]), metric=metric) for row in facts]
     rows = [*pose_rows(clips), *weather_rows(clips), *geometry_rows(clips), *severity_rows(clips)]
+    rows += quality_rows(clips)
     rows += stage(road_edit_rows)(root, clips)
-    rows += [_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
+    rows += [figure_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
     result = {"run_id": read_json(Layout(root).manifest)["run_id"], "clips": len(clips), "rows": rows}
     folder = Path(out)
     write_json(folder / "evaluation.json", result)
@@ -85,22 +80,22 @@ def pose_rows(clips: list[JudgedClip]) -> Iterator[Row]:
         failure = _failure(motion)
         label = clip.facts["label"]
         error = None if failure else float(np.rad2deg(rms(motion.pitch - claimed)))
-        yield _row("pitch_rmse", method, label, error, "deg", note=failure,
+        yield figure_row("pitch_rmse", method, label, error, "deg", note=failure,
                    uncertainty=float(np.rad2deg(motion.typical_pitch_std)))  # fmt: skip
         if np.rad2deg(rms(claimed)) >= responds:
             share = None if failure else rms(motion.pitch - claimed) / rms(claimed)
-            yield _row("pitch_relative_error", method, label, share, "1", note=failure)
+            yield figure_row("pitch_relative_error", method, label, share, "1", note=failure)
         if way[-1] > 0:
             drift = None if failure else rms(motion.normalised_path[:, 0] - reference_progress(way))
-            yield _row("normalised_progress_rmse", method, label, drift, "1", note=failure)
+            yield figure_row("normalised_progress_rmse", method, label, drift, "1", note=failure)
         if np.isfinite(motion.progress).all():
-            yield _row("progress_rmse", method, label, rms(motion.progress - way), "m")
+            yield figure_row("progress_rmse", method, label, rms(motion.progress - way), "m")
 
 
 def weather_rows(clips: list[JudgedClip]) -> Iterator[Row]:
     """E_weather and E_path of each clip against the dry one of the same drive, with the perfect pose's floor."""
     for clip, method, motion in _seen(clips):
-        control = _control(clip, clips, weather=True)
+        control = control_of(clip, clips, weather=True)
         if control is None:
             continue
         other, label = control.motions.get(method), clip.facts["label"]
@@ -114,9 +109,9 @@ def weather_rows(clips: list[JudgedClip]) -> Iterator[Row]:
                 forward[0][:, 0], forward[1][:, 0], station, control_station, window
             )  # fmt: skip
             floor = weather_error(station, control_station, station, control_station, window)
-            yield _row("e_weather", method, label, error, "1", note=failure, window=window, floor=floor)
+            yield figure_row("e_weather", method, label, error, "1", note=failure, window=window, floor=floor)
         error = None if failure else path_error(forward[0][:, :2], forward[1][:, :2])
-        yield _row("e_path", method, label, error, "1", note=failure, floor=0.0)
+        yield figure_row("e_path", method, label, error, "1", note=failure, floor=0.0)
 
 
 def geometry_rows(clips: list[JudgedClip]) -> Iterator[Row]:
@@ -138,7 +133,16 @@ def geometry_rows(clips: list[JudgedClip]) -> Iterator[Row]:
                 note = failure
             except InputError as fault:
                 floor, error, note = None, None, str(fault)
-            yield _row(name, method, clip.facts["label"], error, "1", note=note, window=window, floor=floor)
+            yield figure_row(
+                name, method, clip.facts["label"], error, "1", note=note, window=window, floor=floor
+            )
+
+
+def quality_rows(clips: list[JudgedClip]) -> Iterator[Row]:
+    """Quality of each clip's pictures without a reference."""
+    for clip in clips:
+        for name, value in clip.quality.items():
+            yield figure_row(name, "no reference", clip.facts["label"], value, "1", note="lower is better")
 
 
 def severity_rows(clips: list[JudgedClip]) -> Iterator[Row]:
@@ -147,7 +151,7 @@ def severity_rows(clips: list[JudgedClip]) -> Iterator[Row]:
     for control in dry:
         for kind in ("rain", "snow"):
             family = [
-                c for c in clips if c.facts["weather"] == kind and _control(c, [control], weather=True) is control
+                c for c in clips if c.facts["weather"] == kind and control_of(c, [control], weather=True) is control
             ]  # fmt: skip
             levels = [control, *family]
             if len({c.facts["precipitation_mm_h"] for c in levels}) < 3:
@@ -158,70 +162,8 @@ def severity_rows(clips: list[JudgedClip]) -> Iterator[Row]:
                 values = {c.facts["clip_id"]: c.statistics[name] for c in levels}
                 rho, accuracy = severity_agreement(rates, values)
                 note = "stand-in for a learned judge"
-                yield _row("severity_rank_correlation", name, condition, rho, "1", note=note)
-                yield _row("severity_adjacent_accuracy", name, condition, accuracy, "1", note=note)
-
-
-def road_edit_rows(root: Path, clips: list[JudgedClip]) -> list[Row]:
-    """Road-edit metrics of each feature clip that has a flat twin."""
-    rows, frames = [], Layout(root).frames
-    catalogue = catalogue_of(root)
-    for clip in clips:
-        flat = _control(clip, clips, weather=False)
-        if clip.facts["hazard_height_m"] == 0 or flat is None:
-            continue
-        depth, kind = (read_clip(frames, clip.facts["index"], name) for name in ("depth", "class"))
-        targets = prescribed_masks(clip, depth, np.isin(kind, ROAD_CLASSES), catalogue)
-        pictures = [read_clip(frames, c.facts["index"], "rgb") for c in (clip, flat)]
-        score = score_road_edit(list(pictures[0]), list(pictures[1]), list(targets))
-        for name in ("localised_edit_rate", "anchor_error", "temporal_iou"):
-            note = "the target is never seen" if score is None else ""
-            if score is not None:
-                note = f"{score.active_frames} frames, {score.unregistered} not registered"
-            value = None if score is None else getattr(score, name)
-            rows.append(_row(name, "paired-lab", clip.facts["label"], value, "1", note=note))
-    return rows
-
-
-def prescribed_masks(
-    clip: JudgedClip, depth: NDArray[np.float32], road: NDArray[np.bool_], catalogue: Catalogue
-) -> NDArray[np.bool_]:
-    """Road pixels whose place on the route is that of the clip's feature, bool [F, H, W]."""
-    facts, scene, camera = clip.facts, catalogue.scene, catalogue.camera
-    near, far = (facts["hazard_center_m"] + s * facts["hazard_length_m"] / 2 for s in (-1, 1))
-    masks = np.zeros(depth.shape, bool)
-    inverse = np.linalg.inv(camera.K - PIXEL_CENTRE)
-    poses = clip.frames["T_world_rig"].reshape(-1, 4, 4) @ camera.T_rig_camera
-    for k, station in enumerate(clip.frames["station"]):
-        if not far - LOOK_AHEAD < station < far:
-            continue
-        y, x = np.nonzero(road[k] & np.isfinite(depth[k]) & (depth[k] < LOOK_AHEAD))
-        rays = np.stack([x, y, np.ones(len(x))], axis=1) @ inverse.T
-        points = rays * depth[k, y, x, None] @ poses[k, :3, :3].T + poses[k, :3, 3]
-        along, across, _ = scene.route.project(np.asarray(points, np.float64))
-        inside = (along >= near) & (along <= far)
-        inside &= (across <= scene.carriageway_left) & (across >= scene.carriageway_right)
-        masks[k, y[inside], x[inside]] = True
-    return masks
-
-
-def _row(
-    metric: str, method: str, condition: str, value: float | None, unit: str, *, note: str = "",
-    window: int | None = None, floor: float | None = None, uncertainty: float | None = None,
-) -> Row:  # fmt: skip
-    finite = value is not None and np.isfinite(value)
-    return {
-        "metric": metric,
-        "method": method,
-        "condition": condition,
-        "value": value if finite else None,
-        "unit": unit,
-        "paper": paper_values().get(metric),
-        "window": window or 0,
-        "floor": floor,
-        "uncertainty": uncertainty if uncertainty is not None and np.isfinite(uncertainty) else None,
-        "note": note if finite or note else "not a number",
-    }
+                yield figure_row("severity_rank_correlation", name, condition, rho, "1", note=note)
+                yield figure_row("severity_adjacent_accuracy", name, condition, accuracy, "1", note=note)
 
 
 def _seen(clips: list[JudgedClip]) -> Iterator[tuple[JudgedClip, str, RecoveredMotion]]:
@@ -233,27 +175,3 @@ def _seen(clips: list[JudgedClip]) -> Iterator[tuple[JudgedClip, str, RecoveredM
 def _failure(motion: RecoveredMotion) -> str:
     failed = int(motion.failed.sum())
     return f"{failed} of {len(motion.failed)} frames without a pose; {motion.failures[0]}" if failed else ""
-
-
-def _control(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> JudgedClip | None:
-    """The clip that differs in nothing but a dry sky, or in nothing but a flat road."""
-    free = {"weather", "precipitation_mm_h", "snow_accumulation_h"} if weather else {
-        "hazard_center_m", "hazard_length_m", "hazard_height_m"
-    }  # fmt: skip
-    held = SCENARIO - free
-    for other in clips:
-        plain = other.facts["weather"] == "dry" if weather else other.facts["hazard_height_m"] == 0
-        if plain and other is not clip and all(_same(clip.facts[k], other.facts[k]) for k in held):
-            return None if weather and clip.facts["weather"] == "dry" else other
-    return None
-
-
-SCENARIO = frozenset({
-    "weather", "precipitation_mm_h", "snow_accumulation_h", "initial_speed_km_h", "peak_pressure_mpa", "ramp_s",
-    "hold_s", "release_s", "brake_onset_s", "brake_onset_m", "hazard_center_m", "hazard_length_m", "hazard_height_m",
-})  # fmt: skip
-"""Columns of a clip's row that say what was asked for."""
-
-
-def _same(a: Any, b: Any) -> bool:
-    return bool(a == b or (a != a and b != b))

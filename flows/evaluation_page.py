@@ -34,6 +34,10 @@ MEANING = {
     "localised_edit_rate": "Appendix A.6: active frames with a change where the feature is",
     "anchor_error": "Appendix A.6: distance of centroids over the diagonal",
     "temporal_iou": "Appendix A.6: overlap of masks along the optical flow",
+    "twin_ssim": "feature clip against its flat twin off the feature, before contact; 1: nothing else changed",
+    "twin_flip": "the same by FLIP; 0: nothing else changed",
+    "piqe": "share of distortion in the blocks that are looked at, 0 to 100",
+    "temporal_error": "mean square of a frame less its flow-warped successor",
     "severity_rank_correlation": "Spearman of an image statistic with the rate; a stand-in for CLIP",
     "severity_adjacent_accuracy": "neighbouring levels in that order; a stand-in for CLIP",
 }

@@ -16,11 +16,12 @@ from flows.store.layout import Layout
 from flows.trajectories import read_trajectory
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.motion import RecoveredMotion
+from tasks.eval.no_reference import piqe, temporal_error
 from tasks.eval.outside_trajectory import motion_from_trajectory
 from tasks.eval.pose_essential import recover_motion_essential
 from tasks.eval.pose_photometric import recover_motion_photometric
 from tasks.eval.pose_pnp import recover_motion_pnp
-from tasks.eval.severity import image_statistics
+from tasks.eval.severity import image_statistics, sampled_frames
 from tasks.eval.unusable import unusable_pixels
 
 Row = dict[str, Any]
@@ -38,6 +39,7 @@ class JudgedClip:
     motions : recovered motion by method
     statistics : of its pictures
     thumbnails : three of its frames, uint8 [3, h, w, 3] sRGB
+    quality : of its pictures, without a reference
     """
 
     facts: Row
@@ -45,6 +47,7 @@ class JudgedClip:
     motions: dict[str, RecoveredMotion]
     statistics: dict[str, float]
     thumbnails: NDArray[np.uint8]
+    quality: dict[str, float]
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -86,6 +89,7 @@ def judge_clip(
     route = catalogue.scene.route.pose(frames["station"])[:, :3, :3]
     times = np.asarray(frames["t_ns"] * 1e-9, np.float64)
     others = {name: read_trajectory(path) for name, path in (outside or {}).items()}
+    sampled = rgb[sampled_frames(len(rgb))]
     small = rgb[[0, len(rgb) // 3, 2 * len(rgb) // 3]]
     return JudgedClip(
         facts=facts,
@@ -100,5 +104,9 @@ def judge_clip(
             for name, told in others.items()
         },
         statistics=image_statistics(rgb, np.isin(kind, ROAD_CLASSES)),
+        quality={
+            "piqe": float(np.mean([piqe(picture) for picture in sampled])),
+            "temporal_error": temporal_error(rgb),
+        },
         thumbnails=np.stack([cv2.resize(p, (240, 240 * p.shape[0] // p.shape[1])) for p in small]),
     )

@@ -231,8 +231,10 @@ def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
              for seed in seeds]  # fmt: skip
     for index, (label, scenario, (split, calibration), grid_seed) in enumerate(named):
         row = scenario.as_row()
-        # the seed follows the scenario, not its place in the grid, so that a longer grid repeats its clips
-        seed = str(int(sha256_of([f"{grid_seed}/{content_id(row)}".encode()])[:16], 16))
+        # the seed follows the scenario, not its place in the grid, so that a longer grid repeats its clips; and not
+        # the road feature, so that a feature clip and its flat twin share every drop and every patch of snow
+        seen = {name: value for name, value in row.items() if not name.startswith("hazard_")}
+        seed = str(int(sha256_of([f"{grid_seed}/{content_id(seen)}".encode()])[:16], 16))
         yield ClipPlan(
             index=index,
             clip_id=content_id([asked, row, seed]),

@@ -18,6 +18,11 @@ SPECULAR = 0.85
 """Luma from which a road pixel counts as a highlight [1]."""
 
 
+def sampled_frames(count: int) -> NDArray[np.int64]:
+    """Which of a clip's frames are looked at, evenly spread from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, min(SAMPLED_FRAMES, count)).astype(np.int64))
+
+
 def image_statistics(frames: NDArray[np.uint8], road: NDArray[np.bool_]) -> dict[str, float]:
     """Means over the sampled frames of a clip.
 
@@ -31,7 +36,7 @@ def image_statistics(frames: NDArray[np.uint8], road: NDArray[np.bool_]) -> dict
     dark_channel, contrast, road_brightness, road_saturation, specular_share, particle_energy [1]
     """
     rows = []
-    for k in np.unique(np.linspace(0, len(frames) - 1, min(SAMPLED_FRAMES, len(frames))).astype(int)):
+    for k in sampled_frames(len(frames)):
         picture = frames[k].astype(np.float32) / 255
         luma = picture @ np.array([0.299, 0.587, 0.114], np.float32)
         kernel = np.ones((DARK_WINDOW, DARK_WINDOW), np.uint8)

@@ -67,6 +67,7 @@ def clips(dataset: Path) -> list[JudgedClip]:
                 motions=motions,
                 statistics={},
                 thumbnails=np.zeros((3, 1, 1, 3), np.uint8),
+                quality={},
             )
         )
     return made

@@ -57,7 +57,8 @@ def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) 
     rows = json.loads((judged / "evaluation.json").read_text())["rows"]
     names = {row["metric"] for row in rows}
     assert {"pitch_rmse", "e_weather", "e_geometry_hump", "e_path", "localised_edit_rate", "temporal_iou",
-            "anchor_error", "severity_rank_correlation", *NOT_RUN} <= names  # fmt: skip
+            "anchor_error", "severity_rank_correlation", "piqe", "temporal_error", "twin_ssim", "twin_flip",
+            *NOT_RUN} <= names  # fmt: skip
     assert all(row["note"] for row in rows if row["value"] is None)
     assert {row["method"] for row in rows if row["metric"] == "pitch_rmse"} == {
         "photometric",
@@ -76,6 +77,12 @@ def test_a_trajectory_from_outside_is_scored_by_the_same_code(judged: Path) -> N
     exact = [r for r in rows if r["metric"] == "e_geometry_hump"]
     assert exact and all(r["value"] == pytest.approx(r["floor"], abs=1e-3) for r in exact)
     assert all(r["uncertainty"] is None for r in rows)
+
+
+def test_an_edit_changes_nothing_off_the_feature_before_the_car_meets_it(judged: Path) -> None:
+    rows = json.loads((judged / "evaluation.json").read_text())["rows"]
+    alike = [row for row in rows if row["metric"] == "twin_ssim"]
+    assert len(alike) == 3 and all(row["value"] > 0.999 for row in alike)
 
 
 def test_geometry_stands_at_four_windows_beside_its_floor(judged: Path) -> None:
