@@ -79,9 +79,11 @@ def drive_coupled(
         if isinf(onset_station) and time >= onset:
             onset_station = motion.station - motion.speed * (time - onset)
         held = hold_speed and time < onset
+        commanded = brake_pressure(time - onset - dead, profile)
         if n == 0 or chassis.theta[_LAG] <= 0.0:
-            line = brake_pressure(time - onset - dead, profile)
-        next_line = line_after(line, brake_pressure(time + step - onset - dead, profile), step, chassis.theta)
+            line = commanded
+        next_commanded = brake_pressure(time + step - onset - dead, profile)
+        next_line = line_after(line, commanded, next_commanded, step, chassis.theta)
         rate = (next_line - line) / step
         instant = Instant(time, line, rate, deceleration, standing, held)
         ports = ports_at(motion, memory, x, instant, scale_f, scale_r, step, forms, chassis, tyre, road)

@@ -28,7 +28,7 @@ def coupled(drive, vehicle):
 
 def test_with_no_numbers_the_acting_pressure_is_the_commanded_one():
     assert acting_pressure(2.345, 17.0, 300.0, theta()) == 2.345
-    assert line_after(1.0, 2.345, 5e-4, theta()) == 2.345
+    assert line_after(1.0, 2.0, 2.345, 5e-4, theta()) == 2.345
     assert friction_factor(theta(), 30.0, 1.4, 1e5, 1.0) == 1.0
 
 
@@ -38,7 +38,7 @@ def test_each_number_of_the_line_does_what_it_says():
     assert acting_pressure(2.0, 20.0, 0.0, theta(pressure_curve=0.04)) == pytest.approx(2.16)
     pads = theta(pad_speed=0.006, pad_speed_reference=15.0)
     assert acting_pressure(2.0, 20.0, 0.0, pads) == pytest.approx(2.0 * 0.97)
-    assert line_after(0.0, 1.0, 0.1, theta(lag=0.1)) == pytest.approx(1.0 - exp(-1.0))
+    assert line_after(0.0, 1.0, 1.0, 0.1, theta(lag=0.1)) == pytest.approx(1.0 - exp(-1.0))
 
 
 def test_discs_take_the_heat_and_give_it_to_the_air():

@@ -20,19 +20,20 @@ _LAG, _PUSH = INDEX["lag"], INDEX["push_out"]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def line_after(line: float, commanded: float, step: float, theta: NDArray[np.float64]) -> float:
-    """Pressure at the pads one step on: first-order lag behind the command, exact for a constant one [MPa].
+def line_after(line: float, before: float, after: float, step: float, theta: NDArray[np.float64]) -> float:
+    """Pressure at the pads one step on: first-order lag behind the command, exact for a linear one [MPa].
 
     Parameters
     ----------
     line : pressure at the pads now [MPa]
-    commanded : at the end of the step, dead time taken off [MPa]
+    before, after : commanded at both ends of the step, dead time taken off [MPa]
     step : [s]
     theta : effects, in the order of `PARAMETERS`
     """
     if theta[_LAG] <= 0.0:
-        return commanded
-    return line + (1.0 - exp(-step / theta[_LAG])) * (commanded - line)
+        return after
+    behind = (after - before) / step * theta[_LAG]
+    return after - behind + (line - before + behind) * exp(-step / theta[_LAG])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

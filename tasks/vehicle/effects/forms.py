@@ -22,6 +22,9 @@ SHAPES: dict[str, Shape] = {
     "a exp(-4|x|)": lambda u: np.exp(-4.0 * np.abs(u))[:, None],
     "a max(x - 1/3, 0)": lambda u: np.maximum(u - 1.0 / 3.0, 0.0)[:, None],
     "a max(x - 2/3, 0)": lambda u: np.maximum(u - 2.0 / 3.0, 0.0)[:, None],
+    "a exp(-(4x - 1)^2)": lambda u: np.exp(-np.square(4.0 * u - 1.0))[:, None],
+    "a exp(-(4x - 2)^2)": lambda u: np.exp(-np.square(4.0 * u - 2.0))[:, None],
+    "a exp(-(4x - 3)^2)": lambda u: np.exp(-np.square(4.0 * u - 3.0))[:, None],
     "a + b x": lambda u: np.column_stack((np.ones_like(u), u)),
 }
 """The grammar, in x = variable / scale; linear in its one or two coefficients."""
