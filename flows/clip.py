@@ -31,6 +31,7 @@ from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
 from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.undistort import undistorted
 from tasks.eval.unusable import unusable_pixels
 from tasks.render.backend import select_backend
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
@@ -233,8 +234,9 @@ def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDA
 def rig_of(ride: Rollout, frames: Mapping[str, NDArray[Any]], catalogue: Catalogue) -> RigAt:
     """Rig poses about every frame, for a camera that moves while it sees one."""
     vehicle, tick_s = catalogue.vehicle, 1 / TICK_RATE_HZ
+    time_s = np.arange(len(ride.columns["station"]), dtype=np.float64) * tick_s
     return continuous_rig(
-        catalogue.scene.route, np.arange(len(ride.columns["station"])) * tick_s,
+        catalogue.scene.route, time_s,
         ride.columns["station"], ride.columns["heave"], ride.columns["pitch"], frames["tick"] * tick_s,
         cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
     )  # fmt: skip
@@ -281,12 +283,16 @@ def judge(
     catalogue: Catalogue,
 ) -> dict[str, Any]:
     """Motion recovered from the finished frames, held against the telemetry."""
+    K = catalogue.camera.K - PIXEL_CENTRE
+    seen = undistorted(
+        {name: buffers[name] for name in ("rgb", "depth", "class")}, K, catalogue.camera.distortion
+    )
     recovered = recover_motion_pnp(
-        buffers["rgb"],
-        buffers["depth"],
-        catalogue.camera.K - PIXEL_CENTRE,
+        seen["rgb"],
+        seen["depth"],
+        K,
         catalogue.camera.T_rig_camera,
-        unusable=unusable_pixels(buffers["class"], film_depth_mm),
+        unusable=unusable_pixels(seen["class"], film_depth_mm),
         route_rotations=catalogue.scene.route.pose(frames["station"])[:, :3, :3],
     )
     verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)

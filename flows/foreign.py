@@ -17,6 +17,7 @@ from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
 from tasks.eval.motion_agreement import PoseThresholds
 from tasks.eval.outside_trajectory import motion_from_trajectory
 from tasks.eval.pose_essential import recover_motion_essential
+from tasks.eval.undistort import COEFFICIENTS, undistorted
 
 LIMITS = PoseThresholds(
     pitch_rmse_deg=float("inf"),
@@ -47,7 +48,8 @@ def judge(
     ----------
     video : any file that FFmpeg reads, or a trajectory in the TUM format (.txt, .tum)
     claim : Parquet with pitch [rad] and station [m] (or speed [m/s]) over t_ns or time [s]
-    camera : YAML with focal_length, width and height, or with fx, fy, cx, cy, width and height [px]
+    camera : YAML with focal_length, width and height, or with fx, fy, cx, cy, width and height [px]; where it has
+        k1, k2, p1, p2 or k3 [1], lens distortion as OpenCV writes it, the frames are undistorted first
     out : folder for judgement.json
     metric : whether a trajectory's lengths are metres
 
@@ -67,14 +69,15 @@ def judge(
             problems += error.problems
     if problems:
         raise InputError(problems)
-    seen, told, (K, width, height, mount) = parts
+    seen, told, (K, width, height, mount, distortion) = parts
     size: dict[str, int | None] = {"width": None, "height": None}
     if see is read_video:
         frames, times = seen
         size = {"width": int(frames.shape[2]), "height": int(frames.shape[1])}
         K = resized_intrinsics(K, width, height, frames.shape[2], frames.shape[1])
         at = claim_at(told, times)
-        recovered = recover_motion_essential(frames[at.rows], K, mount)
+        used = undistorted({"rgb": frames[at.rows]}, K, distortion)["rgb"]
+        recovered = recover_motion_essential(used, K, mount)
     else:
         stamps, poses = seen
         times = stamps - stamps[0]
@@ -87,6 +90,7 @@ def judge(
         "judged_frames": len(at.rows),
         "frame_rate_hz": float((len(times) - 1) / (times[-1] - times[0])),
         **size,
+        "undistorted": see is read_video and distortion is not None,
         "method": recovered.method,
         **verdict,
         "not_run": [f"{name}: needs depth" for name in NEEDS_DEPTH] if see is read_video else [],
@@ -183,8 +187,10 @@ def read_claim(path: Path) -> VideoClaim:
     return told
 
 
-def read_intrinsics(path: Path) -> tuple[NDArray[np.float64], int, int, NDArray[np.float64]]:
-    """Intrinsics with pixel centres at whole numbers, the size they hold for, and the mount.
+def read_intrinsics(
+    path: Path,
+) -> tuple[NDArray[np.float64], int, int, NDArray[np.float64], NDArray[np.float64] | None]:
+    """Intrinsics with pixel centres at whole numbers, the size they hold for, the mount, and any lens distortion.
 
     Raises
     ------
@@ -211,6 +217,12 @@ def read_intrinsics(path: Path) -> tuple[NDArray[np.float64], int, int, NDArray[
         for key in ("width", "height", "fx", "fy", "cx", "cy")
         if not isinstance(numbers.get(key), (int, float)) or not numbers[key] > 0
     ]
+    bends = {key: numbers.get(key) or 0.0 for key in COEFFICIENTS}
+    wrong += [
+        f"{path}: the camera's {key} must be a finite number; it is {value}."
+        for key, value in bends.items()
+        if not isinstance(value, (int, float)) or not np.isfinite(value)
+    ]
     if wrong:
         raise InputError(wrong)
     K = np.array(
@@ -219,7 +231,8 @@ def read_intrinsics(path: Path) -> tuple[NDArray[np.float64], int, int, NDArray[
     mount = LEVEL.copy()
     mount[:3, 3] = [-float(numbers.get("behind_front_axle") or 0), float(numbers.get("left_of_centre") or 0),
                     float(numbers.get("height_above_road") or 0)]  # fmt: skip
-    return K, int(numbers["width"]), int(numbers["height"]), mount
+    distortion = np.array(list(bends.values()), np.float64) if any(bends.values()) else None
+    return K, int(numbers["width"]), int(numbers["height"]), mount, distortion
 
 
 def resized_intrinsics(

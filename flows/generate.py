@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from catalogs.grids import Grid
 from flows.clip import make_clip
 from flows.failures import ClipsFailed, disk_full_sentence
 from flows.orchestration import stage
@@ -38,7 +39,7 @@ class RunReport:
 
 
 def generate(
-    grid: str,
+    grid: str | Grid,
     out: str,
     *,
     runner: RunnerName = "dask",
@@ -84,7 +85,7 @@ def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, flo
 
 
 def prepare(
-    grid: str, layout: Layout, backend: str, vehicle: str | None = None, pictures: bool = True
+    grid: str | Grid, layout: Layout, backend: str, vehicle: str | None = None, pictures: bool = True
 ) -> Plan:
     """Check and freeze the plan, and lay out the folder; resumes a folder that holds the same plan."""
     from tasks.render.backend import select_backend
@@ -116,6 +117,7 @@ def create_frame_arrays(layout: Layout, plan: Plan) -> None:
     if not plan.settings.pictures:
         return
     from catalogs.cameras import load_camera
+    from tasks.render.lens import Lens
 
     camera = load_camera(layout.inputs / "camera.yaml")
     attributes = {
@@ -125,6 +127,15 @@ def create_frame_arrays(layout: Layout, plan: Plan) -> None:
         "frame_rate_hz": plan.settings.frame_rate_hz,
         "axes": "rig: x forward, y left, z up (ISO 8855); camera: x right, y down, z forward",
     }
+    if not camera.plain:
+        attributes |= {
+            "distortion": {
+                name: getattr(camera.lens or Lens(), name) for name in ("k1", "k2", "p1", "p2", "k3")
+            },
+            "line_delay_s": camera.line_delay_s,
+            "motion_blur_s": camera.exposure_s if camera.motion_blur else 0.0,
+            "frame_time": "of the middle of the picture, in the middle of its exposure; rows are read downwards",
+        }
     clips, frames = len(plan.clips), plan.settings.frames
     create_arrays(layout.frames, clips, frames, camera.height, camera.width, plan.settings.labels, attributes)
 

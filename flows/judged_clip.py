@@ -22,7 +22,9 @@ from tasks.eval.pose_essential import recover_motion_essential
 from tasks.eval.pose_photometric import recover_motion_photometric
 from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.eval.severity import image_statistics, sampled_frames
+from tasks.eval.undistort import undistorted
 from tasks.eval.unusable import unusable_pixels
+from tasks.render.camera import Camera
 
 Row = dict[str, Any]
 METHODS = ("photometric", "pnp", "essential")
@@ -63,6 +65,14 @@ class JudgedClip:
         return float(np.interp(edge, self.frames["station"], self.times))
 
 
+def seen_by_pinhole(
+    layout: Layout, index: int, *, camera: Camera, names: tuple[str, ...]
+) -> list[NDArray[Any]]:
+    """Arrays of a clip as its judges see them: with the lens's distortion, of which they are told, taken out."""
+    buffers = {name: read_clip(layout.frames, index, name) for name in names}
+    return list(undistorted(buffers, camera.K - PIXEL_CENTRE, camera.distortion).values())
+
+
 def judge_clip(
     root: Path, facts: Row, outside: Mapping[str, Path] | None = None, *, metric: bool = False
 ) -> JudgedClip:
@@ -82,7 +92,9 @@ def judge_clip(
     """
     cv2.setNumThreads(1)
     catalogue, layout = catalogue_of(root), Layout(root)
-    rgb, depth, kind = (read_clip(layout.frames, facts["index"], name) for name in ("rgb", "depth", "class"))
+    rgb, depth, kind = seen_by_pinhole(
+        layout, facts["index"], camera=catalogue.camera, names=("rgb", "depth", "class")
+    )
     frames = clip_columns(root, "frames", facts)
     K, mount = catalogue.camera.K - PIXEL_CENTRE, catalogue.camera.T_rig_camera
     hidden = unusable_pixels(kind, facts["film_depth_mm"])

@@ -54,6 +54,11 @@ class Camera:
         return self.line_delay_s != 0 or self.motion_blur
 
     @property
+    def distortion(self) -> NDArray[np.float64] | None:
+        """k1, k2, p1, p2, k3 as OpenCV takes them, float64 [5] [1]; None for a pinhole."""
+        return None if self.lens is None else self.lens.coefficients
+
+    @property
     def row_times(self) -> NDArray[np.float64]:
         """Beginning, middle and end of each row's exposure from the frame's time, float64 [3, height] [s]."""
         middle = (np.arange(self.height) + 0.5 - self.height / 2) * self.line_delay_s
