@@ -9,11 +9,13 @@ import numpy as np
 from catalogs.gates import load_gates
 from catalogs.studies.ablation import VARIANTS, Variant, cut
 from flows.clip import TICK_RATE_HZ, Catalogue, catalogue_of, drive
+from flows.controls_figure import roc_figure
+from flows.drawing import as_svg
 from flows.judged_clip import METHODS, JudgedClip, judge_clip
 from flows.orchestration import stage
 from flows.physics import clip_facts
 from flows.plan import Plan, read_plan
-from flows.store.layout import write_json
+from flows.store.layout import write_atomically, write_json
 from tasks.errors import InputError
 from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
 
@@ -36,7 +38,7 @@ def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     Parameters
     ----------
     dataset : a finished dataset folder
-    out : folder for controls.json
+    out : folder for controls.json and controls.svg
 
     Raises
     ------
@@ -65,6 +67,7 @@ def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     }
     if out is not None:
         write_json(Path(out) / "controls.json", result)
+        write_atomically(Path(out) / "controls.svg", as_svg(roc_figure(rows, CONTROLS)).encode())
     return result
 
 

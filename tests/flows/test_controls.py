@@ -9,6 +9,8 @@ import pytest
 from catalogs.scenes import write_scene
 from flows.clip import catalogue_of
 from flows.controls import CONTROLS, controls, score_controls
+from flows.controls_figure import roc_figure
+from flows.drawing import as_svg
 from flows.generate import generate
 from flows.judged_clip import METHODS, JudgedClip
 from flows.physics import clip_columns, clip_facts
@@ -81,6 +83,16 @@ def test_a_good_pose_check_sees_all_seven_and_the_blind_are_named(
     assert seen == set(CONTROLS)
     blind = {(row["control"], row["metric"]) for row in rows if row["verdict"] == "blind"}
     assert ("sign-flip", "normalised_progress_rmse") in blind and ("amplitude-0.8", "progress_rmse") in blind
+
+
+def test_each_fault_has_a_panel_with_the_curves_of_its_metrics(
+    dataset: Path, clips: list[JudgedClip]
+) -> None:
+    rows = list(score_controls(clips, read_plan(dataset), catalogue_of(dataset)))
+    drawing = as_svg(roc_figure(rows, CONTROLS))
+    tried = {row["control"] for row in rows}
+    assert all(name in drawing for name in tried)
+    assert as_svg(roc_figure(rows, CONTROLS)) == drawing
 
 
 def test_a_clip_whose_track_was_lost_is_not_scored(dataset: Path, clips: list[JudgedClip]) -> None:
