@@ -19,7 +19,7 @@ from manifests.canonical import content_id, sha256_of
 from manifests.provenance import code_version, library_versions
 from tasks.errors import InputError
 
-PLAN_FORMAT = "musync-plan/1"
+PLAN_FORMAT = "musync-plan/2"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,7 +172,8 @@ def read_plan(root: Path) -> Plan:
     content = read_json(Layout(root).plan)
     if content.get("format") != PLAN_FORMAT:
         raise InputError(
-            f"{Layout(root).plan}: the plan must be of format {PLAN_FORMAT}; it is {content.get('format')!r}"
+            f"{Layout(root).plan}: the plan must be of format {PLAN_FORMAT}; it is {content.get('format')!r}:"
+            " read the dataset with the version that made it, or make it again"
         )
     return Plan(
         run_id=content["run_id"],
