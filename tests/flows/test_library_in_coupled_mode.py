@@ -15,9 +15,7 @@ from catalogs.effects import load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.grown_vehicle import grown_vehicle
-from tasks.closure.answer import NamedEffect, Parameter, Verdict
 from tasks.closure.campaign import Run
-from tasks.closure.disturbance import Disturbance
 from tasks.closure.excitation import reached
 from tasks.closure.forms import PORT_STEP, RANGE, form_in_range
 from tasks.closure.forward import roll, run_model
@@ -25,10 +23,11 @@ from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand, brake_pressure
-from tasks.vehicle.effects.forms import Form, form_name
+from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.library import parameter_vector
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.rollout import Controls, rollout
+from tests.flows.findings import found_effect, found_form, grown_file, verdict_of
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 TIME = np.arange(300) * 0.01
@@ -100,34 +99,6 @@ def changes(plain, manoeuvre, car, theta, slots=()):
     return tuple(np.sqrt(np.mean(np.square(change), axis=0)) for change in (there, here - there))
 
 
-def verdict_of(*effects: NamedEffect, slots=()) -> Verdict:
-    return Verdict(
-        verdict="FOUND", effects=effects, rivals=(), tried=(), error={}, manoeuvre_error={}, correlation={},
-        session_pulls={}, noise={}, disturbance=Disturbance(), detectable={}, campaign="toy", content_hash="c" * 64,
-        split_hash="d" * 64, theta=PLAIN, slots=slots, experiment=None, torn=(), reasons=(),
-    )  # fmt: skip
-
-
-def named(effect, values) -> NamedEffect:
-    return NamedEffect(
-        name=effect.name, effect_class=effect.effect_class, port=effect.port, variable=effect.variable,
-        parameters=tuple(
-            Parameter(name=p.name, value=values[p.name], ci_low=0.0, ci_high=1.0, lower=p.lower, upper=p.upper,
-                      unit=p.unit)
-            for p in effect.parameters
-        ),
-        score=50.0, gain=60.0, inflation=1.0, held_out_gain=9.0, win_share=1.0,
-    )  # fmt: skip
-
-
-def grown(folder: Path, *effects: NamedEffect, reached=()):
-    text, missing = grown_vehicle("paper-reference", verdict_of(*effects), dict(reached))
-    assert text is not None and missing == []
-    path = folder / "grown.yaml"
-    path.write_text(text)
-    return path
-
-
 def sizes(effect):
     """Where there is no size of a truth, three steps of the first parameter, and the second where it starts."""
     values = {p.name: p.start for p in effect.parameters}
@@ -145,7 +116,7 @@ def test_every_effect_of_the_library_does_in_coupled_mode_what_it_does_to_the_cl
     effect, plain, tmp_path
 ):
     values = sizes(effect)
-    car = load_vehicle(grown(tmp_path, named(effect, values)))
+    car = load_vehicle(grown_file(tmp_path / "grown.yaml", found_effect(effect, values), reached={}))
     seen = []
     for manoeuvre in MANOEUVRES:
         size, miss = changes(plain, manoeuvre, car, parameter_vector(values))
@@ -160,7 +131,7 @@ def test_every_effect_of_the_library_does_in_coupled_mode_what_it_does_to_the_cl
 
 def test_a_grade_belongs_to_the_road():
     (grade,) = (e for e in LIBRARY if e.name in OF_THE_ROAD)
-    found = verdict_of(named(grade, {"slope": 0.01}))
+    found = verdict_of(found_effect(grade, {"slope": 0.01}))
     assert grown_vehicle("paper-reference", found, {}) == (None, ["retuned_grade: slope"])
 
 
@@ -181,23 +152,15 @@ def test_a_form_at_any_port_over_any_variable_does_what_it_does_to_the_closures_
 
 
 def test_a_form_that_was_found_is_in_the_vehicle_with_its_range_and_where_it_comes_from(plain, tmp_path):
-    name = form_name("brake_torque", "pressure", "a + b x", 3.6)
-    parameters = tuple(
-        Parameter(name=n, value=v, ci_low=0.9 * v, ci_high=1.1 * v, lower=-2.0, upper=2.0, unit="1")
-        for n, v in (("a", 0.05), ("b", 0.2))
-    )
-    found = NamedEffect(
-        name=name, effect_class="form", port="brake_torque", variable="pressure", parameters=parameters, score=50.0,
-        gain=60.0, inflation=1.0, held_out_gain=9.0, win_share=1.0,
-    )  # fmt: skip
+    found = found_form("brake_torque", "pressure", "a + b x", 3.6, 0.05, 0.2)
     _, _, model = drive("dry", VEHICLE, PLAIN)
     low, high = reached([model], PLAIN, (), "pressure")
     assert low == 0.0 and high == pytest.approx(1.6)
-    path = grown(tmp_path, found, reached={"pressure": (low, high)})
+    path = grown_file(tmp_path / "grown.yaml", found, reached={"pressure": (low, high)})
     (form,) = load_vehicle(path).forms
-    assert form == form_in_range(name, (0.05, 0.2), low, high) and form.name == name
+    assert form == form_in_range(found.name, (0.05, 0.2), low, high) and form.name == found.name
     provenance = vehicle_provenance(path)
-    assert provenance is not None and f"{name}: b" in provenance.bounds
+    assert provenance is not None and f"{found.name}: b" in provenance.bounds
     assert "95 % interval 0.18 to 0.22" in " ".join(path.read_text().split())
     size, miss = changes(plain, "dry", load_vehicle(path), PLAIN, (form.slot,))
     assert size[0] > 0.1 and miss[0] < 0.01 * size[0]
