@@ -20,6 +20,8 @@ BOOTSTRAP = 400
 ALIKE_REFINED = 4
 DECIDED = 0.1
 """Share of the best gain so far below which the linear screen is taken at its word and nothing is refined."""
+LARGE_GAIN = 300.0
+"""Gain from which derivatives taken without an effect no longer hold with it."""
 REACHED = 0.8
 """Share of the linear gain that a refined one reaches where the start did not matter."""
 
@@ -76,27 +78,30 @@ def judge(
     if hypothesis.names[0] in SESSION:
         # the session already carries the same number under a prior: hand it over to the free parameter
         hypothesis = replace(hypothesis, start=base.session[[SESSION.index(hypothesis.names[0])]])
-    # Starts: the linear estimate with the accepted fit's disturbances; the same with fresh ones, which have
-    # not yet absorbed what is sought; close to the accepted fit, which the hypothesis extends.
-    fitted = None
-    for share, offsets in ((1.0, base.offsets), (1.0, None), (0.1, base.offsets)):
-        trial = fit(
-            evidence.train,
-            (*base.parts, hypothesis),
-            evidence.session_sigma,
-            values=np.concatenate((base.values, np.where(first, share * hypothesis.start, hypothesis.start))),
-            session=base.session,
-            offsets=offsets,
-            # parameters that can be traded for each other are found along a valley, in more steps
-            iterations=4 * len(hypothesis.names),
+    # Starts: where the accepted fit is, which the hypothesis extends; and the linear estimate with fresh offsets,
+    # which have not yet absorbed what is sought.
+    free = hypothesis.names[0] in SESSION
+    none = hypothesis.start * (~first if hypothesis.effect_class != "form" and not free else free)
+    starts = ((none, base.offsets), (hypothesis.start, None))
+    trials: list[Fit] = []
+    for begin, offsets in starts:
+        trials.append(
+            fit(
+                evidence.train,
+                (*base.parts, hypothesis),
+                evidence.session_sigma,
+                values=np.concatenate((base.values, begin)),
+                session=base.session,
+                offsets=offsets,
+                # parameters that can be traded for each other are found along a valley, in more steps
+                iterations=4 + 4 * len(hypothesis.names),
+            )
         )
-        if fitted is None or trial.objective < fitted.objective:
-            fitted = trial
-        gain = 0.5 * (base.objective - fitted.objective)
-        worthwhile = (ACCEPT_SCORE < gain < REACHED * foreseen) or hypothesis.names[0] in SESSION
-        if fitted.objective < base.objective and not (offsets is base.offsets and worthwhile):
+        gain = 0.5 * (base.objective - trials[-1].objective)
+        # a large one is only ranked here: derivatives are taken anew at it
+        if gain > min(REACHED * foreseen, LARGE_GAIN) or max(gain, foreseen) < 0.3 * ACCEPT_SCORE:
             break
-    assert fitted is not None
+    fitted = min(trials, key=lambda trial: trial.objective)
     return assess(evidence, base, base_held_out, hypothesis, fitted)
 
 

@@ -125,10 +125,12 @@ def fit_disturbance(
     tolerances: Tolerances,
     effects: tuple[Effect, ...],
     start: Disturbance,
+    splines: tuple[NDArray[np.float64], ...],
+    ridge: NDArray[np.float64],
 ) -> Disturbance:
-    """Scales and times by marginal likelihood, every library direction and the session free.
+    """Scales and times by marginal likelihood, every library direction, every spline and the session free.
 
-    With the directions fixed at 0 an effect would inflate the disturbance that then hides it.
+    With the directions fixed at 0 an effect or a form would inflate the disturbance that then hides it.
 
     Parameters
     ----------
@@ -137,12 +139,14 @@ def fit_disturbance(
     tolerances : session priors
     effects : the library, whose steps set broad priors
     start : first guess
+    splines : derivatives of each run by the knots of the splines, float64 [M, K]
+    ridge : float64 [K] precision of their priors
     """
     broad = [(30.0 * e.parameters[0].step) ** -2 for e in effects]
-    prior = np.concatenate((1.0 / np.square(FREED * np.array(tolerances.session)), broad))
+    prior = np.concatenate((1.0 / np.square(FREED * np.array(tolerances.session)), broad, ridge))
     blocks = []
-    for run, r in zip(evidence, residuals, strict=True):
-        b = np.column_stack((r, run.session, run.library))
+    for run, r, columns in zip(evidence, residuals, splines, strict=True):
+        b = np.column_stack((r, run.session, run.library, columns))
         blocks.append((b.T @ b, run.nuisance.T @ b))
 
     def cost(trial: Disturbance) -> float:

@@ -14,7 +14,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from tasks.closure.campaign import CHANNELS, SESSION, Tolerances
 from tasks.closure.disturbance import DISTURBED, KNOT_SPACING, N_OFFSETS, Disturbance, prior_precision
-from tasks.closure.forward import COARSE_SUBSTEPS, SUBSTEPS, RunModel, instruments, roll
+from tasks.closure.forward import COARSE_SUBSTEPS, SUBSTEPS, RunModel, instruments, roll, starting_speed
 from tasks.closure.noise import whiten
 from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
 from tasks.vehicle.effects.slots import Slot
@@ -86,7 +86,9 @@ class RunEvidence:
                 ),
             )
             at += count
-        out, _ = roll(self.model, moved, slots=slots, initial_speed=self.model.initial_speed + offsets[0])
+        out, _ = roll(
+            self.model, moved, slots=slots, initial_speed=starting_speed(self.model, theta) + offsets[0]
+        )
         if not np.isfinite(out).all():
             return np.full(len(self.nuisance), BROKEN)
         y = instruments(self.model, moved, out)
@@ -140,7 +142,7 @@ def run_evidence(
         return (instruments(model, theta, moved) - y) / step
 
     columns = [
-        slope(base, 0.02, initial_speed=model.initial_speed + 0.02),
+        slope(base, 0.02, initial_speed=starting_speed(model, base) + 0.02),
         slope(_moved(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
     ]
     for name in ("longitudinal_acceleration", "pitch"):

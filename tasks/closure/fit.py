@@ -18,8 +18,11 @@ SLACK = 1.0
 """Rise of a run's misfit that is taken for rounding when its point of linearisation moves."""
 SETTLED = 0.05
 """Change of a run's misfit by a full move of its point of linearisation below which it is moved no further."""
-STRAYED = 0.2
-"""Relative change of a parameter, or miss of the foreseen fall, from which derivatives are taken anew."""
+MISSED = 0.3
+"""Relative miss of the foreseen fall of the misfit from which derivatives are taken anew."""
+
+TRIALS = ((1.0, True), (0.4, True), (1.0, False), (0.4, False), (0.16, False), (0.064, False))
+"""Shares of a step that are tried, and whether the runs' own offsets move along."""
 
 Slopes = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Derivatives by parameters and session, float64 [M, K + 7], and what the nuisances can take from them."""
@@ -120,16 +123,19 @@ def fit(
     objective = _objective(places, prior, s)
     slopes: list[Slopes] = []
     normal = np.eye(k + len(s))
-    differentiated, fell, foreseen = x, np.inf, np.inf
+    blind, fell, foreseen = False, np.inf, np.inf
     for _ in range(iterations):
-        strayed = np.abs(x - differentiated) > STRAYED * np.maximum(np.abs(x), 0.3 * steps)
-        if not slopes or np.any(strayed) or (k and abs(fell - foreseen) > STRAYED * foreseen + 1.0):
-            span = np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps
-            slopes = _slopes(evidence, parts, x, s, places, span)
-            differentiated = x
+        if (
+            not slopes
+            or (k and np.isfinite(fell) and abs(fell - foreseen) > MISSED * foreseen + 1.0)
+            or blind
+        ):
+            slopes = _slopes(evidence, parts, x, s, np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps)
             normal = np.diag(np.concatenate((np.zeros(k), prior)))
             for columns, q in slopes:
                 normal += columns.T @ columns - q.T @ q
+            # a threshold of what is still 0 shows only once that has moved
+            blind = bool(np.any(np.diag(normal)[:k] == 0.0))
         right = np.concatenate((np.zeros(k), -prior * s))
         for place, (columns, q) in zip(places, slopes, strict=True):
             right += columns.T @ place.residual - q.T @ place.projected
@@ -139,23 +145,24 @@ def fit(
             break
         before = objective
         # parameters and each run's own offsets move together; where that does not help, one after the other
-        x_try, s_try = np.clip(x + move[:k], lower, upper), s + move[k:]
         ahead = tuple(
             run.offsets(place.projected - q @ move)
             for run, place, (_, q) in zip(evidence, places, slopes, strict=True)
         )
-        trial = _places(evidence, parts, x_try, s_try, ahead)
-        if _objective(trial, prior, s_try) >= objective:
-            own = tuple(place.offsets for place in places)
-            for share in (1.0, 0.4, 0.16, 0.064):
-                x_try, s_try = np.clip(x + share * move[:k], lower, upper), s + share * move[k:]
-                trial = _places(evidence, parts, x_try, s_try, own)
-                if _objective(trial, prior, s_try) < objective or foreseen < 0.5:
-                    break
-            if _objective(trial, prior, s_try) >= objective:
+        for share, together in TRIALS:
+            x_try, s_try = np.clip(x + share * move[:k], lower, upper), s + share * move[k:]
+            own = tuple(
+                place.offsets + share * together * (d - place.offsets)
+                for place, d in zip(places, ahead, strict=True)
+            )
+            trial = _places(evidence, parts, x_try, s_try, own)
+            better = _objective(trial, prior, s_try) < objective
+            if better or foreseen < 0.1:
                 break
-            trial = _relinearised(evidence, parts, x_try, s_try, trial)
-        x, s, places = x_try, s_try, trial
+        if not better:
+            break
+        x, s = x_try, s_try
+        places = trial if together else _relinearised(evidence, parts, x, s, trial)
         objective = _objective(places, prior, s)
         fell = before - objective
         if abs(fell) < 0.3 and foreseen < 0.5:
@@ -176,20 +183,25 @@ def _slopes(
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
-    places: tuple[Place, ...],
     steps: NDArray[np.float64],
 ) -> list[Slopes]:
-    """Derivatives of every run by parameters and session, and what its nuisances can take from them."""
+    """Derivatives of every run by parameters and session, and what its nuisances can take from them.
+
+    Taken where the nuisances' own are, with the run's offsets at 0: on a road feature that is reached a moment later
+    the nuisances cannot take from derivatives about other offsets what is theirs, and the information comes out many
+    times too large.
+    """
     slopes = []
+    there = compose(parts, x, s)
     moved = [compose(parts, x + step * unit, s) for step, unit in zip(steps, np.eye(len(x)), strict=True)]
-    for run, place in zip(evidence, places, strict=True):
-        a = [
-            (place.residual - run.residual(*there, place.offsets)) / step
-            for there, step in zip(moved, steps, strict=True)
-        ]
+    for run in evidence:
+        if not moved:
+            slopes.append((run.session, run.session_q))
+            continue
+        r = run.residual(*there)
+        a = [(r - run.residual(*far)) / step for far, step in zip(moved, steps, strict=True)]
         columns = np.column_stack((*a, run.session))
-        q = np.column_stack((run.project(columns[:, : len(x)]), run.session_q)) if a else run.session_q
-        slopes.append((columns, q))
+        slopes.append((columns, np.column_stack((run.project(columns[:, : len(x)]), run.session_q))))
     return slopes
 
 

@@ -64,22 +64,28 @@ class Leftover:
     score: float
 
 
-def scan(evidence: Evidence, at: Fit) -> list[Leftover]:
+KEYS = tuple((port, variable) for port, variables in SCANNED.items() for variable in variables)
+RIDGE = np.repeat([(20.0 * PORT_STEP[port]) ** -2 for port, _ in KEYS], KNOTS)
+"""Precision of the broad priors of all knots, in the order of `KEYS`."""
+
+
+def scan(
+    evidence: Evidence, at: Fit, splines: tuple[NDArray[np.float64], ...] | None = None
+) -> list[Leftover]:
     """Fit a spline at every scanned port and variable to the residuals of ``at``; best first.
 
     Parameters
     ----------
     evidence : the runs
     at : fit whose residuals are scanned
+    splines : of `spline_slopes` where they are known
     """
-    theta, slots = compose(at.parts, at.values, at.session)
-    keys = [(port, variable) for port, variables in SCANNED.items() for variable in variables]
-    size, n_session = KNOTS * len(keys), len(evidence.session_sigma)
+    size, n_session = KNOTS * len(KEYS), len(evidence.session_sigma)
     gram, cross, right = np.zeros((size, size)), np.zeros((size, n_session)), np.zeros(size)
     session = np.diag(1.0 / np.square(evidence.session_sigma))
     pull = -at.session / np.square(evidence.session_sigma)
-    for run, r in zip(evidence.train, at.residuals, strict=True):
-        columns = _hats(run, theta, slots, keys)
+    slopes = spline_slopes(evidence, at) if splines is None else splines
+    for run, r, columns in zip(evidence.train, at.residuals, slopes, strict=True):
         q, qr = run.project(columns), run.project(r)
         gram += columns.T @ columns - q.T @ q
         cross += columns.T @ run.session - q.T @ run.session_q
@@ -91,10 +97,9 @@ def scan(evidence: Evidence, at: Fit) -> list[Leftover]:
     right = right - cross @ inverse @ pull
     level = inflation(evidence, at, None)
     found = []
-    for i, (port, variable) in enumerate(keys):
+    for i, (port, variable) in enumerate(KEYS):
         block = slice(KNOTS * i, KNOTS * (i + 1))
-        ridge = (20.0 * PORT_STEP[port]) ** -2
-        covariance = np.asarray(np.linalg.inv(gram[block, block] + ridge * np.eye(KNOTS)), dtype=np.float64)
+        covariance = np.asarray(np.linalg.inv(gram[block, block] + np.diag(RIDGE[block])), dtype=np.float64)
         values = covariance @ right[block]
         gain = 0.5 * float(values @ right[block]) / level
         found.append(
@@ -111,12 +116,22 @@ def scan(evidence: Evidence, at: Fit) -> list[Leftover]:
     return sorted(found, key=lambda leftover: -leftover.score)
 
 
-def _hats(
-    run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], keys: list[tuple[str, str]]
-) -> NDArray[np.float64]:
+def spline_slopes(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], ...]:
+    """Whitened derivatives of every training run by all knots of all scanned splines, float64 [M, K] each.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit about which
+    """
+    theta, slots = compose(at.parts, at.values, at.session)
+    return tuple(_hats(run, theta, slots) for run in evidence.train)
+
+
+def _hats(run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...]) -> NDArray[np.float64]:
     y = predict(run.model, theta, slots=slots, substeps=run.substeps)
     columns = []
-    for port, variable in keys:
+    for port, variable in KEYS:
         low, high = RANGE[variable]
         for k in range(KNOTS):
             hat = np.zeros(KNOTS)
@@ -188,6 +203,16 @@ def form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: 
                         low=max(first, low), high=min(last, high),
                     )  # fmt: skip
     raise InputError(f"form {name}: no port, variable and shape of the grammar have that name")
+
+
+def is_constant(form: Hypothesis) -> bool:
+    """Whether a form does not depend on its variable.
+
+    Parameters
+    ----------
+    form : of `form_hypotheses`
+    """
+    return bool(np.ptp(curve(form)[1]) == 0.0)
 
 
 def _form(leftover: Leftover, name: str, start: NDArray[np.float64], scale: float) -> Hypothesis:

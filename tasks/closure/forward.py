@@ -122,6 +122,17 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     )
 
 
+def starting_speed(model: RunModel, theta: NDArray[np.float64]) -> float:
+    """Speed at the first sample [m/s]: what the sensor read, less its scale error.
+
+    Parameters
+    ----------
+    model : the run
+    theta : float64 [len(ALL_PARAMETERS)]
+    """
+    return model.initial_speed / (1.0 + float(theta[PARAMETER_INDEX["speed_scale"]]))
+
+
 def roll(
     model: RunModel,
     theta: NDArray[np.float64],
@@ -150,7 +161,7 @@ def roll(
     keys, grids, tables = slot_tables(slots)
     if start is None:
         first, out, states = 0, np.zeros((model.samples, len(OUTPUTS))), np.zeros((model.samples, N_STATES))
-        v0 = model.initial_speed if initial_speed is None else initial_speed
+        v0 = starting_speed(model, theta) if initial_speed is None else initial_speed
         omega = v0 / (
             model.constants[CONSTANTS.index("radius")] * (1.0 + motion[PARAMETER_INDEX["wheel_radius"]])
         )

@@ -3,10 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tasks.closure.attribution import (
     ACCEPT_SCORE,
     HELD_OUT_GAIN,
+    LARGE_GAIN,
     REFINED,
     RIVAL_SPAN,
     Candidate,
@@ -19,15 +21,13 @@ from tasks.closure.campaign import SESSION
 from tasks.closure.derivation import fit_disturbance, rederived, rescaled, whitened_residuals
 from tasks.closure.disturbance import Disturbance
 from tasks.closure.fit import Fit, fall, fit, misfit_by_run
-from tasks.closure.forms import form_hypotheses, scan
+from tasks.closure.forms import RIDGE, form_hypotheses, is_constant, scan, spline_slopes
 from tasks.closure.hypothesis import library_hypothesis
 from tasks.closure.screening import Evidence, inflation
 
 MAX_EFFECTS = 3
 RETUNE_PULL = 4.0
 """Pull of a session nuisance, in prior sigmas, from which it is called a wrong number of the vehicle."""
-LARGE_GAIN = 300.0
-"""Gain from which derivatives taken without an effect no longer hold with it."""
 FAR_PULL = 2.5
 """Pull, in prior sigmas, from which the model without effects has its derivatives taken anew at its session."""
 AT_ODDS = 2.0
@@ -169,7 +169,7 @@ def _met_before(explored: Found, candidate: Candidate) -> tuple[Candidate, Evide
     return candidate, None
 
 
-def scale_disturbances(explored: Found) -> Disturbance:
+def scale_disturbances(explored: Found, splines: tuple[NDArray[np.float64], ...]) -> Disturbance:
     """Scales of the disturbances beside whatever explains the runs best.
 
     A large effect that is not yet named would otherwise pass for a disturbance, which then hides it.
@@ -177,10 +177,13 @@ def scale_disturbances(explored: Found) -> Disturbance:
     Parameters
     ----------
     explored : an ungated search under a first guess of the scales
+    splines : `spline_slopes` there
     """
     residuals = whitened_residuals(explored.evidence, explored.base)
     here = explored.evidence
-    return fit_disturbance(here.train, residuals, here.tolerances, here.effects, here.disturbance)
+    return fit_disturbance(
+        here.train, residuals, here.tolerances, here.effects, here.disturbance, splines, RIDGE
+    )
 
 
 def retuned(start: Found, reasons: list[str]) -> Found:
@@ -216,7 +219,12 @@ def retuned(start: Found, reasons: list[str]) -> Found:
     )
 
 
-def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candidate | None]:
+def forms(
+    start: Found,
+    null: Found,
+    reasons: list[str],
+    splines: tuple[NDArray[np.float64], ...] | None = None,
+) -> tuple[Found, Candidate | None]:
     """Look for forms outside the library: alone against all that was named, and in what the named leave over.
 
     Parameters
@@ -224,13 +232,14 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
     start : what the library explains
     null : nothing accepted, same scales
     reasons : is added to
+    splines : `spline_slopes` of ``start`` where they are known
 
     Returns
     -------
     The state, and a form alone that cannot be told from the first effect.
     """
     state, near = start, None
-    left = best_form(state.evidence, state.base)
+    left = best_form(state.evidence, state.base, splines=splines)
     over = left is not None and left.passes
     torn = any(r.accepted.inflation > AT_ODDS for r in state.rounds)
     if state.rounds and (over or torn):
@@ -244,9 +253,13 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
             ahead = (alone.gain - sum(r.accepted.gain for r in state.rounds)) / common - extra * log_n
         first = state.rounds[0].accepted.hypothesis
         # a form of the same variable at the same port is the named effect in another dress, not an unknown one
-        dressed = alone is not None and (alone.hypothesis.port, alone.hypothesis.variable) == (
-            first.port,
-            first.variable,
+        dressed = (
+            alone is not None
+            and alone.hypothesis.port == first.port
+            and (
+                alone.hypothesis.variable == first.variable
+                or (first.variable == "constant" and is_constant(alone.hypothesis))
+            )
         )
         if alone is not None and ahead > RIVAL_SPAN and not dressed:
             reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
@@ -268,7 +281,12 @@ def forms(start: Found, null: Found, reasons: list[str]) -> tuple[Found, Candida
     return state, near
 
 
-def best_form(evidence: Evidence, base: Fit, least: float = 0.0) -> Candidate | None:
+def best_form(
+    evidence: Evidence,
+    base: Fit,
+    least: float = 0.0,
+    splines: tuple[NDArray[np.float64], ...] | None = None,
+) -> Candidate | None:
     """The form that explains most of what a fit leaves over, refined and judged; None if nothing is left.
 
     Parameters
@@ -276,10 +294,11 @@ def best_form(evidence: Evidence, base: Fit, least: float = 0.0) -> Candidate | 
     evidence : the runs
     base : the fit
     least : gain in log likelihood from which a spline is followed up
+    splines : `spline_slopes` where they are known
     """
     level = inflation(evidence, base, None)
     enough = max(ACCEPT_SCORE + float(np.log(evidence.samples)), least / level)
-    leftovers = [x for x in scan(evidence, base)[:2] if x.gain > enough]
+    leftovers = [x for x in scan(evidence, base, splines)[:2] if x.gain > enough]
     if not leftovers:
         return None
     held_out = misfit_by_run(evidence.held_out, base)
@@ -307,7 +326,8 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
         evidence = rederived(evidence, null, library=True)
         null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search(Found(evidence=evidence, base=null), gated=False)
-    scales = scale_disturbances(explored)
+    splines = spline_slopes(explored.evidence, explored.base)
+    scales = scale_disturbances(explored, splines)
     evidence = rescaled(evidence, scales)
     explored = replace(
         explored, rounds=tuple(replace(r, evidence=rescaled(r.evidence, scales)) for r in explored.rounds)
@@ -317,5 +337,5 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
     found = search(start, gated=True, explored=explored)
     if not found.rounds:
         found = replace(retuned(start, reasons), tried=found.tried)
-    found, near = forms(found, start, reasons)
+    found, near = forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
     return start, found, near

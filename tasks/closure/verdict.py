@@ -1,11 +1,11 @@
 """The decision: what is missing, how sure, and what it does to the error on runs that no fit has seen."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.closure.answer import NamedEffect, Verdict, VerdictName, named_effect
+from tasks.closure.answer import ChannelError, NamedEffect, Verdict, VerdictName, named_effect
 from tasks.closure.attribution import RIVAL_SPAN
 from tasks.closure.campaign import CHANNELS, SESSION, Campaign
 from tasks.closure.correlation import residual_input_correlation
@@ -73,17 +73,21 @@ def attribute(
     compared = compare(found.evidence, found.base, found.rounds)
     progress("held-out error")
     error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
-    worse = [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
     tried = list(found.tried)
-    if compared and worse:
+    while compared and (worse := _worse(error)):
         # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
         reasons.append(
             f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
             " held-out runs worse than the frozen model: not named"
         )
-        tried, compared, near_form = [r.accepted for r in found.rounds], [], None
-        found = start
-        error, manoeuvres = held_out_error(start.evidence, start.base, start.base)
+        last, near_form = found.rounds[-1], None
+        tried = [last.accepted, *tried]
+        found = replace(
+            start, base=last.base, rounds=found.rounds[:-1],
+            evidence=found.rounds[-2].evidence if found.rounds[1:] else start.evidence,
+        )  # fmt: skip
+        compared = compare(found.evidence, found.base, found.rounds)
+        error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     progress("intervals")
     named = [named_effect(c.own, c.share, profile_interval(c.own, found.evidence)) for c in compared]
     near = [
@@ -100,7 +104,7 @@ def attribute(
         reasons.append(
             f"{len(near)} other explanation(s) lie within {RIVAL_SPAN:g} units or win too many resamples"
         )
-    if not named and not worse:
+    if not named and not reasons:
         reasons.append("no candidate passes the score, held-out and bound gates together")
     experiment = None
     if compared:
@@ -135,6 +139,10 @@ def attribute(
         reasons=tuple(reasons),
     )
     return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
+
+
+def _worse(error: Mapping[str, ChannelError]) -> list[str]:
+    return [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
 
 
 def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
