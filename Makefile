@@ -4,7 +4,7 @@ BIN := .venv/bin
 READY := .venv/.ready
 DEMO ?= datasets/demo
 
-.PHONY: demo test check study study-schedule study-crash bench clean
+.PHONY: demo test check study study-schedule study-crash freeze bench clean
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -31,6 +31,9 @@ study-schedule: $(READY)
 
 study-crash: $(READY)
 	$(BIN)/python -m benchmarks.crashes
+
+freeze: $(READY)
+	$(BIN)/musync freeze
 
 bench: $(READY)
 	$(BIN)/musync bench --out datasets/bench

@@ -21,6 +21,7 @@ class Scenario:
     hold_s : time at the peak before the release; None holds to the end [s]
     release_s : fall time of the pressure after the hold [s]
     brake_onset_s, brake_onset_m : brake onset by time [s] or by route position [m]; one of them
+    hold_speed : the speed is held until the brake onset, without one throughout; else the car coasts
     hazard_center_m, hazard_length_m : where on the route the road feature lies and how long it is [m]
     hazard_height_m : positive a hump, negative a depression, 0 a flat road [m]
     """
@@ -35,6 +36,7 @@ class Scenario:
     release_s: float = 0.5
     brake_onset_s: float | None = None
     brake_onset_m: float | None = None
+    hold_speed: bool = False
     hazard_center_m: float = 0.0
     hazard_length_m: float = 0.0
     hazard_height_m: float = 0.0

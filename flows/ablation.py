@@ -1,5 +1,6 @@
 """The paper's ablation (Section 4.4): stopping distance over the weather and pitch at a hump, coupling by coupling."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -97,9 +98,8 @@ def stop_rows(study: Ablation, car: Vehicle, surface: SurfaceParameters, mode: M
             if variant == "vertical-only":
                 continue
             for scenario in scenarios:
-                _, ride = drive(
-                    cut(scenario, variant), car, surface, mode, STOP_S, hold_speed_until_brake=True
-                )
+                held = replace(cut(scenario, variant), hold_speed=True)
+                _, ride = drive(held, car, surface, mode, STOP_S)
                 rows.append({
                     "variant": variant,
                     "weather": kind,
@@ -160,8 +160,8 @@ def oracle_trace(folder: Path, condition: Condition) -> Traces:
 def _ride(
     condition: Condition, variant: Variant, car: Vehicle, surface: SurfaceParameters, mode: Mode
 ) -> Rollout:
-    scenario = cut(condition.scenario, variant)
-    return drive(scenario, car, surface, mode, PITCH_S, hold_speed_until_brake=True)[1]
+    held = replace(cut(condition.scenario, variant), hold_speed=True)
+    return drive(held, car, surface, mode, PITCH_S)[1]
 
 
 def _rmse(curve: NDArray[np.float64], reference: NDArray[np.float64]) -> float:

@@ -7,7 +7,7 @@ where the receipt exists, the clip is complete. Making a clip twice writes the s
 import resource
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -146,8 +146,6 @@ def drive(
     surface: SurfaceParameters,
     mode: Mode,
     duration_s: float,
-    *,
-    hold_speed_until_brake: bool = False,
 ) -> tuple[dict[str, Any], Rollout]:
     """Weather to surface state to friction to vehicle motion."""
     weather = weather_of(scenario)
@@ -157,7 +155,7 @@ def drive(
         vehicle,
         scenario.weather,
         friction,
-        replace(controls_of(scenario), hold_speed_until_brake=hold_speed_until_brake),
+        controls_of(scenario),
         hazard_of(scenario),
         mode=mode,
         duration_s=duration_s,
@@ -194,7 +192,7 @@ def controls_of(scenario: Scenario) -> Controls:
             onset_s=scenario.brake_onset_s,
             onset_station_m=scenario.brake_onset_m,
         ),
-        hold_speed_until_brake=False,
+        hold_speed_until_brake=scenario.hold_speed,
     )
 
 

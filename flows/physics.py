@@ -32,7 +32,14 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """
     root = Path(dataset).resolve()
     constants = read_constants(root)
-    rows = [stage(_clip_row)(root, facts, constants) for facts in clip_facts(root)]
+    clips = clip_facts(root)
+    held = [facts["label"] for facts in clips if facts["hold_speed"]]
+    if held:
+        raise InputError(
+            f"{dataset}: {len(held)} clips hold their speed until the brake ({held[0]} first), by a force that no"
+            " column records: the physics audit knows coasting cars only"
+        )
+    rows = [stage(_clip_row)(root, facts, constants) for facts in clips]
     broken = [row for row in rows if not row["passed"]]
     result = {
         "verified": not broken,

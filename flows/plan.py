@@ -77,13 +77,13 @@ class Plan:
 
 
 def make_plan(
-    source: str | Path, backend: str, vehicle: str | None = None, *, pictures: bool = True
+    source: str | Path | Grid, backend: str, vehicle: str | None = None, *, pictures: bool = True
 ) -> tuple[Plan, dict[str, bytes]]:
     """Check a grid against its catalogue entries and scene, and freeze it.
 
     Parameters
     ----------
-    source : grid file, or the name of one that ships
+    source : grid file, the name of one that ships, or a grid that is already read
     backend : rasteriser
     vehicle : takes the place of the grid's; a frozen one runs in the mode it was fitted in
     pictures : False makes telemetry alone, with the clip ids of the same grid with frames
@@ -98,7 +98,7 @@ def make_plan(
         Listing every problem at once.
     """
     try:
-        grid = load_grid(source)
+        grid = source if isinstance(source, Grid) else load_grid(source)
     except FaultyGrid as faults:
         entries = [] if faults.settings is None else _read_entries(faults.settings)[2]
         raise InputError([*faults.problems, *(f"{source}: {problem}" for problem in entries)]) from None
@@ -106,7 +106,8 @@ def make_plan(
         grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
     if not pictures:
         grid = replace(grid, settings=grid.settings.model_copy(update={"pictures": False}))
-    return freeze_grid(grid, str(source), backend)
+    name = source.settings.name if isinstance(source, Grid) else str(source)
+    return freeze_grid(grid, name, backend)
 
 
 def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, bytes]]:

@@ -35,6 +35,7 @@ from flows import describe as _describe  # noqa: E402
 from flows import evaluation as _evaluation  # noqa: E402
 from flows import explain as _explain  # noqa: E402
 from flows import foreign as _foreign  # noqa: E402
+from flows import freezing as _freezing  # noqa: E402
 from flows import generate as _generate  # noqa: E402
 from flows import importing as _importing  # noqa: E402
 from flows import physics as _physics  # noqa: E402
@@ -60,6 +61,8 @@ def as_flow(function: Callable[..., Any]) -> Any:
 
 
 generate = as_flow(_generate.generate)
+reproduce = as_flow(_freezing.reproduce)
+freeze = as_flow(_freezing.freeze)
 audit = as_flow(_audit.audit)
 audit_physics = as_flow(_physics.audit_physics)
 verify = as_flow(_verify.verify)

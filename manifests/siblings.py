@@ -8,7 +8,15 @@ from typing import Any
 CONTROLS: dict[str, tuple[str, ...]] = {
     "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h"),
     "speed": ("initial_speed_km_h",),
-    "braking": ("peak_pressure_mpa", "ramp_s", "hold_s", "release_s", "brake_onset_s", "brake_onset_m"),
+    "braking": (
+        "peak_pressure_mpa",
+        "ramp_s",
+        "hold_s",
+        "release_s",
+        "brake_onset_s",
+        "brake_onset_m",
+        "hold_speed",
+    ),
     "road": ("hazard_center_m", "hazard_length_m", "hazard_height_m"),
 }
 """The scenario's fields by what an experimenter turns: q, u (speed and braking) and g of Eq. overall_pipeline."""

@@ -91,6 +91,7 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="release_s", unit="s", symbol="", description="fall time of the brake pressure"),
     Channel(name="brake_onset_s", unit="s", symbol="t_b", description="brake onset by time"),
     Channel(name="brake_onset_m", unit="m", symbol="", description="brake onset by route position"),
+    Channel(name="hold_speed", unit="", symbol="", description="the speed is held until the brake onset, without one throughout; else the car coasts"),
     Channel(name="hazard_center_m", unit="m", symbol="s_g", description="route coordinate of the road feature's centre"),
     Channel(name="hazard_length_m", unit="m", symbol="L_g", description="length of the road feature"),
     Channel(name="hazard_height_m", unit="m", symbol="A_g", description="height of the road feature; negative is a depression"),

@@ -29,12 +29,13 @@ class PartialScenario(Strict):
     release_s: float | None = None
     brake_onset_s: float | None = None
     brake_onset_m: float | None = None
+    hold_speed: bool | None = None
     hazard_center_m: float | None = None
     hazard_length_m: float | None = None
     hazard_height_m: float | None = None
 
 
-NUMBERS = tuple(name for name in PartialScenario.model_fields if name != "weather")
+NUMBERS = tuple(name for name in PartialScenario.model_fields if name not in {"weather", "hold_speed"})
 Levels = Annotated[dict[str, PartialScenario], Field(min_length=1)]
 
 

@@ -11,7 +11,7 @@ from catalogs.grids.blocks import Strict
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
 
 CALIBRATION = "calibration"
-Value = str | float
+Value = bool | str | float
 
 
 class Between(Strict):

@@ -4,17 +4,21 @@ from typing import Annotated
 
 import typer
 
-from flows.commands.console import Json, Prefect, Runner, Scheduler, Workers, call, show
+from flows.commands.console import CHECK_FAILED, Json, Prefect, Runner, Scheduler, Workers, call, show
+from tasks.errors import InputError
 
 app = typer.Typer()
 
 
 @app.command()
 def generate(
-    grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")],
     out: Annotated[
         str, typer.Option(help="Dataset folder: new, empty, or an unfinished run of the same grid.")
     ],
+    grid: Annotated[str | None, typer.Argument(help="Grid file, or the name of one that ships.")] = None,
+    manifest: Annotated[
+        str | None, typer.Option(help="In place of a grid: a frozen run, by name or file, to be made again.")
+    ] = None,
     runner: Runner = "dask",
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -28,23 +32,54 @@ def generate(
     as_json: Json = False,
 ) -> None:
     """Make the dataset of a scenario grid, or what is missing of it."""
-    report = call(
-        "generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend,
-        vehicle=vehicle, pictures=frames,
-    )  # fmt: skip
+    if (grid is None) == (manifest is None):
+        raise InputError("generate needs either a GRID or --manifest NAME, and not both")
+    differing = None
+    if manifest is not None:
+        if vehicle is not None or not frames:
+            raise InputError(
+                "--manifest says which vehicle drives and whether there are frames: leave the option out"
+            )
+        report, differing = call(
+            "reproduce", prefect, manifest, out, runner=runner, workers=workers, scheduler=scheduler,
+            backend=backend,
+        )  # fmt: skip
+    else:
+        report = call(
+            "generate", prefect, grid, out, runner=runner, workers=workers, scheduler=scheduler, backend=backend,
+            vehicle=vehicle, pictures=frames,
+        )  # fmt: skip
     layout = report.layout
-    show(
-        {
-            "run_id": report.run_id,
-            "clips": report.clips,
-            "made": report.made,
-            "pose_check_failed": list(report.doubtful),
-            "dataset": str(layout.root),
-            "manifest": str(layout.manifest),
-            "contact_sheet": str(layout.previews / "contact_sheet.png") if frames else None,
-        },
-        as_json,
-    )
+    sheet = layout.previews / "contact_sheet.png"
+    facts = {
+        "run_id": report.run_id,
+        "clips": report.clips,
+        "made": report.made,
+        "pose_check_failed": list(report.doubtful),
+        "dataset": str(layout.root),
+        "manifest": str(layout.manifest),
+        "contact_sheet": str(sheet) if sheet.is_file() else None,
+    }
+    if differing is not None:
+        facts |= {"reproduced": report.clips - len(differing), "telemetry_differs": differing}
+    show(facts, as_json)
+    if differing:
+        raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def freeze(
+    grid: Annotated[
+        str | None, typer.Argument(help="Grid file or name; without one, every frozen run that ships.")
+    ] = None,
+    out: Annotated[
+        str | None, typer.Option(help="File to write; by default where the project keeps its own.")
+    ] = None,
+    prefect: Prefect = False,
+    as_json: Json = False,
+) -> None:
+    """Freeze a run: scenarios, seeds, parameters and the hash of each clip's telemetry, for generate --manifest."""
+    show(call("freeze", prefect, grid, out=out), as_json)
 
 
 @app.command()

@@ -264,6 +264,8 @@ def outcome_laws(
                     np.array([facts["stopping_distance"] - way]), 1e-5)
             )  # fmt: skip
     seen = np.isfinite(frames["recovered_pitch"])
+    if not seen.any():  # telemetry alone has no verdict to work out
+        return laws
     claimed = np.rad2deg(frames["pitch"] - frames["pitch"][0])[seen]
     found = np.rad2deg(frames["recovered_pitch"])[seen]
     way = (frames["station"] - frames["station"][0])[seen]

@@ -11,6 +11,7 @@ from flows.audit import audit
 from flows.describe import describe
 from flows.explain import explain
 from flows.generate import generate
+from flows.physics import audit_physics
 from flows.previews import preview
 from flows.query import sql
 from flows.repair import repair
@@ -49,6 +50,7 @@ def test_readers_and_auditors_take_it(bare, tmp_path):
     assert audit(str(bare.root), share=1.0, runner="threads", workers=1)["mismatches"] == []
     assert explain(str(bare.root), "snow-3/hump", 6)["agrees"]
     assert describe(str(bare.root))["clips"][0]["passed"] is None
+    assert audit_physics(str(bare.root))["verified"]
     data = musync.open(bare.root)
     assert data.torch(window=3, columns=["speed"], arrays=[])[1]["telemetry"].shape == (3, 1)
     with pytest.raises(InputError, match="without frames"):

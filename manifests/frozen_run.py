@@ -1,0 +1,136 @@
+"""Frozen runs: scenarios, seeds, parameters and the hash of each clip's telemetry, small enough to ship.
+
+A dataset's manifest (`manifests.manifest`) seals what was made, file by file, and its ids follow from the bytes of
+every input. A frozen run says what has to come out again; the code's state is recorded, and judged by the outcome.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from manifests.explain import ABSENT, REACHES, VEHICLE, value_differences
+from manifests.manifest import seal_of
+from tasks.errors import InputError
+
+FROZEN_FORMAT = "musync-frozen/1"
+FOLDER = Path(__file__).parent / "frozen"
+NEVER_DECIDES = ("source",)
+"""Keys of a catalogue entry that no number follows from."""
+
+
+def frozen_names() -> tuple[str, ...]:
+    """Names of the frozen runs that ship with the project."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.json")))
+
+
+def frozen_source(name_or_path: str | Path) -> Path:
+    """The file of a frozen run: a path ending in .json is taken as it is, a name is looked up among those that ship.
+
+    Raises
+    ------
+    InputError
+        If there is none; the sentence lists those that exist.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".json":
+        path = FOLDER / f"{name_or_path}.json"
+    if not path.is_file():
+        raise InputError(
+            f"manifest {name_or_path}: no such frozen run; give a JSON file or one of: {', '.join(frozen_names())}"
+        )
+    return path
+
+
+def read_frozen(name_or_path: str | Path) -> dict[str, Any]:
+    """Read a frozen run.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is of another format, or was changed by hand.
+    """
+    path = frozen_source(name_or_path)
+    try:
+        frozen: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: a frozen run must be valid JSON; {error}") from None
+    found = frozen.get("format") if isinstance(frozen, dict) else None
+    if found != FROZEN_FORMAT:
+        raise InputError(
+            f"{path}: a frozen run must be of format {FROZEN_FORMAT}; it is {found!r}"
+            " (the manifest.json of a dataset is no frozen run: musync freeze makes one of its grid)"
+        )
+    if seal_of(frozen) != frozen.get("seal"):
+        raise InputError(f"{path}: its seal does not match its content: it was changed after it was frozen")
+    return frozen
+
+
+def sealed(run: Mapping[str, Any]) -> dict[str, Any]:
+    """A frozen run with its format and seal.
+
+    Parameters
+    ----------
+    run : name, grid, parameters, clips, scene, made_with and processor
+    """
+    whole = {"format": FROZEN_FORMAT, **run}
+    return whole | {"seal": seal_of(whole)}
+
+
+def parameters_that_matter(inputs: Mapping[str, Any], pictures: bool) -> dict[str, Any]:
+    """Catalogue entries that reach the run: with pictures all, for telemetry alone those of the vehicle's motion.
+
+    Parameters
+    ----------
+    inputs : parsed entries by their name under ``inputs/``
+    pictures : whether frames are made
+    """
+    return {
+        name: _deciding(entry)
+        for name, entry in inputs.items()
+        if pictures or VEHICLE in REACHES.get(name, ())
+    }
+
+
+def differences(
+    frozen: Mapping[str, Any], parameters: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]
+) -> list[str]:
+    """What here is not as it was frozen, value by value; hashes of telemetry are left to the outcome.
+
+    Parameters
+    ----------
+    frozen : the frozen run
+    parameters : `parameters_that_matter` of what is here
+    clips : records of the clips as the grid makes them here
+    """
+    rows = value_differences(frozen["parameters"], dict(parameters))
+    asked = {clip["label"]: _without_hash(clip) for clip in frozen["clips"]}
+    rows += value_differences(asked, {clip["label"]: _without_hash(clip) for clip in clips}, "clips")
+    return [
+        f"{place} is {_shown(there)} in the manifest and {_shown(here)} here" for place, there, here in rows
+    ]
+
+
+def differing_clips(frozen: Mapping[str, Any], ticks: Mapping[str, str]) -> list[str]:
+    """Labels of the clips whose telemetry is not the frozen one.
+
+    Parameters
+    ----------
+    frozen : the frozen run
+    ticks : label to the hash of the telemetry that came out
+    """
+    return [clip["label"] for clip in frozen["clips"] if ticks.get(clip["label"]) != clip["ticks"]]
+
+
+def _without_hash(clip: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in clip.items() if key != "ticks"}
+
+
+def _deciding(entry: Any) -> Any:
+    if isinstance(entry, dict):
+        return {str(key): _deciding(value) for key, value in entry.items() if key not in NEVER_DECIDES}
+    return [_deciding(value) for value in entry] if isinstance(entry, list) else entry
+
+
+def _shown(value: Any) -> str:
+    return ABSENT if value == ABSENT else repr(value)[:80]
