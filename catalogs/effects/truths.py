@@ -65,6 +65,11 @@ def load_truths(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
             problems.append(
                 f"truth {name}: parameters must be of {', '.join(sorted(effects[name]))}; it has {', '.join(values)}"
             )
+    for name, values in content["sizes"].items():
+        if name not in effects or len(values) != 1 or not set(values) <= effects[name]:
+            problems.append(
+                f"size {name}: needs an effect of the library and one of its parameters; it has {', '.join(values)}"
+            )
     for name, form in content["outside"].items():
         if form["port"] not in PORTS or form["variable"] not in VARIABLES:
             problems.append(
@@ -82,6 +87,22 @@ def load_truths(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
         for name, form in content["outside"].items()
     ]
     return (*library, *outside)
+
+
+def load_sizes(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
+    """Truths of one effect at several sizes each, for power against size.
+
+    Parameters
+    ----------
+    path : YAML with ``sizes`` (effect to parameter to its values)
+    """
+    content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    return tuple(
+        Truth(name=name, values={parameter: float(value)}, slots=(), left_out=())
+        for name, parameters in content["sizes"].items()
+        for parameter, values in parameters.items()
+        for value in values
+    )
 
 
 def _slot(form: dict[str, Any]) -> Slot:

@@ -153,7 +153,7 @@ def close_loop(
 @app.command("close-loop-benchmark")
 def close_loop_benchmark(
     out: Annotated[
-        str, typer.Option(help="Folder for closing-benchmark.json; a later call goes on with it.")
+        str, typer.Option(help="Folder for closing-benchmark.json and campaigns.jsonl; a later call goes on.")
     ],
     seeds: Annotated[int, typer.Option(help="Campaigns of each known truth.", min=0)] = 10,
     nulls: Annotated[int, typer.Option(help="Campaigns of a model that lacks nothing.", min=0)] = 100,
@@ -164,5 +164,5 @@ def close_loop_benchmark(
     """Count how often close-loop is right on campaigns whose truth is known."""
     one_thread()
     result = call("close_loop_benchmark", prefect, out=out, seeds=seeds, nulls=nulls, minutes=minutes)
-    keys = ("campaigns", "false_discoveries", "summary")
+    keys = ("false_discoveries", "summary", "power", "cpu_s")
     show(result if as_json else {key: result[key] for key in keys}, as_json)

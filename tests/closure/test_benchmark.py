@@ -42,7 +42,8 @@ def test_every_truth_is_of_the_library_or_a_form_outside_it() -> None:
 
 
 def row(truth: str | None, outcome: str, *, in_library: bool = True, covered: bool | None = None) -> dict:
-    return {"truth": truth, "outcome": outcome, "in_library": in_library, "covered": covered, "cpu_s": 1.0}
+    kind = "null" if truth is None else "library" if in_library else "outside"
+    return {"kind": kind, "truth": truth, "outcome": outcome, "values": {}, "covered": covered, "cpu_s": 1.0}
 
 
 def test_the_summary_counts_each_kind_once() -> None:
