@@ -104,7 +104,7 @@ def engine_hash() -> str:
 
 
 def _plan(seeds: int, nulls: int) -> Iterator[tuple[str, Truth | None, int]]:
-    """Kind, truth and seed of every campaign, round by round over all truths; nulls and sizes spread over the rounds."""
+    """Kind, truth and seed of every campaign, round by round over all truths, nulls and sizes spread over them."""
     truths, sizes = load_truths(), load_sizes()
     rounds = max(seeds, 1)
     for i in range(rounds):
