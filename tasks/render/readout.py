@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 
 from tasks.render.camera import Camera, viewmat
 from tasks.render.lens import distorted, pixel_directions
+from tasks.render.surface_search import depth_bounds, nearest_surface, parallax_about, place_on
 
 MARGIN = 0.05
 """Share of the picture's larger side by which the wide picture reaches beyond a moving camera's field [1]."""
-TILE = 16
-"""Side of the tiles over which the nearest and farthest surfaces are noted; no point may move farther [px]."""
-KINK = 0.1
-"""Spread of inverse depth over a pixel's neighbours from which they are two surfaces [1]."""
 ROW_STEPS = 6
 """Steps by which the row that shows a point is found; each shrinks the error by the share of a row per row's time."""
+EDGE = 2.0
+"""Neighbours that interpolation needs beyond the last place that is looked at [px]."""
 ALONE = 1.0
 """Parallax about a ray up to which it sees one surface during the whole exposure [px]."""
 MOST_SAMPLES = 32
@@ -73,7 +72,9 @@ def sensor_field(camera: Camera) -> Field:
         The lens does not spread the whole picture.
     """
     directions = pixel_directions(camera.K, camera.width, camera.height, camera.lens)
-    margin = MARGIN * max(camera.width, camera.height) if camera.moves else 0.0
+    if camera.plain:
+        return Field(directions=directions, K=camera.K, width=camera.width, height=camera.height)
+    margin = EDGE + (MARGIN * max(camera.width, camera.height) if camera.moves else 0.0)
     f = np.array((camera.K[0, 0], camera.K[1, 1]))
     low, high = directions.min(axis=(0, 1)) * f - 0.5 - margin, directions.max(axis=(0, 1)) * f + 0.5 + margin
     # whole pixels are added on each side: a pixel that the lens leaves alone stays the pixel it was
@@ -115,112 +116,10 @@ def read_out(
     )
     K = np.array((field.K[0, 0], field.K[1, 1], field.K[0, 2], field.K[1, 2]))
     _read(
-        picture, near, *_bounds(near), field.directions, K, middle, end - begin, blurs,
+        picture, near, *depth_bounds(near), field.directions, K, middle, end - begin, blurs,
         seen.picture, seen.depth, seen.source,
     )  # fmt: skip
     return seen
-
-
-def _bounds(near: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Least and largest inverse depth of each tile and the eight around it [m-1]."""
-    rows, columns = (-(-n // TILE) for n in near.shape)
-    padded = np.pad(
-        near, ((0, rows * TILE - near.shape[0]), (0, columns * TILE - near.shape[1])), mode="edge"
-    )
-    tiles = padded.reshape(rows, TILE, columns, TILE)
-    bounds = []
-    for extreme in (np.min, np.max):
-        around = np.pad(extreme(tiles, axis=(1, 3)), 1, mode="edge")
-        windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3))
-        bounds.append(extreme(windows, axis=(2, 3)))
-    return bounds[0], bounds[1]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _inverse_depth(near, u, v):  # type: ignore[no-untyped-def]
-    """Inverse depth at a place of the picture: bilinear, exact on planes; the nearest pixel's at an edge [m-1]."""
-    height, width = near.shape
-    x = min(max(u - 0.5, 0.0), width - 1.001)
-    y = min(max(v - 0.5, 0.0), height - 1.001)
-    c, r = int(x), int(y)
-    a, b, d, e = near[r, c], near[r, c + 1], near[r + 1, c], near[r + 1, c + 1]
-    most = max(max(a, b), max(d, e))
-    tx, ty = x - c, y - r
-    if most - min(min(a, b), min(d, e)) > KINK * most:
-        return np.float64(near[r + int(ty + 0.5), c + int(tx + 0.5)])
-    return (1 - ty) * ((1 - tx) * a + tx * b) + ty * ((1 - tx) * d + tx * e)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _place(K, ray, shift, w):  # type: ignore[no-untyped-def]
-    """Where the wide picture shows the point of inverse depth w on a row's ray [px]."""
-    z = ray[2] + w * shift[2]
-    return K[0] * (ray[0] + w * shift[0]) / z + K[2], K[1] * (ray[1] + w * shift[1]) / z + K[3]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _on_ray(q, ray, shift):  # type: ignore[no-untyped-def]
-    """Inverse depth in the row's camera of the ray's point whose inverse depth in the wide camera is q [m-1]."""
-    return ray[2] * q / max(1 - shift[2] * q, 0.1)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _about(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
-    """Inverse depths in the row's camera of a ray's points at the nearest and the farthest depth hereabouts [m-1]."""
-    u, v = _place(K, ray, shift, 0.0)
-    row = min(max(int(v), 0), near.shape[0] - 1) // TILE
-    column = min(max(int(u), 0), near.shape[1] - 1) // TILE
-    return (
-        _on_ray(np.float64(nearest[row, column]), ray, shift),
-        _on_ray(np.float64(farthest[row, column]), ray, shift),
-    )
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _parallax(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
-    """How far apart in the wide picture those two points lie [px]."""
-    w, last = _about(near, nearest, farthest, K, ray, shift)
-    u, v = _place(K, ray, shift, w)
-    far_u, far_v = _place(K, ray, shift, last)
-    return max(abs(far_u - u), abs(far_v - v))
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _find(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
-    """The nearest surface on a ray: its place in the wide picture [px] and inverse depth in the row's camera [m-1]."""
-    w, last = _about(near, nearest, farthest, K, ray, shift)
-    u, v = _place(K, ray, shift, w)
-    far_u, far_v = _place(K, ray, shift, last)
-    way = max(abs(far_u - u), abs(far_v - v))
-    found = w
-    if way > 0.05:
-        # from the nearest that there is about here to the farthest, half a pixel at a time
-        steps = int(2 * way) + 1
-        step = (w - last) / steps
-        beside_u, beside_v, beside = u, v, last
-        hit = False
-        for k in range(steps + 1):
-            here = w - k * step
-            u, v = _place(K, ray, shift, here)
-            found = _on_ray(_inverse_depth(near, u, v), ray, shift)
-            if found >= here - 1e-9:
-                # far in front of the ray's point is another thing, behind which the ray passes
-                if found <= here + 2 * step + KINK * found:
-                    hit = True
-                    break
-            else:
-                beside_u, beside_v, beside = u, v, found
-        if not hit:
-            return beside_u, beside_v, beside
-    else:
-        found = _on_ray(_inverse_depth(near, u, v), ray, shift)
-    for _ in range(2):
-        next_u, next_v = _place(K, ray, shift, found)
-        again = _on_ray(_inverse_depth(near, next_u, next_v), ray, shift)
-        if abs(again - found) > KINK * found:
-            break
-        u, v, found = next_u, next_v, again
-    return u, v, found
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -321,7 +220,7 @@ def _read(picture, near, farthest, nearest, directions, K, poses, spans, blurs, 
         for column in range(width):
             direction = directions[row, column]
             _look(pose, span, 0.0, direction, ray, shift)
-            u, v, w = _find(near, nearest, farthest, K, ray, shift)
+            u, v, w = nearest_surface(near, nearest, farthest, K, ray, shift)
             depth[row, column] = 1 / w if w > 0 else np.nan
             r = min(max(int(v), 0), near.shape[0] - 1)
             source[row, column] = r * near.shape[1] + min(max(int(u), 0), near.shape[1] - 1)
@@ -332,11 +231,11 @@ def _read(picture, near, farthest, nearest, directions, K, poses, spans, blurs, 
                     out[row, column, i] = light[i]
                 continue
             _look(pose, span, -0.5, direction, ray, shift)
-            first_u, first_v = _place(K, ray, shift, w)
-            parallax = _parallax(near, nearest, farthest, K, ray, shift)
+            first_u, first_v = place_on(K, ray, shift, w)
+            parallax = parallax_about(near, nearest, farthest, K, ray, shift)
             _look(pose, span, 0.5, direction, ray, shift)
-            last_u, last_v = _place(K, ray, shift, w)
-            parallax = max(parallax, _parallax(near, nearest, farthest, K, ray, shift))
+            last_u, last_v = place_on(K, ray, shift, w)
+            parallax = max(parallax, parallax_about(near, nearest, farthest, K, ray, shift))
             alone = parallax <= ALONE
             way = max(abs(last_u - first_u), abs(last_v - first_v), 0.0 if alone else parallax)
             samples = max(min(int(np.ceil(way + 0.9)), MOST_SAMPLES), 1)
@@ -346,7 +245,7 @@ def _read(picture, near, farthest, nearest, directions, K, poses, spans, blurs, 
                     u, v = first_u + share * (last_u - first_u), first_v + share * (last_v - first_v)
                     if not alone:
                         _look(pose, span, share - 0.5, direction, ray, shift)
-                        u, v, _ = _find(near, nearest, farthest, K, ray, shift)
+                        u, v, _ = nearest_surface(near, nearest, farthest, K, ray, shift)
                 _add_light(picture, u, v, across, down, light)
             for i in range(3):
                 out[row, column, i] = light[i] / samples

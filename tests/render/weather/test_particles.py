@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tasks.render.lens import Lens, distorted
 from tasks.render.weather.particles import visible_streaks
 from tasks.render.weather.precipitation import drawn_optical_depth, drawn_reach, population
 from tasks.render.weather.streaks import draw_streaks
@@ -142,6 +143,48 @@ def test_drawn_coverage_is_the_optical_depth_that_the_air_leaves_out(parameters,
             cover.append(-np.log(np.maximum(1 - layer.alpha, 1e-3)).mean())
         expected = drawn_optical_depth(falling, near, 400.0, np.array([near.farthest_m]))[0]
         assert np.mean(cover) == pytest.approx(expected, rel=0.08)
+
+
+def test_a_row_by_row_shutter_sees_each_particle_at_the_time_of_its_row(parameters, rain):
+    """The streak in row v is the one that a shutter for all rows sees at the time of row v."""
+    near, wind, delay = parameters.air.near, np.array((0.0, 1.0, 0.0)), 7e-5
+    still = shutter(exposure_s=1e-4)
+    by_rows = visible_streaks(rain, near, replace(still, line_delay_s=delay), wind, 9)
+    at_rows = {round(float(d), 12): k for k, d in enumerate(by_rows["diameter"])}
+    compared = 0
+    for row in (20.0, 160.0, 300.0):
+        time = delay * (row - 160)
+        global_then = visible_streaks(rain, near, replace(still, time_s=2.0 + time), wind, 9)
+        centre = 0.5 * (global_then["begin"] + global_then["end"])
+        for k in np.flatnonzero((np.abs(centre[:, 1] - row) < 4) & (np.abs(centre[:, 0] - 240) < 230)):
+            other = at_rows.get(round(float(global_then["diameter"][k]), 12))
+            if other is None:
+                continue
+            seen = 0.5 * (by_rows["begin"][other] + by_rows["end"][other])
+            motion = (global_then["end"][k] - global_then["begin"][k]) / 1e-4
+            # both lie on the particle's way; it meets its row up to 4 rows earlier or later
+            later = delay * (centre[k, 1] - row) / (1 - delay * motion[1])
+            np.testing.assert_allclose(seen, centre[k] + motion * later, atol=0.15)
+            longer = np.linalg.norm(by_rows["end"][other] - by_rows["begin"][other])
+            assert longer == pytest.approx(np.linalg.norm(motion) * 1e-4 / (1 - delay * motion[1]), rel=0.02)
+            compared += 1
+    assert compared > 20
+
+
+def test_a_lens_bends_the_way_of_every_particle(parameters, rain):
+    lens = Lens(k1=-0.3, k2=0.05)
+    near, straight = parameters.air.near, shutter()
+    bent = visible_streaks(rain, near, replace(straight, lens=lens), CALM, 4)
+    plain = visible_streaks(rain, near, straight, CALM, 4)
+    by_size = {round(float(d), 12): k for k, d in enumerate(bent["diameter"])}
+    assert len(bent) > len(plain)  # a barrel sees more
+    for streak in plain:
+        other = bent[by_size[round(float(streak["diameter"]), 12)]]
+        for end in ("begin", "end"):
+            x, y = (streak[end] - (240, 160)) / 400
+            expected = np.array(distorted(x, y, lens.coefficients)) * 400 + (240, 160)
+            if np.abs(streak[end] - (240, 160)).max() < 240:
+                np.testing.assert_allclose(other[end], expected, atol=1e-6)
 
 
 def test_the_scene_hides_what_falls_behind_it(parameters, snow):

@@ -1,0 +1,120 @@
+"""Which surface of a picture with depth a ray meets that starts close beside the picture's own camera.
+
+The ray is that of a pixel of another pose, a readout away: ``ray + w shift``, in axes of the picture's camera, is the
+point of inverse depth w on it, times w. Its way through the picture is searched between the nearest and the farthest
+depth that the picture has about there, from near to far, so that near things hide far ones.
+"""
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+TILE = 16
+"""Side of the tiles over which the nearest and farthest surfaces are noted; no point may move farther [px]."""
+KINK = 0.1
+"""Spread of inverse depth over a pixel's neighbours from which they are two surfaces [1]."""
+
+SLOPE = 0.01
+"""Growth of inverse depth over a step up to which a ray that has come to lie behind a surface has met it [1]."""
+
+
+def depth_bounds(near: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Least and largest inverse depth of each tile and the eight around it [m-1]."""
+    rows, columns = (-(-n // TILE) for n in near.shape)
+    padded = np.pad(
+        near, ((0, rows * TILE - near.shape[0]), (0, columns * TILE - near.shape[1])), mode="edge"
+    )
+    tiles = padded.reshape(rows, TILE, columns, TILE)
+    bounds = []
+    for extreme in (np.min, np.max):
+        around = np.pad(extreme(tiles, axis=(1, 3)), 1, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3))
+        bounds.append(extreme(windows, axis=(2, 3)))
+    return bounds[0], bounds[1]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _inverse_depth(near, u, v):  # type: ignore[no-untyped-def]
+    """Inverse depth at a place of the picture: bilinear, exact on planes; the nearest pixel's at an edge [m-1]."""
+    height, width = near.shape
+    x = min(max(u - 0.5, 0.0), width - 1.001)
+    y = min(max(v - 0.5, 0.0), height - 1.001)
+    c, r = int(x), int(y)
+    a, b, d, e = near[r, c], near[r, c + 1], near[r + 1, c], near[r + 1, c + 1]
+    most = max(max(a, b), max(d, e))
+    tx, ty = x - c, y - r
+    if most - min(min(a, b), min(d, e)) > KINK * most:
+        return np.float64(near[r + int(ty + 0.5), c + int(tx + 0.5)])
+    return (1 - ty) * ((1 - tx) * a + tx * b) + ty * ((1 - tx) * d + tx * e)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def place_on(K, ray, shift, w):  # type: ignore[no-untyped-def]
+    """Where the wide picture shows the point of inverse depth w on a row's ray [px]."""
+    z = ray[2] + w * shift[2]
+    return K[0] * (ray[0] + w * shift[0]) / z + K[2], K[1] * (ray[1] + w * shift[1]) / z + K[3]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _on_ray(q, ray, shift):  # type: ignore[no-untyped-def]
+    """Inverse depth in the row's camera of the ray's point whose inverse depth in the wide camera is q [m-1]."""
+    return ray[2] * q / max(1 - shift[2] * q, 0.1)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _about(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+    """Inverse depths in the row's camera of a ray's points at the nearest and the farthest depth hereabouts [m-1]."""
+    u, v = place_on(K, ray, shift, 0.0)
+    row = min(max(int(v), 0), near.shape[0] - 1) // TILE
+    column = min(max(int(u), 0), near.shape[1] - 1) // TILE
+    return (
+        _on_ray(np.float64(nearest[row, column]), ray, shift),
+        _on_ray(np.float64(farthest[row, column]), ray, shift),
+    )
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def parallax_about(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+    """How far apart in the wide picture those two points lie [px]."""
+    w, last = _about(near, nearest, farthest, K, ray, shift)
+    u, v = place_on(K, ray, shift, w)
+    far_u, far_v = place_on(K, ray, shift, last)
+    return max(abs(far_u - u), abs(far_v - v))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def nearest_surface(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+    """The nearest surface on a ray: its place in the wide picture [px] and inverse depth in the row's camera [m-1]."""
+    w, last = _about(near, nearest, farthest, K, ray, shift)
+    u, v = place_on(K, ray, shift, w)
+    far_u, far_v = place_on(K, ray, shift, last)
+    way = max(abs(far_u - u), abs(far_v - v))
+    found = w
+    if way > 0.05:
+        # from the nearest that there is about here to the farthest, a third of a pixel at a time
+        steps = int(3 * way) + 1
+        step = (w - last) / steps
+        beside_u, beside_v, beside = u, v, last
+        hit = False
+        for k in range(steps + 1):
+            here = w - k * step
+            u, v = place_on(K, ray, shift, here)
+            found = _on_ray(_inverse_depth(near, u, v), ray, shift)
+            if found >= here - 1e-9:
+                # far in front of the ray's point is another thing, behind which the ray passes
+                if found <= here + step + SLOPE * found:
+                    hit = True
+                    break
+            else:
+                beside_u, beside_v, beside = u, v, found
+        if not hit:
+            return int(beside_u) + 0.5, int(beside_v) + 0.5, beside
+    else:
+        found = _on_ray(_inverse_depth(near, u, v), ray, shift)
+    for _ in range(2):
+        next_u, next_v = place_on(K, ray, shift, found)
+        again = _on_ray(_inverse_depth(near, next_u, next_v), ray, shift)
+        if abs(again - found) > KINK * found:
+            break
+        u, v, found = next_u, next_v, again
+    return u, v, found

@@ -1,0 +1,308 @@
+"""Lens, rolling shutter and motion blur against closed forms, and against the renders that they stand for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catalogs.cameras import load_camera
+from catalogs.weather import load_weather
+from tasks.errors import InputError
+from tasks.eval.image_quality import psnr
+from tasks.render.backend import CpuBackend
+from tasks.render.camera import body_poses, continuous_rig, viewmat
+from tasks.render.clip import render_clip
+from tasks.render.composition import compose, encode_8bit
+from tasks.render.environment import environment_view
+from tasks.render.labels import row_flow
+from tasks.render.lens import Lens, distorted
+from tasks.render.readout import read_out, sensor_field
+from tasks.render.sight import row_points
+from tasks.render.weather.parameters import WeatherState
+from tasks.render.weather.scene_light import appended
+from tasks.scene.route import route_from_positions
+from tests.render.weather.scenes import clear_sky, road, surfels
+
+K = np.array([[200.0, 0, 120], [0, 200, 80], [0, 0, 1]])
+LENS = Lens(k1=-0.25, k2=0.05, p1=1e-3, p2=-5e-4)
+CAMERA = replace(load_camera("dashcam-480x320"), width=240, height=160, K=K, exposure_s=0.01)
+ROLLING = replace(CAMERA, line_delay_s=1.5e-4)
+ALL = replace(ROLLING, lens=LENS, motion_blur=True)
+WALL = 10.0
+
+
+def moving(camera, velocity, rate=0.0):
+    """Poses [3, H, 4, 4] of the rows of a camera at the origin that goes steadily and turns about its y."""
+    times = camera.row_times
+    poses = np.tile(np.eye(4), (*times.shape, 1, 1))
+    poses[..., :3, 3] = times[..., None] * velocity
+    cos, sin = np.cos(rate * times), np.sin(rate * times)
+    poses[..., 0, 0], poses[..., 0, 2], poses[..., 2, 0], poses[..., 2, 2] = cos, sin, -sin, cos
+    return poses
+
+
+def paint(x, y):
+    """Light of a wall, by its place on it."""
+    grey = 0.5 + 0.3 * np.sin(4 * x) * np.cos(3 * y)
+    return np.stack((grey, 0.5 * grey, 1 - grey), axis=-1).astype(np.float32)
+
+
+def wide_wall(field):
+    u, v = np.meshgrid(np.arange(field.width) + 0.5, np.arange(field.height) + 0.5)
+    x, y = (WALL * (place - field.K[i, 2]) / field.K[i, i] for i, place in enumerate((u, v)))
+    return paint(x, y), np.full(x.shape, WALL, np.float32)
+
+
+def wall_seen(directions, poses):
+    """What a ray meets of the wall, exactly: its light and its z in the row's camera."""
+    rays = np.concatenate((directions, np.ones((*directions.shape[:2], 1))), axis=-1)
+    rays = rays @ poses[:, :3, :3].swapaxes(1, 2)
+    z = (WALL - poses[:, None, 2, 3]) / rays[..., 2]
+    return paint(*(poses[:, None, i, 3] + z * rays[..., i] for i in range(2))), z
+
+
+@pytest.mark.parametrize(
+    "camera", [replace(CAMERA, lens=LENS), ROLLING, replace(ROLLING, lens=LENS)], ids=["lens", "rows", "both"]
+)
+def test_a_wall_is_seen_as_ray_and_row_time_say(camera):
+    field = sensor_field(camera)
+    poses = moving(camera, np.array((3.0, 0.5, 14.0)), rate=0.4)
+    seen = read_out(*wide_wall(field), field, poses, False)
+    light, z = wall_seen(field.directions, poses[1])
+    np.testing.assert_allclose(seen.depth, z, rtol=1e-5)
+    np.testing.assert_allclose(seen.picture, light, atol=1e-3)
+
+
+def test_blur_is_the_mean_of_the_light_along_the_way():
+    camera = replace(ALL, exposure_s=0.03)
+    field = sensor_field(camera)
+    poses = moving(camera, np.array((6.0, 0.0, 14.0)))
+    seen = read_out(*wide_wall(field), field, poses, True)
+    shares = (np.arange(32) + 0.5) / 32
+    exact = np.mean(
+        [wall_seen(field.directions, poses[0] + s * (poses[2] - poses[0]))[0] for s in shares], axis=0
+    )
+    sharp = read_out(*wide_wall(field), field, poses, False)
+    assert np.abs(seen.picture - exact).max() < 6e-3
+    assert np.abs(sharp.picture - exact).max() > 0.03
+    # labels are those of the middle of the exposure
+    np.testing.assert_array_equal(seen.depth, sharp.depth)
+    np.testing.assert_array_equal(seen.source, sharp.source)
+
+
+def test_a_bar_is_blurred_over_its_way_and_twice_as_wide_in_twice_the_exposure():
+    widths = []
+    for exposure in (0.02, 0.04):
+        camera = replace(CAMERA, motion_blur=True, exposure_s=exposure)
+        field = sensor_field(camera)
+        picture, depth = wide_wall(field)
+        picture[:] = 0
+        picture[:, int(field.K[0, 2])] = 1
+        seen = read_out(picture, depth, field, moving(camera, np.array((20.0, 0, 0))), True).picture[80, :, 0]
+        u = np.arange(240)
+        mean = (seen * u).sum() / seen.sum()
+        widths.append(np.sqrt(12 * ((seen * (u - mean) ** 2).sum() / seen.sum())))
+        assert seen.sum() == pytest.approx(1, abs=0.1)
+    # f V t / Z = 8 and 16 px
+    assert widths == pytest.approx([8, 16], rel=0.06)
+
+
+def test_a_pole_before_a_wall_shears_by_speed_times_row_time_over_depth():
+    field = sensor_field(ROLLING)
+    pole, half = 4.0, 0.15
+    u, _ = np.meshgrid(np.arange(field.width) + 0.5, np.arange(field.height) + 0.5)
+    on_pole = np.abs((u - field.K[0, 2]) / 200 * pole) < half
+    picture = np.where(on_pole[..., None], np.float32(1), np.float32(0.2)) * np.ones(3, np.float32)
+    depth = np.where(on_pole, pole, WALL).astype(np.float32)
+    speed = 25.0
+    seen = read_out(picture, depth, field, moving(ROLLING, np.array((speed, 0, 0))), False)
+    columns = np.arange(240) + 0.5
+    shear = 200 * speed * ROLLING.row_times[1] / pole
+    assert np.ptp(shear) > 25
+    for weights in ((seen.picture[..., 0] - 0.2) / 0.8, (seen.depth < 5) * 1.0):
+        centre = (weights * columns).sum(axis=1) / weights.sum(axis=1)
+        np.testing.assert_allclose(centre, 120 - shear, atol=0.6)
+        assert weights.sum(axis=1) == pytest.approx(2 * half * 200 / pole, abs=1.5)
+
+
+def test_a_straight_line_bends_as_the_formula_says():
+    camera = replace(CAMERA, lens=LENS)
+    field = sensor_field(camera)
+    u, _ = np.meshgrid(np.arange(field.width) + 0.5, np.arange(field.height) + 0.5)
+    x0 = 0.45
+    line = np.exp(-0.5 * ((u - field.K[0, 2] - 200 * x0) / 1.5) ** 2).astype(np.float32)
+    picture = np.repeat(line[..., None], 3, axis=2)
+    still = np.broadcast_to(np.eye(4), (3, 160, 4, 4))
+    seen = read_out(picture, np.full(u.shape, WALL, np.float32), field, still, False).picture[..., 0]
+    columns = np.arange(240) + 0.5
+    found = (seen * columns).sum(axis=1) / seen.sum(axis=1)
+    y = np.linspace(-0.55, 0.55, 2001)
+    bent_x, bent_y = distorted(np.full_like(y, x0), y, LENS.coefficients)
+    rows = np.arange(160) + 0.5
+    expected = 120 + 200 * np.interp((rows - 80) / 200, bent_y, bent_x)
+    assert np.ptp(expected) > 3
+    np.testing.assert_allclose(found, expected, atol=0.05)
+
+
+def test_a_camera_that_stands_still_sees_what_is_drawn_bit_for_bit():
+    camera = replace(ROLLING, motion_blur=True)
+    field = sensor_field(camera)
+    picture, depth = wide_wall(field)
+    seen = read_out(picture, depth, field, np.broadcast_to(np.eye(4), (3, 160, 4, 4)), True)
+    left, top = (int(field.K[i, 2] - K[i, 2]) for i in range(2))
+    inside = np.s_[top : top + 160, left : left + 240]
+    np.testing.assert_array_equal(seen.picture, picture[inside])
+    np.testing.assert_array_equal(seen.depth, depth[inside])
+
+
+def test_flow_leads_to_the_pixel_that_sees_the_same_point():
+    field = sensor_field(ALL)
+    now = moving(ALL, np.array((3.0, 0.5, 14.0)), rate=0.4)[1]
+    later = now.copy()
+    later[:, :3, 3] += (0.2, 0.05, 1.0)
+    depth, next_depth = (wall_seen(field.directions, poses)[1].astype(np.float32) for poses in (now, later))
+    flow, occluded = row_flow(depth, next_depth, field.directions, ALL, now, later)
+    points, next_points = (
+        row_points(field.directions, depth, now),
+        row_points(field.directions, next_depth, later),
+    )
+    there = np.moveaxis(flow, -1, 0) + np.meshgrid(np.arange(240), np.arange(160))
+    inside = ~occluded & (there[0] > 1) & (there[0] < 238) & (there[1] > 1) & (there[1] < 158)
+    assert inside.mean() > 0.7
+    column, row = (np.floor(place[inside]).astype(int) for place in there)
+    tx, ty = there[0][inside] - column, there[1][inside] - row
+    met = sum(
+        ((tx if i else 1 - tx) * (ty if j else 1 - ty))[:, None] * next_points[row + j, column + i]
+        for i in (0, 1)
+        for j in (0, 1)
+    )
+    # a pixel is 5 cm of the wall
+    np.testing.assert_allclose(met, points[inside], atol=2e-3)
+
+
+ROUTE = route_from_positions(np.stack([np.arange(100.0), np.zeros(100), np.zeros(100)], axis=1))
+TICKS = np.arange(201) * 1e-3
+
+
+def rig(speed=16.0):
+    return continuous_rig(
+        ROUTE, TICKS, 1.0 + speed * TICKS, 0.02 * np.sin(9 * TICKS), 0.03 * np.sin(7 * TICKS),
+        np.array((0.0, 0.1, 0.2)), cg_behind_front_axle=1.2, cg_height=0.55,
+    )  # fmt: skip
+
+
+def test_poses_between_ticks_meet_those_of_the_frames_and_go_on_beyond_the_ends():
+    at = rig()
+    exact = body_poses(
+        ROUTE, np.array([2.6]), np.array([0.02 * np.sin(0.9)]), np.array([0.03 * np.sin(0.7)]),
+        cg_behind_front_axle=1.2, cg_height=0.55,
+    )  # fmt: skip
+    np.testing.assert_allclose(at(1, np.zeros(1)), exact, atol=1e-12)
+    before, first, after = at(0, np.array((-0.01, 0.0, 0.01)))
+    np.testing.assert_allclose(before[:3, 3], 2 * first[:3, 3] - after[:3, 3], atol=1e-3)
+    np.testing.assert_allclose(first @ np.linalg.inv(after) @ first, before, atol=1e-12)
+    assert at(2, np.array((0.015,)))[0, 0, 3] == pytest.approx(at(2, np.zeros(1))[0, 0, 3] + 0.24, abs=2e-3)
+
+
+@pytest.fixture(scope="module")
+def parameters():
+    return load_weather()
+
+
+@pytest.fixture(scope="module")
+def street():
+    """A road with a striped wall beside it and posts before the wall."""
+    x, z = (part.ravel() for part in np.meshgrid(np.arange(3, 24, 0.08), np.arange(0, 4, 0.08)))
+    stripes = 0.15 + 0.5 * ((np.floor(2 * x) + np.floor(2 * z)) % 2)
+    wall = surfels(
+        np.column_stack((x, np.full(x.size, 4.0), z)), (0, -1, 0), 0.06, stripes[:, None] * np.ones(3), 6
+    )
+    foot, height = (part.ravel() for part in np.meshgrid(np.arange(8.0, 20, 3), np.arange(0, 3, 0.05)))
+    post = surfels(np.column_stack((foot, np.full(foot.size, 2.5), height)), (-1, 0, 0), 0.05, 0.8, 8)
+    return appended(appended(road(length=22), wall), post)
+
+
+def clip(street, camera, parameters, state=None, **more):
+    at = rig()
+    poses = np.concatenate([at(k, np.zeros(1)) for k in range(3)])
+    state = state or WeatherState(kind="dry")
+    return render_clip(
+        street, clear_sky(), ROUTE, camera, poses, frame_rate_hz=10, weather=state, looks=parameters, seed=1,
+        backend=CpuBackend(), rig_at=at, **more,
+    )  # fmt: skip
+
+
+def drawn(street, camera, pose):
+    backend = CpuBackend()
+    gbuffer = backend.rasterise(backend.prepare(street), viewmat(pose), camera.K, camera.width, camera.height)
+    sky = environment_view(clear_sky(), viewmat(pose), camera.K, camera.width, camera.height)
+    return compose(gbuffer, sky, street.display_encoded), gbuffer
+
+
+def test_with_all_three_off_the_bytes_are_those_of_the_plain_composition(street, parameters):
+    assert CAMERA.plain
+    made = clip(street, CAMERA, parameters)
+    for k in range(3):
+        picture, gbuffer = drawn(street, CAMERA, rig()(k, np.zeros(1))[0] @ CAMERA.T_rig_camera)
+        assert made["rgb"][k].tobytes() == encode_8bit(picture).tobytes()
+        assert made["class"][k].tobytes() == gbuffer.class_id.tobytes()
+
+
+def test_rows_and_blur_are_near_the_renders_that_they_stand_for(street, parameters):
+    """Rolling rows against a render for every eighth row's pose, blur against 32 renders; ignoring them is far off."""
+    at, plain = rig(), clip(street, CAMERA, parameters)["rgb"][1]
+
+    def pose(time):
+        return at(1, np.array([time]))[0] @ CAMERA.T_rig_camera
+
+    rows = np.arange(4, 160, 8)
+    exact = np.stack([drawn(street, CAMERA, pose(ROLLING.row_times[1][r]))[0][r] for r in rows])
+    seen = clip(street, ROLLING, parameters)["rgb"][1]
+    rolled = psnr(encode_8bit(exact), seen[rows])
+    assert rolled > 33
+    assert rolled > psnr(encode_8bit(exact), plain[rows]) + 10
+    shares = (np.arange(32) + 0.5) / 32 - 0.5
+    blurred = replace(CAMERA, motion_blur=True)
+    exact = np.mean(
+        [drawn(street, CAMERA, pose(s * CAMERA.exposure_s))[0] for s in shares], axis=0, dtype=np.float32
+    )
+    found = psnr(encode_8bit(exact), clip(street, blurred, parameters)["rgb"][1])
+    assert found > 38
+    assert found > psnr(encode_8bit(exact), plain) + 4
+
+
+def test_blur_of_a_camera_that_stands_leaves_falling_snow_as_it_is(street, parameters):
+    """A streak has its exposure already: it is not blurred again, and nothing else moves."""
+    pose = ROUTE.pose(np.array((5.0, 5.0)))
+    state = WeatherState(kind="snow", precipitation_mm_h=2, snow_depth_mm=20, snow_coverage=1.0)
+    plain, blurred = (
+        render_clip(
+            street, clear_sky(), ROUTE, camera, pose, frame_rate_hz=10, weather=state, looks=parameters, seed=1,
+            backend=CpuBackend(), rig_at=lambda k, t: np.repeat(pose[:1], len(t), axis=0),
+        )["rgb"]
+        for camera in (CAMERA, replace(CAMERA, motion_blur=True))
+    )  # fmt: skip
+    assert blurred.tobytes() == plain.tobytes()
+    assert plain[0].tobytes() != plain[1].tobytes()
+
+
+def test_labels_follow_rows_and_lens(street, parameters):
+    """Station and height of what a pixel sees come from its own ray and time: road pixels lie on the road."""
+    made = clip(street, ALL, parameters, labelled=lambda s: 0.0 * s)
+    field, poses = sensor_field(ALL), rig()(1, ALL.row_times[1]) @ ALL.T_rig_camera
+    points = row_points(field.directions, made["depth"][1], poses)
+    on_road = np.isfinite(made["road"][1][..., 0])
+    assert on_road.mean() > 0.2
+    assert np.quantile(np.abs(points[on_road][:, 2]), 0.99) < 0.01
+    np.testing.assert_allclose(made["road"][1][on_road], points[on_road][:, :2], atol=5e-3)
+    assert (
+        clip(street, ALL, parameters, labelled=lambda s: 0.0 * s)["flow"].tobytes() == made["flow"].tobytes()
+    )
+
+
+def test_a_camera_that_moves_during_a_frame_needs_poses_between_frames(street, parameters):
+    with pytest.raises(InputError, match="needs rig poses between frames"):
+        render_clip(
+            street, clear_sky(), ROUTE, ALL, np.eye(4)[None].repeat(2, 0), frame_rate_hz=10,
+            weather=WeatherState(kind="dry"), looks=parameters, seed=1, backend=CpuBackend(),
+        )  # fmt: skip
