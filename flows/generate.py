@@ -14,6 +14,7 @@ from flows.seal import seal
 from flows.store.frames import create_arrays
 from flows.store.layout import Layout, clear_partial_files, read_json, write_atomically, write_json
 from flows.store.lock import sole_writer
+from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 
 
@@ -26,7 +27,7 @@ class RunReport:
     layout : where it lies
     run_id : of its frozen plan
     clips, made : clips of the dataset, and of these those made now
-    doubtful : labels of the clips whose pose check failed; they stay in the dataset, with their verdict
+    quarantined : why the pose check failed, by label of the clip; they stay in the dataset, marked
     cost : CPU and wall seconds and peak memory by label of what was made now
     """
 
@@ -34,7 +35,7 @@ class RunReport:
     run_id: str
     clips: int
     made: int
-    doubtful: tuple[str, ...]
+    quarantined: dict[str, list[str]]
     cost: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
@@ -79,7 +80,7 @@ def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, flo
         run_id=plan.run_id,
         clips=len(plan.clips),
         made=made,
-        doubtful=tuple(clip["label"] for clip in clips if clip["verdict"]["passed"] is False),
+        quarantined={clip["label"]: clip["verdict"]["reasons"] for clip in clips if is_quarantined(clip)},
         cost=cost,
     )
 

@@ -128,6 +128,7 @@ class Dataset:
         columns: Sequence[str] = ("speed", "longitudinal_acceleration", "pitch", "heave"),
         arrays: Sequence[str] = ("rgb",),
         clips: Sequence[str] | None = None,
+        quarantined: bool = False,
     ) -> ClipWindows:
         """Windows of consecutive frames with their telemetry, for `torch.utils.data.DataLoader`.
 
@@ -137,9 +138,12 @@ class Dataset:
         stride : frames from the start of one window to the next in a clip; None takes ``window`` [1]
         columns : numeric columns of the frame table
         arrays : of rgb, depth and class; empty for telemetry alone
-        clips : labels or ids; None takes all
+        clips : labels or ids; None takes all that are not in quarantine
+        quarantined : take those too; else a warning names them and ``left_out`` holds their labels
         """
-        return windows_of(self.root, self.manifest, window, stride or window, columns, arrays, clips)
+        return windows_of(
+            self.root, self.manifest, window, stride or window, columns, arrays, clips, quarantined
+        )
 
     def schema(self) -> dict[str, Any]:
         """Columns of every view with unit, paper symbol, CF standard name and description."""

@@ -14,7 +14,7 @@ from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically
 from flows.store.telemetry import labelled_table, read_columns, write_parquet
 from manifests.canonical import sha256_of_file
-from manifests.manifest import freeze
+from manifests.manifest import freeze, is_quarantined
 from manifests.provenance import processor
 from manifests.siblings import sibling_pairs
 from tasks.conventions import PAIR_CHANNELS
@@ -79,6 +79,7 @@ def clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
         {name: r[name] for name in ("clip_id", "index", "label", "seed", "split", "calibration")}
         | r["scenario"]
         | r["figures"]
+        | {"quarantined": is_quarantined(r)}
         | {f"check_{key}": value for key, value in r["verdict"].items() if key != "reasons"}
         for r in receipts
     ]
@@ -105,7 +106,8 @@ def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: list[
     for receipt in spread(receipts, PREVIEW_CLIPS):
         pictures = read_clip(pictures_at, receipt["index"], "rgb")
         columns = read_columns(layout.staged(receipt["clip_id"], "frames"))
-        rows.append((receipt["label"], [pictures[frame] for frame in frames],
+        label = receipt["label"] + (" (quarantined)" if is_quarantined(receipt) else "")
+        rows.append((label, [pictures[frame] for frame in frames],
                      {"speed": columns["speed"], "pitch": columns["pitch"]}))  # fmt: skip
     return encode_png(contact_sheet(rows, frames, plan.settings.frame_rate_hz))
 

@@ -1,5 +1,6 @@
 """Windows of frames and telemetry as a torch dataset, and an order that a seed decides."""
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,7 @@ from torch.utils.data import Dataset, Sampler
 
 from flows.store.frames import ARRAYS
 from flows.store.layout import Layout
+from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 
 
@@ -29,6 +31,7 @@ class ClipWindows(Dataset[dict[str, Any]]):
     arrays : of rgb, depth and class
     window : frames in a sample [1]
     starts : first frame of each window in a clip [1]
+    left_out : labels of the clips in quarantine that are not among them
     """
 
     frames: Path
@@ -38,6 +41,7 @@ class ClipWindows(Dataset[dict[str, Any]]):
     arrays: tuple[str, ...]
     window: int
     starts: tuple[int, ...]
+    left_out: tuple[str, ...]
     _opened: dict[str, zarr.Array] = field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
@@ -101,8 +105,11 @@ def windows_of(
     columns: Sequence[str],
     arrays: Sequence[str],
     clips: Sequence[str] | None,
+    quarantined: bool,
 ) -> ClipWindows:
     """The windows of a dataset's clips, in the order of the dataset.
+
+    A clip in quarantine is left out, with a warning, unless ``quarantined`` or ``clips`` asks for it.
 
     Raises
     ------
@@ -128,8 +135,22 @@ def windows_of(
         problems.append(f"stride must be 1 or more; it is {stride}")
     named = {name for row in rows for name in (row["label"], row["clip_id"])}
     problems += [f"clip {name!r}: no such label or id in the dataset" for name in set(clips or ()) - named]
+    left_out = (
+        tuple(row["label"] for row in rows if is_quarantined(row))
+        if clips is None and not quarantined
+        else ()
+    )
+    rows = [row for row in rows if row["label"] not in left_out]
+    if not rows and not problems:
+        problems = [f"{root}: every clip is in quarantine; quarantined=True takes them all the same"]
     if problems:
         raise InputError(problems)
+    if left_out:
+        warnings.warn(
+            f"{len(left_out)} of {len(rows) + len(left_out)} clips are in quarantine and left out"
+            f" ({', '.join(left_out)}); quarantined=True takes them too",
+            stacklevel=3,
+        )
     values: dict[str, np.ndarray] = {}
     for file in files:
         table = pq.read_table(file, columns=["clip_id", *columns])
@@ -144,4 +165,5 @@ def windows_of(
         arrays=tuple(arrays),
         window=window,
         starts=tuple(range(0, frames - window + 1, stride)),
+        left_out=left_out,
     )

@@ -38,6 +38,11 @@ def freeze(
     return canonical_bytes(manifest | {"seal": seal_of(manifest)})
 
 
+def is_quarantined(clip: Mapping[str, Any]) -> bool:
+    """Whether a clip's record says that its pose check failed; without pictures there was none to fail."""
+    return clip["verdict"]["passed"] is False
+
+
 def seal_of(manifest: Mapping[str, Any]) -> str:
     """SHA-256 of the canonical form of all but the seal itself: what tells a changed manifest from its own."""
     return sha256_of([canonical_bytes({key: value for key, value in manifest.items() if key != "seal"})])

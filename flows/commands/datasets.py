@@ -55,7 +55,7 @@ def generate(
         "run_id": report.run_id,
         "clips": report.clips,
         "made": report.made,
-        "pose_check_failed": list(report.doubtful),
+        "quarantined": report.quarantined,
         "dataset": str(layout.root),
         "manifest": str(layout.manifest),
         "contact_sheet": str(sheet) if sheet.is_file() else None,

@@ -1,7 +1,9 @@
 """The same dataset in every library: one value, whichever way it is read; and the SQL views."""
 
+import copy
 import json
 import shutil
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -111,7 +113,9 @@ def test_answers_are_json(toy_dataset):
 
 
 def test_windows_hold_consecutive_frames_and_their_telemetry(data, toy_dataset):
-    windows = data.torch(window=4, stride=3, columns=["speed", "pitch"], arrays=["rgb", "depth"])
+    windows = data.torch(
+        window=4, stride=3, columns=["speed", "pitch"], arrays=["rgb", "depth"], quarantined=True
+    )
     assert len(windows) == 4 * 3
     sample = windows[3 + 1]
     assert (sample["clip"], sample["start"]) == (1, 3)
@@ -122,7 +126,7 @@ def test_windows_hold_consecutive_frames_and_their_telemetry(data, toy_dataset):
 
 
 def test_workers_give_the_same_batches_in_the_seeds_order(data):
-    windows = data.torch(window=5, columns=["speed"])
+    windows = data.torch(window=5, columns=["speed"], quarantined=True)
 
     def batches(workers: int, seed: int, epoch: int = 0) -> list:
         order = musync.SeededOrder(len(windows), seed)
@@ -135,6 +139,26 @@ def test_workers_give_the_same_batches_in_the_seeds_order(data):
     assert batches(0, seed=8) != alone and batches(0, seed=7, epoch=1) != alone
     assert sorted(c for clips, _, _ in alone for c in clips) == [0, 0, 1, 1, 2, 2, 3, 3]
     assert not all(a <= b for a, b in pairwise(c for clips, _, _ in alone for c in clips))
+
+
+def test_clips_in_quarantine_are_left_out_and_named_unless_asked_for(data):
+    # one second of a toy street is too little for any clip to pass: let one
+    clips = copy.deepcopy(data.manifest["clips"])
+    clips[1]["verdict"]["passed"] = True
+    data = replace(data, manifest=data.manifest | {"clips": clips})
+    failed = tuple(clip["label"] for clip in clips if not clip["verdict"]["passed"])
+    assert len(failed) == 3
+    with pytest.warns(UserWarning, match="3 of 4 clips are in quarantine") as told:
+        windows = data.torch(window=5, columns=["speed"])
+    assert windows.clips == (1,) and windows.left_out == failed
+    assert all(label in str(told[0].message) for label in failed)
+    assert data.torch(window=5, columns=["speed"], quarantined=True).clips == (0, 1, 2, 3)
+    assert data.torch(window=5, columns=["speed"], clips=failed[:1]).clips == (0,)
+
+
+def test_a_dataset_all_in_quarantine_is_no_training_set(data):
+    with pytest.raises(InputError, match="every clip is in quarantine"):
+        data.torch(window=5, columns=["speed"])
 
 
 def test_wrong_arguments_of_windows_are_listed_all_at_once(data):

@@ -141,11 +141,14 @@ def test_labels_come_where_the_grid_asks_for_them_and_an_audit_makes_them_again(
     assert audit(str(layout.root), share=0.2, runner="threads")["verified"]
 
 
-def test_the_report_names_the_clips_whose_pose_check_failed(dataset, grid):
-    verdicts = {clip["label"]: clip["verdict"]["passed"] for clip in manifest_of(dataset)["clips"]}
+def test_a_clip_whose_pose_check_failed_is_kept_and_told_with_its_reasons(dataset, grid):
+    verdicts = {clip["label"]: clip["verdict"] for clip in manifest_of(dataset)["clips"]}
     report = generate(grid, str(dataset.root), runner="threads")
-    assert report.doubtful == tuple(label for label, passed in verdicts.items() if not passed)
-    assert 0 < len(report.doubtful) <= len(verdicts), "one second of a toy street is too little for the gates"
+    failed = {label: verdict["reasons"] for label, verdict in verdicts.items() if not verdict["passed"]}
+    assert report.quarantined == failed and all(failed.values())
+    assert 0 < len(failed) <= len(verdicts), "one second of a toy street is too little for the gates"
+    rows = pq.read_table(dataset.telemetry / "clips.parquet", columns=["label", "quarantined"]).to_pylist()
+    assert {row["label"] for row in rows if row["quarantined"]} == set(failed) and len(rows) == len(verdicts)
 
 
 def broken_on_two(root: str, index: int) -> dict:

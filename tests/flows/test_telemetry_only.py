@@ -25,7 +25,7 @@ def bare(toy_dataset, tmp_path_factory) -> Layout:
     folder = tmp_path_factory.mktemp("bare")
     grid = str(toy_dataset.root.parent / "grid.yaml")
     report = generate(grid, str(folder / "data"), runner="threads", workers=1, pictures=False)
-    assert report.doubtful == ()
+    assert report.quarantined == {}
     return report.layout
 
 
