@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from catalogs.cameras import load_camera
 from catalogs.gates import load_gates
+from catalogs.hazard_markings import load_marking
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.surfaces import load_surface
@@ -37,6 +38,7 @@ from tasks.render.backend import select_backend
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
 from tasks.render.clip import render_clip
 from tasks.render.road_edit import RoadRelief, apply_road_profile
+from tasks.render.road_paint import HazardMarking, painted
 from tasks.render.road_refinement import refined_road
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.scene.route import Route
@@ -63,6 +65,7 @@ class Catalogue:
     scene: Scene
     looks: WeatherParameters
     gates: PoseThresholds
+    marking: HazardMarking | None = None
 
 
 @lru_cache(maxsize=2)
@@ -80,6 +83,7 @@ def load_catalogue(inputs: Path, scene: str) -> Catalogue:
         scene=load_scene(scene),
         looks=load_weather(inputs / "weather"),
         gates=load_gates(inputs / "gates.yaml"),
+        marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
     )
 
 
@@ -262,9 +266,12 @@ def picture(
     gaussians, relief = scene.gaussians, None
     if hazard.height_m != 0:
         relief = relief_of(hazard, scene.route)
-        gaussians, _ = apply_road_profile(
-            refined_road(scene.gaussians, relief), relief, scene.carriageway_left, scene.carriageway_right
-        )
+        carriageway = scene.carriageway_left, scene.carriageway_right
+        gaussians = refined_road(gaussians, relief)
+        if catalogue.marking is not None and hazard.height_m > 0:
+            albedo = catalogue.looks.sky.asphalt_albedo
+            gaussians = painted(gaussians, relief, catalogue.marking, *carriageway, albedo)
+        gaussians, _ = apply_road_profile(gaussians, relief, *carriageway)
     return render_clip(
         gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
         frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,

@@ -9,6 +9,7 @@ from typing import Any
 from catalogs.cameras import camera_source
 from catalogs.gates import GATES
 from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
+from catalogs.hazard_markings import marking_source
 from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.surfaces import surface_source
@@ -151,6 +152,7 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
 
 def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
     """The catalogue files that a grid stands on: name under ``inputs/`` to what finds it."""
+    marking = settings.hazard_marking
     weather = {f"weather/{path.name}": path for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
     return {
         "vehicle.yaml": partial(vehicle_source, settings.vehicle),
@@ -158,6 +160,7 @@ def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
         "camera.yaml": partial(camera_source, settings.camera),
         "gates.yaml": lambda: GATES,
         **{name: partial(Path, path) for name, path in weather.items()},
+        **({} if marking is None else {"hazard_marking.yaml": partial(marking_source, marking)}),
     }
 
 

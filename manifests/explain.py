@@ -11,6 +11,7 @@ REACHES = {
     "vehicle.yaml": (VEHICLE, RENDER),
     "surface.yaml": (VEHICLE, RENDER),
     "camera.yaml": (RENDER,),
+    "hazard_marking.yaml": (RENDER,),
     "gates.yaml": (JUDGING,),
     "weather": (RENDER,),
     "scene": (RENDER,),

@@ -24,6 +24,9 @@ class GridFile(Blocks):
     vehicle: str = "paper-reference"
     surface: str = "dense-asphalt"
     camera: str = "dashcam-480x320"
+    hazard_marking: str | None = Field(
+        default=None, description="Paint on raised road features; without an entry they are left bare."
+    )
     vehicle_mode: Literal["paper", "coupled"] = "paper"
     frames: int = Field(default=81, ge=2)
     frame_rate_hz: float = Field(default=10.0, gt=0, le=1000)

@@ -1,0 +1,53 @@
+"""Paint on raised road features: how it is laid out, and how it reflects."""
+
+from pathlib import Path
+from typing import Annotated
+
+from catalogs.entries import find_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
+from tasks.render.road_paint import HazardMarking
+
+FOLDER = Path(__file__).parent
+
+Reflectance = Annotated[Table, checked("1", minimum=0, maximum=1)]
+
+
+class MarkingEntry(CatalogueEntry):
+    """What a marking's file must hold; the meanings stand at ``HazardMarking``."""
+
+    stripe_width: Annotated[Scalar, checked("m", above=0)]
+    paint: Reflectance
+    gap: Reflectance
+
+
+def marking_source(name_or_path: str | Path) -> Path:
+    """The YAML file of a marking.
+
+    Raises
+    ------
+    InputError
+        If there is none; the sentence lists those that exist.
+    """
+    return find_entry(FOLDER, name_or_path, "hazard marking")
+
+
+def load_marking(name_or_path: str | Path) -> HazardMarking:
+    """Read a marking by its name in the catalogue or from a YAML file.
+
+    Parameters
+    ----------
+    name_or_path : name, or path ending in .yaml
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file, or the names that exist.
+    """
+    entry = read_entry(MarkingEntry, marking_source(name_or_path), "hazard marking")
+    red, green, blue = entry.paint.value
+    dark_red, dark_green, dark_blue = entry.gap.value
+    return HazardMarking(
+        stripe_width=entry.stripe_width.value,
+        paint=(red, green, blue),
+        gap=(dark_red, dark_green, dark_blue),
+    )
