@@ -5,13 +5,12 @@ What an effect changes must be the same in both, on five manoeuvres: to 10 % of 
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-from catalogs.effects import load_effects
+from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.grown_vehicle import grown_vehicle
@@ -42,7 +41,7 @@ MANOEUVRES = {
 FLOOR = np.array([0.002, 0.01, 0.01, 0.015])
 """Of speed, wheel speeds times radius [m/s] and pitch [deg]: none above the noise of a measured campaign."""
 SHARE = 0.1
-TRUTHS = yaml.safe_load(Path("catalogs/effects/truths.yaml").read_text())["library"]
+TRUTHS = yaml.safe_load(LIBRARY_FILE.with_name("truths.yaml").read_text())["library"]
 LIBRARY = [e for e in load_effects() if e.effect_class != "sensor"]
 OF_THE_ROAD = {"retuned_grade"}
 """A grade belongs to the proving ground and not to the vehicle."""
