@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from catalogs.grids import load_grid
-from flows.clip import drive, frame_rows, load_catalogue, picture, rig_of
+from flows.clip import frame_rows, load_catalogue, picture, rig_of
+from flows.driving import drive
 from flows.plan import freeze_grid
 from flows.store.layout import write_atomically
 from tasks.conventions import ROAD_CLASSES

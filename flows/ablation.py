@@ -14,8 +14,8 @@ from catalogs.studies.ablation import VARIANTS, Ablation, Variant, cut, load_abl
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.ablation_figure import ablation_figure
-from flows.clip import drive
 from flows.drawing import as_svg
+from flows.driving import drive
 from flows.store.layout import write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError

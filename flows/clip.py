@@ -21,9 +21,11 @@ from catalogs.gates import load_gates
 from catalogs.hazard_markings import load_marking
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
+from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
+from flows.driving import drive, hazard_of, ranges_of
 from flows.plan import ClipPlan, Plan, read_plan
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import Layout, write_json
@@ -43,12 +45,11 @@ from tasks.render.road_refinement import refined_road
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene
-from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
-from tasks.vehicle.brake import BrakeCommand
+from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
+from tasks.vehicle.rollout import Rollout
+from tasks.vehicle.sensitivity import StudyProtocol
 
 TICK_RATE_HZ = 1000
 PIXEL_CENTRE = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
@@ -65,6 +66,7 @@ class Catalogue:
     scene: Scene
     looks: WeatherParameters
     gates: PoseThresholds
+    study: StudyProtocol
     marking: HazardMarking | None = None
 
 
@@ -84,6 +86,7 @@ def load_catalogue(inputs: Path, scene: str) -> Catalogue:
         looks=load_weather(inputs / "weather"),
         gates=load_gates(inputs / "gates.yaml"),
         marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
+        study=load_sensitivity_study(inputs / "study.yaml")[0],
     )
 
 
@@ -96,8 +99,10 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
     clip = plan.clips[index]
     catalogue = catalogue_of(layout.root)
 
-    facts, ride = drive(
-        clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
+    mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
+    facts, ride = drive(clip.scenario, catalogue.vehicle, catalogue.surface, mode, duration_s)
+    ranges = ranges_of(
+        clip.scenario, facts, catalogue.vehicle, catalogue.surface, catalogue.study, mode, duration_s
     )
     frames = frame_rows(ride, plan, catalogue)
     buffers: dict[str, NDArray[Any]] = {}
@@ -132,7 +137,7 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
             "peak_pitch": float(ride.columns["pitch"].max()),
             "static_pitch": ride.static_pitch,
             "calibration_extrapolated": ride.calibration_extrapolated,
-        }),
+        } | ranges),
         "verdict": verdict,
     }  # fmt: skip
     write_json(layout.receipt(clip.clip_id), receipt)
@@ -142,71 +147,6 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
         "peak_memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
     return receipt | {"cost": cost}
-
-
-def drive(
-    scenario: Scenario,
-    vehicle: Vehicle,
-    surface: SurfaceParameters,
-    mode: Mode,
-    duration_s: float,
-) -> tuple[dict[str, Any], Rollout]:
-    """Weather to surface state to friction to vehicle motion."""
-    weather = weather_of(scenario)
-    state = surface_state(weather, surface)
-    friction = surface_friction(weather, state, surface)
-    ride = rollout(
-        vehicle,
-        scenario.weather,
-        friction,
-        controls_of(scenario),
-        hazard_of(scenario),
-        mode=mode,
-        duration_s=duration_s,
-        snow_depth_mm=state.snow_depth_mm,
-    )
-    facts = {
-        "film_depth_mm": state.film_depth_mm,
-        "snow_depth_mm": state.snow_depth_mm,
-        "snow_coverage": state.snow_coverage,
-        "surface_friction": friction,
-        "tyre_peak": ride.tyre_peak,
-    }
-    return facts, ride
-
-
-def weather_of(scenario: Scenario) -> Weather:
-    """What falls on the road in the scenario."""
-    return Weather(
-        kind=scenario.weather,
-        precipitation_mm_h=scenario.precipitation_mm_h,
-        snow_accumulation_h=scenario.snow_accumulation_h,
-    )
-
-
-def controls_of(scenario: Scenario) -> Controls:
-    """What the driver does in the scenario."""
-    return Controls(
-        initial_speed=scenario.initial_speed_km_h / 3.6,
-        brake=BrakeCommand(
-            peak_pressure_mpa=scenario.peak_pressure_mpa,
-            ramp_s=scenario.ramp_s,
-            hold_s=scenario.hold_s,
-            release_s=scenario.release_s,
-            onset_s=scenario.brake_onset_s,
-            onset_station_m=scenario.brake_onset_m,
-        ),
-        hold_speed_until_brake=scenario.hold_speed,
-    )
-
-
-def hazard_of(scenario: Scenario) -> RoadHazard:
-    """The scenario's road feature."""
-    return RoadHazard(
-        center_m=scenario.hazard_center_m,
-        length_m=scenario.hazard_length_m,
-        height_m=scenario.hazard_height_m,
-    )
 
 
 def relief_of(hazard: RoadHazard, route: Route) -> RoadRelief:

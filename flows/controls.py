@@ -8,9 +8,10 @@ import numpy as np
 
 from catalogs.gates import load_gates
 from catalogs.studies.ablation import VARIANTS, Variant, cut
-from flows.clip import TICK_RATE_HZ, Catalogue, catalogue_of, drive
+from flows.clip import TICK_RATE_HZ, Catalogue, catalogue_of
 from flows.controls_figure import roc_figure
 from flows.drawing import as_svg
+from flows.driving import drive
 from flows.judged_clip import METHODS, JudgedClip, judge_clip
 from flows.orchestration import stage
 from flows.physics import clip_facts

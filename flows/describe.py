@@ -12,8 +12,8 @@ from flows.store.layout import Layout
 
 CPU_SECONDS_PER_MEGAPIXEL = 1.3
 """Of a finished frame with its pose check, measured on the built-in street at 480 x 320."""
-CPU_SECONDS_PER_CLIP = 0.05
-"""Of a clip without frames, measured over 10,000."""
+CPU_SECONDS_PER_CLIP = 0.1
+"""Of a clip without frames, its label ranges included: 0.07 on a flat road, 0.2 over a road feature."""
 BYTES_PER_PIXEL, BYTES_OF_LABELS_PER_PIXEL, BYTES_PER_TICK = 2.4, 3.8, 76
 """On the disk, compressed: measured on the built-in street; noise and another scene's texture cost more."""
 

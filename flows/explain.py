@@ -12,7 +12,7 @@ from catalogs.scenes import load_scene
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.audit import read_manifest
-from flows.clip import controls_of, hazard_of, weather_of
+from flows.driving import controls_of, hazard_of, weather_of
 from flows.plan import read_plan
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.telemetry import read_columns

@@ -11,7 +11,7 @@ from catalogs.grids import Grid, GridFile, expand_grid, grid_names, load_grid
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.audit import read_manifest, tool_differences
-from flows.clip import drive
+from flows.driving import drive
 from flows.generate import RunReport, generate
 from flows.plan import Plan, freeze_grid
 from flows.progress import progress_bar

@@ -12,6 +12,7 @@ from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
 from catalogs.hazard_markings import marking_source
 from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
+from catalogs.studies import SENSITIVITY
 from catalogs.surfaces import surface_source
 from catalogs.vehicles import vehicle_provenance, vehicle_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
@@ -159,6 +160,7 @@ def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
         "surface.yaml": partial(surface_source, settings.surface),
         "camera.yaml": partial(camera_source, settings.camera),
         "gates.yaml": lambda: GATES,
+        "study.yaml": lambda: SENSITIVITY,
         **{name: partial(Path, path) for name, path in weather.items()},
         **({} if marking is None else {"hazard_marking.yaml": partial(marking_source, marking)}),
     }

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.grids import load_grid
-from flows.clip import Catalogue, drive, frame_rows, load_catalogue, picture, rig_of
+from flows.clip import Catalogue, frame_rows, load_catalogue, picture, rig_of
+from flows.driving import drive
 from flows.plan import ClipPlan, Plan, freeze_grid
 from flows.progress import progress_bar
 from flows.store.frames import buffer_hash

@@ -13,6 +13,7 @@ REACHES = {
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
     "gates.yaml": (JUDGING,),
+    "study.yaml": (JUDGING,),
     "weather": (RENDER,),
     "scene": (RENDER,),
     "backend": (RENDER,),

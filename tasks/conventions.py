@@ -103,6 +103,15 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="stop_time", unit="s", symbol="t_s", description="time of the stop since the start of the clip"),
     Channel(name="stopping_distance", unit="m", symbol="d_stop", description="distance from brake onset to the stop"),
     Channel(name="peak_pitch", unit="rad", symbol="", description="largest nose-down pitch of the clip"),
+    Channel(name="surface_friction_p05", unit="1", symbol="mu_c", description="5th percentile, under the paper's bounds of the surface parameters (Appendix E), of: reference surface coefficient"),
+    Channel(name="surface_friction_p50", unit="1", symbol="mu_c", description="median, under the paper's bounds of the surface parameters (Appendix E), of: reference surface coefficient"),
+    Channel(name="surface_friction_p95", unit="1", symbol="mu_c", description="95th percentile, under the paper's bounds of the surface parameters (Appendix E), of: reference surface coefficient"),
+    Channel(name="stopping_distance_p05", unit="m", symbol="d_stop", description="5th percentile, under the paper's bounds of the surface parameters (Appendix E), of: distance from brake onset to the stop; null where the clip ends before it"),
+    Channel(name="stopping_distance_p50", unit="m", symbol="d_stop", description="median, under the paper's bounds of the surface parameters (Appendix E), of: distance from brake onset to the stop; null where the clip ends before it"),
+    Channel(name="stopping_distance_p95", unit="m", symbol="d_stop", description="95th percentile, under the paper's bounds of the surface parameters (Appendix E), of: distance from brake onset to the stop; null where the clip ends before it"),
+    Channel(name="peak_pitch_p05", unit="rad", symbol="", description="5th percentile, under the paper's bounds of the surface parameters (Appendix E), of: largest nose-down pitch of the clip"),
+    Channel(name="peak_pitch_p50", unit="rad", symbol="", description="median, under the paper's bounds of the surface parameters (Appendix E), of: largest nose-down pitch of the clip"),
+    Channel(name="peak_pitch_p95", unit="rad", symbol="", description="95th percentile, under the paper's bounds of the surface parameters (Appendix E), of: largest nose-down pitch of the clip"),
     Channel(name="static_pitch", unit="rad", symbol="theta_0", description="pitch of the resting body, not contained in the pitch column"),
 )  # fmt: skip
 

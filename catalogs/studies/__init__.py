@@ -73,9 +73,22 @@ class Condition:
     scenario: Scenario
 
 
-def load_sensitivity_study() -> tuple[StudyProtocol, tuple[PrintedFigure, ...]]:
-    """Protocol and printed figures of the paper's Appendix E."""
-    entry = read_entry(SensitivityEntry, FOLDER / "surface-sensitivity.yaml", "study")
+SENSITIVITY = FOLDER / "surface-sensitivity.yaml"
+
+
+def load_sensitivity_study(path: Path = SENSITIVITY) -> tuple[StudyProtocol, tuple[PrintedFigure, ...]]:
+    """Protocol and printed figures of the paper's Appendix E.
+
+    Parameters
+    ----------
+    path : the study's file
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file.
+    """
+    entry = read_entry(SensitivityEntry, path, "study")
     values: dict[str, Any] = {name: quantity.value for name, quantity in entry.protocol}
     values["initial_speed"] /= 3.6
     values["samples"] = int(values["samples"])

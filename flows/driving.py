@@ -1,0 +1,97 @@
+"""From a scenario to the vehicle's motion: what the weather, the driver and the road are to the model."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from catalogs.scenario import Scenario
+from tasks.surface.friction import surface_friction
+from tasks.surface.road_profile import RoadHazard
+from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.label_ranges import label_ranges, sampled_friction
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
+from tasks.vehicle.sensitivity import StudyProtocol
+
+
+def drive(
+    scenario: Scenario,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    mode: Mode,
+    duration_s: float,
+) -> tuple[dict[str, Any], Rollout]:
+    """Weather to surface state to friction to vehicle motion."""
+    weather = weather_of(scenario)
+    state = surface_state(weather, surface)
+    friction = surface_friction(weather, state, surface)
+    ride = _ride(scenario, vehicle, friction, state.snow_depth_mm, mode, duration_s)
+    facts = {
+        "film_depth_mm": state.film_depth_mm,
+        "snow_depth_mm": state.snow_depth_mm,
+        "snow_coverage": state.snow_coverage,
+        "surface_friction": friction,
+        "tyre_peak": ride.tyre_peak,
+    }
+    return facts, ride
+
+
+def ranges_of(
+    scenario: Scenario,
+    facts: Mapping[str, Any],
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    study: StudyProtocol,
+    mode: Mode,
+    duration_s: float,
+) -> dict[str, float]:
+    """Percentiles of the clip's labels under the bounds of the surface parameters; the snow's depth stays nominal."""
+
+    def again(friction: float) -> tuple[float, float]:
+        ride = _ride(scenario, vehicle, friction, facts["snow_depth_mm"], mode, duration_s)
+        return ride.stopping_distance, float(ride.columns["pitch"].max())
+
+    return label_ranges(sampled_friction(weather_of(scenario), surface, study), again)
+
+
+def _ride(
+    scenario: Scenario, vehicle: Vehicle, friction: float, snow_depth_mm: float, mode: Mode, duration_s: float
+) -> Rollout:
+    return rollout(
+        vehicle, scenario.weather, friction, controls_of(scenario), hazard_of(scenario),
+        mode=mode, duration_s=duration_s, snow_depth_mm=snow_depth_mm,
+    )  # fmt: skip
+
+
+def weather_of(scenario: Scenario) -> Weather:
+    """What falls on the road in the scenario."""
+    return Weather(
+        kind=scenario.weather,
+        precipitation_mm_h=scenario.precipitation_mm_h,
+        snow_accumulation_h=scenario.snow_accumulation_h,
+    )
+
+
+def controls_of(scenario: Scenario) -> Controls:
+    """What the driver does in the scenario."""
+    return Controls(
+        initial_speed=scenario.initial_speed_km_h / 3.6,
+        brake=BrakeCommand(
+            peak_pressure_mpa=scenario.peak_pressure_mpa,
+            ramp_s=scenario.ramp_s,
+            hold_s=scenario.hold_s,
+            release_s=scenario.release_s,
+            onset_s=scenario.brake_onset_s,
+            onset_station_m=scenario.brake_onset_m,
+        ),
+        hold_speed_until_brake=scenario.hold_speed,
+    )
+
+
+def hazard_of(scenario: Scenario) -> RoadHazard:
+    """The scenario's road feature."""
+    return RoadHazard(
+        center_m=scenario.hazard_center_m,
+        length_m=scenario.hazard_length_m,
+        height_m=scenario.hazard_height_m,
+    )
