@@ -8,9 +8,11 @@ import numpy as np
 import pyarrow as pa
 
 from catalogs.gates import load_gates
+from catalogs.learned_judges import load_judges
 from flows.evaluation_page import page
-from flows.evaluation_rows import control_of, figure_row
+from flows.evaluation_rows import control_of, figure_row, weather_families
 from flows.judged_clip import JudgedClip, Row, judge_clip
+from flows.learned_rows import learned_rows
 from flows.orchestration import stage
 from flows.physics import clip_facts
 from flows.road_edit_rows import road_edit_rows
@@ -30,16 +32,17 @@ from tasks.eval.video_motion import (
 )
 
 NOT_RUN = {
-    "clip_severity_rho": "not run: checkpoint missing",
-    "dover_overall": "not run: checkpoint missing",
-    "fast_vqa": "not run: checkpoint missing",
-    "temporal_lpips": "not run: checkpoint missing",
     "motion_retention": "not run: a dataset holds no editor's input and output pair",
 }
 
 
 def evaluate(
-    dataset: str, *, out: str, trajectories: str | None = None, metric: bool = False
+    dataset: str,
+    *,
+    out: str,
+    trajectories: str | None = None,
+    metric: bool = False,
+    learned: str | None = None,
 ) -> dict[str, Any]:
     """Judge a finished dataset from its pixels and write every figure with its unit and the paper's value.
 
@@ -49,19 +52,22 @@ def evaluate(
     out : folder for evaluation.json, evaluation.parquet and evaluation.html
     trajectories : folder with METHOD/CLIP_ID.txt in the TUM format, scored beside our own checks
     metric : whether their lengths are metres
+    learned : YAML of local checkpoints of learned judges, as `catalogs.learned_judges` reads it
 
     Raises
     ------
     InputError
-        If the folder is no finished dataset, or a trajectory cannot be used.
+        If the folder is no finished dataset, or a trajectory or a checkpoint cannot be used.
     """
     root = Path(dataset).resolve()
+    judges = load_judges(learned)
     facts = clip_facts(root)
     told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
     clips = [stage(judge_clip)(root, row, told.get(row["clip_id"]), metric=metric) for row in facts]
     rows = [*pose_rows(clips), *weather_rows(clips), *geometry_rows(clips), *severity_rows(clips)]
     rows += quality_rows(clips)
     rows += stage(road_edit_rows)(root, clips)
+    rows += learned_rows(root, clips, judges)
     rows += [figure_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
     result = {"run_id": read_json(Layout(root).manifest)["run_id"], "clips": len(clips), "rows": rows}
     folder = Path(out)
@@ -147,23 +153,14 @@ def quality_rows(clips: list[JudgedClip]) -> Iterator[Row]:
 
 def severity_rows(clips: list[JudgedClip]) -> Iterator[Row]:
     """Rank agreement of the named image statistics with the rate, within one drive and one kind of weather."""
-    dry = [c for c in clips if c.facts["weather"] == "dry"]
-    for control in dry:
-        for kind in ("rain", "snow"):
-            family = [
-                c for c in clips if c.facts["weather"] == kind and control_of(c, [control], weather=True) is control
-            ]  # fmt: skip
-            levels = [control, *family]
-            if len({c.facts["precipitation_mm_h"] for c in levels}) < 3:
-                continue
-            rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
-            condition = f"{kind}: {control.facts['label'].partition('/')[2] or 'all'}"
-            for name in control.statistics:
-                values = {c.facts["clip_id"]: c.statistics[name] for c in levels}
-                rho, accuracy = severity_agreement(rates, values)
-                note = "stand-in for a learned judge"
-                yield figure_row("severity_rank_correlation", name, condition, rho, "1", note=note)
-                yield figure_row("severity_adjacent_accuracy", name, condition, accuracy, "1", note=note)
+    for _, condition, levels in weather_families(clips):
+        rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
+        for name in levels[0].statistics:
+            values = {c.facts["clip_id"]: c.statistics[name] for c in levels}
+            rho, accuracy = severity_agreement(rates, values)
+            note = "stand-in for a learned judge"
+            yield figure_row("severity_rank_correlation", name, condition, rho, "1", note=note)
+            yield figure_row("severity_adjacent_accuracy", name, condition, accuracy, "1", note=note)
 
 
 def _seen(clips: list[JudgedClip]) -> Iterator[tuple[JudgedClip, str, RecoveredMotion]]:

@@ -1,5 +1,6 @@
 """A figure's row, and which clip a clip is held against."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,23 @@ def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> J
         if plain and other is not clip and all(_same(clip.facts.get(k), other.facts.get(k)) for k in held):
             return None if weather and clip.facts["weather"] == "dry" else other
     return None
+
+
+def weather_families(clips: list[JudgedClip]) -> Iterator[tuple[str, str, list[JudgedClip]]]:
+    """Clips of one drive in dry weather and at two rates or more of one kind: kind, condition and the clips, dry first.
+
+    Parameters
+    ----------
+    clips : of the dataset
+    """
+    for control in (c for c in clips if c.facts["weather"] == "dry"):
+        for kind in ("rain", "snow"):
+            family = [
+                c for c in clips if c.facts["weather"] == kind and control_of(c, [control], weather=True) is control
+            ]  # fmt: skip
+            levels = [control, *family]
+            if len({c.facts["precipitation_mm_h"] for c in levels}) >= 3:
+                yield kind, f"{kind}: {control.facts['label'].partition('/')[2] or 'all'}", levels
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -1,5 +1,6 @@
 """How a dataset's road features show in its pictures, held against their flat twins."""
 
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -8,8 +9,7 @@ from numpy.typing import NDArray
 
 from flows.clip import PIXEL_CENTRE, Catalogue, catalogue_of
 from flows.evaluation_rows import control_of, figure_row
-from flows.judged_clip import JudgedClip, Row
-from flows.store.frames import read_clip
+from flows.judged_clip import JudgedClip, Row, seen_by_pinhole
 from flows.store.layout import Layout
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.flip import flip
@@ -32,15 +32,16 @@ def road_edit_rows(root: Path, clips: list[JudgedClip]) -> list[Row]:
     root : a finished dataset
     clips : as their judges saw them
     """
-    rows, frames = [], Layout(root).frames
+    rows: list[Row] = []
     catalogue = catalogue_of(root)
+    view = partial(seen_by_pinhole, Layout(root), camera=catalogue.camera)
     for clip in clips:
         flat = control_of(clip, clips, weather=False)
         if clip.facts["hazard_height_m"] == 0 or flat is None:
             continue
-        depth, kind = (read_clip(frames, clip.facts["index"], name) for name in ("depth", "class"))
+        depth, kind = view(clip.facts["index"], names=("depth", "class"))
         targets = prescribed_masks(clip, depth, np.isin(kind, ROAD_CLASSES), catalogue)
-        pictures = [read_clip(frames, c.facts["index"], "rgb") for c in (clip, flat)]
+        pictures = [view(c.facts["index"], names=("rgb",))[0] for c in (clip, flat)]
         score = score_road_edit(list(pictures[0]), list(pictures[1]), list(targets))
         for name in ("localised_edit_rate", "anchor_error", "temporal_iou"):
             note = "the target is never seen" if score is None else ""

@@ -17,11 +17,17 @@ def evaluate(
         str | None, typer.Option(help="Folder with METHOD/CLIP_ID.txt (TUM format) to score as well.")
     ] = None,
     metric: Annotated[bool, typer.Option(help="The trajectories' lengths are metres.")] = False,
+    learned: Annotated[
+        str | None,
+        typer.Option(help="YAML of local checkpoints of learned judges (CLIP, DOVER, FAST-VQA, LPIPS)."),
+    ] = None,
     prefect: Prefect = False,
     as_json: Json = False,
 ) -> None:
     """Judge a dataset from its pixels: poses, motion, road edits and weather, beside the paper's figures."""
-    result = call("evaluate", prefect, dataset, out=out, trajectories=trajectories, metric=metric)
+    result = call(
+        "evaluate", prefect, dataset, out=out, trajectories=trajectories, metric=metric, learned=learned
+    )
     keys = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
     rows = [{key: row[key] for key in keys} for row in result["rows"] if not row["window"]]
     show(result if as_json else {**result, "rows": rows}, as_json)

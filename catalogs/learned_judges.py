@@ -1,0 +1,119 @@
+"""Learned judges that a user has: a YAML file of local TorchScript checkpoints. Nothing is ever downloaded.
+
+::
+
+    clip: {checkpoint: ViT-B-32.pt, text_features: prompts.npy, source: openai/CLIP}
+    dover: {checkpoint: dover.pt, source: VQAssessment/DOVER}
+
+`text_features` is float [3, D]: the mean features of the paper's prompts (Appendix D) for dry, rain and snow.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catalogs.quantities import CatalogueEntry, Text, read_entry
+from tasks.errors import InputError
+
+JUDGES = ("clip", "dover", "fast_vqa", "lpips")
+
+
+class Checkpoint(CatalogueEntry):
+    """One judge's file."""
+
+    checkpoint: Text
+    source: Text
+
+
+class ClipCheckpoint(Checkpoint):
+    """CLIP's file, and the features of the prompts."""
+
+    text_features: Text
+
+
+class JudgeFile(CatalogueEntry):
+    """What the YAML may hold."""
+
+    clip: ClipCheckpoint | None = None
+    dover: Checkpoint | None = None
+    fast_vqa: Checkpoint | None = None
+    lpips: Checkpoint | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadedJudge:
+    """A judge, or why there is none.
+
+    Parameters
+    ----------
+    network : TorchScript module; None where it is missing
+    text_features : float [3, D] of dry, rain and snow; None but for CLIP
+    note : where the weights come from, or why there are none
+    """
+
+    network: Any
+    text_features: NDArray[np.floating] | None
+    note: str
+
+
+def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
+    """Every judge by its name, those that are missing with the reason.
+
+    Parameters
+    ----------
+    path : the YAML file; paths in it are relative to its folder. None has no judge
+
+    Raises
+    ------
+    InputError
+        The YAML is wrong, or a file that is there is no TorchScript module or holds no such features.
+    """
+    if path is None:
+        return {name: _missing("not run: checkpoint missing") for name in JUDGES}
+    file = read_entry(JudgeFile, Path(path), "list of learned judges")
+    judges: dict[str, LoadedJudge] = {}
+    problems: list[str] = []
+    for name in JUDGES:
+        entry: Checkpoint | None = getattr(file, name)
+        try:
+            judges[name] = (
+                _missing("not run: checkpoint missing") if entry is None else _load(Path(path), entry)
+            )
+        except InputError as error:
+            problems += [f"{path}: {name}: {problem}" for problem in error.problems]
+    if problems:
+        raise InputError(problems)
+    return judges
+
+
+def _load(path: Path, entry: Checkpoint) -> LoadedJudge:
+    import torch
+
+    needed = [entry.checkpoint, *([entry.text_features] if isinstance(entry, ClipCheckpoint) else [])]
+    for name in needed:
+        if not (path.parent / name).is_file():
+            return _missing(f"not run: checkpoint missing: {name}")
+    try:
+        network = torch.jit.load(path.parent / entry.checkpoint, map_location="cpu").eval()
+    except (RuntimeError, ValueError) as error:
+        raise InputError(
+            f"{entry.checkpoint} must be a TorchScript module; {str(error).splitlines()[0]}"
+        ) from None
+    features = None
+    if isinstance(entry, ClipCheckpoint):
+        try:
+            features = np.load(path.parent / entry.text_features, allow_pickle=False)
+        except ValueError as error:
+            raise InputError(f"{entry.text_features} must be a NumPy array; {error}") from None
+        if features.ndim != 2 or len(features) != 3 or not np.isfinite(features).all():
+            raise InputError(
+                f"{entry.text_features} must hold finite features [3, D] of dry, rain and snow; it is {features.shape}"
+            )
+    return LoadedJudge(network=network, text_features=features, note=entry.source)
+
+
+def _missing(note: str) -> LoadedJudge:
+    return LoadedJudge(network=None, text_features=None, note=note)
