@@ -7,7 +7,7 @@ where the receipt exists, the clip is complete. Making a clip twice writes the s
 import resource
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -147,6 +147,21 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
         "peak_memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
     return receipt | {"cost": cost}
+
+
+def warm_up(root: str) -> None:
+    """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
+    plan, catalogue = read_plan(Path(root)), catalogue_of(Path(root))
+    short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
+    for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
+        facts, ride = drive(
+            clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, short.duration_s
+        )
+        frames = frame_rows(ride, short, catalogue)
+        if plan.settings.pictures:
+            rig_at = rig_of(ride, frames, catalogue)
+            buffers = picture(clip.scenario, facts, frames, short, catalogue, int(clip.seed), rig_at)
+            judge(buffers, frames, facts["film_depth_mm"], catalogue)
 
 
 def relief_of(hazard: RoadHazard, route: Route) -> RoadRelief:

@@ -1,10 +1,11 @@
 """A grid to a dataset: plan, make the missing clips, seal."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from catalogs.grids import Grid
-from flows.clip import make_clip
+from flows.clip import make_clip, warm_up
 from flows.failures import ClipsFailed, disk_full_sentence
 from flows.orchestration import stage
 from flows.plan import Plan, make_plan, plan_differences, read_plan
@@ -154,7 +155,7 @@ def fan_out(
     failures: dict[str, BaseException] = {}
     labels = {clip.index: clip.label for clip in plan.clips}
     with (
-        open_executor(runner, workers, scheduler) as executor,
+        open_executor(runner, workers, scheduler, partial(warm_up, str(layout.root))) as executor,
         progress_bar("clips", len(indices)) as advance,
     ):
         for (_, index), future in run_unordered(

@@ -18,7 +18,10 @@ ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 @contextmanager
 def open_executor(
-    runner: RunnerName, workers: int | None = None, scheduler: str | None = None
+    runner: RunnerName,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    warm: Callable[[], Any] | None = None,
 ) -> Iterator[Executor]:
     """An executor for the length of a run.
 
@@ -27,11 +30,13 @@ def open_executor(
     runner : ``threads`` in this process, ``processes`` on this machine, or ``dask``
     workers : how many at once; None takes the processors this process may use [1]
     scheduler : address of a running Dask scheduler (tcp:// or tls://); None starts a local cluster
+    warm : what each worker of a running cluster does before it is given work
 
     Raises
     ------
     InputError
-        If a scheduler is named for another runner, or none answers at the address.
+        If a scheduler is named for another runner, none answers at the address, or its workers are not set up like
+        this machine.
     """
     if scheduler is not None and runner != "dask":
         raise InputError(f"--scheduler {scheduler} belongs to --runner dask; the runner is {runner}")
@@ -46,13 +51,15 @@ def open_executor(
         with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as executor:
             yield executor
     else:
-        with _dask_client(count, scheduler) as client, client.get_executor(pure=False) as executor:
+        with _dask_client(count, scheduler, warm) as client, client.get_executor(pure=False) as executor:
             yield executor
 
 
 @contextmanager
-def _dask_client(workers: int, scheduler: str | None) -> Iterator[Any]:
+def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | None) -> Iterator[Any]:
     from distributed import Client, LocalCluster
+
+    from flows.cluster import check_cluster, warm_cluster
 
     # a closing cluster says so in a dozen lines, and Prefect lets every library log
     logging.getLogger("distributed").setLevel(logging.ERROR)
@@ -68,6 +75,9 @@ def _dask_client(workers: int, scheduler: str | None) -> Iterator[Any]:
     except (OSError, ValueError) as error:
         raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
     with client:
+        check_cluster(client, scheduler)
+        if warm is not None:
+            warm_cluster(client, warm, scheduler)
         yield client
 
 

@@ -1,0 +1,104 @@
+"""A Dask cluster that others started: do its workers compute as this machine does, and are their kernels compiled?"""
+
+import socket
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from manifests.provenance import code_version, library_versions
+from tasks.errors import InputError
+
+NOT_ON_WORKERS = ("prefect",)
+"""Recorded libraries that no worker imports."""
+SHOWN_WORKERS = 3
+
+
+def facts_here() -> dict[str, str]:
+    """What has to be equal on every machine that makes a dataset, because its manifest records one of each."""
+    code, libraries = code_version(), library_versions()
+    libraries["python"] = libraries["python"].rpartition(".")[0]
+    kept = {name: version for name, version in libraries.items() if name not in NOT_ON_WORKERS}
+    return {"muSync": code["version"], "muSync's source": code["source_sha256"][:12]} | kept
+
+
+def version_problems(
+    here: Mapping[str, str], there: Mapping[str, Mapping[str, str] | BaseException]
+) -> list[str]:
+    """How workers differ from this machine, workers with one difference in one sentence.
+
+    Parameters
+    ----------
+    here : `facts_here` of this machine
+    there : the same of each worker by its address, or what asking it raised
+    """
+    told: dict[str, list[str]] = {}
+    for address, facts in there.items():
+        if isinstance(facts, BaseException):
+            told.setdefault(
+                f"cannot run muSync ({type(facts).__name__}: {facts}): install this version there", []
+            ).append(address)
+            continue
+        for name, version in here.items():
+            if facts.get(name) != version:
+                sentence = f"{name} is {facts.get(name, 'absent')} there and {version} here: install the same"
+                told.setdefault(sentence, []).append(address)
+    return [f"{_some(addresses)}: {sentence}" for sentence, addresses in told.items()]
+
+
+def check_cluster(client: Any, address: str) -> None:
+    """Refuse a cluster without workers, or with workers that are not set up like this machine.
+
+    Parameters
+    ----------
+    client : `distributed.Client` of the cluster
+    address : of its scheduler
+
+    Raises
+    ------
+    InputError
+        Listing every difference.
+    """
+    if not client.scheduler_info(n_workers=-1)["workers"]:
+        raise InputError(
+            f"--scheduler {address}: the cluster has no workers: start some and run the command again"
+        )
+    problems = version_problems(facts_here(), client.run(facts_here, on_error="return"))
+    if problems:
+        raise InputError([f"--scheduler {address}: {problem}" for problem in problems])
+
+
+def warm_cluster(client: Any, warm: Callable[[], Any], address: str) -> None:
+    """Compile every kernel on each worker before work is handed out: one worker a machine first, whose cache all share.
+
+    Parameters
+    ----------
+    client : `distributed.Client` of the cluster
+    warm : compiles and loads what a clip needs
+    address : of its scheduler
+
+    Raises
+    ------
+    InputError
+        If a worker cannot read what it needs, the dataset's folder above all.
+    """
+    hosts: dict[str, list[str]] = {}
+    for worker, host in client.run(socket.gethostname).items():
+        hosts.setdefault(host, []).append(worker)
+    first = [workers[0] for workers in hosts.values()]
+    rest = [worker for workers in hosts.values() for worker in workers[1:]]
+    for wave in (first, rest):
+        futures = {worker: client.submit(warm, workers=[worker], pure=False) for worker in wave}
+        for worker, future in futures.items():
+            error = future.exception()
+            if isinstance(error, InputError | OSError):
+                raise InputError(
+                    f"--scheduler {address}: worker {worker} cannot begin ({error}): the dataset's folder and the scene"
+                    " must be visible on every worker under the same path"
+                )
+            if error is not None:
+                raise error
+
+
+def _some(addresses: list[str]) -> str:
+    shown = ", ".join(addresses[:SHOWN_WORKERS])
+    rest = len(addresses) - SHOWN_WORKERS
+    return f"workers {shown} and {rest} more" if rest > 0 else f"worker {shown}"
