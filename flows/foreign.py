@@ -1,23 +1,15 @@
-"""A verdict on any video or trajectory: its motion against claimed telemetry, without a renderer's data."""
+"""Verdicts on any video or trajectory, without a renderer's data: against a claim, or against an editor's input."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-import yaml
-from numpy.typing import NDArray
-
+from flows.foreign_sources import read_camera, read_claim, read_footage
 from flows.store.layout import write_json
-from flows.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
+from tasks.eval.foreign_video import claim_at, judge_motion
 from tasks.eval.motion_agreement import PoseThresholds
-from tasks.eval.outside_trajectory import motion_from_trajectory
-from tasks.eval.pose_essential import recover_motion_essential
-from tasks.eval.undistort import COEFFICIENTS, undistorted
+from tasks.eval.video_motion import motion_retention
 
 LIMITS = PoseThresholds(
     pitch_rmse_deg=float("inf"),
@@ -28,9 +20,6 @@ LIMITS = PoseThresholds(
     normalised_progress_rmse=0.02,
 )
 """Camera-only limits: E0 at most 0.20 sees an amplitude 20 % wrong; drift over long clips is no reason alone."""
-MOST_FRAMES, LEAST_FRAMES = 3000, 5
-LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-"""A camera that looks level ahead, for a camera file without a mount."""
 NEEDS_DEPTH = (
     "pose by photometric alignment",
     "pose by points with depth",
@@ -58,202 +47,92 @@ def judge(
     InputError
         Every file that cannot be read, in one sentence each.
     """
-    source = Path(video)
-    problems: list[str] = []
-    parts: list[Any] = []
-    see = read_trajectory if source.suffix in SUFFIXES else read_video
-    for read, path in ((see, source), (read_claim, Path(claim)), (read_intrinsics, Path(camera))):
-        try:
-            parts.append(read(path))
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
-    seen, told, (K, width, height, mount, distortion) = parts
-    size: dict[str, int | None] = {"width": None, "height": None}
-    if see is read_video:
-        frames, times = seen
-        size = {"width": int(frames.shape[2]), "height": int(frames.shape[1])}
-        K = resized_intrinsics(K, width, height, frames.shape[2], frames.shape[1])
-        at = claim_at(told, times)
-        used = undistorted({"rgb": frames[at.rows]}, K, distortion)["rgb"]
-        recovered = recover_motion_essential(used, K, mount)
-    else:
-        stamps, poses = seen
-        times = stamps - stamps[0]
-        at = claim_at(told, times)
-        recovered = motion_from_trajectory(source.stem, at.times, times, poses, mount, metric=metric)
+    footage, told, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
+    at = claim_at(told, footage.times)
+    recovered = footage.motion(lens, at.rows, metric=metric)
     verdict = judge_motion(recovered, at, LIMITS)
+    times, is_video = footage.times, footage.frames is not None
     result = {
-        "video": source.name,
+        "video": footage.name,
         "frames": len(times),
         "judged_frames": len(at.rows),
         "frame_rate_hz": float((len(times) - 1) / (times[-1] - times[0])),
-        **size,
-        "undistorted": see is read_video and distortion is not None,
+        "width": footage.frames.shape[2] if is_video else None,
+        "height": footage.frames.shape[1] if is_video else None,
+        "undistorted": is_video and lens.distortion is not None,
         "method": recovered.method,
         **verdict,
-        "not_run": [f"{name}: needs depth" for name in NEEDS_DEPTH] if see is read_video else [],
+        "not_run": [f"{name}: needs depth" for name in NEEDS_DEPTH] if is_video else [],
     }
     if out is not None:
         write_json(Path(out) / "judgement.json", result)
     return result
 
 
-def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Frames [F, H, W, 3] sRGB and their times [s].
+def retention(
+    source: str,
+    source_braking: str,
+    edited: str,
+    edited_braking: str,
+    *,
+    camera: str,
+    event: tuple[int, int] = (16, 42),
+    out: str | None = None,
+) -> dict[str, Any]:
+    """How much of the road event's pitch an editor kept: its input against its output (paper, Appendix A.5).
+
+    Parameters
+    ----------
+    source, edited : videos or trajectories of the drive over the road feature, before and after the edit
+    source_braking, edited_braking : the same of the drive that brakes on the flat road
+    camera : YAML, as for `judge`
+    event : first and last frame of the event; the paper's at 10 frames a second
+    out : folder for retention.json
 
     Raises
     ------
     InputError
-        If there is no such file, it is no video, breaks off, or has too few or too many frames.
+        For every file that cannot be read, clips of different length, an event outside them, or a lost track.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; give a video.")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty; give a video.")
-    stream = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
-    rate = stream.get(cv2.CAP_PROP_FPS)
-    frames: list[NDArray[Any]] = []
-    stamps: list[float] = []
-    while len(frames) <= MOST_FRAMES:
-        good, picture = stream.read()
-        if not good:
-            break
-        frames.append(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
-        stamps.append(stream.get(cv2.CAP_PROP_POS_MSEC))
-    announced = int(stream.get(cv2.CAP_PROP_FRAME_COUNT))
-    stream.release()
-    if not frames:
-        raise InputError(f"{path}: no frame can be read; the file is damaged or no video.")
-    if len(frames) > MOST_FRAMES:
-        raise InputError(f"{path}: at most {MOST_FRAMES} frames are judged at once; cut the video.")
-    if announced > len(frames) + 1:
-        raise InputError(
-            f"{path}: only {len(frames)} of {announced} frames can be read; the file breaks off."
-        )
-    if len(frames) < LEAST_FRAMES:
-        raise InputError(f"{path}: at least {LEAST_FRAMES} frames are needed; there are {len(frames)}.")
-    times = np.asarray(stamps) / 1000
-    if not (np.diff(times) > 0).all():
-        # a container without time stamps: the rate is all there is
-        if not rate > 0:
-            raise InputError(f"{path}: the video tells neither time stamps nor a frame rate.")
-        times = np.arange(len(frames)) / rate
-    return np.stack(frames), times - times[0]
-
-
-def read_claim(path: Path) -> VideoClaim:
-    """Claimed pitch and station over time.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or lacks or repeats what is needed.
-    """
-    try:
-        table = pq.read_table(path, partitioning=None)
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: the claim must be a Parquet file; {str(error).splitlines()[0]}") from None
-    names = set(table.column_names)
+    names = (source, source_braking, edited, edited_braking)
+    *clips, lens = _read_all(*((read_footage, name) for name in names), (read_camera, camera))
+    counts = [len(clip.times) for clip in clips]
     problems = []
-    if not names & {"t_ns", "time"}:
-        problems.append(f"{path}: the claim lacks a column t_ns or time; it has {', '.join(sorted(names))}.")
-    if "pitch" not in names:
-        problems.append(f"{path}: the claim lacks the column pitch [rad].")
-    if not names & {"station", "speed"}:
-        problems.append(f"{path}: the claim lacks a column station [m] or speed [m/s].")
-    if "clip_id" in names and len(table["clip_id"].unique()) > 1:
+    if len(set(counts)) > 1:
+        problems.append(f"The four clips must have one number of frames; they have {counts}.")
+    if not 2 <= event[0] < event[1] - 1 or not event[1] < min(counts) - 2:
         problems.append(
-            f"{path}: the claim holds {len(table['clip_id'].unique())} clips; give one clip's rows."
+            f"The event must lie within the clips with two frames before and after it; it is frames {event[0]} to"
+            f" {event[1]} of {min(counts)}."
         )
     if problems:
         raise InputError(problems)
-
-    def column(name: str) -> NDArray[np.float64]:
-        return np.asarray(table[name].to_numpy(), np.float64)
-
-    time = column("t_ns") * 1e-9 if "t_ns" in names else column("time")
-    if len(time) < 2 or not (np.diff(time) > 0).all():
-        raise InputError(f"{path}: the claim's time must rise from row to row, over two rows at least.")
-    if "station" in names:
-        station = column("station")
-    else:
-        speed = column("speed")
-        station = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
-    told = VideoClaim(time=time - time[0], pitch=column("pitch"), station=station)
-    if not (np.isfinite(told.pitch).all() and np.isfinite(told.station).all()):
-        raise InputError(f"{path}: the claim's pitch and station must be finite throughout.")
-    return told
-
-
-def read_intrinsics(
-    path: Path,
-) -> tuple[NDArray[np.float64], int, int, NDArray[np.float64], NDArray[np.float64] | None]:
-    """Intrinsics with pixel centres at whole numbers, the size they hold for, the mount, and any lens distortion.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or lacks a number.
-    """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(
-            f"{path}: the camera must be readable YAML; {' '.join(str(error).split())}"
-        ) from None
-    if not isinstance(content, dict):
-        raise InputError(
-            f"{path}: the camera must be a table of width, height and focal_length or fx, fy, cx, cy."
-        )
-    numbers: dict[str, Any] = {k: v.get("value") if isinstance(v, dict) else v for k, v in content.items()}
-    if "focal_length" in numbers and {"width", "height"} <= numbers.keys():
-        f = numbers["focal_length"]
-        half = {k: v / 2 - 0.5 if isinstance(v, (int, float)) else v for k, v in numbers.items()}
-        numbers = {"fx": f, "fy": f, "cx": half["width"], "cy": half["height"]} | numbers
-    wrong = [
-        f"{path}: the camera's {key} must be a number above 0; it is {numbers.get(key)}."
-        for key in ("width", "height", "fx", "fy", "cx", "cy")
-        if not isinstance(numbers.get(key), (int, float)) or not numbers[key] > 0
-    ]
-    bends = {key: numbers.get(key) or 0.0 for key in COEFFICIENTS}
-    wrong += [
-        f"{path}: the camera's {key} must be a finite number; it is {value}."
-        for key, value in bends.items()
-        if not isinstance(value, (int, float)) or not np.isfinite(value)
-    ]
-    if wrong:
-        raise InputError(wrong)
-    K = np.array(
-        [[numbers["fx"], 0, numbers["cx"]], [0, numbers["fy"], numbers["cy"]], [0, 0, 1]], np.float64
-    )
-    mount = LEVEL.copy()
-    mount[:3, 3] = [-float(numbers.get("behind_front_axle") or 0), float(numbers.get("left_of_centre") or 0),
-                    float(numbers.get("height_above_road") or 0)]  # fmt: skip
-    distortion = np.array(list(bends.values()), np.float64) if any(bends.values()) else None
-    return K, int(numbers["width"]), int(numbers["height"]), mount, distortion
+    motions = [clip.motion(lens) for clip in clips]
+    lost = [f"{clip.name}: {m.failures[0]}" for clip, m in zip(clips, motions, strict=True) if m.failures]
+    if lost:
+        raise InputError(lost)
+    before, before_braking, after, after_braking = (motion.pitch for motion in motions)
+    result = {
+        "motion_retention": motion_retention(before, before_braking, after, after_braking, event),
+        "event": list(event),
+        "frames": counts[0],
+        "clips": [clip.name for clip in clips],
+        "method": [motion.method for motion in motions],
+    }
+    if out is not None:
+        write_json(Path(out) / "retention.json", result)
+    return result
 
 
-def resized_intrinsics(
-    K: NDArray[np.float64], width: int, height: int, seen_width: int, seen_height: int
-) -> NDArray[np.float64]:
-    """Intrinsics for a video that was scaled from the camera's size.
-
-    Raises
-    ------
-    InputError
-        If the video was cropped or squeezed: then they are unknown.
-    """
-    across, down = seen_width / width, seen_height / height
-    if abs(across / down - 1) > 0.02:
-        raise InputError(
-            f"The video is {seen_width} x {seen_height} and the camera {width} x {height}: not the same shape, so"
-            " the intrinsics are unknown; give the camera of the video as it is."
-        )
-    scaled = K.copy()
-    scaled[:2, 2] += 0.5
-    scaled[0] *= across
-    scaled[1] *= down
-    scaled[:2, 2] -= 0.5
-    return scaled
+def _read_all(*sources: tuple[Callable[[Path], Any], str]) -> list[Any]:
+    """What each reader makes of its file; every faulty one is told at once."""
+    parts: list[Any] = []
+    problems: list[str] = []
+    for read, path in sources:
+        try:
+            parts.append(read(Path(path)))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return parts

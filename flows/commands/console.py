@@ -52,6 +52,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "bump_study": "bump_study", "close_loop": "closing",
         "close_loop_benchmark": "closing_benchmark",
         "audit_physics": "physics", "evaluate": "evaluation", "controls": "controls", "judge": "foreign",
+        "retention": "foreign",
         "scene_from_stereo": "reconstruction", "scene_import": "scenes", "render_pose": "scenes",
     }[name]  # fmt: skip
     function = getattr(import_module(f"flows.{module}"), name)

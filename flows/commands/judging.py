@@ -63,3 +63,29 @@ def judge(
     show(result, as_json)
     if not result["passed"]:
         raise typer.Exit(CHECK_FAILED)
+
+
+@app.command()
+def retention(
+    source: Annotated[str, typer.Argument(help="The editor's input: the drive over the road feature.")],
+    source_braking: Annotated[str, typer.Argument(help="Its input of the flat-road braking drive.")],
+    edited: Annotated[str, typer.Argument(help="What the editor made of the first.")],
+    edited_braking: Annotated[str, typer.Argument(help="What it made of the second.")],
+    camera: Annotated[str, typer.Option(help="Camera YAML: a catalogue entry, or fx, fy, cx, cy.")],
+    event: Annotated[tuple[int, int], typer.Option(help="First and last frame of the event.")] = (16, 42),
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """How much of a road event's pitch a video editor kept (the paper's source-motion retention)."""
+    result = call(
+        "retention",
+        False,
+        source,
+        source_braking,
+        edited,
+        edited_braking,
+        camera=camera,
+        event=event,
+        out=out,
+    )
+    show(result, as_json)

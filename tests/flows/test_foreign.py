@@ -9,10 +9,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from benchmarks.synthetic_street import Clip, drive_clip
-from flows.foreign import LIMITS, judge, read_intrinsics, read_video, resized_intrinsics
+from flows.foreign import LIMITS, judge, retention
+from flows.foreign_sources import LEVEL, ForeignCamera, intrinsics_at, read_camera, read_video
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
 from tasks.eval.motion import RecoveredMotion
+from tests.flows.test_trajectories import tum_lines
 
 
 @pytest.fixture(scope="module")
@@ -97,11 +99,12 @@ def test_all_wrong_inputs_are_told_at_once(tmp_path: Path) -> None:
 
 def test_intrinsics_follow_the_size_and_refuse_another_shape(tmp_path: Path) -> None:
     K = np.array([[400.0, 0, 239.5], [0, 400, 159.5], [0, 0, 1]])
-    half = resized_intrinsics(K, 480, 320, 240, 160)
+    camera = ForeignCamera(K=K, width=480, height=320, mount=np.eye(4), distortion=None)
+    half = intrinsics_at(camera, 240, 160)
     np.testing.assert_allclose(half, [[200, 0, 119.5], [0, 200, 79.5], [0, 0, 1]])
     with pytest.raises(InputError, match="not the same shape"):
-        resized_intrinsics(K, 480, 320, 320, 320)
-    assert read_intrinsics(Path("catalogs/cameras/dashcam-480x320.yaml"))[0] == pytest.approx(K)
+        intrinsics_at(camera, 320, 320)
+    assert pytest.approx(K) == read_camera(Path("catalogs/cameras/dashcam-480x320.yaml")).K
 
 
 def test_a_short_wrong_swing_is_not_hidden_by_a_long_quiet_clip() -> None:
@@ -119,3 +122,34 @@ def test_a_short_wrong_swing_is_not_hidden_by_a_long_quiet_clip() -> None:
         assert verdict["pitch_judged"] and verdict["passed"] == good
     quiet = VideoClaim(time=times, pitch=nothing, station=10 * times)
     assert not judge_motion(drifting, claim_at(quiet, times), LIMITS)["pitch_judged"]
+
+
+def test_retention_sees_what_an_editor_kept_and_what_it_lost(tmp_path: Path) -> None:
+    frames, dive = 81, 0.02 * np.exp(-((np.arange(81) - 50) ** 2) / 200.0)
+    hump = 0.015 * np.sin((np.arange(81) - 16) / 4.0) * ((np.arange(81) >= 16) & (np.arange(81) <= 42))
+    drift = 2e-4 * np.arange(81)
+    (tmp_path / "K.yaml").write_text("width: 480\nheight: 320\nfocal_length: 400\n")
+
+    def track(name: str, pitch: np.ndarray) -> str:
+        poses = np.tile(LEVEL, (frames, 1, 1))
+        turn = np.tile(np.eye(4), (frames, 1, 1))
+        turn[:, 0, 0] = turn[:, 2, 2] = np.cos(pitch)
+        turn[:, 0, 2], turn[:, 2, 0] = np.sin(pitch), -np.sin(pitch)
+        turn[:, 0, 3] = np.arange(frames)
+        (tmp_path / f"{name}.txt").write_text(tum_lines(np.arange(frames) * 0.1, turn @ poses))
+        return str(tmp_path / f"{name}.txt")
+
+    source, braking = track("source", dive + hump), track("braking", dive)
+    kept, lost = (
+        track("kept", 0.5 * dive - 0.4 * hump + drift),
+        track("lost", 0.5 * dive + 0.4 * np.roll(hump, 6)),
+    )
+    edited_braking = track("edited-braking", 0.5 * dive)
+    whole = retention(source, braking, kept, edited_braking, camera=str(tmp_path / "K.yaml"))
+    assert whole["motion_retention"] == pytest.approx(1.0, abs=0.01)
+    part = retention(
+        source, braking, lost, edited_braking, camera=str(tmp_path / "K.yaml"), out=str(tmp_path / "out")
+    )
+    assert part["motion_retention"] < 0.7 and (tmp_path / "out" / "retention.json").is_file()
+    with pytest.raises(InputError, match="event must lie within"):
+        retention(source, braking, kept, edited_braking, camera=str(tmp_path / "K.yaml"), event=(16, 80))
