@@ -17,7 +17,7 @@ from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, rollout
 from tasks.vehicle.sensitivity import beside_print, sensitivity_study
 
-BENCHMARKS = ("rasteriser", "vehicle", "weather", "pose_checks", "pipeline", "queries")
+BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries")
 
 
 def sensitivity(*, out: str | None = None) -> dict[str, Any]:

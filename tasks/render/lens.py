@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from tasks.errors import InputError
 
 NEWTON_STEPS = 20
+ROUNDING = 1e-14
+"""Distance from the distorted place at which further steps are rounding [1]."""
 CLOSED = 1e-9
 """Largest distance from its distorted place at which an undistorted point counts as found [1]."""
 
@@ -89,6 +91,8 @@ def undistorted(
         if not (area > 0).all():
             break
         off_x, off_y = x - here_x, y - here_y
+        if max(np.abs(off_x).max(), np.abs(off_y).max()) < ROUNDING:
+            break
         found_x, found_y = found_x + (d * off_x - b * off_y) / area, found_y + (a * off_y - c * off_x) / area
     here_x, here_y = distorted(found_x, found_y, k)
     miss = np.hypot(here_x - x, here_y - y)
