@@ -12,7 +12,7 @@ from flows.clip import TICK_RATE_HZ, Catalogue, catalogue_of
 from flows.controls_figure import roc_figure
 from flows.drawing import as_svg
 from flows.driving import drive
-from flows.judged_clip import METHODS, JudgedClip, judge_clip
+from flows.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.orchestration import stage
 from flows.physics import clip_facts
 from flows.plan import Plan, read_plan
@@ -50,7 +50,7 @@ def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     facts = clip_facts(root)
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")
-    clips = [stage(judge_clip)(root, row) for row in facts]
+    clips = [stage(judge_clip)(View(root=root), row) for row in facts]
     rows = list(score_controls(clips, read_plan(root), catalogue_of(root)))
     seen: dict[str, list[str]] = {name: [] for name in CONTROLS}
     for row in rows:

@@ -11,7 +11,7 @@ from catalogs.gates import load_gates
 from catalogs.learned_judges import load_judges
 from flows.evaluation_page import page
 from flows.evaluation_rows import control_of, figure_row, weather_families
-from flows.judged_clip import JudgedClip, Row, judge_clip
+from flows.judged_clip import JudgedClip, Row, View, judge_clip
 from flows.learned_rows import learned_rows
 from flows.orchestration import stage
 from flows.physics import clip_facts
@@ -43,6 +43,7 @@ def evaluate(
     trajectories: str | None = None,
     metric: bool = False,
     learned: str | None = None,
+    crf: int | None = None,
 ) -> dict[str, Any]:
     """Judge a finished dataset from its pixels and write every figure with its unit and the paper's value.
 
@@ -52,6 +53,7 @@ def evaluate(
     out : folder for evaluation.json, evaluation.parquet and evaluation.html
     trajectories : folder with METHOD/CLIP_ID.txt in the TUM format, scored beside our own checks
     metric : whether their lengths are metres
+    crf : constant rate factor of H.264 that the pictures pass through before they are judged [1]
     learned : YAML of local checkpoints of learned judges, as `catalogs.learned_judges` reads it
 
     Raises
@@ -63,13 +65,17 @@ def evaluate(
     judges = load_judges(learned)
     facts = clip_facts(root)
     told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
-    clips = [stage(judge_clip)(root, row, told.get(row["clip_id"]), metric=metric) for row in facts]
+    view = View(root=root, crf=crf)
+    clips = [stage(judge_clip)(view, row, told.get(row["clip_id"]), metric=metric) for row in facts]
     rows = [*pose_rows(clips), *weather_rows(clips), *geometry_rows(clips), *severity_rows(clips)]
     rows += quality_rows(clips)
-    rows += stage(road_edit_rows)(root, clips)
-    rows += learned_rows(root, clips, judges)
+    rows += stage(road_edit_rows)(view, clips)
+    rows += learned_rows(view, clips, judges)
     rows += [figure_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
-    result = {"run_id": read_json(Layout(root).manifest)["run_id"], "clips": len(clips), "rows": rows}
+    codec = "lossless" if crf is None else f"H.264 crf {crf}"
+    result = {
+        "run_id": read_json(Layout(root).manifest)["run_id"], "codec": codec, "clips": len(clips), "rows": rows
+    }  # fmt: skip
     folder = Path(out)
     write_json(folder / "evaluation.json", result)
     write_parquet(pa.Table.from_pylist(rows), folder / "evaluation.parquet")

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flows.clip import PIXEL_CENTRE, catalogue_of
+from flows.film import through_film
 from flows.physics import clip_columns
+from flows.plan import read_plan
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.trajectories import read_trajectory
@@ -24,7 +26,6 @@ from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.eval.severity import image_statistics, sampled_frames
 from tasks.eval.undistort import undistorted
 from tasks.eval.unusable import unusable_pixels
-from tasks.render.camera import Camera
 
 Row = dict[str, Any]
 METHODS = ("photometric", "pnp", "essential")
@@ -65,22 +66,37 @@ class JudgedClip:
         return float(np.interp(edge, self.frames["station"], self.times))
 
 
-def seen_by_pinhole(
-    layout: Layout, index: int, *, camera: Camera, names: tuple[str, ...]
-) -> list[NDArray[Any]]:
-    """Arrays of a clip as its judges see them: with the lens's distortion, of which they are told, taken out."""
-    buffers = {name: read_clip(layout.frames, index, name) for name in names}
-    return list(undistorted(buffers, camera.K - PIXEL_CENTRE, camera.distortion).values())
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """How judges see a dataset: after a film's compression, if any, and with the lens's distortion taken out.
+
+    Parameters
+    ----------
+    root : a finished dataset
+    crf : constant rate factor of the H.264 that the pictures pass through; None leaves them as they are [1]
+    """
+
+    root: Path
+    crf: int | None = None
+
+    def arrays(self, index: int, *names: str) -> list[NDArray[Any]]:
+        """Arrays of the clip at that index, by name."""
+        buffers = {name: read_clip(Layout(self.root).frames, index, name) for name in names}
+        if self.crf is not None and "rgb" in buffers:
+            rate = read_plan(self.root).settings.frame_rate_hz
+            buffers["rgb"] = through_film(buffers["rgb"], rate, self.crf)
+        camera = catalogue_of(self.root).camera
+        return list(undistorted(buffers, camera.K - PIXEL_CENTRE, camera.distortion).values())
 
 
 def judge_clip(
-    root: Path, facts: Row, outside: Mapping[str, Path] | None = None, *, metric: bool = False
+    view: View, facts: Row, outside: Mapping[str, Path] | None = None, *, metric: bool = False
 ) -> JudgedClip:
     """All three pose checks and the image statistics of one clip, and what others recovered of it.
 
     Parameters
     ----------
-    root : a finished dataset
+    view : of the dataset
     facts : the clip's row
     outside : trajectory files by the name of what made them
     metric : whether their lengths are metres
@@ -91,11 +107,9 @@ def judge_clip(
         For a trajectory that cannot be read or does not cover the clip.
     """
     cv2.setNumThreads(1)
-    catalogue, layout = catalogue_of(root), Layout(root)
-    rgb, depth, kind = seen_by_pinhole(
-        layout, facts["index"], camera=catalogue.camera, names=("rgb", "depth", "class")
-    )
-    frames = clip_columns(root, "frames", facts)
+    catalogue = catalogue_of(view.root)
+    rgb, depth, kind = view.arrays(facts["index"], "rgb", "depth", "class")
+    frames = clip_columns(view.root, "frames", facts)
     K, mount = catalogue.camera.K - PIXEL_CENTRE, catalogue.camera.T_rig_camera
     hidden = unusable_pixels(kind, facts["film_depth_mm"])
     route = catalogue.scene.route.pose(frames["station"])[:, :3, :3]

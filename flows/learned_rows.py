@@ -1,15 +1,12 @@
 """What learned judges say of a dataset's pictures; where their weights are missing, a row that says so."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
 from catalogs.learned_judges import LoadedJudge
 from flows.evaluation_rows import figure_row, weather_families
-from flows.judged_clip import JudgedClip, Row
-from flows.store.frames import read_clip
-from flows.store.layout import Layout
+from flows.judged_clip import JudgedClip, Row, View
 from tasks.eval.learned_scores import ClipWeather, NeighbourDistance, VideoJudge, WholeVideo
 from tasks.eval.severity import severity_agreement
 
@@ -19,12 +16,12 @@ FEATURES = {"dry": 0, "rain": 1, "snow": 2}
 """Rows of CLIP's text features."""
 
 
-def learned_rows(root: Path, clips: list[JudgedClip], judges: dict[str, LoadedJudge]) -> Iterator[Row]:
+def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJudge]) -> Iterator[Row]:
     """Scores of each clip, and how CLIP's order of the weathers agrees with their rates.
 
     Parameters
     ----------
-    root : a finished dataset
+    view : of the dataset
     clips : as the other judges saw them
     judges : from `catalogs.learned_judges.load_judges`
     """
@@ -35,12 +32,12 @@ def learned_rows(root: Path, clips: list[JudgedClip], judges: dict[str, LoadedJu
             continue
         judge: VideoJudge = (NeighbourDistance if name == "lpips" else WholeVideo)(network=loaded.network)
         for clip in clips:
-            value = _score(root, clip, judge)
+            value = _score(view, clip, judge)
             yield figure_row(metric, "TorchScript", clip.facts["label"], value, "1", note=loaded.note)
-    yield from _severity(root, clips, judges["clip"])
+    yield from _severity(view, clips, judges["clip"])
 
 
-def _severity(root: Path, clips: list[JudgedClip], clip_judge: LoadedJudge) -> Iterator[Row]:
+def _severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> Iterator[Row]:
     names = ("clip_severity_rho", "clip_adjacent_accuracy")
     if clip_judge.network is None or clip_judge.text_features is None:
         for name in names:
@@ -54,7 +51,7 @@ def _severity(root: Path, clips: list[JudgedClip], clip_judge: LoadedJudge) -> I
             dry=features[FEATURES["dry"]],
         )
         rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
-        scores = {c.facts["clip_id"]: _score(root, c, judge) for c in levels}
+        scores = {c.facts["clip_id"]: _score(view, c, judge) for c in levels}
         rho, _ = severity_agreement(rates, scores)
         # the paper counts pairs whose score rises, whatever the correlation's sign
         rising = np.diff([scores[key] for key in sorted(rates, key=lambda key: rates[key])]) > 0
@@ -62,5 +59,5 @@ def _severity(root: Path, clips: list[JudgedClip], clip_judge: LoadedJudge) -> I
             yield figure_row(name, "TorchScript", condition, value, "1", note=clip_judge.note)
 
 
-def _score(root: Path, clip: JudgedClip, judge: VideoJudge) -> float:
-    return judge.score(read_clip(Layout(root).frames, clip.facts["index"], "rgb"))
+def _score(view: View, clip: JudgedClip, judge: VideoJudge) -> float:
+    return judge.score(view.arrays(clip.facts["index"], "rgb")[0])

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 
+from flows.film import write_film
 from flows.plan import read_plan
 from flows.progress import progress_bar
 from flows.store.frames import read_clip
@@ -15,9 +15,6 @@ from flows.store.layout import Layout, read_json
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.traces import with_traces
-
-CONSTANT_RATE_FACTOR = 18
-"""Quality of H.264: visually lossless [1]."""
 
 
 def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: bool = True) -> dict[str, Any]:
@@ -76,19 +73,3 @@ def _pictures(layout: Layout, row: dict[str, Any], traces: bool) -> list[NDArray
         return pictures
     columns = read_columns(layout.telemetry / "frames", row["clip_id"])
     return [with_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]
-
-
-def write_film(path: Path, pictures: list[NDArray[np.uint8]], frame_rate_hz: float) -> None:
-    """Encode pictures [H, W, 3] of even size as H.264 in MP4; the same pictures give the same bytes."""
-    height, width = pictures[0].shape[:2]
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=round(frame_rate_hz))
-        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-        stream.options = {"crf": str(CONSTANT_RATE_FACTOR), "preset": "medium", "threads": "1"}
-        for picture in pictures:
-            for packet in stream.encode(
-                av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-            ):
-                container.mux(packet)
-        for packet in stream.encode():
-            container.mux(packet)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from flows.audit import read_manifest
 from flows.clip import TICK_RATE_HZ
-from flows.previews import named_clips, write_film
+from flows.film import write_film
+from flows.previews import named_clips
 from flows.progress import progress_bar
 from flows.seal import spread
 from flows.store.frames import read_clip

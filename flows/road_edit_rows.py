@@ -1,16 +1,12 @@
 """How a dataset's road features show in its pictures, held against their flat twins."""
 
-from functools import partial
-from pathlib import Path
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from flows.clip import PIXEL_CENTRE, Catalogue, catalogue_of
 from flows.evaluation_rows import control_of, figure_row
-from flows.judged_clip import JudgedClip, Row, seen_by_pinhole
-from flows.store.layout import Layout
+from flows.judged_clip import JudgedClip, Row, View
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.flip import flip
 from tasks.eval.image_quality import ssim
@@ -24,24 +20,23 @@ AROUND = 18
 """How far about the feature its shade may reach; the dilation of Appendix A.6 [px]."""
 
 
-def road_edit_rows(root: Path, clips: list[JudgedClip]) -> list[Row]:
+def road_edit_rows(view: View, clips: list[JudgedClip]) -> list[Row]:
     """Road-edit metrics of each feature clip that has a flat twin, and whether the edit left the rest alone.
 
     Parameters
     ----------
-    root : a finished dataset
+    view : of the dataset
     clips : as their judges saw them
     """
     rows: list[Row] = []
-    catalogue = catalogue_of(root)
-    view = partial(seen_by_pinhole, Layout(root), camera=catalogue.camera)
+    catalogue = catalogue_of(view.root)
     for clip in clips:
         flat = control_of(clip, clips, weather=False)
         if clip.facts["hazard_height_m"] == 0 or flat is None:
             continue
-        depth, kind = view(clip.facts["index"], names=("depth", "class"))
+        depth, kind = view.arrays(clip.facts["index"], "depth", "class")
         targets = prescribed_masks(clip, depth, np.isin(kind, ROAD_CLASSES), catalogue)
-        pictures = [view(c.facts["index"], names=("rgb",))[0] for c in (clip, flat)]
+        pictures = [view.arrays(c.facts["index"], "rgb")[0] for c in (clip, flat)]
         score = score_road_edit(list(pictures[0]), list(pictures[1]), list(targets))
         for name in ("localised_edit_rate", "anchor_error", "temporal_iou"):
             note = "the target is never seen" if score is None else ""

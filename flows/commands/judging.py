@@ -21,12 +21,22 @@ def evaluate(
         str | None,
         typer.Option(help="YAML of local checkpoints of learned judges (CLIP, DOVER, FAST-VQA, LPIPS)."),
     ] = None,
+    crf: Annotated[
+        int | None, typer.Option(min=0, max=51, help="Judge what is left after H.264 of this rate factor.")
+    ] = None,
     prefect: Prefect = False,
     as_json: Json = False,
 ) -> None:
     """Judge a dataset from its pixels: poses, motion, road edits and weather, beside the paper's figures."""
     result = call(
-        "evaluate", prefect, dataset, out=out, trajectories=trajectories, metric=metric, learned=learned
+        "evaluate",
+        prefect,
+        dataset,
+        out=out,
+        trajectories=trajectories,
+        metric=metric,
+        learned=learned,
+        crf=crf,
     )
     keys = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
     rows = [{key: row[key] for key in keys} for row in result["rows"] if not row["window"]]

@@ -4,7 +4,8 @@ import av
 import numpy as np
 import pytest
 
-from flows.previews import preview, write_film
+from flows.film import through_film, write_film
+from flows.previews import preview
 from flows.store.frames import read_clip
 from flows.store.layout import read_json
 from tasks.errors import InputError
@@ -44,3 +45,13 @@ def test_clips_and_datasets_that_are_not_there_are_named(toy_dataset, tmp_path):
         preview(str(toy_dataset.root), str(tmp_path), clips=["fog", "dry/flat"])
     with pytest.raises(InputError, match="must be a finished dataset"):
         preview(str(tmp_path), str(tmp_path))
+
+
+def test_a_film_gives_back_what_its_rate_factor_leaves() -> None:
+    y, x = np.mgrid[:64, :96]
+    frames = np.stack([np.stack([x + k, y, x + y], axis=-1) % 256 for k in range(5)]).astype(np.uint8)
+    errors = [
+        float(np.abs(through_film(frames, 10.0, crf).astype(int) - frames).mean()) for crf in (1, 23, 45)
+    ]
+    assert through_film(frames, 10.0, 23).shape == frames.shape
+    assert errors == sorted(errors) and errors[0] < 3.0
