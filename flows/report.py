@@ -84,7 +84,9 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     """
     grid, rows = manifest["grid"], manifest["clips"]
     place = {row["clip_id"]: k for k, row in enumerate(rows)}
-    kept = ("clip_id", "label", "seed", "scenario", "figures", "verdict", "content")
+    kept = (
+        "clip_id", "label", "seed", "split", "calibration", "scenario", "figures", "verdict", "content"
+    )  # fmt: skip
     return {
         "name": grid["name"],
         "summary": f"{len(rows)} clips of {grid['frames']} frames on {grid['scene']}, vehicle {grid['vehicle']}"

@@ -33,8 +33,11 @@ const COLUMNS = [
 
 // ---- filters
 
-const CHIPS = { weather: (c) => c.scenario.weather, hazard: roadOf, verdict: verdictOf };
-const chosen = { weather: new Set(), hazard: new Set(), verdict: new Set() };
+const CHIPS = {
+  weather: (c) => c.scenario.weather, hazard: roadOf, verdict: verdictOf,
+  calibration: (c) => c.calibration, split: (c) => c.split,
+};
+const chosen = Object.fromEntries(Object.keys(CHIPS).map((name) => [name, new Set()]));
 let order = { column: null, rising: true };
 
 function drawChips() {
@@ -155,6 +158,8 @@ async function beside(clip, sibling) {
   $("label").textContent = clip.label;
   $("badge").className = `badge ${verdictOf(clip)}`;
   $("badge").textContent = { passed: "pose check passed", failed: "pose check failed", unjudged: "not judged: no frames" }[verdictOf(clip)];
+  $("labels").textContent = LABELS.map(([name, key, digits, unit, factor]) => ranged(clip.figures, name, key, digits, unit, factor))
+    .filter(Boolean).join(" · ");
   $("changes").textContent = sibling ? changes(clip, sibling) : "";
   history.replaceState(null, "", `#${clip.clip_id}${sibling ? `+${sibling.clip_id}` : ""}`);
   markRows();
@@ -177,9 +182,19 @@ async function beside(clip, sibling) {
   traces.point(player.time);
 }
 
+const LABELS = [["friction", "surface_friction", 3, "", 1], ["stop", "stopping_distance", 1, " m", 1], ["peak pitch", "peak_pitch", 2, "°", 180 / Math.PI]];
+
+/** A label with its p05 and p95 under the surface's bounds; empty if the clip has no such figure. */
+function ranged(figures, name, key, digits, unit, factor) {
+  const text = (k) => (typeof figures[k] === "number" ? (figures[k] * factor).toFixed(digits) : null);
+  const [low, high] = [text(`${key}_p05`), text(`${key}_p95`)];
+  const range = low === null && high === null ? "" : ` (${low ?? "–"} to ${high ?? "longer than the clip"})`;
+  return text(key) === null ? "" : `${name} ${text(key)}${unit}${range}`;
+}
+
 /** What the sibling changes, in words: only figures that both have. */
 function changes(clip, sibling) {
-  const parts = [["friction", "surface_friction", 3, "", 1], ["stop", "stopping_distance", 1, " m", 1], ["peak pitch", "peak_pitch", 2, "°", 180 / Math.PI]]
+  const parts = LABELS
     .filter(([, key]) => typeof clip.figures[key] === "number" && typeof sibling.figures[key] === "number")
     .map(([name, key, digits, unit, factor]) => `${name} ${signed((sibling.figures[key] - clip.figures[key]) * factor, digits)}${unit}`);
   const fields = Object.keys(clip.scenario).filter((key) => clip.scenario[key] !== sibling.scenario[key]);
@@ -194,7 +209,7 @@ const facts = (rows) => el("dl", {}, ...rows.flatMap(([key, value, hash]) =>
 function drawClipFacts(clip) {
   const rows = (values) => Object.entries(values).map(([key, value]) => [key, typeof value === "number" ? String(value) : value]);
   $("clip-facts").lastElementChild.replaceChildren(
-    facts([["clip_id", clip.clip_id, true], ["seed", clip.seed, true]]),
+    facts([["clip_id", clip.clip_id, true], ["seed", clip.seed, true], ["split", clip.split || "none"], ["calibration", clip.calibration]]),
     el("h3", { textContent: "Scenario" }), facts(rows(clip.scenario)),
     el("h3", { textContent: "Outcome" }), facts(rows(clip.figures)),
     el("h3", { textContent: "Pose check" }), facts(rows({ ...clip.verdict, reasons: clip.verdict.reasons.join("; ") || "none" })),
@@ -237,8 +252,8 @@ $("title").textContent = REPORT.name;
 $("facts").textContent = REPORT.summary;
 $("time").max = REPORT.duration_s;
 const speeds = clips.map((c) => c.scenario.initial_speed_km_h);
-$("speed-from").placeholder = Math.min(...speeds);
-$("speed-to").placeholder = Math.max(...speeds);
+$("speed-from").placeholder = Math.floor(Math.min(...speeds));
+$("speed-to").placeholder = Math.ceil(Math.max(...speeds));
 drawChips();
 drawHead();
 drawRunFacts();

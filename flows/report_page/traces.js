@@ -4,7 +4,7 @@
 
 const PANEL_PX = 108;
 const HEAD_PX = 22;
-const MARGIN = { l: 46, r: 10, t: 8, b: 38 };
+const MARGIN = { l: 46, r: 10, t: 14, b: 38 };
 
 const waiting = new Map();
 

@@ -75,6 +75,7 @@ def test_the_page_lists_every_clip_and_each_filter_reduces_them(page):
     page.click("#hazard .chip[data-value=hump]")
     assert labels(page) == ["snow-3/hump"]
     page.click("#reset")
+    assert not page.is_visible("#calibration"), "all clips lie off the grid: nothing to choose"
     page.fill("#speed-from", "50")
     assert labels(page) == []
     page.fill("#speed-from", "40")
@@ -101,6 +102,9 @@ def test_the_sibling_stands_beside_with_its_film_its_traces_and_what_it_changes(
     assert page.evaluate("traces.plot.data.length") == 2 * page.evaluate("REPORT.panels.length")
     change = clips["snow-3/hump"]["surface_friction"] - clips["dry/hump"]["surface_friction"]
     assert f"friction −{-change:.3f}" in page.inner_text("#changes")
+    own = clips["dry/hump"]
+    low, high = own["surface_friction_p05"], own["surface_friction_p95"]
+    assert f"friction {own['surface_friction']:.3f} ({low:.3f} to {high:.3f})" in page.inner_text("#labels")
     page.select_option("#sibling", "")
     page.wait_for_function("traces.shown.length === 1")
     assert page.locator("video:visible").count() == 1
