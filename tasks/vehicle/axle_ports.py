@@ -6,7 +6,7 @@ from numba import njit
 
 from tasks.vehicle.brake import abs_command, abs_update
 from tasks.vehicle.chassis import Chassis
-from tasks.vehicle.effects.brake_line import acting_pressure, disc_rate
+from tasks.vehicle.effects.brake_line import acting_pressure
 from tasks.vehicle.effects.chassis import ChassisEffects, effective_friction, grip_reserve, stick_share
 from tasks.vehicle.effects.exact import friction_factor, slot_sum
 from tasks.vehicle.effects.ports import INDEX, PORTS
@@ -14,7 +14,7 @@ from tasks.vehicle.effects.slots import SlotTables
 from tasks.vehicle.states import AxleMemory, Instant
 from tasks.vehicle.tyre import TyreCurve
 from tasks.vehicle.vertical_ports import Ground, Strut
-from tasks.vehicle.wheels import Axle, Wheels
+from tasks.vehicle.wheels import Wheels
 
 _PAD, _ROLL, _ROLL_SPEED, _RELAXATION = (
     INDEX[name] for name in ("pad_drag", "rolling_coefficient", "rolling_speed", "relaxation_length")
@@ -237,38 +237,3 @@ def reserve_of(ports: AxlePorts, tyre: TyreCurve) -> float:
     if ports.ground.load <= 0.0:
         return 0.0
     return grip_reserve(ports.tyre_force / ports.ground.load, tyre.peak)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def wheel_rate(ports: AxlePorts, axle: Axle) -> float:
-    """Angular acceleration of an axle's wheels [rad/s2].
-
-    Parameters
-    ----------
-    ports : of the axle
-    axle : its wheels
-    """
-    torque = ports.lever * ports.tyre_force - ports.brake_torque - ports.ground_moment - ports.shaft_torque
-    return torque / axle.inertia
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def memory_rate(
-    memory: AxleMemory, ports: AxlePorts, speed: float, omega: float, disc_capacity: float, chassis: Chassis
-) -> AxleMemory:
-    """Rates of what an axle carries on: slip behind its relaxation length, heat of sliding, discs.
-
-    Parameters
-    ----------
-    memory, ports : of the axle
-    speed : [m/s]
-    omega : wheel speed [rad/s]
-    disc_capacity : heat capacity of its discs [J/K]
-    chassis : the values
-    """
-    following = relaxation_rate(speed, chassis.wheels.speed_floor, chassis.theta[_RELAXATION])
-    return AxleMemory(
-        following * (ports.slip - memory.slip),
-        abs(ports.tyre_force * ports.force_slip) * speed,
-        disc_rate(memory.disc_rise, ports.brake_torque * omega, disc_capacity),
-    )

@@ -7,9 +7,10 @@ wheels stay quiet to standstill; everywhere else (body, axles, road, heat) the m
 
 from numba import njit
 
-from tasks.vehicle.axle_ports import memory_rate, wheel_rate
+from tasks.vehicle.axle_ports import AxlePorts, relaxation_rate
 from tasks.vehicle.chassis import Chassis
-from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R
+from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, disc_rate
+from tasks.vehicle.effects.ports import INDEX
 from tasks.vehicle.effects.slots import SlotTables
 from tasks.vehicle.half_car import HalfCar, HalfCarState, half_car_rates, moved
 from tasks.vehicle.ports import Ports, ports_at
@@ -17,6 +18,44 @@ from tasks.vehicle.road import RoadFeature
 from tasks.vehicle.slip_matrix import GAMMA, axle_slope, solve_slip, without_speed
 from tasks.vehicle.states import AxleMemory, Instant, Memory, Motion, moved_axle, moved_motion
 from tasks.vehicle.tyre import TyreCurve
+from tasks.vehicle.wheels import Axle
+
+_RELAXATION = INDEX["relaxation_length"]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def wheel_rate(ports: AxlePorts, axle: Axle) -> float:
+    """Angular acceleration of an axle's wheels [rad/s2].
+
+    Parameters
+    ----------
+    ports : of the axle
+    axle : its wheels
+    """
+    torque = ports.lever * ports.tyre_force - ports.brake_torque - ports.ground_moment - ports.shaft_torque
+    return torque / axle.inertia
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def memory_rate(
+    memory: AxleMemory, ports: AxlePorts, speed: float, omega: float, disc_capacity: float, chassis: Chassis
+) -> AxleMemory:
+    """Rates of what an axle carries on: slip behind its relaxation length, heat of sliding, discs.
+
+    Parameters
+    ----------
+    memory, ports : of the axle
+    speed : [m/s]
+    omega : wheel speed [rad/s]
+    disc_capacity : heat capacity of its discs [J/K]
+    chassis : the values
+    """
+    following = relaxation_rate(speed, chassis.wheels.speed_floor, chassis.theta[_RELAXATION])
+    return AxleMemory(
+        following * (ports.slip - memory.slip),
+        abs(ports.tyre_force * ports.force_slip) * speed,
+        disc_rate(memory.disc_rise, ports.brake_torque * omega, disc_capacity),
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
