@@ -13,13 +13,14 @@ from catalogs.effects import load_effects
 from catalogs.effects.truths import Truth, load_sizes, load_truths
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.store.layout import write_json
+from flows.closing_benchmark_tables import benchmark_tables
+from flows.store.layout import write_atomically, write_json
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
 from tasks.closure.benchmark import covered, exact_interval, outcome, synthetic_campaign
 from tasks.closure.verdict import attribute
 
-FILE, LOG = "closing-benchmark.json", "campaigns.jsonl"
+FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
 FIRST_NULL, FIRST_TRUTH, FIRST_SIZE = 200_000, 300_000, 400_000
 """Seeds: of the first null, of the first campaign of the first truth and of the first size; 100 apart from one truth
 or size to the next. None of them has been used while the engine was made."""
@@ -45,7 +46,7 @@ def close_loop_benchmark(
 
     Parameters
     ----------
-    out : folder for ``closing-benchmark.json`` and ``campaigns.jsonl``
+    out : folder for ``closing-benchmark.json``, its tables in Markdown and ``campaigns.jsonl``
     seeds : campaigns of each truth
     nulls : campaigns of a model that lacks nothing
     minutes : no campaign is begun after so long
@@ -94,6 +95,7 @@ def close_loop_benchmark(
             file.write(json.dumps(row) + "\n")
     result = summary(rows) | {"campaigns": rows, "engine_sha256": engine, "made_with": code_version()}
     write_json(folder / FILE, result)
+    write_atomically(folder / TABLES, benchmark_tables(result).encode())
     return result
 
 

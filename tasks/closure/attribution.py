@@ -19,7 +19,7 @@ REFINED = 5
 BOOTSTRAP = 400
 ALIKE_REFINED = 4
 DECIDED = 0.1
-"""Share of the best gain so far below which the linear screen is taken at its word and nothing is refined."""
+"""Share of the best gain over inflation so far below which the linear screen is taken at its word."""
 LARGE_GAIN = 300.0
 """Gain from which derivatives taken without an effect no longer hold with it."""
 REACHED = 0.8
@@ -99,7 +99,8 @@ def judge(
         )
         gain = 0.5 * (base.objective - trials[-1].objective)
         # a large one is only ranked here: derivatives are taken anew at it
-        if gain > min(REACHED * foreseen, LARGE_GAIN) or max(gain, foreseen) < 0.3 * ACCEPT_SCORE:
+        enough = REACHED * foreseen if len(hypothesis.names) == 1 else np.inf
+        if gain > min(enough, LARGE_GAIN) or max(gain, foreseen) < 0.3 * ACCEPT_SCORE:
             break
     fitted = min(trials, key=lambda trial: trial.objective)
     return assess(evidence, base, base_held_out, hypothesis, fitted)
@@ -166,7 +167,14 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
     return np.array(scores)
 
 
-def ladder(evidence: Evidence, base: Fit, count: int = REFINED, *, gated: bool = True) -> list[Candidate]:
+def ladder(
+    evidence: Evidence,
+    base: Fit,
+    count: int = REFINED,
+    *,
+    gated: bool = True,
+    also: frozenset[str] = frozenset(),
+) -> list[Candidate]:
     """The best candidates to add to ``base``, refined and sorted by score, best first.
 
     Parameters
@@ -175,23 +183,31 @@ def ladder(evidence: Evidence, base: Fit, count: int = REFINED, *, gated: bool =
     base : fit of what is accepted so far
     count : how many of the screening are refined
     gated : judge them on held-out runs as well, and refine what looks like the best of them too
+    also : names of effects that are refined whatever the screen says of them
     """
-    gains, estimates = screen(evidence, base)
+    gains, estimates, seconds = screen(evidence, base)
     held_out = misfit_by_run(evidence.held_out, base) if gated else None
     order = [int(j) for j in np.argsort(-gains, kind="stable") if gains[j] > 0.3 * ACCEPT_SCORE][:count]
 
     def judged(j: int) -> Candidate:
-        hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]))
+        hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
         return judge(evidence, base, held_out, hypothesis, float(gains[j]))
 
     candidates: list[Candidate] = []
+    refined: list[int] = []
     for j in order:
-        if gains[j] > DECIDED * max((c.gain for c in candidates), default=0.0):
+        if gains[j] > DECIDED * max((c.gain / c.inflation for c in candidates), default=0.0):
             candidates.append(judged(j))
+            refined.append(j)
+    known = {p.name for p in base.parts}
+    for j, effect in enumerate(evidence.effects):
+        if effect.name in also and effect.name not in known and j not in refined:
+            candidates.append(judged(j))
+            refined.append(j)
     if candidates and gated:
         best = max(range(len(candidates)), key=lambda i: candidates[i].score)
         if candidates[best].score > ACCEPT_SCORE:
-            near = [j for j in look_alikes(evidence, order[best]) if j not in order and gains[j] > 0.0]
+            near = [j for j in look_alikes(evidence, refined[best]) if j not in refined and gains[j] > 0.0]
             candidates += [judged(j) for j in near[:ALIKE_REFINED]]
     return sorted(candidates, key=lambda c: -c.score)
 

@@ -87,7 +87,7 @@ def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
         )
         if effects:
             return fresh
-        kept = replace(fresh, library=run.library)
+        kept = replace(fresh, library=run.library, others=run.others)
         return with_disturbance(kept, evidence.tolerances, evidence.disturbance)
 
     return replace(

@@ -24,6 +24,8 @@ BROKEN = 1e4
 """Whitened residual of a trial that the integration does not survive: no fit goes there."""
 STEADY = 20.0
 """Misfit by the longer step below which derivatives are taken with it."""
+SECOND_SHARES = (0.3, 0.6)
+"""Where in its range an effect's second parameter is tried by the screen, besides its first value."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 
 
@@ -40,9 +42,10 @@ class RunEvidence:
     information : float64 [D, D] nuisance' nuisance
     session : float64 [M, 7] derivatives by the session's nuisances
     library : float64 [M, E] derivatives by the first parameter of every library effect
+    others : float64 [M, X] the same with the second parameter at `second_values`
     factor : Cholesky factor (lower) of information + prior precision
     session_q : float64 [D, 7] factor^-1 nuisance' session
-    library_q : float64 [D, E] factor^-1 nuisance' library
+    library_q, others_q : float64 [D, E], [D, X] factor^-1 nuisance' library, and others
     substeps : integration steps between samples with which derivatives are taken
     """
 
@@ -54,9 +57,11 @@ class RunEvidence:
     information: NDArray[np.float64]
     session: NDArray[np.float64]
     library: NDArray[np.float64]
+    others: NDArray[np.float64]
     factor: NDArray[np.float64]
     session_q: NDArray[np.float64]
     library_q: NDArray[np.float64]
+    others_q: NDArray[np.float64]
     substeps: int
 
     def residual(
@@ -168,18 +173,24 @@ def run_evidence(
         slope(_moved(base, i, 0.5 * s), 0.5 * s)
         for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
     ]
-    library = []
+    library, others = [], []
     for effect in effects:
         theta = base.copy()
-        first_parameter = effect.parameters[0]
-        if base[first_parameter.index] == 0.0:
+        leading = effect.parameters[0]
+        if base[leading.index] == 0.0:
             for parameter in effect.parameters[1:]:
                 theta[parameter.index] = parameter.start
-        library.append(
-            slope(_moved(theta, first_parameter.index, first_parameter.step), first_parameter.step)
+        library.append(slope(_moved(theta, leading.index, leading.step), leading.step))
+    for place, value in second_values(effects):
+        leading, second = effects[place].parameters
+        theta = base.copy()
+        theta[second.index] = value
+        # an effect that is there already is not looked for
+        there = base[leading.index] != 0.0
+        others.append(
+            np.zeros_like(y) if there else slope(_moved(theta, leading.index, leading.step), leading.step)
         )
-    if not library:
-        library = [np.zeros_like(y)]
+    library, others = library or [np.zeros_like(y)], others or [np.zeros_like(y)]
     nuisance = whiten(np.stack(columns, axis=-1), rho, sigma)
     evidence = RunEvidence(
         model=model,
@@ -190,9 +201,11 @@ def run_evidence(
         information=nuisance.T @ nuisance,
         session=whiten(np.stack(session, axis=-1), rho, sigma),
         library=whiten(np.stack(library, axis=-1), rho, sigma),
+        others=whiten(np.stack(others, axis=-1), rho, sigma),
         factor=np.empty(0),
         session_q=np.empty(0),
         library_q=np.empty(0),
+        others_q=np.empty(0),
         substeps=substeps,
     )
     return with_disturbance(evidence, tolerances, disturbance)
@@ -204,8 +217,24 @@ def with_disturbance(evidence: RunEvidence, tolerances: Tolerances, disturbance:
     factor = cholesky(evidence.information + precision, lower=True, check_finite=False)
     changed = replace(evidence, factor=factor)
     return replace(
-        changed, session_q=changed.project(changed.session), library_q=changed.project(changed.library)
-    )
+        changed, session_q=changed.project(changed.session), library_q=changed.project(changed.library),
+        others_q=changed.project(changed.others),
+    )  # fmt: skip
+
+
+def second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
+    """Places of the effects with a second parameter, and the values at which the screen tries it.
+
+    Parameters
+    ----------
+    effects : the library
+    """
+    return [
+        (place, second.lower + share * (second.upper - second.lower))
+        for place, effect in enumerate(effects)
+        for second in effect.parameters[1:]
+        for share in SECOND_SHARES
+    ]
 
 
 def _moved(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:

@@ -40,8 +40,8 @@ class Hypothesis:
     build: Build
 
 
-def library_hypothesis(effect: Effect, start: float | None = None) -> Hypothesis:
-    """A library effect as a hypothesis; ``start`` replaces the first parameter's first value."""
+def library_hypothesis(effect: Effect, start: float | None = None, second: float = np.nan) -> Hypothesis:
+    """A library effect as a hypothesis; ``start`` and ``second`` replace the first values of its parameters."""
     indices = [p.index for p in effect.parameters]
 
     def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
@@ -52,6 +52,8 @@ def library_hypothesis(effect: Effect, start: float | None = None) -> Hypothesis
     first = effect.parameters[0]
     begin = np.array([p.start for p in effect.parameters])
     begin[0] = min(max(first.step if start is None else start, first.lower), first.upper)
+    if np.isfinite(second):
+        begin[1] = second
     return Hypothesis(
         name=effect.name,
         effect_class=effect.effect_class,

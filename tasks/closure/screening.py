@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tasks.closure.campaign import Tolerances
 from tasks.closure.disturbance import Disturbance
-from tasks.closure.evidence import RunEvidence
+from tasks.closure.evidence import RunEvidence, second_values
 from tasks.closure.fit import Fit
 from tasks.vehicle.effects.library import Effect
 
@@ -45,7 +45,9 @@ class Evidence:
         return sum(len(run.nuisance) for run in self.train)
 
 
-def screen(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def screen(
+    evidence: Evidence, at: Fit
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Gain and estimate of every library effect, linearly, beyond the accepted ones.
 
     Parameters
@@ -55,14 +57,19 @@ def screen(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], NDArray[np
 
     Returns
     -------
-    gains float64 [E] and estimates float64 [E] of the first parameter
+    gains float64 [E], estimates float64 [E] of the first parameter, and float64 [E] the value of the second at which
+    the gain is largest (nan where its first value is, or where there is none)
     """
-    accepted = [j for j, e in enumerate(evidence.effects) if e.name in {p.name for p in at.parts}]
-    library, n_session = len(evidence.effects), len(evidence.session_sigma)
+    effects = evidence.effects
+    accepted = [j for j, e in enumerate(effects) if e.name in {p.name for p in at.parts}]
+    tried = [(j, np.nan) for j in range(len(effects))] + second_values(effects)
+    library, n_session = len(tried), len(evidence.session_sigma)
     gram, right = np.zeros((library + n_session,) * 2), np.zeros(library + n_session)
+    several = bool(second_values(effects))
     for run, r in zip(evidence.train, at.residuals, strict=True):
-        b = np.column_stack((run.library, run.session))
-        q = np.column_stack((run.library_q, run.session_q))
+        extra, extra_q = ((run.others,), (run.others_q,)) if several else ((), ())
+        b = np.column_stack((run.library, *extra, run.session))
+        q = np.column_stack((run.library_q, *extra_q, run.session_q))
         gram += b.T @ b - q.T @ q
         right += b.T @ r - q.T @ run.project(r)
     others = [*accepted, *range(library, library + n_session)]
@@ -71,20 +78,21 @@ def screen(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], NDArray[np
     inner = np.linalg.inv(
         gram[np.ix_(others, others)] + np.diag(precision) + 1e-9 * np.diag(np.diag(gram)[others])
     )
-    gains, estimates = np.zeros(library), np.zeros(library)
-    for j, effect in enumerate(evidence.effects):
+    gains, estimates, seconds = np.zeros(len(effects)), np.zeros(len(effects)), np.full(len(effects), np.nan)
+    for i, (j, second) in enumerate(tried):
         if j in accepted:
             continue
-        cross = gram[j, others]
-        information = gram[j, j] - cross @ inner @ cross
-        if information <= 1e-6 * gram[j, j] or gram[j, j] <= 0.0:
+        cross = gram[i, others]
+        information = gram[i, i] - cross @ inner @ cross
+        if information <= 1e-6 * gram[i, i] or gram[i, i] <= 0.0:
             continue
-        value = (right[j] - cross @ inner @ right[others]) / information
-        first = effect.parameters[0]
-        value = min(max(value, first.lower), first.upper)
-        estimates[j] = value
-        gains[j] = value * (right[j] - cross @ inner @ right[others]) - 0.5 * information * value**2
-    return gains, estimates
+        slope = right[i] - cross @ inner @ right[others]
+        first = effects[j].parameters[0]
+        value = min(max(slope / information, first.lower), first.upper)
+        gain = value * slope - 0.5 * information * value**2
+        if i == j or gain > gains[j]:
+            gains[j], estimates[j], seconds[j] = gain, value, second
+    return gains, estimates, seconds
 
 
 def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> float:

@@ -117,9 +117,10 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
     explored : an earlier search whose first effect, where it is met again, need not be looked for anew
     """
     state = start
+    met = frozenset(r.accepted.hypothesis.name for r in explored.rounds) if explored else frozenset()
     for _ in range(MAX_EFFECTS):
         count = REFINED if gated else EXPLORED
-        tried = ladder(state.evidence, state.base, count, gated=gated)
+        tried = ladder(state.evidence, state.base, count, gated=gated, also=met)
         places: dict[str, Evidence] = {}
         for i, candidate in enumerate(tried[:SETTLED] if gated else tried[:1]):
             if candidate.score > max(ACCEPT_SCORE, 0.3 * tried[0].score):
