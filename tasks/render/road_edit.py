@@ -37,6 +37,20 @@ class RoadRelief:
     far: float
 
 
+def road_lift(gaussians: Gaussians, relief: RoadRelief) -> NDArray[np.float64]:
+    """Height H_g of the feature under every road Gaussian, float64 [N]; 0 for all that is no road [m].
+
+    Parameters
+    ----------
+    gaussians : the street, lifted or not
+    relief : the road feature
+    """
+    lift = np.zeros(len(gaussians))
+    road = np.isin(gaussians.class_id, ROAD_CLASSES)
+    lift[road] = relief.elevation(relief.route.project(gaussians.means[road])[0])
+    return lift
+
+
 def apply_road_profile(
     gaussians: Gaussians, relief: RoadRelief, carriageway_left: float, carriageway_right: float
 ) -> tuple[Gaussians, NDArray[np.bool_]]:

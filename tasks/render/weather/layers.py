@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.gbuffer import GBuffer
-from tasks.render.road_edit import RoadRelief
+from tasks.render.road_edit import RoadRelief, road_lift
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
 from tasks.render.weather.layer import Layer, recompose
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
@@ -171,7 +171,8 @@ def weather_scene(
         c = p.snow_cover
         field = snow_field(gaussians, c.patches, c.tracks, c.anchors, route, seed)
         amount = (state.snow_coverage, state.snow_depth_mm, p.snow_cover)
-        snow = snow_layer(scene, field, white, *amount)
+        lift = None if relief is None else road_lift(scene, relief)
+        snow = snow_layer(scene, field, white, *amount, lift)
         scene = appended(without(whitened(scene, field, white, *amount), snow.buried), snow.gaussians)
     falling = Falling(
         population=falls,

@@ -45,7 +45,9 @@ class RoadAnchors:
     flat: NDArray[np.bool_]
 
 
-def road_anchors(gaussians: Gaussians, parameters: AnchorParameters) -> RoadAnchors:
+def road_anchors(
+    gaussians: Gaussians, parameters: AnchorParameters, lift: NDArray[np.floating] | None = None
+) -> RoadAnchors:
     """Gaussians of the road surface that carry snow.
 
     An anchor is of a road class, lies within the height tolerance of the plane through its neighbours, and its
@@ -56,6 +58,8 @@ def road_anchors(gaussians: Gaussians, parameters: AnchorParameters) -> RoadAnch
     ----------
     gaussians : the scene
     parameters : tolerance and limits
+    lift : [N] height of a road feature that each Gaussian lies on, which is no distance from the road [m]; None
+        for a road as it was built
 
     Returns
     -------
@@ -74,7 +78,11 @@ def road_anchors(gaussians: Gaussians, parameters: AnchorParameters) -> RoadAnch
     normal *= np.where(normal[:, 2] < 0, -1.0, 1.0)[:, None]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     upright = normal[:, 2] >= np.cos(np.deg2rad(p.tilt_limit_deg))
-    near = np.abs(means[:, 2] - height) <= p.height_tolerance_m
+    level = means
+    if lift is not None:
+        level = means - np.outer(lift[index], (0, 0, 1))
+        height, _ = _local_planes(level)
+    near = np.abs(level[:, 2] - height) <= p.height_tolerance_m
     kept = upright & near
     return RoadAnchors(index=index[kept], normal=normal[kept], flat=flat[kept])
 

@@ -90,6 +90,7 @@ def snow_layer(
     coverage: float,
     depth_mm: float,
     parameters: SnowCoverParameters,
+    lift: NDArray[np.floating] | None = None,
 ) -> SnowLayer:
     """The Gaussians of the snow on the road.
 
@@ -101,13 +102,14 @@ def snow_layer(
     coverage : c_s [1]
     depth_mm : h_s [mm]
     parameters : how snow lies and looks
+    lift : [N] height of a road feature under each Gaussian, as `road_anchors` takes it [m]
 
     Returns
     -------
     SnowLayer
     """
     p = parameters
-    anchors = road_anchors(gaussians, p.anchors)
+    anchors = road_anchors(gaussians, p.anchors, lift)
     x, y = gaussians.means[anchors.index, :2].T
     tracks = tracks_at(field, x, y)
     xi = coverage_rank(field, x, y, tracks)

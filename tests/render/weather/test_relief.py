@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.render.road_edit import RoadRelief, apply_road_profile
+from tasks.render.road_edit import RoadRelief, apply_road_profile, road_lift
 from tasks.render.weather.layers import weather_scene
 from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.relief import ReliefLight, clear_light, relief_ratios, relit, sun_in
+from tasks.render.weather.road_anchors import road_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
-from tests.render.weather.scenes import clear_sky
+from tests.render.weather.scenes import clear_sky, road
 from tests.toy_street import toy_street
 
 SCENE = toy_street()
@@ -172,3 +173,13 @@ def test_under_cloud_a_feature_has_no_sunny_side(parameters, kind):
     near, far = (gain[changed & (np.abs(x - place) < 0.2)].mean() for place in (9.5, 10.5))
     assert near == pytest.approx(far, abs=4e-3)
     assert near < 0.999
+
+
+def test_the_crest_of_a_short_hump_carries_snow_like_the_road_about_it(parameters):
+    """A hump of 0.6 m rises further above its neighbours' plane than an outlier may; it is road all the same."""
+    relief = relief_of(0.1, 0.6, 8.0)
+    shaped, _ = apply_road_profile(road(), relief, 4.0, -4.0)
+    limits = parameters.snow_cover.anchors
+    crest = np.flatnonzero(np.abs(shaped.means[:, 0] - 8.0) < 0.1)
+    assert not np.isin(crest, road_anchors(shaped, limits).index).any()
+    assert np.isin(crest, road_anchors(shaped, limits, road_lift(shaped, relief)).index).all()
