@@ -1,12 +1,15 @@
 """The generator of known truths, and the interval that its counts are given with."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from catalogs.effects.truths import load_truths
+from catalogs.effects.truths import load_sizes, load_truths
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from flows import closing_benchmark
 from flows.closing_benchmark import summary
 from tasks.closure.benchmark import exact_interval, synthetic_campaign
 from tasks.closure.drives import TRAINING
@@ -39,6 +42,43 @@ def test_every_truth_is_of_the_library_or_a_form_outside_it() -> None:
     truths = load_truths()
     assert sum(t.in_library for t in truths) >= 20 and sum(not t.in_library for t in truths) >= 6
     assert all((t.form is None) == t.in_library for t in truths)
+
+
+def answer(name: str) -> SimpleNamespace:
+    effect = SimpleNamespace(name=name, port="brake_torque", variable="pressure", parameters=())
+    verdict = SimpleNamespace(verdict="FOUND", effects=(effect,), rivals=(), tried=(), reasons=())
+    return SimpleNamespace(verdict=verdict)
+
+
+def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_engine(
+    tmp_path, monkeypatch
+) -> None:
+    judged: list[int] = []
+
+    def judge(seed: int, *_: object) -> SimpleNamespace:
+        judged.append(seed)
+        if len(judged) == 20:
+            raise KeyboardInterrupt
+        return answer("brake_fade")
+
+    monkeypatch.setattr(closing_benchmark, "synthetic_campaign", lambda model, road, truth, seed, slots: seed)
+    monkeypatch.setattr(closing_benchmark, "attribute", judge)
+    monkeypatch.setattr(closing_benchmark, "covered", lambda *_: None)
+    with pytest.raises(KeyboardInterrupt):
+        closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4)
+    result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4)
+    seeds = [row["seed"] for row in result["campaigns"]]
+    assert len(judged) == len(seeds) + 1 and len(set(seeds)) == len(seeds)
+    assert len(seeds) == 4 + 2 * len(load_truths()) + 2 * len(load_sizes())
+    # round by round: no truth has its second campaign before all have their first
+    order = [row["truth"] for row in result["campaigns"] if row["kind"] in ("library", "outside")]
+    assert order[: len(load_truths())] == [t.name for t in load_truths()]
+    tables = (tmp_path / "closing-benchmark.md").read_text()
+    assert "| false discoveries on nulls | at most 2 % | 4 of 4 |" in tables
+    assert "| brake_fade | fade 0.005 | 2 of 2 | 1.00 |" in tables
+    monkeypatch.setattr(closing_benchmark, "engine_hash", lambda: "another")
+    again = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=0, nulls=1)
+    assert [row["truth"] for row in again["campaigns"]] == [None]
 
 
 def row(truth: str | None, outcome: str, *, in_library: bool = True, covered: bool | None = None) -> dict:

@@ -14,12 +14,12 @@ from catalogs.effects import load_effects
 from tasks.closure.derivation import fit_disturbance, whitened_residuals
 from tasks.closure.disturbance import Disturbance
 from tasks.closure.drives import RICH, planned_run
-from tasks.closure.evidence import run_evidence
+from tasks.closure.evidence import run_evidence, second_values
 from tasks.closure.fit import fit
 from tasks.closure.forms import RIDGE, form_hypotheses, scan, spline_slopes
 from tasks.closure.forward import COARSE_SUBSTEPS, SUBSTEPS, RunModel, predict, run_model, starting_speed
 from tasks.closure.hypothesis import library_hypothesis
-from tasks.closure.screening import Evidence
+from tasks.closure.screening import Evidence, screen
 from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect, parameter_vector
 from tasks.vehicle.effects.slots import Slot
 
@@ -86,6 +86,20 @@ def test_a_threshold_of_what_starts_at_nothing_is_fitted_once_that_has_moved() -
         iterations=12,
     )  # fmt: skip
     assert fitted.values == pytest.approx([250.0, 5.0], rel=0.2)
+
+
+def test_the_screen_sees_an_effect_whose_threshold_is_far_from_its_first_value() -> None:
+    creep = LIBRARY["idle_creep"]
+    truth = parameter_vector({"creep_force": 600.0, "creep_speed": 8.0})
+    models = [
+        measured(plain_run(v, p), truth, i) for i, (v, p) in enumerate(((9.0, 0.0), (8.0, 0.2), (7.0, 0.0)))
+    ]
+    evidence = evidence_of(models, (creep,))
+    null = fit(evidence.train, (), evidence.session_sigma)
+    gains, estimates, seconds = screen(evidence, null)
+    tried = [value for _, value in second_values(evidence.effects)]
+    assert seconds[0] == min(tried, key=lambda value: abs(value - 8.0)) != creep.parameters[1].start
+    assert gains[0] > 50.0 and estimates[0] > 300.0
 
 
 def test_long_steps_are_for_runs_that_they_hardly_change() -> None:

@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.effects import load_effects
+from tasks.closure.attribution import ladder
 from tasks.closure.campaign import SESSION
 from tasks.closure.derivation import TORN, step_change
 from tasks.closure.disturbance import Disturbance
@@ -95,3 +96,13 @@ def test_the_next_experiment_excites_what_tells_the_two_apart() -> None:
     assert plan.plan in {words for words, _ in EXPERIMENTS} and "hot discs" in plan.plan
     assert plan.expected_d2 > 20.0
     assert next_experiment(evidence, faded, faded, VEHICLE, SURFACE).expected_d2 < 1e-6
+
+
+def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> None:
+    evidence = evidence_of(parameter_vector({"fade": 0.06}), "brake_fade", "rolling_resistance")
+    null = fit(evidence.train, (), evidence.session_sigma)
+    plain, asked = (
+        {c.hypothesis.name for c in ladder(evidence, null, gated=False, also=also)}
+        for also in (frozenset[str](), frozenset({"rolling_resistance"}))
+    )
+    assert plain == {"brake_fade"} and asked == {"brake_fade", "rolling_resistance"}
