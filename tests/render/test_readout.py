@@ -180,6 +180,15 @@ def test_flow_leads_to_the_pixel_that_sees_the_same_point():
     np.testing.assert_allclose(met, points[inside], atol=2e-3)
 
 
+def test_a_frame_s_time_is_that_of_the_middle_of_the_picture_and_of_its_exposure():
+    """Rows 79 and 80 of 160 lie half a line delay to either side."""
+    begin, middle, end = replace(ROLLING, motion_blur=True).row_times
+    assert middle[[0, 79, 80, 159]] == pytest.approx(1.5e-4 * np.array((-79.5, -0.5, 0.5, 79.5)))
+    np.testing.assert_allclose(middle - begin, 0.005)
+    np.testing.assert_allclose(end - middle, 0.005)
+    assert not CAMERA.row_times.any()
+
+
 ROUTE = route_from_positions(np.stack([np.arange(100.0), np.zeros(100), np.zeros(100)], axis=1))
 TICKS = np.arange(201) * 1e-3
 

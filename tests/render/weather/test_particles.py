@@ -150,6 +150,9 @@ def test_a_row_by_row_shutter_sees_each_particle_at_the_time_of_its_row(paramete
     near, wind, delay = parameters.air.near, np.array((0.0, 1.0, 0.0)), 7e-5
     still = shutter(exposure_s=1e-4)
     by_rows = visible_streaks(rain, near, replace(still, line_delay_s=delay), wind, 9)
+    at_once = {
+        round(float(s["diameter"]), 12): s["share"] for s in visible_streaks(rain, near, still, wind, 9)
+    }
     at_rows = {round(float(d), 12): k for k, d in enumerate(by_rows["diameter"])}
     compared = 0
     for row in (20.0, 160.0, 300.0):
@@ -167,6 +170,9 @@ def test_a_row_by_row_shutter_sees_each_particle_at_the_time_of_its_row(paramete
             np.testing.assert_allclose(seen, centre[k] + motion * later, atol=0.15)
             longer = np.linalg.norm(by_rows["end"][other] - by_rows["begin"][other])
             assert longer == pytest.approx(np.linalg.norm(motion) * 1e-4 / (1 - delay * motion[1]), rel=0.02)
+            # in more rows' exposures, with the same light in each
+            share = by_rows["share"][other] / at_once[round(float(global_then["diameter"][k]), 12)]
+            assert share == pytest.approx(1 / (1 - delay * motion[1]), rel=0.02)
             compared += 1
     assert compared > 20
 
