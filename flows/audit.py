@@ -11,13 +11,15 @@ from flows.generate import create_frame_arrays, fan_out
 from flows.orchestration import stage
 from flows.plan import Plan, read_plan
 from flows.runner import RunnerName
-from flows.store.frames import arrays_of, read_clip
+from flows.store.arrays import arrays_of
+from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_json
 from flows.store.lock import sole_writer
+from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from manifests.canonical import sha256_of
 from manifests.compare import first_pixel_difference, first_row_difference
-from manifests.manifest import check_format, damaged_files
+from manifests.manifest import damaged_files
 from manifests.provenance import code_version, library_versions, processor
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
@@ -69,26 +71,6 @@ def audit(
     if out is not None:
         write_json(Path(out) / "audit.json", result)
     return result
-
-
-def read_manifest(layout: Layout) -> dict[str, Any]:
-    """The manifest of a sealed dataset.
-
-    Raises
-    ------
-    InputError
-        If the run is unfinished, or the manifest is missing or of another format.
-    """
-    if layout.plan.is_file() and not layout.manifest.is_file():
-        plan = read_plan(layout.root)
-        done = sum(layout.receipt(clip.clip_id).is_file() for clip in plan.clips)
-        raise InputError(
-            f"{layout.root}: the dataset must be finished; {done} of {len(plan.clips)} clips are made:"
-            " run its musync generate command again"
-        )
-    manifest: dict[str, Any] = read_json(layout.manifest)
-    check_format(manifest, layout.manifest)
-    return manifest
 
 
 def chosen_clips(manifest: Mapping[str, Any], share: float) -> list[Mapping[str, Any]]:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from flows.audit import read_manifest
 from flows.store.frames import read_clip
 from flows.store.layout import Layout, write_atomically, write_json
+from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from manifests.canonical import content_id
 from manifests.compare import first_row_difference

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.cameras import load_camera
-from flows.audit import read_manifest
 from flows.clip import TICK_RATE_HZ
 from flows.plan import make_plan
 from flows.store.layout import Layout
+from flows.store.sealed import read_manifest
 
 CPU_SECONDS_PER_MEGAPIXEL = 1.3
 """Of a finished frame with its pose check, measured on the built-in street at 480 x 320."""

@@ -11,10 +11,10 @@ from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.audit import read_manifest
 from flows.driving import controls_of, hazard_of, weather_of
 from flows.plan import read_plan
 from flows.store.layout import Layout, write_atomically, write_json
+from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.explanation import force_steps, picture_steps, pitch_steps, surface_steps

@@ -10,13 +10,14 @@ import yaml
 from catalogs.grids import Grid, GridFile, expand_grid, grid_names, load_grid
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.audit import read_manifest, tool_differences
+from flows.audit import tool_differences
 from flows.driving import drive
 from flows.generate import RunReport, generate
 from flows.plan import Plan, freeze_grid
 from flows.progress import progress_bar
 from flows.runner import RunnerName
 from flows.store.layout import read_json, write_atomically
+from flows.store.sealed import read_manifest
 from flows.store.telemetry import columns_hash
 from manifests.frozen_run import (
     FOLDER,

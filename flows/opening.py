@@ -4,20 +4,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import duckdb
-import pandas as pd
 import pyarrow as pa
 import pyarrow.dataset
 import pyarrow.parquet as pq
-import zarr
 
-from flows.audit import read_manifest
-from flows.query import VIEWS, connect, schema
+from flows.query import VIEWS, connect_sealed, schema
 from flows.store.layout import Layout
-from flows.windows import ClipWindows, windows_of
+from flows.store.sealed import read_manifest
 from tasks.errors import InputError
+
+if TYPE_CHECKING:  # each takes its time to import, and few people need all of them
+    import pandas as pd
+    import zarr
+
+    from flows.windows import ClipWindows
 
 STORED = ("clips", "ticks", "frames", "pairs")
 
@@ -58,13 +61,13 @@ class Dataset:
     @cached_property
     def connection(self) -> duckdb.DuckDBPyConnection:
         """A DuckDB connection with the views clips, ticks, frames, verdicts and pairs."""
-        return connect(self.root)
+        return connect_sealed(Layout(self.root))
 
     def sql(self, query: str) -> duckdb.DuckDBPyRelation:
         """A query over the views, as a relation that is evaluated when its rows are asked for."""
         return self.connection.sql(query)
 
-    def pandas(self, table: str = "clips", columns: Sequence[str] | None = None) -> pd.DataFrame:
+    def pandas(self, table: str = "clips", columns: Sequence[str] | None = None) -> "pd.DataFrame":
         """A view as a pandas frame; what is not represented is NaN.
 
         Parameters
@@ -94,7 +97,7 @@ class Dataset:
         return self.sql(f"SELECT {chosen} FROM {table}")
 
     @property
-    def frames(self) -> zarr.Group:
+    def frames(self) -> "zarr.Group":
         """The frames as lazy Zarr arrays ``[clip, frame, y, x(, channel)]``; ``index`` of a clip is its first axis.
 
         Raises
@@ -104,6 +107,8 @@ class Dataset:
         """
         if not self.manifest["grid"].get("pictures", True):
             raise InputError(f"{self.root}: the dataset was made without frames")
+        import zarr
+
         return zarr.open_group(Layout(self.root).frames, mode="r")
 
     def xarray(self) -> Any:
@@ -129,7 +134,7 @@ class Dataset:
         arrays: Sequence[str] = ("rgb",),
         clips: Sequence[str] | None = None,
         quarantined: bool = False,
-    ) -> ClipWindows:
+    ) -> "ClipWindows":
         """Windows of consecutive frames with their telemetry, for `torch.utils.data.DataLoader`.
 
         Parameters
@@ -141,6 +146,8 @@ class Dataset:
         clips : labels or ids; None takes all that are not in quarantine
         quarantined : take those too; else a warning names them and ``left_out`` holds their labels
         """
+        from flows.windows import windows_of
+
         return windows_of(
             self.root, self.manifest, window, stride or window, columns, arrays, clips, quarantined
         )

@@ -7,9 +7,8 @@ from typing import Any, Literal
 import duckdb
 import pyarrow.parquet as pq
 
-from catalogs.grids.schema import grid_schema
-from flows.audit import read_manifest
 from flows.store.layout import Layout
+from flows.store.sealed import read_manifest
 from tasks.conventions import (
     CHECK_CHANNELS,
     CLIP_CHANNELS,
@@ -52,6 +51,11 @@ def connect(dataset: str | Path) -> duckdb.DuckDBPyConnection:
     """
     layout = Layout(Path(dataset).resolve())
     read_manifest(layout)
+    return connect_sealed(layout)
+
+
+def connect_sealed(layout: Layout) -> duckdb.DuckDBPyConnection:
+    """`connect` to a dataset whose manifest has been read."""
     connection = duckdb.connect()
     for table in ("clips", "pairs", "ticks", "frames"):
         files = table_files(layout, table).replace("'", "''")
@@ -113,6 +117,8 @@ def schema(of: Literal["views", "grid"] = "views") -> dict[str, Any]:
     of : ``grid`` gives the JSON Schema of a grid file instead
     """
     if of == "grid":
+        from catalogs.grids.schema import grid_schema
+
         return grid_schema()
     return {
         view: [

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.audit import read_manifest
 from flows.clip import TICK_RATE_HZ
 from flows.film import write_film
 from flows.previews import named_clips
@@ -19,6 +18,7 @@ from flows.progress import progress_bar
 from flows.seal import spread
 from flows.store.frames import read_clip
 from flows.store.layout import Layout, write_atomically
+from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from manifests.siblings import sibling_pairs
 from tasks.conventions import TICK_CHANNELS

@@ -4,10 +4,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from flows.audit import read_manifest
 from flows.orchestration import stage
 from flows.store.layout import Layout, clear_partial_files, write_json
 from flows.store.lock import sole_writer
+from flows.store.sealed import read_manifest
 from manifests.manifest import damaged_files, manifest_damage, recorded_files
 from tasks.errors import InputError
 

@@ -12,7 +12,7 @@ import torch
 import zarr
 from torch.utils.data import Dataset, Sampler
 
-from flows.store.frames import ARRAYS
+from flows.store.arrays import ARRAYS
 from flows.store.layout import Layout
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError

@@ -1,7 +1,20 @@
 """For analysts: ``import musync; data = musync.open("datasets/demo")``."""
 
+from typing import TYPE_CHECKING, Any
+
 from flows.opening import Dataset, open
-from flows.windows import ClipWindows, SeededOrder
 from tasks.errors import InputError
 
+if TYPE_CHECKING:
+    from flows.windows import ClipWindows, SeededOrder
+
 __all__ = ["ClipWindows", "Dataset", "InputError", "SeededOrder", "open"]
+
+
+def __getattr__(name: str) -> Any:
+    """Torch is imported with the classes that need it: it takes longer than a question to a dataset."""
+    if name in {"ClipWindows", "SeededOrder"}:
+        from flows import windows
+
+        return getattr(windows, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -5,7 +5,6 @@ from itertools import product
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
-from scipy.stats import qmc
 
 Level = tuple[str, dict[str, Any]]
 
@@ -109,6 +108,8 @@ def _levels(axis: Mapping[str, PartialScenario]) -> list[Level]:
 
 
 def _drawn(cube: LatinHypercube) -> list[Level]:
+    from scipy.stats import qmc  # its import takes longer than most commands
+
     low, high = zip(*cube.ranges.values(), strict=True)
     unit = qmc.LatinHypercube(len(cube.ranges), rng=cube.seed).random(cube.count)
     width = len(str(cube.count - 1))

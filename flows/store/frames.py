@@ -12,30 +12,8 @@ import numpy as np
 import zarr
 from zarr.codecs import BloscCodec, Crc32cCodec
 
+from flows.store.arrays import DIMENSION_SIZES, arrays_of
 from manifests.canonical import sha256_of
-
-ARRAYS: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "rgb": ("uint8", ("channel",), "sRGB-encoded colour"),
-    "depth": ("float32", (), "camera z [m], rounded to 13 mantissa bits; NaN where nothing is seen"),
-    "class": ("uint8", (), "semantic class"),
-}
-LABEL_ARRAYS: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "normal": ("int8", ("axis",), "world normal in steps of 1/127; zero where nothing is seen"),
-    "road": ("float32", ("coordinate",), "station and lateral position of road pixels [m]; NaN off the road"),
-    "flow": ("float32", ("direction",), "way right and down to the next frame [px]; NaN without depth"),
-    "marks": (
-        "uint8",
-        (),
-        "bits: what changed the pixel, what is out of sight in the next frame, what is hazard",
-    ),
-}
-"""Written where the grid asks for labels."""
-_SIZES = {"channel": 3, "axis": 3, "coordinate": 2, "direction": 2}
-
-
-def arrays_of(labels: bool) -> dict[str, tuple[str, tuple[str, ...], str]]:
-    """Type, further dimensions and meaning of the arrays of a dataset with or without labels."""
-    return ARRAYS | LABEL_ARRAYS if labels else ARRAYS
 
 
 def create_arrays(
@@ -44,7 +22,7 @@ def create_arrays(
     """Create the group and its arrays, once, before any clip is written."""
     group = zarr.create_group(path, overwrite=False, attributes=dict(attributes))
     for name, (dtype, extra, meaning) in arrays_of(labels).items():
-        tail = (height, width, *(_SIZES[dimension] for dimension in extra))
+        tail = (height, width, *(DIMENSION_SIZES[dimension] for dimension in extra))
         group.create_array(
             name,
             shape=(clips, frames, *tail),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flows.store.frames import arrays_of
+from flows.store.arrays import arrays_of
 from tasks.errors import InputError
 
 STAGED_TABLES = ("ticks", "frames")

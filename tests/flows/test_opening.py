@@ -3,6 +3,8 @@
 import copy
 import json
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from itertools import pairwise
 
@@ -99,6 +101,17 @@ def test_a_missing_table_is_told_with_what_to_do(toy_dataset, tmp_path):
     (tmp_path / "copy" / "telemetry" / "pairs.parquet").unlink()
     with pytest.raises(InputError, match="files of pairs are missing: musync repair"):
         sql(str(tmp_path / "copy"), "SELECT 1")
+
+
+def test_a_question_needs_neither_torch_nor_what_makes_clips(toy_dataset):
+    code = (
+        "import sys, musync; musync.open(sys.argv[1]).sql('SELECT count(*) FROM ticks').fetchall();"
+        "print({'torch', 'numba', 'zarr', 'scipy', 'flows.clip'} & sys.modules.keys())"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code, toy_dataset.root], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout.strip() == "set()"
 
 
 def test_an_unknown_table_names_those_that_exist(data):

@@ -3,7 +3,8 @@ import pyarrow.parquet as pq
 import pytest
 import zarr
 
-from flows.store.frames import ARRAYS, buffer_hash, create_arrays, read_clip, write_clip
+from flows.store.arrays import ARRAYS
+from flows.store.frames import buffer_hash, create_arrays, read_clip, write_clip
 from flows.store.layout import Layout, clear_partial_files, write_atomically, write_json
 from flows.store.telemetry import columns_hash, labelled_table, read_columns, write_parquet
 from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
@@ -120,7 +121,11 @@ def test_channel_names_are_unique_and_described():
         "label",
         "seed",
         "weather",
+        "split",
+        "calibration",
         "calibration_extrapolated",
+        "hold_speed",
+        "quarantined",
         "check_method",
         "check_passed",
     }
