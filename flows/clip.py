@@ -35,6 +35,7 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
 from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.eval.undistort import undistorted
+from tasks.eval.unroll import one_shutter
 from tasks.eval.unusable import unusable_pixels
 from tasks.render.backend import select_backend
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
@@ -243,9 +244,18 @@ def judge(
     catalogue: Catalogue,
 ) -> dict[str, Any]:
     """Motion recovered from the finished frames, held against the telemetry."""
-    K = catalogue.camera.K - PIXEL_CENTRE
-    seen = undistorted(
-        {name: buffers[name] for name in ("rgb", "depth", "class")}, K, catalogue.camera.distortion
+    K, route = catalogue.camera.K - PIXEL_CENTRE, catalogue.scene.route.pose(frames["station"])[:, :3, :3]
+    seen = one_shutter(
+        undistorted(
+            {name: buffers[name] for name in ("rgb", "depth", "class")}, K, catalogue.camera.distortion
+        ),
+        K,
+        catalogue.camera.T_rig_camera,
+        distortion=catalogue.camera.distortion,
+        line_delay_s=catalogue.camera.line_delay_s,
+        frame_interval_s=float(frames["t_ns"][1] - frames["t_ns"][0]) * 1e-9,
+        film_depth_mm=film_depth_mm,
+        route_rotations=route,
     )
     recovered = recover_motion_pnp(
         seen["rgb"],
@@ -253,7 +263,7 @@ def judge(
         K,
         catalogue.camera.T_rig_camera,
         unusable=unusable_pixels(seen["class"], film_depth_mm),
-        route_rotations=catalogue.scene.route.pose(frames["station"])[:, :3, :3],
+        route_rotations=route,
     )
     verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)
     return {

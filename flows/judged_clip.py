@@ -25,6 +25,7 @@ from tasks.eval.pose_photometric import recover_motion_photometric
 from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.eval.severity import image_statistics, sampled_frames
 from tasks.eval.undistort import undistorted
+from tasks.eval.unroll import one_shutter
 from tasks.eval.unusable import unusable_pixels
 
 Row = dict[str, Any]
@@ -111,9 +112,20 @@ def judge_clip(
     rgb, depth, kind = view.arrays(facts["index"], "rgb", "depth", "class")
     frames = clip_columns(view.root, "frames", facts)
     K, mount = catalogue.camera.K - PIXEL_CENTRE, catalogue.camera.T_rig_camera
-    hidden = unusable_pixels(kind, facts["film_depth_mm"])
     route = catalogue.scene.route.pose(frames["station"])[:, :3, :3]
     times = np.asarray(frames["t_ns"] * 1e-9, np.float64)
+    still = one_shutter(
+        {"rgb": rgb, "depth": depth, "class": kind},
+        K,
+        mount,
+        distortion=catalogue.camera.distortion,
+        line_delay_s=catalogue.camera.line_delay_s,
+        frame_interval_s=float(times[1] - times[0]),
+        film_depth_mm=facts["film_depth_mm"],
+        route_rotations=route,
+    )
+    hidden = unusable_pixels(still["class"], facts["film_depth_mm"])
+    with_depth = (still["rgb"], still["depth"], K, mount, hidden, route)
     others = {name: read_trajectory(path) for name, path in (outside or {}).items()}
     sampled = rgb[sampled_frames(len(rgb))]
     small = rgb[[0, len(rgb) // 3, 2 * len(rgb) // 3]]
@@ -121,8 +133,8 @@ def judge_clip(
         facts=facts,
         frames=frames,
         motions={
-            "photometric": recover_motion_photometric(rgb, depth, K, mount, hidden, route),
-            "pnp": recover_motion_pnp(rgb, depth, K, mount, hidden, route),
+            "photometric": recover_motion_photometric(*with_depth),
+            "pnp": recover_motion_pnp(*with_depth),
             "essential": recover_motion_essential(rgb, K, mount, route_rotations=route),
         }
         | {

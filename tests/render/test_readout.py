@@ -1,6 +1,7 @@
 """Lens, rolling shutter and motion blur against closed forms, and against the renders that they stand for."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from catalogs.cameras import load_camera
 from catalogs.weather import load_weather
 from tasks.errors import InputError
 from tasks.eval.image_quality import psnr
+from tasks.eval.unroll import row_times, unrolled
 from tasks.render.backend import CpuBackend
 from tasks.render.camera import body_poses, continuous_rig, viewmat
 from tasks.render.clip import render_clip
@@ -187,6 +189,32 @@ def test_a_frame_s_time_is_that_of_the_middle_of_the_picture_and_of_its_exposure
     np.testing.assert_allclose(middle - begin, 0.005)
     np.testing.assert_allclose(end - middle, 0.005)
     assert not CAMERA.row_times.any()
+
+
+def test_the_judge_takes_rows_back_to_one_shutter():
+    """Told the line delay and roughly the motion, its own code gives the picture and depth of the middle row's pose."""
+    still = sensor_field(CAMERA).directions
+    rolled, ahead = [], np.array((3.0, 0.5, 14.0))
+    for k in range(3):
+        poses = moving(ROLLING, ahead)[1]
+        poses[:, :3, 3] += 0.01 * k * ahead
+        light, z = wall_seen(still, poses)
+        rolled.append((encode_8bit(light), z.astype(np.float32)))
+    rgb, depth = (np.stack(part) for part in zip(*rolled, strict=True))
+    way = np.tile(np.eye(4), (3, 1, 1))
+    way[:, :3, 3] = 0.01 * np.arange(3)[:, None] * ahead
+    pinhole = K - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+    told = {"rgb": rgb, "depth": depth, "class": np.zeros(depth.shape, np.uint8)}
+    times = row_times(pinhole, (160, 240), None, ROLLING.line_delay_s)
+    seen = unrolled(told, pinhole, times, SimpleNamespace(T_rig0_rig=way), np.eye(4), 0.01)
+    middle = np.broadcast_to(np.eye(4), (160, 4, 4)).copy()
+    middle[:, :3, 3] = way[1, :3, 3]
+    light, z = wall_seen(still, middle)
+    inside = np.s_[4:-4, 8:-8]
+    np.testing.assert_allclose(seen["depth"][1][inside], z[inside], rtol=1e-4)
+    apart = np.abs(seen["rgb"][1].astype(int) - encode_8bit(light))[inside]
+    assert apart.max() <= 3
+    assert np.abs(rgb[1].astype(int) - encode_8bit(light))[inside].max() > 20
 
 
 ROUTE = route_from_positions(np.stack([np.arange(100.0), np.zeros(100), np.zeros(100)], axis=1))
