@@ -10,7 +10,7 @@ from rfc8785 import CanonicalizationError
 from manifests.canonical import canonical_bytes, sha256_of, sha256_of_file
 from tasks.errors import InputError
 
-MANIFEST_FORMAT = "musync-manifest/1"
+MANIFEST_FORMAT = "musync-manifest/2"
 
 
 def freeze(

@@ -42,7 +42,7 @@ let order = { column: null, rising: true };
 
 function drawChips() {
   for (const [name, of] of Object.entries(CHIPS)) {
-    const values = [...new Set(clips.map(of))];
+    const values = [...new Set(clips.map(of))].filter(Boolean);
     $(name).hidden = values.length < 2;
     for (const value of values) {
       const chip = el("button", { type: "button", className: "chip", textContent: value, dataset: { value } });
@@ -171,9 +171,9 @@ async function beside(clip, sibling) {
   document.querySelector("figure.b").hidden = films.length < 2;
   document.querySelectorAll("figcaption").forEach((caption, k) => { caption.textContent = pair[k]?.label ?? ""; });
   player.load(films);
-  const traced = pair.filter((c) => c.traced);
+  const traced = clip.traced ? pair.filter((c) => c.traced) : [];
   $("player").hidden = !clip.traced;
-  $("untraced").hidden = traced.length === pair.length;
+  $("untraced").hidden = pair.every((c) => c.traced);
   $("untraced").textContent = `No traces of ${pair.filter((c) => !c.traced).map((c) => c.label).join(" and ")} in this report: `
     + "musync report with --clip brings those that you name.";
   const columns = await Promise.all(traced.map(telemetryOf));

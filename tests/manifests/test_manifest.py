@@ -45,5 +45,5 @@ def test_a_missing_shared_file_is_named_without_a_clip(sealed):
 
 
 def test_a_manifest_of_another_version_is_refused_with_both_formats():
-    with pytest.raises(InputError, match=r"musync-manifest/1; it is 'musync-manifest/9'"):
+    with pytest.raises(InputError, match=r"musync-manifest/2; it is 'musync-manifest/9'"):
         check_format({"format": "musync-manifest/9"}, Path("manifest.json"))
