@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from catalogs.learned_judges import load_judges
-from flows import learned_rows
+from flows.learned_rows import learned_rows
 from tasks.errors import InputError
 from tasks.eval.learned_scores import CLIP_MEAN, CLIP_STD, ClipWeather, NeighbourDistance, WholeVideo
 
@@ -95,8 +95,8 @@ def test_rows_hold_scores_where_there_is_a_checkpoint_and_the_reason_where_there
     )
     made = clips({"dry": 0.0, "rain-2": 2.0, "rain-10": 10.0, "rain-50": 50.0})
     levels = [200, 150, 100, 50]
-    monkeypatch.setattr(learned_rows, "read_clip", lambda path, index, name: video([levels[index]] * 3))
-    rows = list(learned_rows.learned_rows(Path("made"), made, load_judges(tmp_path / "judges.yaml")))
+    view = SimpleNamespace(arrays=lambda index, *names: [video([levels[index]] * 3)])
+    rows = list(learned_rows(view, made, load_judges(tmp_path / "judges.yaml")))
     by_metric = {
         metric: [row for row in rows if row["metric"] == metric] for metric in {r["metric"] for r in rows}
     }
@@ -110,7 +110,7 @@ def test_rows_hold_scores_where_there_is_a_checkpoint_and_the_reason_where_there
 
 
 def test_without_a_list_every_judge_is_missing():
-    rows = list(learned_rows.learned_rows(Path("made"), clips({"dry": 0.0}), load_judges(None)))
+    rows = list(learned_rows(SimpleNamespace(), clips({"dry": 0.0}), load_judges(None)))
     assert {row["metric"] for row in rows} == {
         "clip_severity_rho", "clip_adjacent_accuracy", "dover_overall", "fast_vqa", "temporal_lpips",
     }  # fmt: skip
