@@ -11,6 +11,7 @@ from flows.generate import create_frame_arrays, fan_out
 from flows.orchestration import stage
 from flows.plan import Plan, read_plan
 from flows.runner import RunnerName
+from flows.store.address import everything, working
 from flows.store.arrays import arrays_of
 from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_json
@@ -55,11 +56,11 @@ def audit(
     """
     if not 0 <= share <= 1:
         raise InputError(f"--share must lie in 0 to 1; it is {share:g}")
-    layout = Layout(Path(dataset).resolve())
-    manifest = read_manifest(layout)
-    damaged = stage(damaged_files)(layout.root, manifest)
-    chosen = chosen_clips(manifest, share)
-    mismatches = stage(remake_and_compare)(layout, manifest, chosen, runner, workers, scheduler)
+    with working(dataset, everything) as layout:
+        manifest = read_manifest(layout)
+        damaged = stage(damaged_files)(layout.root, manifest)
+        chosen = chosen_clips(manifest, share)
+        mismatches = stage(remake_and_compare)(layout, manifest, chosen, runner, workers, scheduler)
     result = {
         "verified": not damaged and not mismatches,
         "files": len(manifest["artifacts"]) + sum(len(clip["artifacts"]) for clip in manifest["clips"]),

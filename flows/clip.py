@@ -27,8 +27,9 @@ from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
 from flows.driving import drive, hazard_of, ranges_of
 from flows.plan import ClipPlan, Plan, read_plan
+from flows.store.address import here, publish
 from flows.store.frames import buffer_hash, write_clip
-from flows.store.layout import Layout, write_json
+from flows.store.layout import STAGED_TABLES, Layout, write_json
 from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
@@ -91,11 +92,11 @@ def load_catalogue(inputs: Path, scene: str) -> Catalogue:
     )
 
 
-def make_clip(root: str, index: int) -> dict[str, Any]:
-    """Make and commit clip ``index`` of the dataset at ``root``; returns its receipt."""
+def make_clip(layout: Layout, index: int) -> dict[str, Any]:
+    """Make and commit clip ``index`` of a dataset; returns its receipt."""
     started = time.process_time(), time.perf_counter()
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
-    layout = Layout(Path(root))
+    layout = here(layout)
     plan = read_plan(layout.root)
     clip = plan.clips[index]
     catalogue = catalogue_of(layout.root)
@@ -142,6 +143,8 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
         "verdict": verdict,
     }  # fmt: skip
     write_json(layout.receipt(clip.clip_id), receipt)
+    tables = [layout.staged(clip.clip_id, table) for table in STAGED_TABLES]
+    publish(layout, [*shards.values(), *tables], last=layout.receipt(clip.clip_id))
     cost = {
         "cpu_s": time.process_time() - started[0],
         "wall_s": time.perf_counter() - started[1],
@@ -150,9 +153,10 @@ def make_clip(root: str, index: int) -> dict[str, Any]:
     return receipt | {"cost": cost}
 
 
-def warm_up(root: str) -> None:
+def warm_up(layout: Layout) -> None:
     """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
-    plan, catalogue = read_plan(Path(root)), catalogue_of(Path(root))
+    root = here(layout).root
+    plan, catalogue = read_plan(root), catalogue_of(root)
     short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
     for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
         facts, ride = drive(

@@ -16,6 +16,7 @@ from flows.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.orchestration import stage
 from flows.physics import clip_facts
 from flows.plan import Plan, read_plan
+from flows.store.address import reading
 from flows.store.layout import write_atomically, write_json
 from tasks.errors import InputError
 from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
@@ -46,7 +47,7 @@ def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     InputError
         If the folder is no finished dataset, or holds fewer than two clips.
     """
-    root = Path(dataset).resolve()
+    root = reading(dataset).root
     facts = clip_facts(root)
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from flows.store.address import reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.sealed import read_manifest
@@ -37,7 +38,7 @@ def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
     InputError
         If a folder is no sealed dataset, or its inputs are missing.
     """
-    old, new = Layout(Path(a).resolve()), Layout(Path(b).resolve())
+    old, new = reading(a), reading(b)
     before, after = read_manifest(old), read_manifest(new)
     why = input_differences(before, after, _inputs(old, before), _inputs(new, after))
     theirs = {content_id(clip["scenario"]): clip for clip in after["clips"]}
@@ -45,8 +46,8 @@ def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
     pairs = [(clip, theirs[key]) for key, clip in ours.items() if key in theirs]
     rows = [row for x, y in pairs if (row := _clip_row(old, new, x, y, why)) is not None]
     result: dict[str, Any] = {
-        "a": {"dataset": str(old.root), "run_id": before["run_id"]},
-        "b": {"dataset": str(new.root), "run_id": after["run_id"]},
+        "a": {"dataset": str(old), "run_id": before["run_id"]},
+        "b": {"dataset": str(new), "run_id": after["run_id"]},
         "same": not rows and ours.keys() == theirs.keys(),
         "why": why,
         "clips": rows,

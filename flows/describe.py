@@ -1,13 +1,12 @@
 """What is in a dataset, and what a grid would make: for people, without making anything."""
 
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 from catalogs.cameras import load_camera
 from flows.clip import TICK_RATE_HZ
 from flows.plan import make_plan
-from flows.store.layout import Layout
+from flows.store.address import nothing, reading, stored_bytes
 from flows.store.sealed import read_manifest
 
 CPU_SECONDS_PER_MEGAPIXEL = 1.3
@@ -26,7 +25,7 @@ def describe(dataset: str) -> dict[str, Any]:
     InputError
         If the folder is no sealed dataset.
     """
-    layout = Layout(Path(dataset).resolve())
+    layout = reading(dataset, nothing)
     manifest = read_manifest(layout)
     settings = manifest["grid"]
     return {
@@ -38,7 +37,7 @@ def describe(dataset: str) -> dict[str, Any]:
         "camera": settings["camera"],
         "frames_per_clip": settings["frames"],
         "frame_rate_hz": settings["frame_rate_hz"],
-        "megabytes": round(sum(f.stat().st_size for f in layout.root.rglob("*") if f.is_file()) / 1e6, 1),
+        "megabytes": round(stored_bytes(layout) / 1e6, 1),
         "clips": [
             {"clip_id": clip["clip_id"], "label": clip["label"]}
             | {

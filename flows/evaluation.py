@@ -16,6 +16,7 @@ from flows.learned_rows import learned_rows
 from flows.orchestration import stage
 from flows.physics import clip_facts
 from flows.road_edit_rows import road_edit_rows
+from flows.store.address import reading
 from flows.store.layout import Layout, read_json, write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from flows.trajectories import trajectory_files
@@ -61,7 +62,7 @@ def evaluate(
     InputError
         If the folder is no finished dataset, or a trajectory or a checkpoint cannot be used.
     """
-    root = Path(dataset).resolve()
+    root = reading(dataset).root
     judges = load_judges(learned)
     facts = clip_facts(root)
     told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 
 from catalogs.grids import Grid
 from flows.clip import make_clip, warm_up
@@ -11,7 +10,8 @@ from flows.orchestration import stage
 from flows.plan import Plan, make_plan, plan_differences, read_plan
 from flows.progress import progress_bar
 from flows.runner import RunnerName, open_executor, run_unordered
-from flows.seal import seal
+from flows.seal import needed_to_seal, seal
+from flows.store.address import bring, claim, publish, reading, resumable, working
 from flows.store.frames import create_arrays
 from flows.store.layout import Layout, clear_partial_files, read_json, write_atomically, write_json
 from flows.store.lock import sole_writer
@@ -62,16 +62,23 @@ def generate(
     ClipsFailed
         If clips failed; run the same command again to make just those.
     """
-    layout = Layout(Path(out).resolve())
-    plan = stage(prepare)(grid, layout, backend, vehicle, pictures)
-    if layout.manifest.is_file():
-        return _report(layout, plan, 0, {})
-    with sole_writer(layout):
-        clear_partial_files(layout)
-        missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
-        cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
-        stage(seal)(layout, plan)
-    return _report(layout, plan, len(missing), cost)
+    missing: list[int] = []
+    cost: dict[str, dict[str, float]] = {}
+    with working(out, resumable) as layout:
+        plan = stage(prepare)(grid, layout, backend, vehicle, pictures)
+        if not layout.manifest.is_file():
+            with sole_writer(layout):
+                clear_partial_files(layout)
+                missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
+                cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
+                bring(layout, needed_to_seal(layout, plan))
+                stage(seal)(layout, plan)
+    return _report(reading(out, summary), plan, len(missing), cost)
+
+
+def summary(name: str) -> bool:
+    """What is shown of a run when it has ended."""
+    return name.startswith("previews/")
 
 
 def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, float]]) -> RunReport:
@@ -98,19 +105,22 @@ def prepare(
         if existing.run_id != plan.run_id:
             differences = plan_differences(plan.as_json(), existing.as_json())
             raise InputError(
-                f"{layout.root}: holds the dataset of another run: {'; '.join(differences[:5])}; give an empty folder"
+                f"{layout}: holds the dataset of another run: {'; '.join(differences[:5])}; give an empty folder"
             )
         return existing
     if layout.root.exists() and (not layout.root.is_dir() or any(layout.root.iterdir())):
         raise InputError(
-            f"{layout.root}: must be an empty or new folder, or a muSync dataset; it holds other files"
+            f"{layout}: must be an empty or new folder, or a muSync dataset; it holds other files"
         )
     for name, content in inputs.items():
         write_atomically(layout.inputs / name, content)
     write_json(layout.inputs / "grid.json", plan.settings.model_dump(mode="json"))
     create_frame_arrays(layout, plan)
+    prepared = [path for path in layout.root.rglob("*") if path.is_file()]
     # last: where the plan exists, the folder is ready to be filled
     write_json(layout.plan, plan.as_json())
+    publish(layout, prepared)
+    claim(layout, layout.plan)
     return plan
 
 
@@ -155,19 +165,17 @@ def fan_out(
     failures: dict[str, BaseException] = {}
     labels = {clip.index: clip.label for clip in plan.clips}
     with (
-        open_executor(runner, workers, scheduler, partial(warm_up, str(layout.root))) as executor,
+        open_executor(runner, workers, scheduler, partial(warm_up, layout)) as executor,
         progress_bar("clips", len(indices)) as advance,
     ):
-        for (_, index), future in run_unordered(
-            executor, make_clip, ((str(layout.root), index) for index in indices)
-        ):
+        for (_, index), future in run_unordered(executor, make_clip, ((layout, index) for index in indices)):
             error = future.exception()
             if error is None:
                 cost[labels[index]] = future.result()["cost"]
                 advance(labels[index])
             elif disk_full_sentence(error) is not None:
                 raise InputError(
-                    f"{layout.root}: the disk is full; {len(cost)} of {len(indices)} clips are committed and kept:"
+                    f"{layout}: the disk is full; {len(cost)} of {len(indices)} clips are committed and kept:"
                     " free space and run the same command again"
                 )
             else:
@@ -177,7 +185,7 @@ def fan_out(
         first = next(iter(failures.values()))
         names = ", ".join(sorted(failures))
         raise ClipsFailed(
-            f"{layout.root}: {len(failures)} of {len(indices)} clips failed ({names}); the first said:"
+            f"{layout}: {len(failures)} of {len(indices)} clips failed ({names}); the first said:"
             f" {type(first).__name__}: {first}; the others are kept: run the same command again to make just these"
         ) from first
     return cost

@@ -12,6 +12,7 @@ import pyarrow.dataset
 import pyarrow.parquet as pq
 
 from flows.query import VIEWS, connect_sealed, schema
+from flows.store.address import frames_store, reading, telemetry
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
 from tasks.errors import InputError
@@ -33,13 +34,15 @@ class Dataset:
     ----------
     root : its folder
     manifest : its frozen manifest
+    origin : its address in an object store; ``root`` then holds what has been read of it
     """
 
     root: Path
     manifest: dict[str, Any]
+    origin: str | None = None
 
     def __repr__(self) -> str:
-        return f"Dataset({str(self.root)!r}, {len(self.manifest['clips'])} clips)"
+        return f"Dataset({self.origin or str(self.root)!r}, {len(self.manifest['clips'])} clips)"
 
     def telemetry(self, table: str = "ticks") -> pyarrow.dataset.Dataset:
         """A stored table as a pyarrow dataset: clips, ticks, frames or pairs; units stand in its schema.
@@ -106,10 +109,10 @@ class Dataset:
             If the dataset was made without frames.
         """
         if not self.manifest["grid"].get("pictures", True):
-            raise InputError(f"{self.root}: the dataset was made without frames")
+            raise InputError(f"{self.origin or self.root}: the dataset was made without frames")
         import zarr
 
-        return zarr.open_group(Layout(self.root).frames, mode="r")
+        return zarr.open_group(frames_store(Layout(self.root, self.origin)), mode="r")
 
     def xarray(self) -> Any:
         """The frames as a lazy xarray dataset with named dimensions; needs the package xarray.
@@ -123,7 +126,7 @@ class Dataset:
             import xarray
         except ImportError:
             raise InputError("xarray is not installed: pip install 'musync[analysts]'") from None
-        return xarray.open_zarr(Layout(self.root).frames, consolidated=False, chunks=None)
+        return xarray.open_zarr(frames_store(Layout(self.root, self.origin)), consolidated=False, chunks=None)
 
     def torch(
         self,
@@ -148,6 +151,10 @@ class Dataset:
         """
         from flows.windows import windows_of
 
+        if self.origin is not None:  # workers read the files of these arrays often
+            reading(
+                self.origin, lambda name: name.startswith(tuple(f"frames.zarr/{array}/" for array in arrays))
+            )
         return windows_of(
             self.root, self.manifest, window, stride or window, columns, arrays, clips, quarantined
         )
@@ -165,8 +172,8 @@ def open(dataset: str | Path) -> Dataset:
     InputError
         If the folder is no sealed dataset.
     """
-    layout = Layout(Path(dataset).resolve())
-    return Dataset(root=layout.root, manifest=read_manifest(layout))
+    layout = reading(dataset, telemetry)
+    return Dataset(root=layout.root, manifest=read_manifest(layout), origin=layout.origin)
 
 
 def _known(table: str, names: tuple[str, ...]) -> None:

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import yaml
 
 from flows.orchestration import stage
+from flows.store.address import reading, telemetry
 from flows.store.layout import Layout, read_json, write_json
 from flows.store.telemetry import table_columns
 from tasks.conventions import FRAME_CHANNELS, TICK_CHANNELS
@@ -30,7 +31,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     InputError
         If the folder is no finished dataset, a table lacks columns, or its mode's laws are not known here.
     """
-    root = Path(dataset).resolve()
+    root = reading(dataset, telemetry).root
     constants = read_constants(root)
     clips = clip_facts(root)
     held = [facts["label"] for facts in clips if facts["hold_speed"]]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flows.film import write_film
 from flows.plan import read_plan
 from flows.progress import progress_bar
+from flows.store.address import reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout, read_json
 from flows.store.telemetry import read_columns
@@ -32,7 +33,7 @@ def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: b
     InputError
         The folder holds no finished dataset, or a clip is not in it.
     """
-    layout = Layout(Path(dataset))
+    layout = reading(dataset)
     if not layout.manifest.is_file():
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
     plan, rows = read_plan(layout.root), read_json(layout.manifest)["clips"]

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import duckdb
 import pyarrow.parquet as pq
 
+from flows.store.address import reading, telemetry
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
 from tasks.conventions import (
@@ -49,7 +50,7 @@ def connect(dataset: str | Path) -> duckdb.DuckDBPyConnection:
     InputError
         If the folder is no sealed dataset.
     """
-    layout = Layout(Path(dataset).resolve())
+    layout = reading(dataset, telemetry)
     read_manifest(layout)
     return connect_sealed(layout)
 
@@ -74,7 +75,7 @@ def _columns(layout: Layout, table: str) -> str:
         return "*"
     first = next(layout.root.glob(str(Path(table_files(layout, table)).relative_to(layout.root))), None)
     if first is None:
-        raise InputError(f"{layout.root}: the files of {table} are missing: musync repair makes them again")
+        raise InputError(f"{layout}: the files of {table} are missing: musync repair makes them again")
     floats = [field.name for field in pq.read_schema(first) if str(field.type) == "double"]
     nulls = ", ".join(f'nullif("{name}", \'nan\'::DOUBLE) AS "{name}"' for name in floats)
     return f"* REPLACE ({nulls})"

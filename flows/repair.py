@@ -16,6 +16,7 @@ from flows.orchestration import stage
 from flows.plan import ClipPlan, Plan, input_sources, read_plan
 from flows.runner import RunnerName
 from flows.seal import clips_table, pairs_table, preview_sheet, table_parts, write_part
+from flows.store.address import everything, publish, working
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically, write_json
 from flows.store.lock import sole_writer
 from flows.store.telemetry import write_parquet
@@ -56,28 +57,35 @@ def repair(
     InputError
         The manifest itself is damaged, or inputs that clips follow from cannot be found any more.
     """
-    layout = Layout(Path(dataset).resolve())
+    with working(dataset, everything) as layout:
+        result = _repaired(layout, runner, workers, scheduler)
+    if out is not None:
+        write_json(Path(out) / "repair.json", result)
+    return result
+
+
+def _repaired(
+    layout: Layout, runner: RunnerName, workers: int | None, scheduler: str | None
+) -> dict[str, Any]:
     found = stage(compare_files)(layout)
     if any(row["path"] == "manifest.json" for row in found["damaged"]):
         raise InputError(
-            f"{layout.manifest}: {found['damaged'][0]['damage']}, so nothing says what the other files should be:"
+            f"{layout}/manifest.json: {found['damaged'][0]['damage']}, so nothing says what the other files should be:"
             " put back a copy of the manifest, or generate the grid again into another folder"
         )
     manifest = read_json(layout.manifest)
     paths = [row["path"] for row in found["damaged"] if row["damage"] != "not recorded"]
     with sole_writer(layout):
         restored = stage(restore)(layout, manifest, paths, runner, workers, scheduler) if paths else []
+        publish(layout, [layout.root / path for path in restored])
         shutil.rmtree(layout.staging)
-    result = {
+    return {
         "repaired": stage(compare_files)(layout)["verified"],
         "damaged": found["damaged"],
         "restored": restored,
         "failed": sorted(set(paths) - set(restored)),
         "differences": tool_differences(manifest),
     }
-    if out is not None:
-        write_json(Path(out) / "repair.json", result)
-    return result
 
 
 def restore(

@@ -16,6 +16,7 @@ from flows.film import write_film
 from flows.previews import named_clips
 from flows.progress import progress_bar
 from flows.seal import spread
+from flows.store.address import reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout, write_atomically
 from flows.store.sealed import read_manifest
@@ -52,7 +53,7 @@ def report(dataset: str, *, out: str | None = None, clips: list[str] | None = No
     InputError
         The folder holds no finished dataset, a clip is not in it, or the page's folder holds other files.
     """
-    layout = Layout(Path(dataset).resolve())
+    layout = reading(dataset)
     manifest = read_manifest(layout)
     rows: list[dict[str, Any]] = manifest["clips"]
     brought = named_clips(rows, clips, dataset) if clips else spread(rows, TRACED_CLIPS)
@@ -159,6 +160,8 @@ def _bring(
 
 
 def _folder(layout: Layout, out: str | None) -> Path:
+    if out is None and layout.origin is not None:
+        raise InputError(f"{layout}: --out must name a folder for the page of a dataset in an object store")
     folder = Path(out).resolve() if out else layout.root.with_name(f"{layout.root.name}-report")
     if folder.is_relative_to(layout.root):
         raise InputError(

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flows.plan import Plan
+from flows.store.address import publish, withdraw
 from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically
 from flows.store.telemetry import labelled_table, read_columns, write_parquet
@@ -38,18 +39,34 @@ def seal(layout: Layout, plan: Plan) -> None:
     sheet = layout.previews / "contact_sheet.png"
     if plan.settings.pictures:
         write_atomically(sheet, preview_sheet(layout, layout.frames, plan, receipts))
-    shared = [
+    made = [
         *tables,
         layout.telemetry / "clips.parquet",
         layout.telemetry / "pairs.parquet",
         *([sheet] if plan.settings.pictures else []),
+    ]
+    shared = [
+        *made,
         layout.plan,
         *sorted(path for path in layout.inputs.rglob("*") if path.is_file()),
         *sorted(layout.frames.rglob("zarr.json")),
     ]
     artifacts = {layout.relative(path): sha256_of_file(path) for path in shared}
     write_atomically(layout.manifest, freeze(plan.as_json(), receipts, artifacts, processor()))
+    publish(layout, made, last=layout.manifest)
+    withdraw(layout, [path for path in layout.staging.iterdir() if path.name != "lock"])
     shutil.rmtree(layout.staging)
+
+
+def needed_to_seal(layout: Layout, plan: Plan) -> list[Path]:
+    """The files of finished clips that sealing reads."""
+    ids = [clip.clip_id for clip in plan.clips]
+    shown = spread(plan.clips, PREVIEW_CLIPS) if plan.settings.pictures else []
+    return [
+        *(layout.receipt(clip_id) for clip_id in ids),
+        *(layout.staged(clip_id, table) for clip_id in ids for table in STAGED_TABLES),
+        *(layout.frame_shard("rgb", clip.index) for clip in shown),
+    ]
 
 
 def table_parts(plan: Plan, table: str) -> dict[str, list[str]]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flows.seal import PREVIEW_CLIPS, spread
+from flows.store.address import reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout, read_json, write_atomically
 from flows.store.telemetry import read_columns
@@ -35,7 +36,7 @@ def sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
     InputError
         The folder holds no finished dataset, or its grid has neither two weathers nor a road feature.
     """
-    layout = Layout(Path(dataset))
+    layout = reading(dataset)
     if not layout.manifest.is_file():
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
     clips = read_json(layout.manifest)["clips"]

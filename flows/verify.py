@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from flows.orchestration import stage
+from flows.store.address import everything, stored_record, withdraw, working
 from flows.store.layout import Layout, clear_partial_files, write_json
 from flows.store.lock import sole_writer
 from flows.store.sealed import read_manifest
@@ -35,8 +36,8 @@ def verify(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     InputError
         If the folder is no sealed dataset of this format.
     """
-    layout = Layout(Path(dataset).resolve())
-    result = stage(compare_files)(layout)
+    with working(dataset, everything) as layout:
+        result = stage(compare_files)(layout)
     if out is not None:
         write_json(Path(out) / "verify.json", result)
     return result
@@ -85,9 +86,13 @@ def gc(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
     InputError
         If the folder is no dataset, or another run is writing it.
     """
-    layout = Layout(Path(dataset).resolve())
+    with working(dataset, stored_record) as layout:
+        return _collect(layout, dry_run)
+
+
+def _collect(layout: Layout, dry_run: bool) -> dict[str, Any]:
     if not layout.plan.is_file() and not layout.manifest.is_file():
-        raise InputError(f"{dataset}: must be a muSync dataset; it has neither plan.json nor manifest.json")
+        raise InputError(f"{layout}: must be a muSync dataset; it has neither plan.json nor manifest.json")
     with sole_writer(layout):
         found = [path for path in layout.root.rglob("*.partial*") if layout.staging not in path.parents]
         found += [path for path in layout.staging.glob("*") if _left_in_staging(layout, path)]
@@ -95,6 +100,7 @@ def gc(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
         size = sum(_bytes(path) for path in found)
         if not dry_run:
             clear_partial_files(layout)
+            withdraw(layout, [path for path in found if layout.staging in path.parents])
             for path in found:
                 shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
         if layout.manifest.is_file() and not (dry_run and found):

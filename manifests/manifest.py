@@ -68,7 +68,7 @@ def manifest_damage(content: bytes) -> str | None:
     return None if sealed else "changed: its seal does not match its content"
 
 
-def check_format(manifest: Mapping[str, Any], place: Path) -> None:
+def check_format(manifest: Mapping[str, Any], place: object) -> None:
     """Raise `InputError` if the manifest is of another format than this version reads."""
     found = manifest.get("format")
     if found != MANIFEST_FORMAT:

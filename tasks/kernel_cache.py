@@ -22,8 +22,7 @@ def place_kernel_cache() -> None:
     """Point Numba at the folder of the present sources, unless the user has chosen one (NUMBA_CACHE_DIR)."""
     if "NUMBA_CACHE_DIR" in os.environ:
         return
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = Path(os.environ.get("MUSYNC_CACHE", home / "musync")) / "kernels" / sources_hash()
+    folder = cache_root() / "kernels" / sources_hash()
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     if "numba" in sys.modules:
         from numba.core import config
@@ -31,6 +30,12 @@ def place_kernel_cache() -> None:
         config.CACHE_DIR = str(folder)
     if not folder.is_dir():
         _forget_old(folder.parent)
+
+
+def cache_root() -> Path:
+    """Folder of what can be had again: MUSYNC_CACHE, or one in the user's cache."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return Path(os.environ.get("MUSYNC_CACHE", home / "musync"))
 
 
 def sources_hash(package: Path = Path(__file__).parent) -> str:

@@ -10,6 +10,7 @@ import scipy
 import tasks.scene
 from catalogs.scenes.folder import write_scene
 from tasks.errors import InputError
+from tasks.kernel_cache import cache_root
 
 
 def cached_street(seed: int = 2025) -> Path:
@@ -19,7 +20,7 @@ def cached_street(seed: int = 2025) -> Path:
     ----------
     seed : of every texture and object
     """
-    folder = _cache_root() / f"street-{seed}-{_recipe_hash()}"
+    folder = cache_root() / f"street-{seed}-{_recipe_hash()}"
     if not (folder / "scene.json").is_file():
         from tasks.scene.street import build_street
 
@@ -34,11 +35,6 @@ def cached_street(seed: int = 2025) -> Path:
                     f"{folder}: the cache of generated scenes must be writable; it is not"
                 ) from None
     return folder
-
-
-def _cache_root() -> Path:
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(os.environ.get("MUSYNC_CACHE", Path(home) / "musync"))
 
 
 def _recipe_hash() -> str:

@@ -2,12 +2,17 @@
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
 import typer
 
+from tasks.errors import InputError
+
 DONE, CHECK_FAILED, INPUT_WRONG, BROKEN = 0, 1, 2, 3
+
+DATASETS, WRITE_DATASETS = {"dataset", "a", "b"}, {"generate", "reproduce", "schedule"}
+"""Arguments that may be addresses in an object store, and functions that may write to one."""
 
 Json = Annotated[bool, typer.Option("--json", help="Print the JSON instead of text.")]
 Out = Annotated[str | None, typer.Option(help="Folder for the JSON this command writes.")]
@@ -26,7 +31,27 @@ def one_thread() -> None:
 
 def call(name: str, prefect: bool, /, *args: Any, **kwargs: Any) -> Any:
     """Call a pipeline function, as a Prefect flow where one is asked for."""
-    return _function(name, prefect or "PREFECT_API_URL" in os.environ)(*args, **kwargs)
+    function = _function(name, prefect or "PREFECT_API_URL" in os.environ)
+    _refuse_addresses(function, args, kwargs)
+    return function(*args, **kwargs)
+
+
+def _refuse_addresses(function: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> None:
+    """Datasets may lie in an object store; pages, films, tables and scenes are written to folders."""
+    from inspect import signature
+
+    from flows.store.objects import is_address
+
+    given = signature(function).bind(*args, **kwargs).arguments
+    folders = set(given) - DATASETS - ({"out"} if function.__name__ in WRITE_DATASETS else set())
+    problems = [
+        f"{'--out ' if name == 'out' else ''}{given[name]}: must be a folder or file of this machine; only datasets"
+        " may lie in an object store"
+        for name in sorted(folders)
+        if is_address(given[name]) and given[name].startswith("s3:")
+    ]
+    if problems:
+        raise InputError(problems)
 
 
 def _function(name: str, as_flow: bool) -> Callable[..., Any]:

@@ -15,9 +15,19 @@ STAGED_TABLES = ("ticks", "frames")
 
 @dataclass(frozen=True)
 class Layout:
-    """Paths of one dataset; nothing is created by asking for them."""
+    """Paths of one dataset; nothing is created by asking for them.
+
+    Parameters
+    ----------
+    root : folder
+    origin : address in an object store that the folder stands for; None for a folder in its own right
+    """
 
     root: Path
+    origin: str | None = None
+
+    def __str__(self) -> str:
+        return self.origin or str(self.root)
 
     @property
     def manifest(self) -> Path:

@@ -2,15 +2,17 @@
 
 import fcntl
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from flows.store.layout import Layout
+from flows.store.lease import leased
+from flows.store.objects import Objects
 from tasks.errors import InputError
 
 
 @contextmanager
 def sole_writer(layout: Layout) -> Iterator[None]:
-    """Hold the dataset for writing; the lock goes with the process, however it ends.
+    """Hold the dataset for writing; the lock goes with the process, however it ends, or in a store soon after it.
 
     Raises
     ------
@@ -23,6 +25,7 @@ def sole_writer(layout: Layout) -> Iterator[None]:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise InputError(
-                f"{layout.root}: another run is writing this dataset; wait for it or give another folder"
+                f"{layout}: another run is writing this dataset; wait for it or give another folder"
             ) from None
-        yield
+        with nullcontext() if layout.origin is None else leased(Objects(layout.origin)):
+            yield

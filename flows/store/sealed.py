@@ -19,7 +19,7 @@ def read_manifest(layout: Layout) -> dict[str, Any]:
         clips = read_json(layout.plan)["clips"]
         done = sum(layout.receipt(clip["clip_id"]).is_file() for clip in clips)
         raise InputError(
-            f"{layout.root}: the dataset must be finished; {done} of {len(clips)} clips are made:"
+            f"{layout}: the dataset must be finished; {done} of {len(clips)} clips are made:"
             " run its musync generate command again"
         )
     manifest: dict[str, Any] = read_json(layout.manifest)

@@ -9,6 +9,7 @@ import pytest
 
 from flows.cluster import check_cluster, facts_here, version_problems, warm_cluster
 from flows.generate import generate
+from flows.store.layout import Layout
 from tasks.errors import InputError
 
 HERE = {"muSync": "0.1.0", "python": "3.11", "numpy": "2.4.6"}
@@ -90,7 +91,7 @@ def test_a_worker_that_does_not_see_the_folder_is_told(scheduler):
     with Client(scheduler) as client:
         client.wait_for_workers(1, timeout=30)
         with pytest.raises(InputError, match="must be visible on every worker under the same path"):
-            warm_cluster(client, partial(warm_up, "/nowhere/at/all"), scheduler)
+            warm_cluster(client, partial(warm_up, Layout(Path("/nowhere/at/all"))), scheduler)
 
 
 def test_a_cluster_without_workers_is_refused(tmp_path):

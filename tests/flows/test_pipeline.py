@@ -151,16 +151,16 @@ def test_a_clip_whose_pose_check_failed_is_kept_and_told_with_its_reasons(datase
     assert {row["label"] for row in rows if row["quarantined"]} == set(failed) and len(rows) == len(verdicts)
 
 
-def broken_on_two(root: str, index: int) -> dict:
+def broken_on_two(layout: Layout, index: int) -> dict:
     if index == 2:
         raise RuntimeError("lightning struck")
-    return make_clip(root, index)
+    return make_clip(layout, index)
 
 
-def full_on_two(root: str, index: int) -> dict:
+def full_on_two(layout: Layout, index: int) -> dict:
     if index == 2:
         raise OSError(28, "No space left on device")
-    return make_clip(root, index)
+    return make_clip(layout, index)
 
 
 @pytest.mark.parametrize(

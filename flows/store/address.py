@@ -1,0 +1,252 @@
+"""A dataset by its address: a folder, or ``s3://bucket/prefix``, which is worked on through a folder here.
+
+What reads a finished dataset gets a folder in the user's cache, named by the hash of the manifest: files come once, and
+only with their recorded bytes. What writes, or asks whether the bytes are right, gets a folder of its own for its time,
+filled from the store alone; clips go to the store as they are made, the receipt last. For a folder nothing happens.
+"""
+
+import atexit
+import fcntl
+import json
+import shutil
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import lru_cache
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+from flows.store.layout import Layout
+from flows.store.lease import LOCK
+from flows.store.objects import Objects, is_address
+from manifests.canonical import sha256_of, sha256_of_file
+from manifests.manifest import check_format, recorded_files
+from tasks.errors import InputError
+from tasks.kernel_cache import cache_root
+
+Wanted = Callable[[str], bool]
+SHOWN = 5
+PREPARED = ("inputs/", "frames.zarr/")
+"""What is sent before a plan, and means nothing without it."""
+
+
+def everything(name: str) -> bool:
+    """All files of a dataset, those of unfinished clips too."""
+    return True
+
+
+def telemetry(name: str) -> bool:
+    """What questions about numbers need, and what frames there are."""
+    return name.endswith("zarr.json") or not name.startswith(("frames.zarr/", "previews/"))
+
+
+def nothing(name: str) -> bool:
+    """The manifest alone, which always comes."""
+    return False
+
+
+def planned(name: str) -> bool:
+    """What a worker needs to make a clip."""
+    return name == "plan.json" or name.startswith("inputs/") or name.endswith("zarr.json")
+
+
+def stored_record(name: str) -> bool:
+    """What says how far a dataset is, and what a killed run staged."""
+    return name in {"plan.json", "manifest.json"} or name.startswith(".staging/")
+
+
+def resumable(name: str) -> bool:
+    """What going on with a run needs: its plan, and which clips are complete."""
+    return (
+        planned(name) or name == "manifest.json" or (name.startswith(".staging/") and name.endswith(".json"))
+    )
+
+
+def reading(address: str | Path, wanted: Wanted = everything) -> Layout:
+    """A finished dataset to read from.
+
+    Parameters
+    ----------
+    address : folder, or address in an object store
+    wanted : which files have to be here; those of a folder are all
+
+    Raises
+    ------
+    InputError
+        The address holds no finished dataset, or files of it are missing or not the recorded ones.
+    """
+    if not is_address(address):
+        return Layout(Path(address).resolve())
+    objects = Objects(str(address))
+    content = objects.read("manifest.json")
+    if content is None:
+        raise InputError(_unfinished(objects))
+    layout = Layout(_mirrors() / sha256_of([content])[:32], objects.address)
+    manifest = json.loads(content)
+    check_format(manifest, layout)
+    recorded = {name: digest for name, (digest, _) in recorded_files(manifest).items() if wanted(name)}
+    missing = {name for name in recorded if not (layout.root / name).is_file()}
+    absent = objects.fetch(missing, layout.root)
+    wrong = sorted(
+        name for name in missing.difference(absent) if sha256_of_file(layout.root / name) != recorded[name]
+    )
+    for name in wrong:
+        (layout.root / name).unlink()
+    if absent or wrong:
+        problems = [f"{name}: missing" for name in absent] + [
+            f"{name}: not the recorded bytes" for name in wrong
+        ]
+        rest = [f"and {len(problems) - SHOWN} more"] if len(problems) > SHOWN else []
+        raise InputError(
+            [f"{layout}/{problem}: musync repair makes it again" for problem in problems[:SHOWN]] + rest
+        )
+    objects.fetch(["manifest.json"], layout.root)
+    return layout
+
+
+@contextmanager
+def working(address: str, wanted: Wanted) -> Iterator[Layout]:
+    """A dataset to write to or to examine; at an object store's address, the files that it holds now.
+
+    Parameters
+    ----------
+    address : folder, or address in an object store; neither need exist
+    wanted : which files of a store are brought here
+
+    Raises
+    ------
+    InputError
+        If the store cannot be used, or holds something else at that address.
+    """
+    if not is_address(address):
+        yield Layout(Path(address).resolve())
+        return
+    objects = Objects(address)
+    names = set(objects.sizes())
+    if not {"plan.json", "manifest.json"} & names:
+        if any(not name.startswith(PREPARED) for name in names):
+            raise InputError(f"{address}: must be empty, new or a muSync dataset; it holds other objects")
+        names = set()
+    with _work_folder() as folder:
+        layout = Layout(folder / "dataset", address)
+        objects.fetch([name for name in names if wanted(name) and name != LOCK], layout.root)
+        yield layout
+
+
+def here(layout: Layout) -> Layout:
+    """In a worker: the dataset in a folder of this machine; with a store, no folder need be shared."""
+    return layout if layout.origin is None or layout.root.parent.is_dir() else _elsewhere(layout)
+
+
+def bring(layout: Layout, paths: Iterable[Path]) -> None:
+    """Have files here that other machines or earlier runs sent to the store.
+
+    Raises
+    ------
+    InputError
+        If the store lacks some.
+    """
+    if layout.origin is not None:
+        missing = [layout.relative(path) for path in paths if not path.is_file()]
+        absent = Objects(layout.origin).fetch(missing, layout.root)
+        if absent:
+            raise InputError(
+                f"{layout}: the store has lost {len(absent)} objects, {absent[0]} first: run it again"
+            )
+
+
+def publish(layout: Layout, paths: Iterable[Path], last: Path | None = None) -> None:
+    """Send files to the store; ``last`` is sent when the others are there, and tells readers so."""
+    if layout.origin is not None:
+        objects = Objects(layout.origin)
+        objects.send({layout.relative(path): path for path in paths})
+        if last is not None:
+            objects.write(layout.relative(last), last)
+
+
+def claim(layout: Layout, path: Path) -> None:
+    """Send a file that must not be there yet.
+
+    Raises
+    ------
+    InputError
+        If another run was faster.
+    """
+    if layout.origin is not None and (
+        Objects(layout.origin).write(layout.relative(path), path, expected="") is None
+    ):
+        raise InputError(
+            f"{layout}: another run has begun a dataset there just now: wait for it, or give another address"
+        )
+
+
+def withdraw(layout: Layout, paths: Collection[Path]) -> None:
+    """Remove files from the store."""
+    if layout.origin is not None:
+        Objects(layout.origin).remove([layout.relative(path) for path in paths])
+
+
+def stored_bytes(layout: Layout) -> int:
+    """Size of all files of a dataset where it lies [B]."""
+    if layout.origin is not None:
+        return sum(Objects(layout.origin).sizes().values())
+    return sum(path.stat().st_size for path in layout.root.rglob("*") if path.is_file())
+
+
+def frames_store(layout: Layout) -> Any:
+    """The Zarr store of the frames, which are read from where they lie."""
+    return (
+        layout.frames if layout.origin is None else Objects(f"{layout.origin}/{layout.frames.name}").as_zarr()
+    )
+
+
+def _unfinished(objects: Objects) -> str:
+    names = objects.sizes().keys()
+    if "plan.json" not in names:
+        return f"{objects.address}: there is no muSync dataset"
+    done = sum(name.startswith(".staging/") and name.endswith(".json") for name in names)
+    return (
+        f"{objects.address}: the dataset must be finished; {done} clips of it are made: run its musync generate"
+        " command again"
+    )
+
+
+def _mirrors() -> Path:
+    return cache_root() / "stores"
+
+
+@contextmanager
+def _work_folder() -> Iterator[Path]:
+    """A new folder beside the mirrors that goes with the run; those of killed runs go now."""
+    _mirrors().mkdir(parents=True, exist_ok=True)
+    for left in _mirrors().glob("work-*"):
+        with ExitStack() as stack:
+            if _held(left, stack):
+                shutil.rmtree(left, ignore_errors=True)
+    with ExitStack() as stack:
+        folder = Path(mkdtemp(prefix="work-", dir=_mirrors()))
+        while not _held(folder, stack):  # another run took it for a left-over just now
+            folder = Path(mkdtemp(prefix="work-", dir=_mirrors()))
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _held(folder: Path, stack: ExitStack) -> bool:
+    """Lock a work folder for as long as the stack lives, if no live process holds it."""
+    try:
+        stream = stack.enter_context((folder / "alive").open("w"))
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+@lru_cache(maxsize=1)
+def _elsewhere(layout: Layout) -> Layout:
+    """This process's own folder for a run whose folder lies on another machine."""
+    assert layout.origin is not None
+    stack = ExitStack()
+    atexit.register(stack.close)
+    return stack.enter_context(working(layout.origin, planned))

@@ -1,0 +1,92 @@
+"""One writer at a time on a dataset in an object store: a lock object that its owner keeps renewing.
+
+Nobody's clock is trusted: a lock is dead when it has not changed for `LEASE_S` while somebody watched it. Where two
+writers do meet, because one was asleep for longer, they write the same bytes.
+"""
+
+import json
+import os
+import platform
+import time
+import uuid
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from threading import Event, Thread
+from typing import Any
+
+from flows.store.objects import Objects
+from tasks.errors import InputError
+
+LEASE_S, RENEW_S, WATCH_S = 30.0, 5.0, 0.5
+LOCK = ".staging/lock"
+
+
+@contextmanager
+def leased(objects: Objects) -> Iterator[None]:
+    """Hold the dataset at an address for writing.
+
+    Raises
+    ------
+    InputError
+        If another run holds it.
+    """
+    tag = objects.write(LOCK, _claim(), expected="") or _taken_over(objects)
+    held, ended = [tag], Event()
+    renewer = Thread(target=_keep, args=(objects, held, ended), daemon=True)
+    renewer.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        renewer.join()
+        if held and objects.tag(LOCK) == held[0]:
+            objects.remove([LOCK])
+
+
+def _keep(objects: Objects, held: list[str], ended: Event) -> None:
+    """Renew the lock until the run ends, or somebody else has it."""
+    while not ended.wait(RENEW_S):
+        try:
+            tag = objects.write(LOCK, _claim(), expected=held[0])
+        except InputError:  # no answer now: the next time
+            continue
+        if tag is None:
+            held.clear()
+            return
+        held[0] = tag
+
+
+def _taken_over(objects: Objects) -> str:
+    """The tag of the lock, once its owner is known to be dead."""
+    seen, content = objects.tag(LOCK), objects.read(LOCK)
+    owner: dict[str, Any] = json.loads(content) if content else {"host": "", "pid": 0}
+    busy = InputError(
+        f"{objects.address}: another run is writing this dataset (on {owner['host']}, process {owner['pid']});"
+        " wait for it or give another address"
+    )
+    until = time.monotonic() + LEASE_S
+    while not _died_here(owner) and time.monotonic() < until:
+        if objects.tag(LOCK) != seen:
+            raise busy
+        time.sleep(WATCH_S)
+    tag = objects.write(LOCK, _claim(), expected=seen or "")
+    if tag is None:
+        raise busy
+    return tag
+
+
+def _claim() -> bytes:
+    claim = {"host": platform.node(), "pid": os.getpid(), "renewal": uuid.uuid4().hex}
+    return json.dumps(claim, sort_keys=True).encode()
+
+
+def _died_here(owner: Mapping[str, Any]) -> bool:
+    if owner["host"] != platform.node():
+        return False
+    try:
+        os.kill(int(owner["pid"]), 0)
+    except ProcessLookupError:
+        return True
+    except PermissionError:
+        pass
+    return False

@@ -1,0 +1,202 @@
+"""A dataset at an s3:// address, on a real S3 server in a process of its own: the same promises as in a folder."""
+
+import time
+import warnings
+
+import numpy as np
+import pytest
+
+import musync
+from flows.audit import audit
+from flows.describe import describe
+from flows.generate import generate
+from flows.query import sql
+from flows.repair import repair
+from flows.store.address import reading, working
+from flows.store.frames import read_clip
+from flows.store.layout import Layout
+from flows.store.lease import LOCK, leased
+from flows.store.objects import Objects
+from flows.verify import gc, verify
+from tasks.errors import InputError
+from tests.flows.objects_server import ask, environment, kill, s3_server, start
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    with s3_server(tmp_path_factory.mktemp("s3")) as address:
+        yield address
+
+
+@pytest.fixture
+def machine(server, tmp_path, monkeypatch):
+    """This process as a machine that knows the server and has read nothing yet."""
+    variables = environment(server, tmp_path / "cache")
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    return variables
+
+
+@pytest.fixture(scope="module")
+def grid(toy_dataset) -> str:
+    return str(toy_dataset.root.parent / "grid.yaml")
+
+
+@pytest.fixture(scope="module")
+def stored(server, grid, tmp_path_factory) -> str:
+    """The toy dataset with its frames, made at an address."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in environment(server, tmp_path_factory.mktemp("cache")).items():
+            patch.setenv(name, value)
+        assert generate(grid, "s3://data/sets/toy", runner="threads", workers=1).made == 4
+    return "s3://data/sets/toy"
+
+
+def files_of(layout: Layout) -> dict[str, bytes]:
+    return {layout.relative(path): path.read_bytes() for path in layout.root.rglob("*") if path.is_file()}
+
+
+def objects_of(address: str) -> dict[str, bytes]:
+    objects = Objects(address)
+    return {name: objects.read(name) for name in objects.sizes()}
+
+
+def test_the_objects_are_the_files_of_the_same_run_in_a_folder(stored, machine, toy_dataset):
+    assert objects_of(stored) == files_of(toy_dataset)
+
+
+def test_no_folder_of_the_run_is_left(stored, machine, grid, tmp_path):
+    assert generate(grid, stored).made == 0
+    assert list((tmp_path / "cache" / "stores").glob("work-*")) == []
+
+
+def test_it_is_audited_and_questions_bring_no_frames(stored, machine, toy_dataset, tmp_path):
+    query = "SELECT label, max(pitch) AS pitch FROM ticks GROUP BY label ORDER BY label"
+    assert sql(stored, query) == sql(str(toy_dataset.root), query)
+    assert describe(stored) == describe(str(toy_dataset.root))
+    here = [
+        path for path in (tmp_path / "cache").rglob("*") if path.is_file() and "frames.zarr" in path.parts
+    ]
+    assert here and {path.name for path in here} == {"zarr.json"}
+    result = audit(stored, share=0.25, runner="threads", workers=1)
+    assert result["verified"] and len(result["rerun"]) == 1
+
+
+def test_analysts_read_single_frames_from_the_store_and_windows_from_their_cache(
+    stored, machine, toy_dataset
+):
+    data = musync.open(stored)
+    expected = read_clip(toy_dataset.frames, 2, "rgb")
+    assert np.array_equal(data.frames["rgb"][2, 5], expected[5])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of clips in quarantine
+        windows = data.torch(window=3, columns=["speed"], quarantined=True)
+    assert windows[0]["rgb"].shape[0] == 3
+
+
+def test_one_flipped_bit_is_named_and_repaired_and_no_reader_gets_it(stored, machine):
+    objects = Objects(stored)
+    name = "telemetry/ticks/family=snow/part-0000.parquet"
+    whole = objects.read(name)
+    objects.write(name, whole[:999] + bytes([whole[999] ^ 4]) + whole[1000:])
+    found = verify(stored)
+    assert [(row["path"], row["damage"]) for row in found["damaged"]] == [(name, "changed")]
+    with pytest.raises(InputError, match=r"part-0000.parquet: not the recorded bytes: musync repair"):
+        sql(stored, "SELECT count(*) FROM ticks")
+    assert repair(stored, runner="threads", workers=1)["restored"] == [name]
+    assert objects.read(name) == whole and verify(stored)["verified"]
+
+
+def test_a_killed_run_goes_on_from_what_the_store_holds_on_another_machine(
+    server, machine, grid, toy_dataset, tmp_path
+):
+    address = "s3://data/sets/killed"
+    command = ["generate", grid, "--out", address, "--runner", "threads", "--workers", "1"]
+    run = start(command, machine)
+    objects = Objects(address)
+    deadline = time.monotonic() + 120
+    receipts: set[str] = set()
+    while not receipts and time.monotonic() < deadline and run.poll() is None:
+        receipts = {
+            name for name in objects.sizes() if name.endswith(".json") and name.startswith(".staging/")
+        }
+        time.sleep(0.02)
+    kill(run)
+    assert 1 <= len(receipts) < 4
+    with pytest.raises(InputError, match="must be finished"):
+        sql(address, "SELECT 1")
+    resumed = start(command, environment(server, tmp_path / "other machine"))
+    out, errors = resumed.communicate(timeout=120)
+    assert resumed.returncode == 0, errors
+    made = int(out.split("made: ")[1].split()[0])
+    assert 0 < made < 4
+    assert objects_of(address) == files_of(toy_dataset)
+
+
+def test_the_second_writer_is_told_and_the_lock_of_a_dead_one_is_taken(stored, machine, monkeypatch):
+    monkeypatch.setattr("flows.store.lease.RENEW_S", 0.2)
+    objects = Objects(stored)
+    with (
+        leased(objects),
+        pytest.raises(InputError, match="another run is writing this dataset"),
+        leased(objects),
+    ):
+        pass
+    assert objects.tag(LOCK) is None
+    objects.write(LOCK, b'{"host": "gone", "pid": 1}')
+    monkeypatch.setattr("flows.store.lease.LEASE_S", 1.0)
+    with leased(objects):
+        assert b"gone" not in objects.read(LOCK)
+    assert objects.tag(LOCK) is None
+
+
+def test_another_grid_does_not_go_into_the_same_dataset(stored, machine, grid, tmp_path):
+    other = tmp_path / "other.yaml"
+    with open(grid) as source:
+        other.write_text(source.read().replace("frames: 11", "frames: 10"))
+    with pytest.raises(InputError, match=r"s3://data/sets/toy: holds the dataset of another run: .*frames"):
+        generate(str(other), stored)
+
+
+def test_what_a_killed_run_left_in_the_store_is_collected(stored, machine):
+    objects = Objects(stored)
+    objects.write(".staging/abc.json", b"{}")
+    assert len(gc(stored)["removed"]) == 1
+    assert not [name for name in objects.sizes() if name.startswith(".staging/")]
+
+
+def test_faults_of_the_store_are_one_sentence_each(server, machine, grid, monkeypatch):
+    def told(address: str) -> str:
+        with pytest.raises(InputError) as raised:
+            reading(address)
+        (sentence,) = raised.value.problems
+        return sentence
+
+    assert "must be like s3://bucket/prefix" in told("s3://data")
+    assert "must be like s3://bucket/prefix" in told("gs://data/toy")
+    assert "the bucket does not exist" in told("s3://nowhere/toy")
+    assert "there is no muSync dataset" in told("s3://data/nothing")
+    Objects("s3://data/other").write("letter.txt", b"Dear Sir")
+    with (
+        pytest.raises(InputError, match="it holds other objects"),
+        working("s3://data/other", lambda _: True),
+    ):
+        pass
+    ask(f"{server}/moto-api/reset-auth", "POST", b"0")
+    try:
+        assert "refuses the credentials (InvalidAccessKeyId)" in told("s3://data/nothing")
+    finally:
+        ask(f"{server}/moto-api/reset-auth", "POST", b"inf")
+    monkeypatch.setattr("flows.store.objects.RETRIES", 0)
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
+    assert "no object store answers at http://127.0.0.1:9" in told("s3://data/nothing")
+    monkeypatch.setitem(__import__("sys").modules, "obstore", None)
+    assert "pip install 'musync[s3]'" in told("s3://data/nothing")
+
+
+def test_a_command_whose_output_must_be_a_folder_says_so(machine):
+    run = start(["verify", "s3://data/sets/toy", "--out", "s3://data/reports"], machine)
+    _, errors = run.communicate(timeout=60)
+    assert (
+        run.returncode == 2 and "--out s3://data/reports: must be a folder or file of this machine" in errors
+    )
