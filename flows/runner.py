@@ -72,6 +72,11 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
         return
     try:
         client = Client(scheduler, timeout=CONNECT_TIMEOUT)
+    except TypeError:  # what Dask raises for tls:// without certificates
+        raise InputError(
+            f"--scheduler {scheduler}: tls needs certificates; name them in Dask's configuration "
+            "(distributed.comm.tls.ca-file, .client.cert, .client.key)"
+        ) from None
     except (OSError, ValueError) as error:
         raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
     with client:

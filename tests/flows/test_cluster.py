@@ -1,14 +1,24 @@
 """A cluster started by others: as processes of their own, held against this machine, and used."""
 
+import json
+import os
+import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from threading import Thread
 
 import pytest
+from distributed import Client
 
+from flows.clip import warm_up
 from flows.cluster import check_cluster, facts_here, version_problems, warm_cluster
 from flows.generate import generate
+from flows.runner import open_executor
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -37,42 +47,48 @@ def test_what_only_this_machine_needs_is_not_asked_of_workers():
     assert "prefect" not in facts_here() and {"numpy", "numba", "muSync's source"} <= facts_here().keys()
 
 
-@pytest.fixture(scope="module")
-def scheduler(tmp_path_factory):
-    """A scheduler and a worker, each a process of its own, as an administrator starts them."""
-    folder = tmp_path_factory.mktemp("cluster")
+@contextmanager
+def cluster(
+    folder: Path, workers: int, tls: Sequence[str] = ()
+) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+    """A scheduler and workers, each a process of its own, as an administrator starts them."""
+    folder.mkdir(exist_ok=True)
     file, log = folder / "scheduler.json", (folder / "log").open("w")
     dask = [sys.executable, "-m", "dask"]
+    protocol = ["--protocol", "tls"] if tls else []
     parts = [
-        [*dask, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(file)],
-        [*dask, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard", "--no-nanny",
-         "--local-directory", str(folder)],
+        [*dask, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(file),
+         *protocol, *tls],
+        *[[*dask, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard", "--no-nanny",
+           "--local-directory", str(folder), "--name", str(number), *protocol, *tls] for number in range(workers)],
     ]  # fmt: skip
     running = [
         subprocess.Popen(part, cwd=folder, stdout=log, stderr=log, start_new_session=True) for part in parts
     ]
     try:
-        yield address_in(file)
+        yield address_in(file), running[1:]
     finally:
         for process in reversed(running):
             process.terminate()
             process.wait(timeout=20)
 
 
-def address_in(file: Path) -> str:
-    import json
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory):
+    with cluster(tmp_path_factory.mktemp("cluster"), 1) as (address, _):
+        yield address
 
-    for _ in range(200):
+
+def address_in(file: Path) -> str:
+    for _ in range(400):
         if file.is_file() and file.stat().st_size:
             address: str = json.loads(file.read_text())["address"]
             return address
         time.sleep(0.1)
-    raise TimeoutError("no scheduler came up in 20 s")
+    raise TimeoutError("no scheduler came up in 40 s")
 
 
 def test_the_bytes_made_on_a_cluster_are_those_made_here(toy_dataset, scheduler, tmp_path):
-    from distributed import Client
-
     with Client(scheduler) as client:
         client.wait_for_workers(1, timeout=30)
     grid = str(toy_dataset.root.parent / "grid.yaml")
@@ -81,13 +97,58 @@ def test_the_bytes_made_on_a_cluster_are_those_made_here(toy_dataset, scheduler,
     assert made.layout.manifest.read_bytes() == toy_dataset.manifest.read_bytes()
 
 
+def test_a_worker_killed_in_the_middle_changes_no_byte(toy_dataset, tmp_path):
+    layout = Layout(tmp_path / "data")
+    told: dict[str, int] = {}
+
+    def kill_one_when_a_clip_is_there(worker: subprocess.Popen) -> None:
+        while not (done := len(list(layout.staging.glob("*.json")))):
+            time.sleep(0.01)
+        os.kill(worker.pid, signal.SIGKILL)
+        told["clips"] = done
+
+    with cluster(tmp_path / "cluster", 2) as (address, workers):
+        with Client(address) as client:
+            client.wait_for_workers(2, timeout=60)
+        watcher = Thread(target=kill_one_when_a_clip_is_there, args=workers[:1], daemon=True)
+        watcher.start()
+        made = generate(str(toy_dataset.root.parent / "grid.yaml"), str(layout.root), scheduler=address)
+        assert workers[0].wait(5) == -signal.SIGKILL and workers[1].poll() is None
+    assert told["clips"] < made.made == 4
+    assert layout.manifest.read_bytes() == toy_dataset.manifest.read_bytes()
+
+
+def test_a_cluster_behind_certificates_is_used_with_those_that_dask_is_configured_with(tmp_path):
+    pytest.importorskip("cryptography", reason="makes the certificate of this test")
+    import dask
+    from distributed.security import Security
+
+    made = Security.temporary()
+    names = {"ca-file": "ca.pem", "cert": "cert.pem", "key": "key.pem"}
+    parts = dict(zip(names, (made.tls_ca_file, made.tls_client_cert, made.tls_client_key), strict=True))
+    for option, file in names.items():
+        (tmp_path / file).write_text(parts[option])
+    tls = [word for option, file in names.items() for word in (f"--tls-{option}", str(tmp_path / file))]
+    settings = {
+        "distributed.comm.tls.ca-file": str(tmp_path / "ca.pem"),
+        "distributed.comm.tls.client.cert": str(tmp_path / "cert.pem"),
+        "distributed.comm.tls.client.key": str(tmp_path / "key.pem"),
+    }
+    with cluster(tmp_path / "cluster", 1, tls) as (address, _):
+        assert address.startswith("tls://")
+        with (
+            pytest.raises(InputError, match="tls needs certificates"),
+            open_executor("dask", 1, address),
+        ):
+            pass
+        with dask.config.set(settings):
+            with Client(address) as client:
+                client.wait_for_workers(1, timeout=60)
+            with open_executor("dask", None, address) as executor:
+                assert executor.submit(abs, -7).result() == 7
+
+
 def test_a_worker_that_does_not_see_the_folder_is_told(scheduler):
-    from functools import partial
-
-    from distributed import Client
-
-    from flows.clip import warm_up
-
     with Client(scheduler) as client:
         client.wait_for_workers(1, timeout=30)
         with pytest.raises(InputError, match="must be visible on every worker under the same path"):

@@ -2,17 +2,20 @@
 
 import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import flows.generate
 import musync
 from flows.audit import audit
+from flows.clip import make_clip
 from flows.describe import describe
-from flows.generate import generate
+from flows.generate import generate, prepare
 from flows.query import sql
 from flows.repair import repair
-from flows.store.address import reading, working
+from flows.store.address import reading, resumable, working
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.lease import LOCK, leased
@@ -131,6 +134,28 @@ def test_a_killed_run_goes_on_from_what_the_store_holds_on_another_machine(
     made = int(out.split("made: ")[1].split()[0])
     assert 0 < made < 4
     assert objects_of(address) == files_of(toy_dataset)
+
+
+def test_workers_on_other_machines_share_no_folder_with_the_run(machine, grid, toy_dataset, monkeypatch):
+    def make_elsewhere(layout: Layout, index: int) -> dict:
+        return make_clip(Layout(Path("/a folder of the other machine/dataset"), layout.origin), index)
+
+    monkeypatch.setattr(flows.generate, "make_clip", make_elsewhere)
+    address = "s3://data/sets/apart"
+    assert generate(grid, address, runner="threads", workers=1).made == 4
+    assert objects_of(address) == files_of(toy_dataset)
+
+
+def test_a_second_run_on_another_machine_is_told_while_the_first_goes_on(server, machine, grid, tmp_path):
+    address = "s3://data/sets/busy"
+    with working(address, resumable) as layout:
+        prepare(grid, layout, "cpu")
+    with leased(Objects(address)):
+        run = start(
+            ["generate", grid, "--out", address, "--runner", "threads"], environment(server, tmp_path / "b")
+        )
+        _, errors = run.communicate(timeout=120)
+    assert run.returncode == 2 and f"{address}: another run is writing this dataset (on " in errors
 
 
 def test_the_second_writer_is_told_and_the_lock_of_a_dead_one_is_taken(stored, machine, monkeypatch):

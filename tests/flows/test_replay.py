@@ -48,7 +48,7 @@ def test_a_seed_that_reaches_the_motion_is_named_by_channel(grid, monkeypatch):
 
 
 def test_snow_that_ignores_the_seed_is_named(grid, monkeypatch):
-    monkeypatch.setattr(replay, "picture", lambda *args: picture(*args[:-1], 7))
+    monkeypatch.setattr(replay, "picture", lambda *args: picture(*args[:5], 7, *args[6:]))
     result = replay.replay_audit(grid, seeds=2)
     assert "snow-3/flat: 2 seeds gave 1 different pictures" in result["problems"]
 
