@@ -235,7 +235,7 @@ def picture(
     return render_clip(
         gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
         frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
-        backend=select_backend(plan.backend), relief=relief,
+        backend=select_backend(plan.backend), relief=relief, to_sun=scene.to_sun,
         labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
         rig_at=rig_at,
     )  # fmt: skip

@@ -17,7 +17,7 @@ from tasks.render.backend import select_backend
 from tasks.render.composition import compose, encode_8bit
 from tasks.render.environment import environment_view, plain_sky
 from tasks.scene.classify import classify_road
-from tasks.scene.scene import Scene
+from tasks.scene.scene import Scene, sun_problems
 from tasks.scene.transform import moved
 
 
@@ -29,6 +29,7 @@ def scene_import(
     camera_height: float = 1.5,
     half_width: float = 3.5,
     metres_per_unit: float = 1.0,
+    sun_direction_deg: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
     """Make a scene folder of Gaussians trained elsewhere and a route.
 
@@ -37,13 +38,16 @@ def scene_import(
     camera_height : of the route's camera poses above the road [m]
     half_width : of the carriageway, to either side of the route [m]
     metres_per_unit : scale of the files, for reconstructions without one [m]
+    sun_direction_deg : azimuth and elevation of the sun, as in `Scene` [deg]
 
     Raises
     ------
     InputError
-        Listing the problems of the files, or if ``out`` is not empty.
+        Listing the problems of the files, or if ``out`` is not empty, or the sun below the horizon.
     """
     must_be_new(Path(out))
+    if problems := sun_problems(sun_direction_deg):
+        raise InputError(problems)
     course, T_world_source = read_route(Path(route), camera_height, metres_per_unit)
     cloud = moved(read_gaussians(Path(gaussians)), T_world_source)
     scene = Scene(
@@ -53,6 +57,7 @@ def scene_import(
         environment=plain_sky(),
         carriageway_left=half_width,
         carriageway_right=-half_width,
+        sun_direction_deg=sun_direction_deg,
     )
     write_scene(scene, Path(out), {"source": Path(gaussians).name})
     road = np.isin(scene.gaussians.class_id, ROAD_CLASSES).mean()

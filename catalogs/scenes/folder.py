@@ -13,7 +13,7 @@ from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians, check_gaussians
 from tasks.scene.route import Route
-from tasks.scene.scene import Scene
+from tasks.scene.scene import LOWEST_SUN_DEG, Scene, sun_problems
 
 SCENE_FORMAT = "musync-scene/1"
 GAUSSIAN_ARRAYS = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
@@ -55,6 +55,8 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
             "carriageway_right": scene.carriageway_right,
             "sha256": {name: _file_hash(partial / name) for name in ARRAY_FILES},
         }
+        if scene.sun_direction_deg is not None:
+            content["sun_direction_deg"] = list(scene.sun_direction_deg)
         (partial / "scene.json").write_text(json.dumps(content | facts, indent=1, sort_keys=True) + "\n")
         if folder.exists():
             folder.rmdir()
@@ -107,6 +109,7 @@ def read_scene(folder: Path) -> Scene:
         environment=arrays["environment"],
         carriageway_left=content["carriageway_left"],
         carriageway_right=content["carriageway_right"],
+        sun_direction_deg=None if (sun := content.get("sun_direction_deg")) is None else (sun[0], sun[1]),
     )
 
 
@@ -116,6 +119,8 @@ def scene_hash(folder: Path) -> str:
     decisive = {
         key: content[key] for key in ("sha256", *BLENDING_RULES, "carriageway_left", "carriageway_right")
     }
+    if content.get("sun_direction_deg") is not None:
+        decisive["sun_direction_deg"] = content["sun_direction_deg"]
     return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
 
@@ -149,6 +154,9 @@ def _read_facts(folder: Path) -> dict[str, Any]:
         "carriageway_left and carriageway_right must be numbers [m], positive and negative": (
             isinstance(left, int | float) and isinstance(right, int | float) and right < 0 < left
         ),
+        f"sun_direction_deg, where given, must be azimuth and elevation [deg], the latter {LOWEST_SUN_DEG:g} to 90": (
+            _is_sun(content.get("sun_direction_deg"))
+        ),
         f"sha256 must name {', '.join(ARRAY_FILES)}": (
             isinstance(hashes, dict) and set(hashes) == set(ARRAY_FILES)
         ),
@@ -157,6 +165,12 @@ def _read_facts(folder: Path) -> dict[str, Any]:
     if problems:
         raise InputError(problems)
     return content
+
+
+def _is_sun(value: Any) -> bool:
+    """Whether an entry of scene.json is a sound direction of the sun, or none."""
+    pair = isinstance(value, list) and len(value) == 2 and all(isinstance(v, int | float) for v in value)
+    return value is None or (pair and not sun_problems((value[0], value[1])))
 
 
 def _file_hash(path: Path) -> str | None:

@@ -33,6 +33,7 @@ def render_clip(
     seed: int,
     backend: Backend,
     relief: RoadRelief | None = None,
+    to_sun: NDArray[np.float64] | None = None,
     labelled: Profile | None = None,
     rig_at: RigAt | None = None,
 ) -> dict[str, NDArray[np.generic]]:
@@ -51,6 +52,7 @@ def render_clip(
     seed : visual seed; it moves particles and snow, and nothing else [1]
     backend : the rasteriser
     relief : the road feature, as the light meets it; None for a flat road
+    to_sun : float64 [3] as in `Scene.to_sun` [1]
     labelled : H_g(s) of the clip; with it the clip gets the labels of `tasks.render.labels` too
     rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
 
@@ -60,7 +62,9 @@ def render_clip(
     ``class`` uint8 [F, H, W] `SemanticClass`; with labels ``normal``, ``road``, ``marks`` and ``flow``
     """
     focal_px = float(camera.K[0, 0])
-    scene, clip_weather = weather_scene(gaussians, environment, weather, looks, focal_px, seed, route, relief)
+    scene, clip_weather = weather_scene(
+        gaussians, environment, weather, looks, focal_px, seed, route, relief, to_sun
+    )
     prepared = backend.prepare(scene)
     field = sensor_field(camera)
     T_world_camera = T_world_rig @ camera.T_rig_camera

@@ -1,4 +1,4 @@
-"""A street one can drive: Gaussians, the route through them, and what lies beyond them."""
+"""A street one can drive: Gaussians, the route through them, what lies beyond them, and what lights them."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
+
+LOWEST_SUN_DEG = 1.0
+"""A lower sun lights the flat road by less than a fiftieth: its share cannot be read off the road [deg]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +25,8 @@ class Scene:
         row 0 zenith, last row nadir; column centre = world +x, leftward columns toward +y [1]
     carriageway_left, carriageway_right : lateral extent of the carriageway from the route [m],
         left positive (y left): ``carriageway_right < 0 < carriageway_left``
+    sun_direction_deg : azimuth and elevation of a sun that the panorama does not show; azimuth from world +x, the
+        direction of travel where a reconstruction begins, towards +y; None leaves it to the panorama [deg]
     """
 
     name: str
@@ -30,3 +35,25 @@ class Scene:
     environment: NDArray[np.float32]
     carriageway_left: float
     carriageway_right: float
+    sun_direction_deg: tuple[float, float] | None = None
+
+    @property
+    def to_sun(self) -> NDArray[np.float64] | None:
+        """Unit vector to that sun, world frame, float64 [3] [1]."""
+        if self.sun_direction_deg is None:
+            return None
+        azimuth, elevation = np.radians(self.sun_direction_deg)
+        flat = np.cos(elevation)
+        return np.array((flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)))
+
+
+def sun_problems(sun_direction_deg: tuple[float, float] | None) -> list[str]:
+    """What is wrong with a sun's azimuth and elevation [deg], each as one sentence; empty when it is sound."""
+    if sun_direction_deg is None or (
+        np.isfinite(sun_direction_deg).all() and LOWEST_SUN_DEG <= sun_direction_deg[1] <= 90
+    ):
+        return []
+    return [
+        f"sun: azimuth must be finite and elevation {LOWEST_SUN_DEG:g} to 90 deg;"
+        f" they are {sun_direction_deg[0]:g} and {sun_direction_deg[1]:g}"
+    ]

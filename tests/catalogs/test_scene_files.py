@@ -73,6 +73,16 @@ def test_the_hash_follows_the_content_and_not_the_place(tmp_path):
     assert scene_hash(tmp_path / "a") == scene_hash(tmp_path / "b") != scene_hash(tmp_path / "c")
 
 
+def test_a_sun_reads_back_turns_from_plus_x_to_plus_y_and_is_part_of_the_hash(tmp_path):
+    sunny = replace(SCENE, sun_direction_deg=(90.0, 30.0))
+    write_scene(SCENE, tmp_path / "a", {})
+    write_scene(sunny, tmp_path / "b", {})
+    assert read_scene(tmp_path / "a").to_sun is None
+    to_sun = read_scene(tmp_path / "b").to_sun
+    np.testing.assert_allclose(to_sun, (0, np.sqrt(3) / 2, 0.5), atol=1e-12)
+    assert scene_hash(tmp_path / "a") != scene_hash(tmp_path / "b")
+
+
 def test_a_nan_in_a_gaussian_is_refused_with_its_number(tmp_path):
     broken = toy_street()
     broken.gaussians.means[41, 2] = np.nan
@@ -216,10 +226,15 @@ def test_an_imported_scene_is_a_scene_folder(tmp_path):
     ply(tmp_path / "a.ply")
     write_kitti(tmp_path / "poses.txt")
     facts = scene_import(
-        str(tmp_path / "a.ply"), str(tmp_path / "poses.txt"), str(tmp_path / "scene"), camera_height=1.65
+        str(tmp_path / "a.ply"),
+        str(tmp_path / "poses.txt"),
+        str(tmp_path / "scene"),
+        camera_height=1.65,
+        sun_direction_deg=(120.0, 40.0),
     )
     scene = load_scene(str(tmp_path / "scene"))
     assert len(scene.gaussians) == facts["gaussians"] == 50
+    assert scene.sun_direction_deg == (120.0, 40.0)
     assert scene.route.length == pytest.approx(facts["route_length_m"])
     assert set(np.unique(scene.gaussians.class_id)) <= {SemanticClass.ROAD, SemanticClass.OTHER}
 
@@ -346,6 +361,8 @@ def test_reading_prints_nothing_where_json_is_printed(tmp_path, capfd):
         ("carriageway_left", -3, "carriageway_left"),
         ("carriageway_right", None, "carriageway_right"),
         ("sha256", {}, "sha256 must name means.npy"),
+        ("sun_direction_deg", [120.0], "sun_direction_deg, where given"),
+        ("sun_direction_deg", [120.0, 0.2], "sun_direction_deg, where given"),
     ],
 )
 def test_a_scene_json_with_a_wrong_entry_is_refused_with_its_key(tmp_path, key, value, sentence):

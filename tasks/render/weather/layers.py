@@ -1,7 +1,7 @@
 """Weather over a clear clip. Call order, once for the clip and then for every frame:
 
 1. ``gaussians, weather = weather_scene(gaussians, environment, state, parameters, focal_px, seed, route,
-   relief)`` with the clip's road edit already in the Gaussians' shape; rasterise the Gaussians that come back;
+   relief, to_sun)`` with the clip's road edit already in the Gaussians' shape; rasterise the Gaussians that come back;
 2. ``picture = compose(gbuffer, clear sky)``: the clear linear picture, sky included, as in dry weather;
 3. ``frame = apply_weather(weather, picture, gbuffer, shutter)``, then encode ``frame.picture``.
 
@@ -122,6 +122,7 @@ def weather_scene(
     seed: int,
     route: Route | None = None,
     relief: RoadRelief | None = None,
+    to_sun: NDArray[np.floating] | None = None,
 ) -> tuple[Gaussians, ClipWeather]:
     """Bring a clip's weather into its scene: softened shadows, snow where it lies, the light on a road feature.
 
@@ -135,6 +136,7 @@ def weather_scene(
     seed : visual seed of the clip [1]
     route : where wheels have left tracks in the snow; None leaves it untouched
     relief : the clip's road feature, lit by the weather's light as it is turned to it; None for a flat road
+    to_sun : [3] unit vector to the clear sky's sun, as in `Scene.to_sun` [1]
 
     Returns
     -------
@@ -155,7 +157,7 @@ def weather_scene(
         )
         if relief is None:
             return gaussians, dry
-        return relit(gaussians, relief, clear_light(gaussians, environment, parameters.sky)), dry
+        return relit(gaussians, relief, clear_light(gaussians, environment, parameters.sky, to_sun)), dry
     p = parameters
     falls = population(p.rain if state.kind == "rain" else p.snowfall, state.precipitation_mm_h)
     air = precipitating_air(falls, p.air.near, focal_px, p.air.haze_visual_range_m)

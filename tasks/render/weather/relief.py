@@ -73,25 +73,29 @@ def sun_in(environment: NDArray[np.floating]) -> Floats | None:
 
 
 def clear_light(
-    gaussians: Gaussians, environment: NDArray[np.floating], parameters: SkyParameters
+    gaussians: Gaussians,
+    environment: NDArray[np.floating],
+    parameters: SkyParameters,
+    to_sun: NDArray[np.floating] | None = None,
 ) -> ReliefLight:
     """The light in clear weather, read off the scene.
 
     What a road of known reflectance sends back tells the light on it; what the panorama's sky gives, as far as
-    the street lets it in, is skylight, and the rest is the sun's, if the panorama shows one.
+    the street lets it in, is skylight, and the rest is the sun's, if the scene has one.
 
     Parameters
     ----------
     gaussians : the clear scene
     environment : [H, W, 3] its panorama [1]
     parameters : reflectance of the road and share of open sky
+    to_sun : [3] unit vector to a sun that the panorama does not show; None looks for it there [1]
 
     Returns
     -------
     ReliefLight
     """
     shade = ground_light(gaussians, SemanticClass.ROAD)
-    sun = sun_in(environment)
+    sun = sun_in(environment) if to_sun is None else np.asarray(to_sun, dtype=np.float64)
     luminance = np.asarray(environment, dtype=np.float64) @ LUMINANCE
     limit = SUN_OVER_SKY * np.median(luminance[: len(luminance) // 2])
     lit = float(LUMINANCE @ shade.lit)

@@ -134,6 +134,18 @@ def test_the_sun_is_found_in_a_panorama_that_has_one():
     assert sun_in(np.minimum(sky, 0.9)) is None
 
 
+def test_a_sun_told_lights_as_the_same_sun_shown(parameters):
+    """The panorama less its sun's brightness, and the direction beside it: a stereo street has no more."""
+    shown = clear_light(SCENE.gaussians, clear_sky(), parameters.sky)
+    hidden = np.minimum(clear_sky(), 0.9)
+    told = clear_light(SCENE.gaussians, hidden, parameters.sky, shown.to_sun)
+    assert told.sun_share == pytest.approx(shown.sun_share, abs=0.02)
+    assert clear_light(SCENE.gaussians, hidden, parameters.sky).sun_share == 0
+    relief = relief_of(0.1)
+    for a, b in zip(relief_ratios(relief, shown), relief_ratios(relief, told), strict=True):
+        np.testing.assert_allclose(a, b, atol=0.02)
+
+
 def test_only_the_road_on_the_feature_and_in_its_shadow_changes_colour(parameters):
     relief = relief_of(0.1)
     shaped, _ = apply_road_profile(SCENE.gaussians, relief, 4.0, -4.0)
