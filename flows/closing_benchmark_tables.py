@@ -58,9 +58,13 @@ def _figures(result: Mapping[str, Any]) -> list[Sequence[str]]:
 
 
 def _times(result: Mapping[str, Any]) -> list[Sequence[str]]:
-    words = {"null": "nothing missing", "effect": "an effect or a form"}
+    words = {"null": "nothing missing", "effect": "an effect or a form", "pair": "two effects at once"}
     return [
-        [words[kind], "under 20", *(f"{times[key]:.1f}" for key in ("mean", "median", "max"))]
+        [
+            words[kind],
+            "under 20" if kind != "pair" else "",
+            *(f"{times[key]:.1f}" for key in ("mean", "median", "max")),
+        ]
         for kind, times in result["cpu_s"].items()
     ]
 
@@ -73,8 +77,9 @@ def _misses(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """One line for every campaign that was neither right nor refused, and for every interval without its truth."""
     lines = []
     for row in rows:
-        at = f"{row['truth'] or 'nothing missing'} (seed {row['seed']})"
-        if row["outcome"] not in ("right", "right form", "refused"):
+        poor = "poor design, " if row["kind"].startswith("poor") else ""
+        at = f"{row['truth'] or 'nothing missing'} ({poor}seed {row['seed']})"
+        if row["outcome"] not in ("right", "right form", "both", "refused"):
             rivals = f"; not told from {', '.join(row['rivals'])}" if row["rivals"] else ""
             lines.append(f"- {at}: {row['verdict']} {', '.join(row['named'])}{rivals}")
         elif row["covered"] is False:

@@ -157,12 +157,18 @@ def close_loop_benchmark(
     ],
     seeds: Annotated[int, typer.Option(help="Campaigns of each known truth.", min=0)] = 10,
     nulls: Annotated[int, typer.Option(help="Campaigns of a model that lacks nothing.", min=0)] = 100,
+    harder: Annotated[
+        int,
+        typer.Option(help="Campaigns of each pair of effects, and of each truth on a poor design.", min=0),
+    ] = 1,
     minutes: Annotated[float, typer.Option(help="Stop after so long, with what is done.")] = 1e9,
     prefect: Prefect = False,
     as_json: Json = False,
 ) -> None:
     """Count how often close-loop is right on campaigns whose truth is known."""
     one_thread()
-    result = call("close_loop_benchmark", prefect, out=out, seeds=seeds, nulls=nulls, minutes=minutes)
+    result = call(
+        "close_loop_benchmark", prefect, out=out, seeds=seeds, nulls=nulls, harder=harder, minutes=minutes
+    )
     keys = ("false_discoveries", "summary", "power", "cpu_s")
     show(result if as_json else {key: result[key] for key in keys}, as_json)

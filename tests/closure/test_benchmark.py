@@ -7,10 +7,11 @@ import pytest
 from scipy.stats import binom
 
 from catalogs.effects.truths import load_sizes, load_truths
+from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows import closing_benchmark
-from flows.closing_benchmark import summary
+from flows.closing_benchmark_summary import pair_outcome, summary
 from tasks.closure.benchmark import exact_interval, synthetic_campaign
 from tasks.closure.drives import TRAINING
 
@@ -61,15 +62,19 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
             raise KeyboardInterrupt
         return answer("brake_fade")
 
-    monkeypatch.setattr(closing_benchmark, "synthetic_campaign", lambda model, road, truth, seed, slots: seed)
+    monkeypatch.setattr(
+        closing_benchmark, "synthetic_campaign", lambda model, road, truth, seed, slots, design: seed
+    )
     monkeypatch.setattr(closing_benchmark, "attribute", judge)
     monkeypatch.setattr(closing_benchmark, "covered", lambda *_: None)
     with pytest.raises(KeyboardInterrupt):
-        closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4)
-    result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4)
+        closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
+    result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
     seeds = [row["seed"] for row in result["campaigns"]]
     assert len(judged) == len(seeds) + 1 and len(set(seeds)) == len(seeds)
-    assert len(seeds) == 4 + 2 * len(load_truths()) + 2 * len(load_sizes())
+    library = [truth for truth in load_truths() if truth.in_library]
+    harder = 3 * len(library)  # as many pairs as truths, and each truth and a null on the poor design
+    assert len(seeds) == 4 + 2 * len(load_truths()) + 2 * len(load_sizes()) + harder
     # round by round: no truth has its second campaign before all have their first
     order = [row["truth"] for row in result["campaigns"] if row["kind"] in ("library", "outside")]
     assert order[: len(load_truths())] == [t.name for t in load_truths()]
@@ -77,7 +82,7 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
     assert "| false discoveries on nulls | at most 2 % | 4 of 4 |" in tables
     assert "| brake_fade | fade 0.005 | 2 of 2 | 1.00 |" in tables
     monkeypatch.setattr(closing_benchmark, "engine_hash", lambda: "another")
-    again = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=0, nulls=1)
+    again = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=0, nulls=1, harder=0)
     assert [row["truth"] for row in again["campaigns"]] == [None]
 
 
@@ -86,10 +91,37 @@ def row(truth: str | None, outcome: str, *, in_library: bool = True, covered: bo
     return {"kind": kind, "truth": truth, "outcome": outcome, "values": {}, "covered": covered, "cpu_s": 1.0}
 
 
+@pytest.mark.parametrize(
+    ("verdict", "named", "rivals", "expected"),
+    [
+        ("NOTHING", [], [], "refused"),
+        ("FOUND", ["drag", "lag"], [], "both"),
+        ("FOUND", ["lag"], [], "one"),
+        ("FOUND", ["lag", "fade"], [], "wrong"),
+        ("SET", ["fade"], ["lag"], "set with truth"),
+        ("SET", ["fade"], ["push-out"], "set without truth"),
+        ("UNKNOWN_FORM", ["brake_torque ~ const"], [], "form"),
+    ],
+)
+def test_two_effects_at_once_are_counted_by_what_is_named(verdict, named, rivals, expected) -> None:
+    assert pair_outcome(verdict, named, rivals, ["lag", "drag"]) == expected
+
+
+def test_every_truth_is_in_two_pairs_and_no_pair_comes_twice() -> None:
+    library = tuple(truth for truth in load_truths() if truth.in_library)
+    pairs = [frozenset(truth.name for truth in pair) for pair in load_closing_study().pairs(library)]
+    assert len(set(pairs)) == len(pairs) == len(library)
+    assert {name: sum(name in pair for pair in pairs) for name in set().union(*pairs)} == {
+        truth.name: 2 for truth in library
+    }
+
+
 def test_the_summary_counts_each_kind_once() -> None:
     rows = [
         row(None, "right"), row(None, "false discovery"), row("brake_lag", "right", covered=True),
         row("brake_lag", "wrong"), row("brake_fade", "set with truth"), row("hump", "right form", in_library=False),
+        row("brake_lag", "refused") | {"kind": "size"}, row("brake_lag", "refused") | {"kind": "poor"},
+        row("brake_lag + brake_fade", "one") | {"kind": "pair"},
     ]  # fmt: skip
     result = summary(rows)
     assert (result["false_discoveries"]["hits"], result["false_discoveries"]["of"]) == (1, 2)
@@ -97,4 +129,7 @@ def test_the_summary_counts_each_kind_once() -> None:
     assert shares["library effect named exactly"] == (1, 3) and shares["wrong single label"] == (1, 3)
     assert shares["truth within the 95 % interval"] == (1, 1)
     assert shares["outside the library: form with right port and variable"] == (1, 1)
+    assert shares["two effects at once: one of them named, nothing else"] == (1, 1)
+    assert shares["poor design: refused"] == (1, 1)
+    # sizes and poor designs have shares of their own
     assert result["confusion"]["brake_lag"] == {"right": 1, "wrong": 1}

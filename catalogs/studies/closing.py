@@ -1,0 +1,67 @@
+"""Harder campaigns for close-loop than one effect on a rich design: two effects at once, and too few manoeuvres."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from catalogs.effects.truths import Truth
+from catalogs.quantities import CatalogueEntry, read_entry
+from tasks.closure.drives import TRAINING, Drive
+
+FILE = Path(__file__).with_name("closing.yaml")
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class DriveEntry(CatalogueEntry):
+    """One planned run; the meanings stand at ``Drive``."""
+
+    weather: Literal["dry", "rain", "snow"] = "dry"
+    rate: Annotated[float, Field(ge=0)] = 0.0
+    speed: Positive
+    peak: float
+    duration: Positive
+
+
+class ClosingStudy(CatalogueEntry):
+    """Which truths come in pairs, and the poor design.
+
+    Parameters
+    ----------
+    partner_after : how far after a truth its partner stands [1]
+    poor_design : the runs; the first `TRAINING` of them train
+    """
+
+    partner_after: Annotated[int, Field(ge=1)]
+    poor_design: Annotated[tuple[DriveEntry, ...], Field(min_length=TRAINING + 3)]
+
+    def drives(self) -> tuple[Drive, ...]:
+        """The poor design as planned runs."""
+        return tuple(Drive(**entry.model_dump()) for entry in self.poor_design)
+
+    def pairs(self, truths: tuple[Truth, ...]) -> tuple[tuple[Truth, Truth], ...]:
+        """Each truth with its partner; a pair comes once.
+
+        Parameters
+        ----------
+        truths : library effects at their sizes
+        """
+        count = len(truths)
+        chosen = {frozenset((j, (j + self.partner_after) % count)): None for j in range(count)}
+        return tuple((truths[min(pair)], truths[max(pair)]) for pair in chosen if len(pair) == 2)
+
+
+def load_closing_study(path: str | Path = FILE) -> ClosingStudy:
+    """The study's file.
+
+    Parameters
+    ----------
+    path : YAML
+
+    Raises
+    ------
+    InputError
+        With every rule the file breaks.
+    """
+    return read_entry(ClosingStudy, Path(path), "study")
