@@ -1,7 +1,8 @@
 """Kill -9 a generating run and its workers at random points, then resume: are the bytes those of a run left alone?
 
-``make study-crash`` kills 50 times. A folder is killed again and again until a run gets through, and is then held
-against the uninterrupted run byte for byte; between kills a reader looks at what is there.
+``make study-crash`` kills 50 times and says after each what it found; ``python -m benchmarks.crashes KILLS SEED`` takes
+a part of it. A folder is killed again and again until a run gets through, and is then held against the uninterrupted
+run byte for byte; between kills a reader looks at what is there.
 """
 
 import json
@@ -52,8 +53,9 @@ def crash_study(grid: Path, place: Path, kills: int, seed: int = SEED) -> dict[s
     committed clips that a reader found incomplete; ``committed_at_kill``, clips already committed at each kill.
     """
     draw = random.Random(seed)
-    started = time.monotonic()
     _start(grid, place / "whole").wait()
+    started = time.monotonic()
+    _start(grid, place / "timed").wait()  # a second run, because the first compiles what later ones find
     life = time.monotonic() - started
     whole = _files(place / "whole")
     result: dict[str, Any] = {
@@ -63,25 +65,36 @@ def crash_study(grid: Path, place: Path, kills: int, seed: int = SEED) -> dict[s
         "half_clips": 0,
         "committed_at_kill": [],
     }
-    for turn in range(kills):
+    while True:
         folder = place / f"killed-{result['runs_finished']}"
         run = _start(grid, folder)
-        try:
-            # the first part of a run's life is imports, in which nothing can break
-            run.wait(life * draw.uniform(0.3, 1.0))
-        except subprocess.TimeoutExpired:
-            os.killpg(run.pid, signal.SIGKILL)
-            run.wait()
+        # the first part of a run's life is imports, in which nothing can break
+        if result["kills"] < kills and _killed_after(run, life * draw.uniform(0.3, 1.0)):
+            halves, committed = _half_clips(Layout(folder))
             result["kills"] += 1
-        halves, committed = _half_clips(Layout(folder))
-        result["half_clips"] += halves
-        result["committed_at_kill"].append(committed)
-        if turn == kills - 1:
-            _start(grid, folder).wait()
-        if Layout(folder).manifest.is_file():
+            result["half_clips"] += halves
+            result["committed_at_kill"].append(committed)
+            print(f"kill {result['kills']} of {kills}: {committed} clips, {halves} half", file=sys.stderr)
+        elif run.wait() != 0:
+            raise RuntimeError(
+                f"a run in {folder} ended with exit code {run.returncode}, and nobody killed it"
+            )
+        else:
             result["runs_finished"] += 1
             result["equal"] += _files(folder) == whole
-    return result
+            if result["kills"] == kills:
+                return result
+
+
+def _killed_after(run: "subprocess.Popen[bytes]", seconds: float) -> bool:
+    """Kill a run and its workers then; False if it has ended before."""
+    try:
+        run.wait(seconds)
+    except subprocess.TimeoutExpired:
+        os.killpg(run.pid, signal.SIGKILL)
+        run.wait()
+        return True
+    return False
 
 
 def _start(grid: Path, folder: Path) -> "subprocess.Popen[bytes]":
@@ -119,6 +132,6 @@ def _half_clips(layout: Layout) -> tuple[int, int]:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as scratch:
         (Path(scratch) / "grid.yaml").write_text(GRID)
-        found = crash_study(Path(scratch) / "grid.yaml", Path(scratch), KILLS)
+        found = crash_study(Path(scratch) / "grid.yaml", Path(scratch), *map(int, sys.argv[1:] or [KILLS]))
     print(json.dumps(found))
     sys.exit(0 if found["equal"] == found["runs_finished"] > 0 and found["half_clips"] == 0 else 1)

@@ -1,6 +1,7 @@
 """A reproducibility audit: are the files those recorded, and do the same inputs still make the same bytes?"""
 
 import math
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -8,20 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from flows.generate import create_frame_arrays, fan_out
+from flows.input_changes import input_changes
 from flows.orchestration import stage
 from flows.plan import Plan, read_plan
 from flows.runner import RunnerName
 from flows.store.address import everything, working
 from flows.store.arrays import arrays_of
 from flows.store.frames import read_clip
-from flows.store.layout import STAGED_TABLES, Layout, read_json, write_json
+from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically, write_json
 from flows.store.lock import sole_writer
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from manifests.canonical import sha256_of
 from manifests.compare import first_pixel_difference, first_row_difference
+from manifests.explain import as_sentences, reasons
 from manifests.manifest import damaged_files
-from manifests.provenance import code_version, library_versions, processor
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 
@@ -43,11 +45,14 @@ def audit(
     ----------
     dataset : a sealed dataset folder
     share : share of the clips to make again, at least one clip unless 0 [1]
-    out : folder for ``audit.json``; None writes none
+    out : folder for ``audit.json`` and ``audit.txt``; None writes none
+    workers : how many at once; None takes another number than a generating run does by itself [1]
 
     Returns
     -------
-    The audit: ``verified`` (all well), ``damaged``, ``rerun``, ``mismatches`` and ``differences`` of the tools.
+    The audit: ``verified`` (all well); ``files``; ``damaged[]``; ``rerun[]``, the clips made again; ``mismatches[]``,
+    each with where it differs first and the inputs that can be ``why``; ``differences[]`` of inputs and tools between
+    what made the dataset and what is here; ``not_remade[]``, why damaged inputs let no clip be made.
 
     Raises
     ------
@@ -56,22 +61,71 @@ def audit(
     """
     if not 0 <= share <= 1:
         raise InputError(f"--share must lie in 0 to 1; it is {share:g}")
+    changes: list[dict[str, Any]] = []
+    mismatches: list[dict[str, Any]] = []
+    not_remade: list[str] = []
     with working(dataset, everything) as layout:
         manifest = read_manifest(layout)
         damaged = stage(damaged_files)(layout.root, manifest)
         chosen = chosen_clips(manifest, share)
-        mismatches = stage(remake_and_compare)(layout, manifest, chosen, runner, workers, scheduler)
+        try:
+            changes = input_changes(layout, manifest)
+            mismatches = stage(remake_and_compare)(
+                layout, manifest, chosen, runner, workers or other_count(), scheduler
+            )
+        except InputError as error:
+            if not damaged:
+                raise
+            chosen, not_remade = [], list(error.problems)
     result = {
         "verified": not damaged and not mismatches,
         "files": len(manifest["artifacts"]) + sum(len(clip["artifacts"]) for clip in manifest["clips"]),
         "damaged": damaged,
         "rerun": [clip["clip_id"] for clip in chosen],
-        "mismatches": mismatches,
-        "differences": tool_differences(manifest),
+        "mismatches": [row | {"why": reasons(row["changed"], changes)} for row in mismatches],
+        "differences": as_sentences(changes),
+        "not_remade": not_remade,
     }
     if out is not None:
         write_json(Path(out) / "audit.json", result)
+        write_atomically(Path(out) / "audit.txt", as_text(result).encode())
     return result
+
+
+def as_text(result: Mapping[str, Any]) -> str:
+    """The audit in lines for people.
+
+    Parameters
+    ----------
+    result : of `audit`
+    """
+    lines = [
+        f"{len(result['damaged'])} of {result['files']} files are not those recorded",
+        *(f"  {row['path']}: {row['damage']}" for row in result["damaged"]),
+        f"{len(result['mismatches'])} of {len(result['rerun'])} clips made again differ",
+        *(f"  none could be made: {problem}" for problem in result["not_remade"]),
+    ]
+    for row in result["mismatches"]:
+        pixel = f", pixel {row['pixel'][0]} right and {row['pixel'][1]} down" if "pixel" in row else ""
+        values = f": {row['recorded']} recorded, {row['remade']} made again" if "recorded" in row else ""
+        because = ", ".join(row["why"]) or "no input that is recorded"
+        first = f"{row['stage']}, {row['channel']}, {row['counted_in']} {row['tick']}{pixel}{values}"
+        lines += [
+            f"  {row['label']} ({row['clip_id']}): {', '.join(row['changed'])}",
+            f"    first in {first}",
+            f"    can come from: {because}",
+        ]
+    lines.append(
+        "inputs and tools that differ:" if result["differences"] else "no recorded input or tool differs"
+    )
+    lines += [f"  {difference}" for difference in result["differences"]]
+    lines.append("verified" if result["verified"] else "not verified")
+    return "\n".join(lines) + "\n"
+
+
+def other_count() -> int:
+    """Another number of workers than `flows.runner.open_executor` takes by itself: bytes must not depend on it [1]."""
+    return len(os.sched_getaffinity(0)) - 1 or 2
 
 
 def chosen_clips(manifest: Mapping[str, Any], share: float) -> list[Mapping[str, Any]]:
@@ -110,18 +164,6 @@ def remake_and_compare(
         ]
 
 
-def tool_differences(manifest: Mapping[str, Any]) -> list[str]:
-    """How the code, libraries and processor here differ from those that made the dataset."""
-    ours = {"code": code_version(), "libraries": library_versions(), "processor": processor()}
-    theirs = {**manifest["made_with"], "processor": manifest["processor"]}
-    return [
-        f"{group} {key}: {theirs[group].get(key)} made it, {value} is here"
-        for group, facts in ours.items()
-        for key, value in facts.items()
-        if theirs[group].get(key) != value
-    ]
-
-
 def _first_difference(
     layout: Layout, remade: Layout, plan: Plan, clip: Mapping[str, Any]
 ) -> dict[str, Any] | None:
@@ -147,4 +189,5 @@ def _first_difference(
         difference = first_pixel_difference(first, recorded_pixels, read_clip(remade.frames, index, first))
     # the hashes differ but the stored values do not: the file was changed after it was recorded
     return {"clip_id": clip_id, "label": clip["label"], "stage": STAGE_OF[first], "changed": changed,
+            "counted_in": "tick" if first == "ticks" else "frame",
             **(difference or {"channel": first, "tick": 0})}  # fmt: skip

@@ -10,7 +10,6 @@ import yaml
 from catalogs.grids import Grid, GridFile, expand_grid, grid_names, load_grid
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.audit import tool_differences
 from flows.driving import drive
 from flows.generate import RunReport, generate
 from flows.plan import Plan, freeze_grid
@@ -19,6 +18,7 @@ from flows.runner import RunnerName
 from flows.store.layout import read_json, write_atomically
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import columns_hash
+from manifests.explain import as_sentences, tool_differences, tools_here
 from manifests.frozen_run import (
     FOLDER,
     differences,
@@ -107,7 +107,7 @@ def problems_of(frozen: Mapping[str, Any]) -> list[str]:
     differing = differing_clips(frozen, ticks_of(plan))
     if not differing:
         return []
-    tools = "; ".join(tool_differences(frozen)) or "none that is recorded"
+    tools = "; ".join(as_sentences(tool_differences(frozen, tools_here()))) or "none that is recorded"
     return [
         f"the telemetry of {len(differing)} of {len(frozen['clips'])} clips comes out otherwise ({differing[0]} first),"
         f" from the same scenarios and parameters; tools that differ: {tools}"

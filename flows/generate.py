@@ -6,6 +6,7 @@ from functools import partial
 from catalogs.grids import Grid
 from flows.clip import make_clip, warm_up
 from flows.failures import ClipsFailed, disk_full_sentence
+from flows.input_changes import frozen_inputs
 from flows.orchestration import stage
 from flows.plan import Plan, make_plan, plan_differences, read_plan
 from flows.progress import progress_bar
@@ -17,6 +18,9 @@ from flows.store.layout import Layout, clear_partial_files, read_json, write_ato
 from flows.store.lock import sole_writer
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
+
+SHOWN = 8
+"""Differences told when a folder holds another run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +64,7 @@ def generate(
     InputError
         For a faulty grid, or a folder that holds something else.
     ClipsFailed
-        If clips failed; run the same command again to make just those.
+        If clips failed, and not for want of an input; run the same command again to make just those.
     """
     missing: list[int] = []
     cost: dict[str, dict[str, float]] = {}
@@ -103,9 +107,14 @@ def prepare(
     if layout.plan.is_file():
         existing = read_plan(layout.root)
         if existing.run_id != plan.run_id:
-            differences = plan_differences(plan.as_json(), existing.as_json())
+            theirs = frozen_inputs(layout, existing.inputs)
+            differences = plan_differences(existing.as_json(), plan.as_json(), theirs, inputs)
             raise InputError(
-                f"{layout}: holds the dataset of another run: {'; '.join(differences[:5])}; give an empty folder"
+                [
+                    f"{layout}: holds the dataset of another run: {difference}"
+                    for difference in differences[:SHOWN]
+                ]
+                + [f"{layout}: give an empty folder, or go on there with what made it"]
             )
         return existing
     if layout.root.exists() and (not layout.root.is_dir() or any(layout.root.iterdir())):
@@ -181,6 +190,11 @@ def fan_out(
             else:
                 failures[labels[index]] = error
                 advance(f"{labels[index]} failed")
+    wrong = [
+        problem for error in failures.values() if isinstance(error, InputError) for problem in error.problems
+    ]
+    if wrong and all(isinstance(error, InputError) for error in failures.values()):
+        raise InputError(list(dict.fromkeys(wrong)))
     if failures:
         first = next(iter(failures.values()))
         names = ", ".join(sorted(failures))

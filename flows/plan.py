@@ -18,6 +18,7 @@ from catalogs.vehicles import vehicle_provenance, vehicle_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.store.layout import Layout, read_json
 from manifests.canonical import content_id, sha256_of
+from manifests.explain import input_differences, shown, value_differences
 from manifests.provenance import code_version, library_versions
 from tasks.errors import InputError
 
@@ -194,18 +195,24 @@ def read_plan(root: Path) -> Plan:
     )
 
 
-def plan_differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], place: str = "") -> list[str]:
-    """Where two plans' JSON differ, as ``path: a, not b``."""
-    differences = []
-    for key in sorted(ours.keys() | theirs.keys()):
-        a, b = ours.get(key), theirs.get(key)
-        path = f"{place}.{key}" if place else key
-        if isinstance(a, Mapping) and isinstance(b, Mapping):
-            differences += plan_differences(a, b, path)
-        elif a != b and key not in {"run_id", "clip_id"}:
-            short = isinstance(a, str | float | int) and isinstance(b, str | float | int)
-            differences.append(f"{path} is {b!r} there and {a!r} here" if short else f"{path} differs")
-    return differences
+def plan_differences(
+    theirs: Mapping[str, Any],
+    ours: Mapping[str, Any],
+    their_inputs: Mapping[str, bytes],
+    our_inputs: Mapping[str, bytes],
+) -> list[str]:
+    """Where the plan of a dataset (theirs) and the one made here (ours) differ, to the value, a sentence each.
+
+    Parameters
+    ----------
+    theirs, ours : plans as JSON
+    their_inputs, our_inputs : catalogue files by their path under ``inputs/``
+    """
+    grid = [(f"grid.{path}", a, b) for path, a, b in value_differences(theirs["grid"], ours["grid"])]
+    bare = [{**plan, "grid": {}} for plan in (theirs, ours)]
+    rows = input_differences(bare[0], bare[1], their_inputs, our_inputs)
+    rest = [(f"{row['input']} {row['path']}".strip(), row["a"], row["b"]) for row in rows]
+    return [f"{place} is {shown(a)} there and {shown(b)} here" for place, a, b in (*grid, *rest)]
 
 
 def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str], list[str]]:

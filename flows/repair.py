@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 
 from catalogs.grids import GridFile
 from catalogs.scenario import Scenario
-from flows.audit import tool_differences
 from flows.generate import create_frame_arrays, fan_out
+from flows.input_changes import recorded_input
 from flows.orchestration import stage
 from flows.plan import ClipPlan, Plan, input_sources, read_plan
 from flows.runner import RunnerName
@@ -22,6 +22,7 @@ from flows.store.lock import sole_writer
 from flows.store.telemetry import write_parquet
 from flows.verify import compare_files
 from manifests.canonical import sha256_of_file
+from manifests.explain import as_sentences, tool_differences, tools_here
 from manifests.manifest import recorded_files
 from tasks.errors import InputError
 
@@ -84,7 +85,7 @@ def _repaired(
         "damaged": found["damaged"],
         "restored": restored,
         "failed": sorted(set(paths) - set(restored)),
-        "differences": tool_differences(manifest),
+        "differences": as_sentences(tool_differences(manifest, tools_here())),
     }
 
 
@@ -138,12 +139,11 @@ def _prepare(layout: Layout, scratch: Layout, manifest: Mapping[str, Any]) -> Pl
     sources = input_sources(plan.settings)
     problems = []
     for name, digest in manifest["inputs"].items():
-        kept = layout.inputs / name
-        source = kept if kept.is_file() and sha256_of_file(kept) == digest else _found(sources, name)
-        if source is None or sha256_of_file(source) != digest:
+        source = recorded_input(layout, sources, name, digest)
+        if source is None:
             problems.append(
-                f"{kept}: damaged, and the catalogue here has no entry with its bytes (SHA-256 {digest[:12]}...):"
-                " put the file back and repair again"
+                f"{layout.inputs / name}: damaged, and the catalogue here has no entry with its bytes"
+                f" (SHA-256 {digest[:12]}...): put the file back and repair again"
             )
             continue
         (scratch.inputs / name).parent.mkdir(parents=True, exist_ok=True)
@@ -152,14 +152,6 @@ def _prepare(layout: Layout, scratch: Layout, manifest: Mapping[str, Any]) -> Pl
         raise InputError(problems)
     create_frame_arrays(scratch, plan)
     return read_plan(scratch.root)
-
-
-def _found(sources: Mapping[str, Any], name: str) -> Path | None:
-    try:
-        path: Path = sources[name]()
-    except (KeyError, InputError):
-        return None
-    return path if path.is_file() else None
 
 
 def plan_of(manifest: Mapping[str, Any]) -> Plan:

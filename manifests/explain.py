@@ -6,6 +6,8 @@ from typing import Any
 
 import yaml
 
+from manifests.provenance import code_version, library_versions, processor
+
 VEHICLE, RENDER, JUDGING = "vehicle", "render", "judging"
 REACHES = {
     "vehicle.yaml": (VEHICLE, RENDER),
@@ -17,6 +19,7 @@ REACHES = {
     "weather": (RENDER,),
     "scene": (RENDER,),
     "backend": (RENDER,),
+    "parameters": (VEHICLE, RENDER),
     "vehicle_mode": (VEHICLE, RENDER),
     "frames": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
@@ -40,7 +43,7 @@ def input_differences(
     Parameters
     ----------
     a, b : manifests
-    inputs_a, inputs_b : frozen catalogue files by their path under ``inputs/``
+    inputs_a, inputs_b : catalogue files by their path under ``inputs/``; where one lacks, hashes are compared
 
     Returns
     -------
@@ -50,14 +53,67 @@ def input_differences(
     for name in sorted(a["inputs"].keys() | b["inputs"].keys()):
         if a["inputs"].get(name) != b["inputs"].get(name):
             key = "weather" if PurePosixPath(name).parts[0] == "weather" else name
-            rows += _rows(name, key, _parsed(inputs_a.get(name)), _parsed(inputs_b.get(name)))
+            known = all(
+                name in files or name not in m["inputs"] for m, files in ((a, inputs_a), (b, inputs_b))
+            )
+            rows += (
+                _rows(name, key, _parsed(inputs_a.get(name)), _parsed(inputs_b.get(name)))
+                if known
+                else _rows(name, key, a["inputs"].get(name, ABSENT), b["inputs"].get(name, ABSENT))
+            )
     rows += _rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
     rows += _rows("backend", "backend", a["backend"], b["backend"])
     for name in ("vehicle_mode", "frames", "frame_rate_hz", "seed"):
         rows += _rows(name, name, a["grid"].get(name), b["grid"].get(name))
-    for name in ("code", "libraries"):
-        rows += _rows(name, name, a["made_with"].get(name), b["made_with"].get(name))
-    return rows + _rows("processor", "processor", a.get("processor"), b.get("processor"))
+    return rows + tool_differences(a, b)
+
+
+def tool_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of `input_differences` that are about code, libraries and processor.
+
+    Parameters
+    ----------
+    a, b : manifests, or `tools_here`
+    """
+    rows = [
+        _rows(name, name, a["made_with"].get(name), b["made_with"].get(name))
+        for name in ("code", "libraries")
+    ]
+    return [*rows[0], *rows[1], *_rows("processor", "processor", a.get("processor"), b.get("processor"))]
+
+
+def tools_here() -> dict[str, Any]:
+    """What a manifest records of code, libraries and processor, of here and now."""
+    return {
+        "made_with": {"code": code_version(), "libraries": library_versions()},
+        "processor": processor(),
+    }
+
+
+def parameter_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows like those of `input_differences` for what was asked of each clip.
+
+    Parameters
+    ----------
+    a, b : plans or manifests
+    """
+    asked = [
+        {clip["label"]: {"seed": clip["seed"], **clip["scenario"]} for clip in m["clips"]} for m in (a, b)
+    ]
+    return _rows("parameters", "parameters", *asked)
+
+
+def as_sentences(differences: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Each row of differences between what made a dataset (a) and what is here (b), in words."""
+    return [
+        f"{row['input']} {row['path']}".strip() + f": {shown(row['a'])} made it, {shown(row['b'])} is here"
+        for row in differences
+    ]
+
+
+def shown(value: Any) -> str:
+    """A value in a sentence, cut where it is long."""
+    return (value if isinstance(value, str) else repr(value))[:80]
 
 
 def reasons(changed: Sequence[str], differences: Sequence[Mapping[str, Any]]) -> list[str]:

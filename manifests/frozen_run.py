@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from manifests.explain import ABSENT, REACHES, VEHICLE, value_differences
+from manifests.explain import REACHES, VEHICLE, shown, value_differences
 from manifests.manifest import seal_of
 from tasks.errors import InputError
 
@@ -107,7 +107,7 @@ def differences(
     asked = {clip["label"]: _without_hash(clip) for clip in frozen["clips"]}
     rows += value_differences(asked, {clip["label"]: _without_hash(clip) for clip in clips}, "clips")
     return [
-        f"{place} is {_shown(there)} in the manifest and {_shown(here)} here" for place, there, here in rows
+        f"{place} is {shown(there)} in the manifest and {shown(here)} here" for place, there, here in rows
     ]
 
 
@@ -130,7 +130,3 @@ def _deciding(entry: Any) -> Any:
     if isinstance(entry, dict):
         return {str(key): _deciding(value) for key, value in entry.items() if key not in NEVER_DECIDES}
     return [_deciding(value) for value in entry] if isinstance(entry, list) else entry
-
-
-def _shown(value: Any) -> str:
-    return ABSENT if value == ABSENT else repr(value)[:80]

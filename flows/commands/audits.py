@@ -24,7 +24,12 @@ def audit(
     result = call(
         "audit", prefect, dataset, share=share, out=out, runner=runner, workers=workers, scheduler=scheduler
     )
-    show(result, as_json)
+    if as_json:
+        show(result, as_json)
+    else:
+        from flows.audit import as_text
+
+        typer.echo(as_text(result), nl=False)
     if not result["verified"]:
         raise typer.Exit(CHECK_FAILED)
 

@@ -1,0 +1,123 @@
+"""An audit that finds a difference says where it begins and which input can be why."""
+
+import json
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+import flows.audit
+import manifests.explain
+from catalogs.scenes import load_scene, write_scene
+from flows.audit import as_text, audit
+from flows.generate import generate
+from flows.store.layout import Layout
+from tasks.errors import InputError
+from tests.flows.test_pipeline import GRID
+from tests.toy_street import TOY_CAMERA, toy_street
+
+
+@pytest.fixture
+def copy(toy_dataset, tmp_path) -> Layout:
+    shutil.copytree(toy_dataset.root, tmp_path / "copy")
+    return Layout(tmp_path / "copy")
+
+
+@pytest.fixture
+def own(tmp_path) -> Layout:
+    """A dataset whose scene and camera are this test's own."""
+    write_scene(toy_street(), tmp_path / "scene", {})
+    (tmp_path / "camera.yaml").write_text(TOY_CAMERA)
+    grid = GRID.format(scene=tmp_path / "scene", camera=tmp_path / "camera.yaml", frames=2)
+    (tmp_path / "grid.yaml").write_text(grid)
+    return generate(str(tmp_path / "grid.yaml"), str(tmp_path / "data"), runner="threads", workers=1).layout
+
+
+def audited(layout: Layout, **options) -> dict:
+    return audit(str(layout.root), **{"share": 0.25, "runner": "threads", "workers": 1} | options)
+
+
+def test_a_changed_catalogue_value_is_named_with_both_values_and_as_the_reason(copy, tmp_path):
+    file = copy.inputs / "vehicle.yaml"
+    file.write_text(file.read_text().replace("cg_height: {value: 0.55", "cg_height: {value: 0.6"))
+    result = audited(copy, out=str(tmp_path / "told"))
+    assert result["differences"] == ["vehicle.yaml cg_height.value: 0.55 made it, 0.6 is here"]
+    (mismatch,) = result["mismatches"]
+    assert (mismatch["stage"], mismatch["why"]) == ("vehicle", ["vehicle.yaml"])
+    text = (tmp_path / "told" / "audit.txt").read_text()
+    assert text == as_text(result) and "can come from: vehicle.yaml" in text
+    assert f"tick {mismatch['tick']}: {mismatch['recorded']!r} recorded, {mismatch['remade']!r}" in text
+
+
+def test_a_changed_parameter_of_a_clip_is_named(copy):
+    plan = json.loads(copy.plan.read_text())
+    for clip in plan["clips"]:
+        clip["scenario"]["initial_speed_km_h"] += 1
+    copy.plan.write_text(json.dumps(plan))
+    result = audited(copy)
+    assert "parameters dry/flat.initial_speed_km_h: 40 made it, 41.0 is here" in result["differences"]
+    assert result["mismatches"][0]["why"] == ["parameters"]
+
+
+def test_another_library_another_processor_and_another_code_are_named(copy, monkeypatch):
+    """The look is changed in the recorded hash, so that there is a mismatch whose reason is asked for."""
+    manifest = json.loads(copy.manifest.read_bytes())
+    for clip in manifest["clips"]:
+        clip["content"]["rgb"] = "0" * 64
+    copy.manifest.write_text(json.dumps(manifest))
+    here = manifests.explain.tools_here()
+    here["made_with"]["libraries"]["numpy"] = "9.9"
+    here["made_with"]["code"]["source_sha256"] = "0" * 64
+    here["processor"]["vector_extensions"] = "none"
+    monkeypatch.setattr("flows.input_changes.tools_here", lambda: here)
+    result = audited(copy)
+    assert [line.split(":")[0] for line in result["differences"]] == [
+        "code source_sha256", "libraries numpy", "processor vector_extensions"
+    ]  # fmt: skip
+    assert result["mismatches"][0]["why"] == ["code", "libraries", "processor"]
+
+
+def test_inputs_from_which_nothing_can_be_made_are_damage_and_no_crash(copy):
+    (copy.inputs / "surface.yaml").unlink()
+    result = audited(copy)
+    assert not result["verified"] and result["rerun"] == [] and result["not_remade"]
+    assert [row["path"] for row in result["damaged"]] == ["inputs/surface.yaml"]
+    assert result["differences"][0].startswith("surface.yaml")
+
+
+def test_a_scene_that_has_changed_since_is_named_as_the_reason(own, tmp_path):
+    shutil.rmtree(tmp_path / "scene")
+    write_scene(toy_street(seed=2), tmp_path / "scene", {})
+    load_scene.cache_clear()  # as if in another process
+    result = audited(own)
+    assert result["mismatches"][0]["why"] == ["scene"] and result["differences"][0].startswith("scene")
+
+
+def test_a_broken_scene_is_the_inputs_fault_and_one_sentence(own, tmp_path):
+    file = tmp_path / "scene" / "means.npy"
+    np.save(file, np.load(file) + 1)
+    load_scene.cache_clear()
+    with pytest.raises(InputError, match=r"must have the SHA-256 of scene\.json") as told:
+        audited(own, share=1.0)
+    assert len(told.value.problems) == 1
+
+
+def test_another_catalogue_or_code_does_not_go_into_the_same_folder_and_both_values_are_told(
+    own, tmp_path, monkeypatch
+):
+    (tmp_path / "camera.yaml").write_text(TOY_CAMERA.replace("{value: 80", "{value: 81"))
+    monkeypatch.setattr("flows.plan.code_version", lambda: {"version": "9", "source_sha256": "0" * 64})
+    with pytest.raises(InputError) as told:
+        generate(str(tmp_path / "grid.yaml"), str(own.root), runner="threads")
+    text = str(told.value)
+    assert "camera.yaml focal_length.value is 80 there and 81 here" in text
+    assert "code version is" in text and "and 9 here" in text and "clips" not in text
+
+
+def test_an_audit_left_to_itself_takes_another_number_of_workers_than_the_run_did(copy, monkeypatch):
+    taken = []
+    monkeypatch.setattr(flows.audit, "remake_and_compare", lambda *given: taken.append(given[4]) or [])
+    audited(copy, workers=None)
+    audited(copy, workers=7)
+    assert taken[0] not in (None, 0, len(os.sched_getaffinity(0))) and taken[1] == 7
