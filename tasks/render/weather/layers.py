@@ -180,7 +180,7 @@ def weather_scene(
         population=falls,
         air=air,
         sky=sky,
-        environment=overcast_environment(environment, sky, air.extinction, p.sky, seed),
+        environment=overcast_environment(environment, sky, air.extinction, p.sky, seed, covered),
         snow=field,
     )
     if relief is not None:

@@ -1,9 +1,9 @@
 """What a wet road mirrors: marching along the mirrored ray through the picture's own depth.
 
 A ray that meets a surface of the picture takes its colour. A ray that passes behind a surface and does not
-come out again takes that surface's colour: a car's front stands for its underside. A ray that leaves the
-picture goes on to the surface at its edge, as far as that can be believed, and else to the sky: a facade goes
-on above the frame.
+come out again takes that surface's colour: a car's front stands for its underside, and no ray that passes
+under so low an edge comes out. A ray that leaves the picture goes on to the surface at its edge, as far as that
+can be believed, and else to the sky: a facade goes on above the frame.
 """
 
 from math import exp, sqrt
@@ -20,6 +20,8 @@ STEP_GROWTH = 1.26
 HALVINGS = 5
 THICKNESS_M, THICKNESS_SHARE = 0.4, 0.04
 NEAREST_Z_M = 0.2
+UNDERSIDE_M = 1.0
+"""What ends lower than this over the road, a car or a bench, is solid from there up; crowns and signs are not."""
 EDGE_FADE = 0.35
 """Share of the picture's height over which the surface at its edge is trusted to go on."""
 
@@ -108,8 +110,11 @@ def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-
 
 
 @numba.njit(cache=True, nogil=True)
-def _march(origin, direction, depth, camera):  # type: ignore[no-untyped-def]
-    """Follow a ray through the depth picture: pixel (u, v) and length t of what it meets, and how far to believe it."""
+def _march(origin, direction, climb, depth, camera):  # type: ignore[no-untyped-def]
+    """Follow a ray through the depth picture: pixel (u, v) and length t of what it meets, and how far to believe it.
+
+    ``climb`` is how far the ray rises over the road by its length.
+    """
     height, width = depth.shape
     step, t = np.float32(FIRST_STEP_M) + np.float32(0.02) * origin[2], np.float32(0)
     hidden, hidden_u, hidden_v, hidden_t = False, np.float32(0), np.float32(0), np.float32(0)
@@ -140,6 +145,8 @@ def _march(origin, direction, depth, camera):  # type: ignore[no-untyped-def]
         if _gap(u, v, z, depth) < np.float32(THICKNESS_M) + np.float32(THICKNESS_SHARE) * z:
             return u, v, far, np.float32(1)
         hidden, hidden_u, hidden_v, hidden_t = True, u, v, far
+        if climb * far < np.float32(UNDERSIDE_M):
+            break
     return hidden_u, hidden_v, hidden_t, np.float32(hidden)
 
 
@@ -164,7 +171,7 @@ def _mirror(picture, depth, normal, road, environment, R, camera, extinction, ai
             for i in range(3):
                 across = R[0, i] * up[0] + R[1, i] * up[1] + R[2, i] * up[2]
                 direction[i] = origin[i] / away - 2 * facing * across
-            u, v, t, belief = _march(origin, direction, depth, camera)
+            u, v, t, belief = _march(origin, direction, -facing, depth, camera)
             if belief < 1:
                 x = R[0, 0] * direction[0] + R[0, 1] * direction[1] + R[0, 2] * direction[2]
                 y = R[1, 0] * direction[0] + R[1, 1] * direction[1] + R[1, 2] * direction[2]

@@ -39,6 +39,7 @@ class SkyParameters:
     asphalt_albedo : reflectance of dry road, from which the light is read [1]
     shadow_kept : power to which large light and shade on the road are left [1]
     far_field_m : distance at which the environment's far field is seen through the air [m]
+    eye_height_m : height over the ground from which what lies below the horizon is seen through the air [m]
     """
 
     cloud_transmittance: float
@@ -56,6 +57,7 @@ class SkyParameters:
     asphalt_albedo: float
     shadow_kept: float
     far_field_m: float
+    eye_height_m: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,9 +163,16 @@ def light_from(sky: SkyLight, up: NDArray[np.floating], parameters: SkyParameter
 
 
 def overcast_environment(
-    environment: NDArray[np.floating], sky: SkyLight, extinction: float, parameters: SkyParameters, seed: int
+    environment: NDArray[np.floating],
+    sky: SkyLight,
+    extinction: float,
+    parameters: SkyParameters,
+    seed: int,
+    snow: float = 0.0,
 ) -> NDArray[np.float32]:
     """The environment under precipitating cloud: new sky, and the far field as the air lets it through.
+
+    Below the horizon the environment is ground, and as near as the eye's height over it says.
 
     Parameters
     ----------
@@ -172,6 +181,7 @@ def overcast_environment(
     extinction : extinction coefficient of the air [m-1]
     parameters : how cloud changes the light
     seed : visual seed of the clip [1]
+    snow : share of the ground that snow covers [1]
 
     Returns
     -------
@@ -181,10 +191,13 @@ def overcast_environment(
     height = len(environment)
     elevation = pi / 2 - (np.arange(height) + 0.5) / height * pi
     far = np.asarray(environment, dtype=np.float32)
-    air = float(np.exp(-extinction * p.far_field_m))
+    distance = np.minimum(p.far_field_m, p.eye_height_m / np.maximum(np.sin(-elevation), 1e-9))
+    air = np.exp(-extinction * distance).astype(np.float32)[:, None, None]
     # three by three by hand: a BLAS rounds as its processor likes
-    relit = [sum(np.float32(air * row[c]) * far[..., c] for c in range(3)) for row in sky.relight]
-    out = np.stack(relit, axis=-1) + ((1 - air) * sky.airlight).astype(np.float32)
+    relit = [sum(np.float32(row[c]) * far[..., c] for c in range(3)) for row in sky.relight]
+    covered = np.where(elevation < 0, np.float32(snow), np.float32(0))[:, None, None]
+    ground = (1 - covered) * np.stack(relit, axis=-1) + covered * sky.ground.astype(np.float32)
+    out = air * ground + (1 - air) * sky.airlight.astype(np.float32)
     above = elevation > 0
     cloud = _cloud(elevation[above], environment.shape[1], sky, extinction, p, seed)
     luminance = sum(np.float32(weight) * far[above, :, c] for c, weight in enumerate(LUMINANCE))

@@ -1,5 +1,7 @@
 """The wet road: darker under its film, and a mirror where the film lies over the texture.
 
+Pavement and earth beside it drain: water fills their pores, so that they are darker, but no film stands on them.
+
 Refraction of the texture below shifts it by at most the film depth, about a millimetre, which is under a tenth
 of a pixel at three metres: it is left out.
 """
@@ -12,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.conventions import ROAD_CLASSES
+from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.gbuffer import GBuffer
 from tasks.render.weather.layer import Layer
 from tasks.render.weather.puddles import RoadWaterParameters, water_surface, wetness
@@ -95,7 +97,7 @@ def wet_layer(
     parameters: WetRoadParameters,
     seed: int,
 ) -> Layer:
-    """The water on the road.
+    """The water on the road and on the ground beside it.
 
     Parameters
     ----------
@@ -132,39 +134,50 @@ def wet_layer(
     rough = _column_mean(light, road, round(p.rough_slope * focal_px))
     gain = np.ones((*road.shape, 1), dtype=np.float32)
     add = np.zeros_like(picture)
+    facing = np.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
+    drained = np.where(np.isin(gbuffer.class_id, DRAINED_CLASSES), facing, np.float32(0))
     _wet(
-        picture, road, water.smooth, water.cosine, sharp, rough, wetness(film_depth_mm, p.water),
+        picture, road, drained, water.smooth, water.cosine, sharp, rough, wetness(film_depth_mm, p.water),
         p.water.ripple_slope, p.rough_slope, p.refractive_index, p.diffuse_reflectance,
         LUMINANCE / float(LUMINANCE @ sky.white), gain, add,
     )  # fmt: skip
     return Layer(name="wet", gain=gain, add=add)
 
 
+DRAINED_CLASSES = (SemanticClass.SIDEWALK, SemanticClass.KERB, SemanticClass.TERRAIN)
+"""Rough ground with pores that water runs off."""
+STEEPEST_SOAKED = 0.5
+"""Upward part of a normal from which on ground is soaked through: 60 deg steep, it still gets half the rain [1]."""
 ALBEDO_RANGE = (0.02, 0.9)
 """Reflectances that a road's own paint and stone can have; beyond them it is the light that was misread."""
 
 
 @numba.njit(cache=True, nogil=True)
 def _wet(  # type: ignore[no-untyped-def]
-    picture, road, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse, to_albedo, gain, add,
+    picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
+    to_albedo, gain, add,
 ):  # fmt: skip
     """Mirror lobes of smooth water and of wet texture over the darkened road.
 
     Facets tilted towards the eye meet its line of sight more steeply than the mean surface: a lobe of slope s
-    reflects as a mirror does at the cosine sqrt(cos^2 + s^2).
+    reflects as a mirror does at the cosine sqrt(cos^2 + s^2). Drained ground is as wet as it faces the rain.
     """
     for row in range(road.shape[0]):
         for column in range(road.shape[1]):
-            if not road[row, column]:
+            soaked = wet if road[row, column] else wet * drained[row, column]
+            if soaked <= 0:
                 continue
-            share, steep = smooth[row, column], cosine[row, column] ** 2
-            mirror = share * fresnel_reflectance(min(1.0, sqrt(steep + ripple_slope**2)), index)
-            sheen = (wet - share) * fresnel_reflectance(min(1.0, sqrt(steep + rough_slope**2)), index)
             albedo = 0.0
             for c in range(3):
                 albedo += to_albedo[c] * picture[row, column, c]
             albedo = min(max(albedo, ALBEDO_RANGE[0]), ALBEDO_RANGE[1])
-            darker = 1 - wet * (1 - wet_albedo_ratio(albedo, index, diffuse))
+            darker = 1 - soaked * (1 - wet_albedo_ratio(albedo, index, diffuse))
+            if not road[row, column]:
+                gain[row, column, 0] = darker
+                continue
+            share, steep = smooth[row, column], cosine[row, column] ** 2
+            mirror = share * fresnel_reflectance(min(1.0, sqrt(steep + ripple_slope**2)), index)
+            sheen = (wet - share) * fresnel_reflectance(min(1.0, sqrt(steep + rough_slope**2)), index)
             gain[row, column, 0] = (1 - mirror - sheen) * darker
             for c in range(3):
                 add[row, column, c] = mirror * sharp[row, column, c] + sheen * rough[row, column, c]

@@ -90,6 +90,19 @@ def test_what_stands_dark_against_the_clear_sky_stays_and_fades(parameters, sky,
     assert hill == pytest.approx((1 - through) * sky.airlight, rel=0.1)
 
 
+def test_ground_below_the_horizon_is_as_near_as_the_eye_is_high_and_white_under_snow(parameters, sky, air):
+    """Straight down it lies at 1.4 m, through air that takes under half a percent; far fog is no ground."""
+    dark = np.where(np.arange(64)[:, None, None] < 32, clear_sky(64), np.float32(0))
+    bare = overcast_environment(dark, sky, air.extinction, parameters.sky, 1)
+    assert bare[-1].max() < 0.01 * sky.airlight.max()
+    down = np.sin((np.arange(33, 64) + 0.5 - 32) / 64 * np.pi)
+    through = np.exp(-air.extinction * 1.4 / down)
+    np.testing.assert_allclose(bare[33:, 0], np.outer(1 - through, sky.airlight), rtol=1e-3)
+    white = overcast_environment(dark, sky, air.extinction, parameters.sky, 1, snow=1.0)
+    np.testing.assert_allclose(white[-1, 0], sky.ground, rtol=0.05)
+    np.testing.assert_array_equal(white[:32], bare[:32])
+
+
 def test_panorama_columns_turn_left_from_plus_x():
     panorama = np.zeros((8, 16, 3), np.float32)
     panorama[3:5, 7:9] = (1, 0, 0)

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tasks.conventions import SemanticClass
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.puddles import water_surface, wetness
 from tasks.render.weather.reflection import mirrored_scene
-from tasks.render.weather.sky import sky_light
+from tasks.render.weather.sky import LUMINANCE, sky_light
 from tasks.render.weather.wet_road import fresnel_reflectance, wet_albedo_ratio, wet_layer
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import ASPHALT, flat_gbuffer
@@ -92,6 +93,54 @@ def test_only_the_road_gets_wet(parameters, sky):
     assert np.all(layer.gain[other] == 1)
     assert np.all(layer.add[other] == 0)
     assert np.abs(recompose(picture, [layer])[~other] - picture[~other]).min() > 0
+
+
+def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):
+    """By Lekner and Dorf at their own reflectance; walls, which face no rain, and cars stay as they are."""
+    picture, gbuffer = flat_gbuffer(VIEW)
+    beside = (gbuffer.class_id == SemanticClass.ROAD) & (np.arange(160) > 100)
+    for kind, soaks in (
+        (SemanticClass.SIDEWALK, True),
+        (SemanticClass.TERRAIN, True),
+        (SemanticClass.VEHICLE, False),
+    ):
+        ground = replace(gbuffer, class_id=np.where(beside, np.uint8(kind), gbuffer.class_id))
+        cloudy = np.full((8, 16, 3), 0.9, np.float32)
+        layer = wet_layer(
+            picture, ground, cloudy, sky, 0.0, pixel_rays(VIEW), VIEW.T_world_camera, VIEW.K, 4.0,
+            parameters.wet_road, 1,
+        )  # fmt: skip
+        expected = wet_albedo_ratio(ASPHALT / (LUMINANCE @ sky.white), 1.333, 0.066) if soaks else 1.0
+        assert layer.gain[beside] == pytest.approx(expected, rel=1e-3)
+        assert np.all(layer.add[beside] == 0)
+    standing = replace(ground, class_id=np.where(beside, np.uint8(SemanticClass.KERB), gbuffer.class_id))
+    standing.normal[beside] = (1, 0, 0)
+    upright = wet_layer(
+        picture, standing, cloudy, sky, 0.0, pixel_rays(VIEW), VIEW.T_world_camera, VIEW.K, 4.0,
+        parameters.wet_road, 1,
+    )  # fmt: skip
+    assert np.all(upright.gain[beside] == 1)
+
+
+@pytest.mark.parametrize(("low", "high", "solid"), [(0.35, 1.25, True), (1.2, 1.3, False)])
+def test_no_mirrored_ray_passes_under_a_car_and_comes_out_above_it(low, high, solid):
+    """Something dark hangs 8 m ahead between two heights: road behind it sees past a sign, not past a car."""
+    picture, gbuffer = flat_gbuffer(VIEW)
+    down = np.arange(108)[:, None] + 0.5 - 54.0
+    hangs = (down > 133 * (1.4 - high) / 8) & (down < 133 * (1.4 - low) / 8) & (abs(np.arange(160) - 80) < 30)
+    depth = np.where(hangs, np.float32(8), gbuffer.depth)
+    seen = np.where(hangs[..., None], np.float32(0.02), picture)
+    road = (gbuffer.class_id == SemanticClass.ROAD) & ~hangs
+    sky = np.full((8, 16, 3), 0.9, np.float32)
+    mirrored = mirrored_scene(
+        seen, depth, gbuffer.normal, road, sky, VIEW.T_world_camera, VIEW.K, 0.0, np.ones(3)
+    )
+    behind = road & (depth > 9) & (depth < 11) & (abs(np.arange(160) - 80) < 28)
+    assert behind.sum() > 100
+    if solid:
+        assert mirrored[behind].max() < ASPHALT + 0.01
+    else:
+        assert mirrored[behind].mean() > 0.5
 
 
 def test_the_mirror_takes_and_gives_no_more_than_all_light(parameters, sky):
