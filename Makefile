@@ -13,6 +13,7 @@ $(READY): pyproject.toml
 
 demo: $(READY)
 	$(BIN)/musync generate demo --out $(DEMO)
+	$(BIN)/musync report $(DEMO)
 
 test: $(READY)
 	$(BIN)/python -m pytest

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 TILE_WIDTH, CURVE_WIDTH, MARGIN, CAPTION = 300, 240, 6, 20
 INK, FAINT, PAPER = (40, 40, 40), (200, 200, 200), 250
+FONT = (cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)
+"""Face, scale, thickness."""
 CURVE_COLOURS = {"speed": (30, 90, 200), "pitch": (200, 70, 20)}
 
 Row = tuple[str, Sequence[NDArray[np.uint8]], Mapping[str, NDArray[np.float64]]]
@@ -19,7 +21,7 @@ def contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz: flo
     Parameters
     ----------
     rows : label, pictures uint8 [H, W, 3] at ``frames``, and curves by name (speed [m/s], pitch [rad]) per frame
-    frames : frame numbers of the columns
+    frames : frame numbers of the columns; the first column has the row's label in place of its time
     frame_rate_hz : [Hz]
 
     Returns
@@ -39,10 +41,10 @@ def contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz: flo
             left = j * step_x + MARGIN
             small = cv2.resize(picture, tile, interpolation=cv2.INTER_AREA)
             sheet[top + CAPTION : top + CAPTION + tile[1], left : left + tile[0]] = small
-            caption = (
-                f"{label}   t = {frame / frame_rate_hz:.1f} s" if j == 0 else f"{frame / frame_rate_hz:.1f} s"
-            )
-            _text(sheet, caption, (left, top + CAPTION - 6))
+            caption = label if j == 0 else f"{frame / frame_rate_hz:.1f} s"
+            # a label may be longer than its picture is wide: times stand at the right
+            shift = 0 if j == 0 else tile[0] - cv2.getTextSize(caption, *FONT)[0][0]
+            _text(sheet, caption, (left + shift, top + CAPTION - 6))
         left = len(frames) * step_x + MARGIN
         box = sheet[top + CAPTION : top + CAPTION + tile[1], left : left + CURVE_WIDTH]
         _draw_curves(box, curves, limits)
@@ -116,4 +118,5 @@ def _draw_curves(
 def _text(
     sheet: NDArray[np.uint8], text: str, origin: tuple[int, int], colour: tuple[int, int, int] = INK
 ) -> None:
-    cv2.putText(sheet, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.38, colour, 1, cv2.LINE_AA)
+    face, scale, thickness = FONT
+    cv2.putText(sheet, text, origin, face, scale, colour, thickness, cv2.LINE_AA)
