@@ -10,6 +10,7 @@ from tasks.render.spherical_harmonics import C0
 from tasks.render.weather.coverage_field import FieldParameters, height_field
 from tasks.render.weather.road_anchors import AnchorParameters, road_anchors
 from tasks.render.weather.scene_light import recoloured, to_display_unclipped
+from tasks.render.weather.shelter import open_share
 from tasks.render.weather.snow_field import SnowField, coverage_rank, local_depth_mm, tracks_at
 from tasks.render.weather.wheel_tracks import TrackParameters
 from tasks.scene.gaussians import Gaussians
@@ -18,6 +19,7 @@ EDGE_WIDTHS = 1.4
 """Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
 BURIED = 0.98
 """Share of an anchor that its snow hides from which on the anchor itself need not be drawn."""
+GROUND_CLASSES = (*ROAD_CLASSES, SemanticClass.KERB, SemanticClass.SIDEWALK, SemanticClass.TERRAIN)
 NARROWEST = 0.35
 """Width of the narrowest Gaussian, at the very edge, by that of its anchor."""
 
@@ -167,6 +169,8 @@ def whitened(
 ) -> Gaussians:
     """The scene with snow on everything that faces up, and damp road between the snow.
 
+    What stands on the ground gets as much as reaches it past what hangs above; ground gets it all, drifted there.
+
     The road under the snow layer is whitened too: far away a pixel blends many Gaussians, and dark ones between
     the layer's would show through.
 
@@ -197,7 +201,9 @@ def whitened(
     tracks[road[bears]] = tracks_at(field, x[road[bears]], y[road[bears]])
     xi = coverage_rank(field, x, y, tracks)
     hidden = np.zeros(len(gaussians))
-    hidden[bears] = facing[bears] * hidden_share(local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm), p)
+    reached = np.where(np.isin(gaussians.class_id, GROUND_CLASSES), 1.0, open_share(gaussians))
+    depth = reached[bears] * local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm)
+    hidden[bears] = facing[bears] * hidden_share(depth, p)
     damp = np.where(road, p.damp_albedo_ratio, 1.0)
     even = np.zeros(len(gaussians))
     snow = _snow_colour(even, even, white, p)

@@ -179,6 +179,21 @@ def test_snow_settles_on_what_faces_up_and_leaves_walls_bare(street, parameters)
     assert colours[-1] == pytest.approx(mean_colours(scene)[-1], rel=1e-5)
 
 
+def test_under_a_roof_the_ground_is_white_and_what_stands_on_it_is_bare(street, parameters):
+    x, y = (v.ravel() for v in np.meshgrid(np.arange(4.0, 6.0, 0.05), np.arange(5.0, 7.0, 0.05)))
+    roof = surfels(np.column_stack((x, y, 3.0 + 0 * x)), (0, 0, 1), 0.05, 0.1, SemanticClass.BUILDING)
+    table, ground = (
+        surfels(np.array([[5.0, 6.0, height]]), (0, 0, 1), 0.1, 0.1, kind)
+        for height, kind in ((1.0, SemanticClass.OTHER), (0.1, SemanticClass.SIDEWALK))
+    )
+    scene = appended(appended(appended(street, roof), table), ground)
+    colours = mean_colours(
+        whitened(scene, field_of(scene, parameters), WHITE, 1.0, 30.0, parameters.snow_cover)
+    )
+    assert colours[-1].mean() > 1.0 and colours[len(street)].mean() > 1.0
+    assert colours[-2].mean() < 0.2
+
+
 def test_wheel_tracks_are_covered_last_and_leave_the_share_as_it_is(street, parameters):
     poses = np.tile(np.eye(4), (2, 1, 1))
     poses[1, 0, 3] = 18.0
