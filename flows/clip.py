@@ -237,7 +237,7 @@ def picture(
         frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
         backend=select_backend(plan.backend), relief=relief, to_sun=scene.to_sun,
         labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
-        rig_at=rig_at,
+        rig_at=rig_at, composition=plan.settings.composition,
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from catalogs.cameras import camera_source
+from catalogs.cameras import camera_source, load_camera
 from catalogs.gates import GATES
 from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
 from catalogs.hazard_markings import marking_source
@@ -21,6 +21,7 @@ from manifests.canonical import content_id, sha256_of
 from manifests.explain import input_differences, shown, value_differences
 from manifests.provenance import code_version, library_versions
 from tasks.errors import InputError
+from tasks.render.sensor import Sensor
 
 PLAN_FORMAT = "musync-plan/2"
 
@@ -119,6 +120,8 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
     inputs, scene, problems = _read_entries(settings)
     if scene:
         problems += _route_problems(grid)
+    if "camera.yaml" in inputs:
+        problems += _composition_problems(settings)
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
     hashes = {name: sha256_of([content]) for name, content in inputs.items()}
@@ -129,6 +132,8 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         "vehicle_mode": settings.vehicle_mode,
         "frames": settings.frames,
         "frame_rate_hz": settings.frame_rate_hz,
+        # what is as it was before there was a choice keeps its ids
+        **({} if settings.composition == "linear" else {"composition": settings.composition}),
     }
     clips = tuple(_clip_plans(grid, asked))
     repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()
@@ -258,6 +263,16 @@ def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
             split=split,
             calibration=calibration,
         )
+
+
+def _composition_problems(settings: GridFile) -> list[str]:
+    camera = load_camera(settings.camera)
+    if settings.composition == "linear" or (camera.plain and camera.sensor == Sensor()):
+        return []
+    return [
+        f"composition: paper is one of finished 8-bit pictures; {camera.name} has a lens, a shutter or a sensor that"
+        " needs linear light: take a plain camera or composition: linear"
+    ]
 
 
 def _route_problems(grid: Grid) -> list[str]:

@@ -21,6 +21,7 @@ REACHES = {
     "backend": (RENDER,),
     "parameters": (VEHICLE, RENDER),
     "vehicle_mode": (VEHICLE, RENDER),
+    "composition": (RENDER,),
     "frames": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
     "seed": (RENDER,),
@@ -63,7 +64,7 @@ def input_differences(
             )
     rows += _rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
     rows += _rows("backend", "backend", a["backend"], b["backend"])
-    for name in ("vehicle_mode", "frames", "frame_rate_hz", "seed"):
+    for name in ("vehicle_mode", "composition", "frames", "frame_rate_hz", "seed"):
         rows += _rows(name, name, a["grid"].get(name), b["grid"].get(name))
     return rows + tool_differences(a, b)
 

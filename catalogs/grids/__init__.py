@@ -34,6 +34,10 @@ class GridFile(Blocks):
     visual_seeds: int = Field(
         default=1, ge=1, le=1000, description="Clips of each scenario, with visual seeds from seed upward."
     )
+    composition: Literal["linear", "paper"] = Field(
+        default="linear",
+        description="linear adds up light; paper adds drops and flakes as 8-bit differences (Appendix A.4).",
+    )
     labels: bool = False
     pictures: bool = True
     base: PartialScenario = PartialScenario()

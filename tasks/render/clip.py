@@ -1,5 +1,7 @@
 """A clip's frames, one after the other, from rig poses to finished pictures in their weather."""
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,7 @@ from tasks.render.readout import sensor_field
 from tasks.render.road_edit import Profile, RoadRelief
 from tasks.render.sensor import photographed
 from tasks.render.sight import as_drawn, through_sensor
+from tasks.render.weather.attribution import paper_picture
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter
@@ -36,6 +39,7 @@ def render_clip(
     to_sun: NDArray[np.float64] | None = None,
     labelled: Profile | None = None,
     rig_at: RigAt | None = None,
+    composition: Literal["linear", "paper"] = "linear",
 ) -> dict[str, NDArray[np.generic]]:
     """Render every frame of a clip.
 
@@ -55,6 +59,7 @@ def render_clip(
     to_sun : float64 [3] as in `Scene.to_sun` [1]
     labelled : H_g(s) of the clip; with it the clip gets the labels of `tasks.render.labels` too
     rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
+    composition : ``paper`` finishes pictures as `paper_picture` does, without lens, shutter and sensor
 
     Returns
     -------
@@ -91,8 +96,13 @@ def render_clip(
             seen = as_drawn(*of_frame, labelled is not None)
         else:
             seen = through_sensor(*of_frame, camera, field, T_world_rows[frame], labelled is not None)
+        developed = (
+            paper_picture(finished)
+            if composition == "paper"
+            else encode_8bit(photographed(seen.picture, camera.sensor, seed, frame))
+        )
         buffers: dict[str, NDArray[np.generic]] = {
-            "rgb": encode_8bit(photographed(seen.picture, camera.sensor, seed, frame)),
+            "rgb": developed,
             "depth": round_depth(seen.depth),
             "class": seen.class_id,
         }

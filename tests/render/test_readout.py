@@ -20,6 +20,7 @@ from tasks.render.labels import row_flow
 from tasks.render.lens import Lens, distorted
 from tasks.render.readout import read_out, sensor_field
 from tasks.render.sight import row_points
+from tasks.render.weather.attribution import LAYER_BITS
 from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.scene_light import appended
 from tasks.scene.route import route_from_positions
@@ -283,6 +284,25 @@ def test_with_all_three_off_the_bytes_are_those_of_the_plain_composition(street,
         picture, gbuffer = drawn(street, CAMERA, rig()(k, np.zeros(1))[0] @ CAMERA.T_rig_camera)
         assert made["rgb"][k].tobytes() == encode_8bit(picture).tobytes()
         assert made["class"][k].tobytes() == gbuffer.class_id.tobytes()
+
+
+def test_the_paper_s_composition_changes_only_pixels_of_falling_rain(street, parameters):
+    """Elsewhere the 8-bit difference is none, and the picture is the linear one; dry weather has no particles."""
+    state = WeatherState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263)
+    ours, theirs = (
+        clip(street, CAMERA, parameters, state, composition=name, labelled=lambda s: 0.0 * s)
+        for name in ("linear", "paper")
+    )
+    differs = (ours["rgb"] != theirs["rgb"]).any(axis=-1)
+    assert 0 < differs.mean() < 0.5
+    # a mark says half a grey level on the wet street; the residual is taken off the street before it is wet
+    falls = ours["marks"] & LAYER_BITS["particles"] > 0
+    assert np.abs(ours["rgb"].astype(int) - theirs["rgb"])[~falls].max() <= 4
+    assert ours["marks"].tobytes() == theirs["marks"].tobytes()
+    dry = [
+        clip(street, CAMERA, parameters, composition=name)["rgb"].tobytes() for name in ("linear", "paper")
+    ]
+    assert dry[0] == dry[1]
 
 
 def test_rows_and_blur_are_near_the_renders_that_they_stand_for(street, parameters):

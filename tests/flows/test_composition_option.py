@@ -1,0 +1,27 @@
+"""The grid's choice of composition: part of what decides a clip, and refused where it has no meaning."""
+
+from dataclasses import replace
+
+import pytest
+
+from catalogs.grids import load_grid
+from flows.plan import freeze_grid
+from tasks.errors import InputError
+
+
+def planned(**settings):
+    grid = load_grid("demo")
+    return freeze_grid(replace(grid, settings=grid.settings.model_copy(update=settings)), "demo", "cpu")[0]
+
+
+def test_another_composition_is_another_clip():
+    linear, paper = planned(), planned(composition="paper")
+    assert not {clip.clip_id for clip in linear.clips} & {clip.clip_id for clip in paper.clips}
+    assert [clip.seed for clip in linear.clips] == [clip.seed for clip in paper.clips]
+
+
+@pytest.mark.parametrize("camera", ["dashcam-480x320-rolling", "dashcam-480x320-noisy"])
+def test_8_bit_composition_is_refused_for_a_camera_that_needs_linear_light(camera):
+    planned(camera=camera)
+    with pytest.raises(InputError, match=f"composition: paper .* {camera} .* composition: linear"):
+        planned(camera=camera, composition="paper")
