@@ -1,5 +1,7 @@
 """Which layer changed which pixel, and the composition that the paper used for its particles."""
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from tasks.render.weather.layer import Layer, recompose
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
 from tasks.render.weather.particles import Shutter
 from tasks.render.weather.snow_field import coverage_rank, tracks_at
+from tasks.render.weather.snow_layer import GROUND_CLASSES, steepest_bearing
 
 LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
 """Bit of each layer in an attribution picture."""
@@ -31,7 +34,9 @@ def attribution(
     -------
     uint8 [H, W] bits [1]
     """
-    bits = np.where(snow_on_road(weather, gbuffer, shutter), LAYER_BITS["snow"], 0).astype(np.uint8)
+    bits = np.where(snow_on(GROUND_CLASSES, weather, gbuffer, shutter), LAYER_BITS["snow"], 0).astype(
+        np.uint8
+    )
     picture = frame.base
     for layer in frame.layers:
         after = recompose(picture, (layer,))
@@ -52,11 +57,14 @@ def changed(before: NDArray[np.float32], after: NDArray[np.float32], layer: Laye
     return np.where(step >= 0.5 / 255, LAYER_BITS[layer.name], 0).astype(np.uint8)
 
 
-def snow_on_road(weather: ClipWeather, gbuffer: GBuffer, shutter: Shutter) -> NDArray[np.bool_]:
-    """Road pixels on which snow lies, by the coverage field at the point that the pixel sees.
+def snow_on(
+    classes: Collection[int], weather: ClipWeather, gbuffer: GBuffer, shutter: Shutter
+) -> NDArray[np.bool_]:
+    """Pixels of the ground on which snow lies, by the coverage field at the point that the pixel sees.
 
     Parameters
     ----------
+    classes : which ground
     weather : the clip's weather
     gbuffer : the rasterisation of its scene
     shutter : pose and intrinsics
@@ -68,11 +76,13 @@ def snow_on_road(weather: ClipWeather, gbuffer: GBuffer, shutter: Shutter) -> ND
     mask = np.zeros(gbuffer.depth.shape, dtype=bool)
     if weather.falling is None or weather.falling.snow is None:
         return mask
-    road = np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5)
-    ray = pixel_rays(shutter)[road]
-    place = shutter.T_world_camera[:3, 3] + gbuffer.depth[road, None] * ray
+    road = np.isin(gbuffer.class_id, ROAD_CLASSES)
+    bears = road | (gbuffer.normal[..., 2] > steepest_bearing(weather.parameters.snow_cover))
+    ground = np.isin(gbuffer.class_id, list(classes)) & bears & (gbuffer.alpha > 0.5)
+    place = shutter.T_world_camera[:3, 3] + gbuffer.depth[ground, None] * pixel_rays(shutter)[ground]
     field, x, y = weather.falling.snow, place[:, 0], place[:, 1]
-    mask[road] = coverage_rank(field, x, y, tracks_at(field, x, y)) <= weather.state.snow_coverage
+    tracks = np.where(road[ground], tracks_at(field, x, y), 0.0)
+    mask[ground] = coverage_rank(field, x, y, tracks) <= weather.state.snow_coverage
     return mask
 
 

@@ -191,8 +191,8 @@ def whitened(
     p = parameters
     road = np.isin(gaussians.class_id, ROAD_CLASSES)
     up = np.where(gaussians.class_id == SemanticClass.SKY, 0.0, gaussians.normals[:, 2])
-    limit = np.cos(np.deg2rad(p.anchors.tilt_limit_deg))
-    facing = np.clip((up - limit / 2) / (limit / 2), 0, 1)
+    limit = steepest_bearing(p)
+    facing = np.clip((up - limit) / limit, 0, 1)
     bears = np.flatnonzero(facing > 0)
     place = gaussians.means[bears]
     x, y = place[:, 0], place[:, 1]
@@ -208,6 +208,11 @@ def whitened(
     even = np.zeros(len(gaussians))
     snow = _snow_colour(even, even, white, p)
     return recoloured(gaussians, (1 - hidden) * damp, hidden[:, None] * snow)
+
+
+def steepest_bearing(parameters: SnowCoverParameters) -> float:
+    """Upward part of a normal from which on a surface bears some snow; at twice that it bears all [1]."""
+    return 0.5 * float(np.cos(np.deg2rad(parameters.anchors.tilt_limit_deg)))
 
 
 def _steepness(

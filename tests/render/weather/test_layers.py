@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.conventions import SemanticClass
+from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.render.composition import encode_8bit, to_linear
 from tasks.render.rasteriser import prepare, rasterise
-from tasks.render.weather.attribution import LAYER_BITS, attribution, paper_picture, snow_on_road
+from tasks.render.weather.attribution import LAYER_BITS, attribution, paper_picture, snow_on
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.scene_light import appended, to_display_unclipped
+from tasks.render.weather.snow_layer import GROUND_CLASSES
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import clear_sky, road, surfels
 
@@ -98,7 +99,7 @@ def test_severity_is_ordered(street, parameters):
     masks = []
     for state in SNOW.values():
         weather, _, gbuffer, view = frame(street, state, parameters)
-        masks.append(snow_on_road(weather, gbuffer, view))
+        masks.append(snow_on(ROAD_CLASSES, weather, gbuffer, view))
     road = (gbuffer.class_id == SemanticClass.ROAD) & (gbuffer.alpha > 0.5)
     assert masks[0].sum() < masks[1].sum() < masks[2].sum()
     assert np.array_equal(masks[3], road)
@@ -131,6 +132,20 @@ def test_attribution_names_the_layers_that_changed_a_pixel(street, parameters):
     white = drawn.base[..., 0] > 0.6
     on_road = gbuffer.class_id == SemanticClass.ROAD
     assert (snow == white)[on_road].mean() > 0.8
+
+
+def test_the_mark_of_snow_is_on_level_ground_beside_the_road_too(street, parameters):
+    weather, _, gbuffer, view = frame(street, SNOW[1], parameters)
+    road = gbuffer.class_id == SemanticClass.ROAD
+    left = road & (np.arange(144) < 72)
+    pavement = np.where(left, np.uint8(SemanticClass.SIDEWALK), gbuffer.class_id)
+    beside = replace(gbuffer, class_id=pavement)
+    assert np.array_equal(
+        snow_on(GROUND_CLASSES, weather, beside, view), snow_on(ROAD_CLASSES, weather, gbuffer, view)
+    )
+    assert not snow_on(ROAD_CLASSES, weather, beside, view)[left].any()
+    upright = replace(beside, normal=np.where(left[..., None], np.float32((1, 0, 0)), gbuffer.normal))
+    assert not snow_on(GROUND_CLASSES, weather, upright, view)[left].any()
 
 
 def test_the_paper_s_composition_adds_the_residual_of_8_bit_pictures(street, parameters):

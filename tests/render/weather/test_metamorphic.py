@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tasks.conventions import SemanticClass
+from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.composition import compose, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.labels import forward_flow
 from tasks.render.rasteriser import prepare, rasterise
 from tasks.render.weather.atmosphere import air_layer, light_layer, precipitating_air
-from tasks.render.weather.attribution import snow_on_road
+from tasks.render.weather.attribution import snow_on
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import apply_weather, pixel_rays, weather_scene
 from tasks.render.weather.parameters import WeatherState
@@ -77,7 +77,7 @@ def test_snow_that_covers_more_leaves_no_covered_pixel_bare(street, parameters):
     for coverage in (0.1, 0.3, 0.6, 0.9):
         weather, _, _, view = rendered(street, replace(SNOW, snow_coverage=coverage), parameters)
         # the same pixels' points, or the snow's own height would shift them
-        masks.append(snow_on_road(weather, flat_gbuffer(view)[1], view))
+        masks.append(snow_on(ROAD_CLASSES, weather, flat_gbuffer(view)[1], view))
     for less, more in pairwise(masks):
         assert not (less & ~more).any()
         assert more.sum() > less.sum()
