@@ -13,7 +13,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.driving import controls_of, hazard_of, weather_of
 from flows.plan import read_plan
-from flows.store.address import reading
+from flows.store.address import reading, telemetry
 from flows.store.layout import write_atomically, write_json
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
@@ -45,7 +45,7 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
     InputError
         The folder is no sealed dataset, or has no such clip or frame.
     """
-    layout = reading(dataset)
+    layout = reading(dataset, telemetry)
     manifest, plan = read_manifest(layout), read_plan(layout.root)
     chosen = [c for c in plan.clips if clip in (c.clip_id, c.label)]
     problems = []

@@ -1,7 +1,8 @@
-"""Datasets made again and again: a dated folder a run, an unfinished one resumed, a report where one fails."""
+"""Datasets made again and again: a dated place a run, an unfinished one resumed, parameters checked beforehand."""
 
 import json
 import os
+import re
 import shlex
 import shutil
 import socket
@@ -15,19 +16,19 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, get_args
 
+from flows.failure_report import is_webhook, stamp
 from flows.generate import generate
-from flows.plan import make_plan, read_plan
+from flows.plan import make_plan
 from flows.runner import RunnerName
-from flows.store.layout import Layout, read_json, write_atomically
+from flows.store.layout import Layout, read_json
+from flows.store.objects import Objects, is_address
 from tasks.errors import InputError
 
 SERVER_START_S = 120.0
-NOTIFY_TIMEOUT_S = 60.0
-REPORTS = "reports"
 
 
-def dataset_folder(grid: str, root: Path, backend: str, at: datetime) -> Path:
-    """Where a run at that time writes: the latest unfinished dataset of the same plan, or a new dated folder.
+def dataset_place(grid: str, root: str, backend: str, at: datetime) -> str:
+    """Where a run at that time writes: the latest unfinished dataset of the same plan, or a new dated one.
 
     An unfinished dataset of another plan (the grid, the catalogue or the code has changed since) is left alone: its
     clips could not be mixed with those made now.
@@ -35,7 +36,7 @@ def dataset_folder(grid: str, root: Path, backend: str, at: datetime) -> Path:
     Parameters
     ----------
     grid : grid file or name
-    root : folder of all datasets of the schedule
+    root : folder of all datasets of the schedule, or address in an object store
     backend : rasteriser
     at : scheduled time of the run
     """
@@ -43,15 +44,28 @@ def dataset_folder(grid: str, root: Path, backend: str, at: datetime) -> Path:
 
     plan, _ = make_plan(grid, select_backend(backend).name)
     name = plan.settings.name
-    for folder in sorted(root.glob(f"{name}-[0-9]*"), reverse=True):
+    begun = _begun_in_store if is_address(root) else _begun_in_folder
+    for place, run_id in begun(root, re.compile(rf"{re.escape(name)}-\d{{8}}T\d{{6}}Z")):
+        if run_id == plan.run_id:
+            return place
+    return f"{root}/{name}-{stamp(at)}"
+
+
+def _begun_in_folder(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, str]]:
+    """Unfinished datasets and their run ids, the latest first."""
+    folders = [path for path in Path(root).glob("*") if dated.fullmatch(path.name)]
+    for folder in sorted(folders, reverse=True):
         layout = Layout(folder)
-        if (
-            layout.plan.is_file()
-            and not layout.manifest.is_file()
-            and read_plan(folder).run_id == plan.run_id
-        ):
-            return folder
-    return root / f"{name}-{at.astimezone(UTC):%Y%m%dT%H%M%SZ}"
+        if layout.plan.is_file() and not layout.manifest.is_file():
+            yield str(folder), read_json(layout.plan)["run_id"]
+
+
+def _begun_in_store(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, str]]:
+    for name in sorted(filter(dated.fullmatch, Objects(root).folders()), reverse=True):
+        objects = Objects(f"{root}/{name}")
+        plan = objects.read("plan.json")
+        if plan is not None and objects.tag("manifest.json") is None:
+            yield objects.address, json.loads(plan)["run_id"]
 
 
 def scheduled_run(
@@ -68,18 +82,18 @@ def scheduled_run(
 
     Parameters
     ----------
-    grid, root, at, backend : as for `dataset_folder`
+    grid, root, at, backend : as for `dataset_place`
     runner, workers, scheduler : as for generating
 
     Returns
     -------
     ``dataset``, ``run_id``, ``clips``, ``made``, ``contact_sheet`` and ``verdicts[]``.
     """
-    folder = dataset_folder(grid, Path(root), backend, at)
-    report = generate(grid, str(folder), runner=runner, workers=workers, scheduler=scheduler, backend=backend)
+    place = dataset_place(grid, root, backend, at)
+    report = generate(grid, place, runner=runner, workers=workers, scheduler=scheduler, backend=backend)
     clips = read_json(report.layout.manifest)["clips"]
     return {
-        "dataset": str(report.layout.root),
+        "dataset": str(report.layout),
         "run_id": report.run_id,
         "clips": report.clips,
         "made": report.made,
@@ -97,57 +111,22 @@ def scheduled_run(
     }
 
 
-def report_failure(grid: str, root: str, at: datetime, error: BaseException, notify: str | None) -> Path:
-    """Write what went wrong for people, and tell the notification hook; returns the report.
-
-    Parameters
-    ----------
-    grid, root, at : of the run
-    error : what ended it
-    notify : shell-like command, which gets the report's path as its last argument, or an http(s) address, which
-        gets JSON; a hook that fails is noted in the report
-    """
-    path = Path(root) / REPORTS / f"{at.astimezone(UTC):%Y%m%dT%H%M%SZ}.txt"
-    facts = {
-        "what": "a scheduled muSync run failed",
-        "grid": grid,
-        "root": root,
-        "scheduled": at.astimezone(UTC).isoformat(),
-        "error": f"{type(error).__name__}: {error}",
-        "next": "committed clips are kept; the next run of the schedule makes what is missing",
-    }
-    text = "".join(f"{key}: {value}\n" for key, value in facts.items())
-    write_atomically(path, text.encode())
-    if notify is not None:
-        try:
-            _notify(notify, path, facts)
-        except (OSError, subprocess.SubprocessError) as fault:
-            write_atomically(path, (text + f"notification {notify} failed: {fault}\n").encode())
-    return path
-
-
-def _notify(notify: str, report: Path, facts: dict[str, str]) -> None:
-    if _is_webhook(notify):
-        body = json.dumps(facts | {"report": str(report)}).encode()
-        request = urllib.request.Request(notify, body, {"Content-Type": "application/json"})
-        urllib.request.urlopen(request, timeout=NOTIFY_TIMEOUT_S).close()
-    else:
-        subprocess.run([*shlex.split(notify), str(report)], check=True, timeout=NOTIFY_TIMEOUT_S)
-
-
-def _is_webhook(notify: str) -> bool:
-    return notify.startswith(("http://", "https://"))
-
-
 def checked_parameters(
-    grid: str, every: str, out: str, runner: str, workers: int | None, notify: str | None
+    grid: str,
+    every: str,
+    out: str,
+    runner: str,
+    workers: int | None,
+    notify: str | None,
+    scheduler: str | None = None,
 ) -> dict[str, Any]:
     """The parameters of a schedule's runs, with every fault found now and not at three in the morning.
 
     Raises
     ------
     InputError
-        Listing what is wrong with the grid, the cron expression, the folder, the runner and the hook.
+        Listing what is wrong with the grid, the cron expression, the folder or address, the runner, the scheduler and
+        the hook.
     """
     from cronsim import CronSim, CronSimError
 
@@ -160,20 +139,43 @@ def checked_parameters(
         make_plan(grid, "cpu")
     except InputError as error:
         problems += error.problems
-    root = Path(out).resolve()
-    nearest = next(folder for folder in (root, *root.parents) if folder.exists())
-    if not nearest.is_dir() or not os.access(nearest, os.W_OK):
-        problems.append(f"--out {out}: must be a folder that can be written; {nearest} cannot")
+    root = out.rstrip("/") if is_address(out) else str(Path(out).resolve())
+    problems += _place_problems(out)
     if runner not in get_args(RunnerName):
         problems.append(f"--runner must be one of {', '.join(get_args(RunnerName))}; it is {runner}")
-    if notify is not None and not _is_webhook(notify):
+    if scheduler is not None and runner != "dask":
+        problems.append(f"--scheduler {scheduler} belongs to --runner dask; the runner is {runner}")
+    if scheduler is not None and not re.fullmatch(r"(tcp|tls)://[^/]+:\d+", scheduler):
+        problems.append(f"--scheduler must be like tcp://host:8786 or tls://host:8786; it is {scheduler!r}")
+    if notify is not None and not is_webhook(notify):
         words = shlex.split(notify)
         if not words or shutil.which(words[0]) is None:
             problems.append(f"--notify must be an http(s) address or a command that exists; it is {notify!r}")
     if problems:
         raise InputError(problems)
     source = str(Path(grid).resolve()) if Path(grid).suffix in {".yaml", ".yml"} else grid
-    return {"grid": source, "root": str(root), "runner": runner, "workers": workers, "notify": notify}
+    return {
+        "grid": source,
+        "root": root,
+        "runner": runner,
+        "workers": workers,
+        "scheduler": scheduler,
+        "notify": notify,
+    }
+
+
+def _place_problems(out: str) -> list[str]:
+    if is_address(out):
+        try:
+            Objects(out).folders()
+        except InputError as error:
+            return [f"--out {problem}" for problem in error.problems]
+        return []
+    root = Path(out).resolve()
+    nearest = next(folder for folder in (root, *root.parents) if folder.exists())
+    if nearest.is_dir() and os.access(nearest, os.W_OK):
+        return []
+    return [f"--out {out}: must be a folder that can be written; {nearest} cannot"]
 
 
 def schedule(
@@ -183,6 +185,7 @@ def schedule(
     out: str,
     runner: str = "dask",
     workers: int | None = None,
+    scheduler: str | None = None,
     notify: str | None = None,
 ) -> None:
     """Serve the generating flow on a schedule from this process, until it is stopped.
@@ -193,8 +196,8 @@ def schedule(
     ----------
     grid : grid file or name
     every : cron expression, UTC
-    out : folder in which each run makes its dated dataset
-    runner, workers : as for generating
+    out : folder, or address in an object store, in which each run makes its dated dataset
+    runner, workers, scheduler : as for generating
     notify : command or http(s) address that is told of a failed run
 
     Raises
@@ -202,8 +205,9 @@ def schedule(
     InputError
         Listing every parameter that is wrong.
     """
-    parameters = checked_parameters(grid, every, out, runner, workers, notify)
-    Path(parameters["root"]).mkdir(parents=True, exist_ok=True)
+    parameters = checked_parameters(grid, every, out, runner, workers, notify, scheduler)
+    if not is_address(out):
+        Path(out).mkdir(parents=True, exist_ok=True)
     with _prefect_api():
         from flows.prefect_schedule import serve
 

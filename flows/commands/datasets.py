@@ -56,12 +56,15 @@ def generate(
         "clips": report.clips,
         "made": report.made,
         "quarantined": report.quarantined,
-        "dataset": str(layout.root),
+        "dataset": str(layout),
         "manifest": str(layout.manifest),
         "contact_sheet": str(sheet) if sheet.is_file() else None,
     }
     if differing is not None:
         facts |= {"reproduced": report.clips - len(differing), "telemetry_differs": differing}
+    if not as_json and report.quarantined:
+        rows = report.quarantined.items()
+        facts["quarantined"] = [{"clip": label, "why": "; ".join(reasons)} for label, reasons in rows]
     show(facts, as_json)
     if differing:
         raise typer.Exit(CHECK_FAILED)
@@ -86,15 +89,19 @@ def freeze(
 def schedule(
     grid: Annotated[str, typer.Argument(help="Grid file, or the name of one that ships.")],
     every: Annotated[str, typer.Option(help='Cron expression, UTC: "0 3 * * *" is every night at three.')],
-    out: Annotated[str, typer.Option(help="Folder in which each run makes its dated dataset.")],
+    out: Annotated[
+        str, typer.Option(help="Folder or s3:// address in which each run makes its dated dataset.")
+    ],
     runner: Runner = "dask",
     workers: Workers = None,
+    scheduler: Scheduler = None,
     notify: Annotated[
         str | None, typer.Option(help="Command or http(s) address that is told of a failed run.")
     ] = None,
 ) -> None:
     """Make a dataset of a grid again and again, as a Prefect deployment served from this process."""
-    call("schedule", False, grid, every=every, out=out, runner=runner, workers=workers, notify=notify)
+    call("schedule", False, grid, every=every, out=out, runner=runner, workers=workers,
+        scheduler=scheduler, notify=notify)  # fmt: skip
 
 
 @app.command()

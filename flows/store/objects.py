@@ -68,6 +68,12 @@ class Objects:
         with self._explained():
             return {entry["path"]: entry["size"] for chunk in self._api.list(self._store) for entry in chunk}
 
+    def folders(self) -> list[str]:
+        """First parts of the names that have more than one, as a listing of folders would show them."""
+        with self._explained():
+            found = self._api.list_with_delimiter(self._store)["common_prefixes"]
+        return sorted(PurePosixPath(name).name for name in found)
+
     def read(self, name: str) -> bytes | None:
         """An object's bytes; None where there is none."""
         with self._explained():

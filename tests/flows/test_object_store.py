@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,12 @@ import musync
 from flows.audit import audit
 from flows.clip import make_clip
 from flows.describe import describe
+from flows.explain import explain
+from flows.failure_report import report_failure
 from flows.generate import generate, prepare
 from flows.query import sql
 from flows.repair import repair
+from flows.scheduling import checked_parameters, dataset_place, scheduled_run
 from flows.store.address import reading, resumable, working
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
@@ -77,6 +81,7 @@ def test_it_is_audited_and_questions_bring_no_frames(stored, machine, toy_datase
     query = "SELECT label, max(pitch) AS pitch FROM ticks GROUP BY label ORDER BY label"
     assert sql(stored, query) == sql(str(toy_dataset.root), query)
     assert describe(stored) == describe(str(toy_dataset.root))
+    assert explain(stored, "dry/hump", 4)["agrees"]
     here = [
         path for path in (tmp_path / "cache").rglob("*") if path.is_file() and "frames.zarr" in path.parts
     ]
@@ -188,6 +193,25 @@ def test_what_a_killed_run_left_in_the_store_is_collected(stored, machine):
     objects.write(".staging/abc.json", b"{}")
     assert len(gc(stored)["removed"]) == 1
     assert not [name for name in objects.sizes() if name.startswith(".staging/")]
+
+
+def test_a_schedule_writes_dated_datasets_to_a_store_resumes_there_and_reports_there(
+    machine, grid, tmp_path, monkeypatch
+):
+    root, at = "s3://data/nightly", datetime(2026, 3, 1, 3, tzinfo=UTC)
+    monkeypatch.chdir(tmp_path)
+    assert checked_parameters(grid, "0 3 * * *", f"{root}/", "threads", 1, None)["root"] == root
+    with pytest.raises(InputError, match="--out s3://nowhere/nightly: the bucket does not exist"):
+        checked_parameters(grid, "0 3 * * *", "s3://nowhere/nightly", "threads", 1, None)
+    with working(f"{root}/toy-20260301T030000Z", resumable) as layout:
+        prepare(grid, layout, "cpu")
+    run = scheduled_run(grid, root, at=at + timedelta(days=1), runner="threads", workers=1)
+    assert (run["dataset"], run["made"]) == (f"{root}/toy-20260301T030000Z", 4)
+    assert dataset_place(grid, root, "cpu", at + timedelta(days=2)) == f"{root}/toy-20260303T030000Z"
+    report = report_failure("toy", root, at, RuntimeError("no luck"), None)
+    assert report.is_relative_to(tmp_path)
+    assert Objects(root).read("reports/20260301T030000Z.txt") == report.read_bytes()
+    assert not (tmp_path / "s3:").exists()
 
 
 def test_faults_of_the_store_are_one_sentence_each(server, machine, grid, monkeypatch):

@@ -9,8 +9,9 @@ import pytest
 
 import flows.generate
 from flows.clip import make_clip
+from flows.failure_report import report_failure
 from flows.failures import ClipsFailed
-from flows.scheduling import checked_parameters, report_failure, scheduled_run
+from flows.scheduling import checked_parameters, scheduled_run
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -100,10 +101,13 @@ def test_a_hook_that_fails_is_noted_and_does_not_hide_the_failure(tmp_path):
 def test_everything_wrong_with_a_schedule_is_told_when_it_is_made(tmp_path):
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(InputError) as caught:
-        checked_parameters("nowhere", "every night", str(tmp_path / "taken"), "fish", None, "no-such-command")
+        checked_parameters(
+            "nowhere", "every night", str(tmp_path / "taken"), "fish", None, "no-such-command", "cluster"
+        )
     text = str(caught.value)
-    assert len(caught.value.problems) == 5
-    for word in ("--every", "nowhere: no such grid", "--out", "--runner", "--notify"):
+    assert len(caught.value.problems) == 7
+    for word in ("--every", "nowhere: no such grid", "--out", "--runner", "--scheduler cluster belongs to",
+                 "--scheduler must be like tcp://host:8786", "--notify"):  # fmt: skip
         assert word in text
 
 

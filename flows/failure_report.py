@@ -1,0 +1,73 @@
+"""What a scheduled run that failed leaves for people: a report, and word to a command or a webhook."""
+
+import json
+import shlex
+import subprocess
+import urllib.request
+from datetime import UTC, datetime
+from pathlib import Path
+
+from flows.store.layout import write_atomically
+from flows.store.objects import Objects, is_address
+from tasks.errors import InputError
+
+NOTIFY_TIMEOUT_S = 60.0
+REPORTS = "reports"
+LOCAL = Path(".musync")
+"""Under the working folder: where reports lie of a schedule that writes to an object store."""
+
+
+def report_failure(grid: str, root: str, at: datetime, error: BaseException, notify: str | None) -> Path:
+    """Write what went wrong for people, and tell the notification hook; returns the report.
+
+    Under an address in an object store the report is an object too, and the file lies under the working folder.
+
+    Parameters
+    ----------
+    grid, root, at : of the run
+    error : what ended it
+    notify : shell-like command, which gets the report's path as its last argument, or an http(s) address, which
+        gets JSON; a hook that fails is noted in the report
+    """
+    path = (LOCAL if is_address(root) else Path(root)).resolve() / REPORTS / f"{stamp(at)}.txt"
+    facts = {
+        "what": "a scheduled muSync run failed",
+        "grid": grid,
+        "root": root,
+        "scheduled": at.astimezone(UTC).isoformat(),
+        "error": f"{type(error).__name__}: {error}",
+        "next": "committed clips are kept; the next run of the schedule makes what is missing",
+    }
+    text = "".join(f"{key}: {value}\n" for key, value in facts.items())
+    write_atomically(path, text.encode())
+    if notify is not None:
+        try:
+            _notify(notify, path, facts)
+        except (OSError, subprocess.SubprocessError) as fault:
+            text += f"notification {notify} failed: {fault}\n"
+            write_atomically(path, text.encode())
+    if is_address(root):
+        try:
+            Objects(root).write(f"{REPORTS}/{path.name}", text.encode())
+        except InputError as fault:  # the store may be what failed
+            write_atomically(path, f"{text}the report could not be sent: {fault}\n".encode())
+    return path
+
+
+def _notify(notify: str, report: Path, facts: dict[str, str]) -> None:
+    if is_webhook(notify):
+        body = json.dumps(facts | {"report": str(report)}).encode()
+        request = urllib.request.Request(notify, body, {"Content-Type": "application/json"})
+        urllib.request.urlopen(request, timeout=NOTIFY_TIMEOUT_S).close()
+    else:
+        subprocess.run([*shlex.split(notify), str(report)], check=True, timeout=NOTIFY_TIMEOUT_S)
+
+
+def is_webhook(notify: str) -> bool:
+    """Whether a hook is an address that is posted to, and not a command."""
+    return notify.startswith(("http://", "https://"))
+
+
+def stamp(at: datetime) -> str:
+    """A time as names of datasets and reports carry it: UTC, to the second."""
+    return f"{at.astimezone(UTC):%Y%m%dT%H%M%SZ}"
