@@ -1,4 +1,4 @@
-"""Two sheets of stills: the same place in every weather, and a road feature before, at and after contact."""
+"""Two sheets of stills: the same place in every weather; a road feature before, at and after contact, and its twin."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -47,7 +47,7 @@ def sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
             [_still(layout, clip, station, clip["label"]) for clip in row]
             for row in spread(weathers, PREVIEW_CLIPS)
         ],
-        "hazards": [_contact(layout, clip) for clip in hazards],
+        "hazards": [_contact(layout, clip, clips) for clip in hazards],
     }
     if not any(drawn.values()):
         raise InputError(f"{dataset}: must have two weathers of one drive, or a road feature; it has neither")
@@ -69,11 +69,29 @@ def _by_everything_but_weather(clips: list[dict[str, Any]]) -> list[list[dict[st
     return list(groups.values())
 
 
-def _contact(layout: Layout, clip: Mapping[str, Any]) -> list[Picture]:
+def _contact(layout: Layout, clip: Mapping[str, Any], clips: list[dict[str, Any]]) -> list[Picture]:
+    """Before, at and after contact; beside them the place before contact on the flat twin, where there is one."""
     scenario = clip["scenario"]
     half, center = scenario["hazard_length_m"] / 2, scenario["hazard_center_m"]
     places = {clip["label"]: center - half - BEFORE_M, "contact": center, "after": center + half + AFTER_M}
-    return [_still(layout, clip, place, caption) for caption, place in places.items()]
+    stills = [_still(layout, clip, place, caption) for caption, place in places.items()]
+    twins = [other for other in clips if is_flat_twin(other, clip)]
+    return stills + [_still(layout, twin, center - half - BEFORE_M, twin["label"]) for twin in twins[:1]]
+
+
+def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
+    """Whether a clip is another's flat control: the same drive, weather and seed, without the road feature.
+
+    Parameters
+    ----------
+    other, clip : rows of a manifest's ``clips``
+    """
+    same = all(
+        other["scenario"][key] == value
+        for key, value in clip["scenario"].items()
+        if not key.startswith("hazard_")
+    )
+    return same and other["seed"] == clip["seed"] and not other["scenario"]["hazard_height_m"]
 
 
 def _still(layout: Layout, clip: Mapping[str, Any], station: float, caption: str) -> Picture:

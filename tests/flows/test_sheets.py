@@ -3,7 +3,7 @@
 import cv2
 import pytest
 
-from flows.sheets import sheets
+from flows.sheets import is_flat_twin, sheets
 from tasks.errors import InputError
 from tasks.render.contact_sheet import CAPTION, MARGIN, TILE_WIDTH
 
@@ -16,6 +16,19 @@ def test_sheets_have_a_row_a_drive_and_a_row_a_feature(toy_dataset, tmp_path):
     # two drives in two weathers; two clips with a hump, three moments each
     assert weather.shape[:2] == (2 * row + MARGIN, 2 * column + MARGIN)
     assert hazards.shape[:2] == (2 * row + MARGIN, 3 * column + MARGIN)
+
+
+def test_a_flat_twin_is_the_same_drive_weather_and_seed_without_the_feature():
+    flat, hump = (
+        {"seed": "7", "scenario": {"weather": "dry", "initial_speed_km_h": 40, "hazard_center_m": center,
+                                   "hazard_height_m": height}}
+        for center, height in ((0, 0.0), (4, 0.075))
+    )  # fmt: skip
+    assert is_flat_twin(flat, hump)
+    assert not is_flat_twin(hump, hump)
+    assert not is_flat_twin(flat | {"seed": "8"}, hump)
+    for other in ({"weather": "rain"}, {"initial_speed_km_h": 60}):
+        assert not is_flat_twin(flat | {"scenario": flat["scenario"] | other}, hump)
 
 
 def test_a_folder_that_is_no_dataset_is_named(tmp_path):
