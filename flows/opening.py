@@ -15,6 +15,7 @@ from flows.query import VIEWS, connect_sealed, schema
 from flows.store.address import frames_store, reading, telemetry
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
+from tasks.conventions import CHANNELS_BY_NAME
 from tasks.errors import InputError
 
 if TYPE_CHECKING:  # each takes its time to import, and few people need all of them
@@ -115,7 +116,7 @@ class Dataset:
         return zarr.open_group(frames_store(Layout(self.root, self.origin)), mode="r")
 
     def xarray(self) -> Any:
-        """The frames as a lazy xarray dataset with named dimensions; needs the package xarray.
+        """The frames as a lazy xarray dataset, its clips by label and its frames with their time; needs xarray.
 
         Raises
         ------
@@ -126,7 +127,20 @@ class Dataset:
             import xarray
         except ImportError:
             raise InputError("xarray is not installed: pip install 'musync[analysts]'") from None
-        return xarray.open_zarr(frames_store(Layout(self.root, self.origin)), consolidated=False, chunks=None)
+        pixels = xarray.open_zarr(
+            frames_store(Layout(self.root, self.origin)), consolidated=False, chunks=None
+        )
+        clips, time = self.manifest["clips"], CHANNELS_BY_NAME["t_ns"]
+        seconds = [frame / self.manifest["grid"]["frame_rate_hz"] for frame in range(pixels.sizes["frame"])]
+        return pixels.assign_coords(
+            clip=[clip["label"] for clip in clips],
+            clip_id=("clip", [clip["clip_id"] for clip in clips]),
+            t=(
+                "frame",
+                seconds,
+                {"standard_name": time.standard_name, "long_name": time.description, "units": "s"},
+            ),
+        )
 
     def torch(
         self,
@@ -145,7 +159,7 @@ class Dataset:
         window : frames in one sample [1]
         stride : frames from the start of one window to the next in a clip; None takes ``window`` [1]
         columns : numeric columns of the frame table
-        arrays : of rgb, depth and class; empty for telemetry alone
+        arrays : of rgb, depth, class and the labels that the grid asked for; empty for telemetry alone
         clips : labels or ids; None takes all that are not in quarantine
         quarantined : take those too; else a warning names them and ``left_out`` holds their labels
         """

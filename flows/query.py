@@ -8,6 +8,7 @@ import duckdb
 import pyarrow.parquet as pq
 
 from flows.store.address import reading, telemetry
+from flows.store.arrays import arrays_of
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
 from tasks.conventions import (
@@ -113,6 +114,8 @@ def sql(dataset: str, query: str) -> dict[str, Any]:
 def schema(of: Literal["views", "grid"] = "views") -> dict[str, Any]:
     """Every view's columns: name, unit, paper symbol, CF standard name and description, from the one table.
 
+    The key ``arrays`` holds those of the frames: type and dimensions too.
+
     Parameters
     ----------
     of : ``grid`` gives the JSON Schema of a grid file instead
@@ -121,18 +124,23 @@ def schema(of: Literal["views", "grid"] = "views") -> dict[str, Any]:
         from catalogs.grids.schema import grid_schema
 
         return grid_schema()
-    return {
-        view: [
-            {
-                "name": channel.name,
-                "unit": channel.unit,
-                "symbol": channel.symbol,
-                "standard_name": channel.standard_name,
-                "description": channel.description,
-            }
-            for channel in channels
+    views = {view: [_meaning(channel) for channel in channels] for view, channels in VIEWS.items()}
+    return views | {
+        "arrays": [
+            _meaning(array.channel)
+            | {"dtype": array.dtype, "dimensions": ["clip", "frame", "y", "x", *array.dimensions]}
+            for array in arrays_of(labels=True).values()
         ]
-        for view, channels in VIEWS.items()
+    }
+
+
+def _meaning(channel: Channel) -> dict[str, Any]:
+    return {
+        "name": channel.name,
+        "unit": channel.unit,
+        "symbol": channel.symbol,
+        "standard_name": channel.standard_name,
+        "description": channel.description,
     }
 
 

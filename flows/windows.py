@@ -12,7 +12,7 @@ import torch
 import zarr
 from torch.utils.data import Dataset, Sampler
 
-from flows.store.arrays import ARRAYS
+from flows.store.arrays import arrays_of
 from flows.store.layout import Layout
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
@@ -123,7 +123,7 @@ def windows_of(
     ]
     files = sorted((layout.telemetry / "frames").glob("*/*.parquet"))
     known = {f.name for f in pq.read_schema(files[0]) if str(f.type) in {"double", "int64", "bool"}}
-    stored = {name for name in ARRAYS if (layout.frames / name).is_dir()}
+    stored = {name for name in arrays_of(labels=True) if (layout.frames / name).is_dir()}
     problems = [
         f"column {name!r}: no such numeric column of the frame table" for name in columns if name not in known
     ]

@@ -1,24 +1,68 @@
-"""The arrays of ``frames.zarr``: their type, further dimensions and meaning."""
+"""The arrays of ``frames.zarr``: their type, further dimensions, unit and meaning."""
 
-ARRAYS: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "rgb": ("uint8", ("channel",), "sRGB-encoded colour"),
-    "depth": ("float32", (), "camera z [m], rounded to 13 mantissa bits; NaN where nothing is seen"),
-    "class": ("uint8", (), "semantic class"),
-}
-LABEL_ARRAYS: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "normal": ("int8", ("axis",), "world normal in steps of 1/127; zero where nothing is seen"),
-    "road": ("float32", ("coordinate",), "station and lateral position of road pixels [m]; NaN off the road"),
-    "flow": ("float32", ("direction",), "way right and down to the next frame [px]; NaN without depth"),
-    "marks": (
-        "uint8",
-        (),
-        "bits: what changed the pixel, what is out of sight in the next frame, what is hazard",
+from dataclasses import dataclass
+
+from tasks.conventions import Channel, SemanticClass
+
+
+@dataclass(frozen=True, kw_only=True)
+class PixelArray:
+    """One array ``[clip, frame, y, x, *dimensions]``.
+
+    Parameters
+    ----------
+    channel : its name, unit and meaning, as of a telemetry column
+    dtype : of its numbers
+    dimensions : further ones
+    flags : meanings of its values, in order from 0; none where values are no codes
+    """
+
+    channel: Channel
+    dtype: str
+    dimensions: tuple[str, ...] = ()
+    flags: tuple[str, ...] = ()
+
+
+def _array(
+    name: str,
+    dtype: str,
+    unit: str,
+    description: str,
+    dimensions: tuple[str, ...] = (),
+    flags: tuple[str, ...] = (),
+) -> PixelArray:
+    channel = Channel(name=name, unit=unit, symbol="", description=description)
+    return PixelArray(channel=channel, dtype=dtype, dimensions=dimensions, flags=flags)
+
+
+_CLASSES = tuple(kind.name.lower() for kind in SemanticClass)
+_PIXELS = (
+    _array("rgb", "uint8", "1", "sRGB-encoded colour", ("channel",)),
+    _array("depth", "float32", "m", "camera z, rounded to 13 mantissa bits; NaN where nothing is seen"),
+    _array("class", "uint8", "1", "semantic class", flags=_CLASSES),
+)
+_LABELS = (
+    _array("normal", "int8", "1", "world normal in steps of 1/127; zero where nothing is seen", ("axis",)),
+    _array(
+        "road",
+        "float32",
+        "m",
+        "station and lateral position of road pixels; NaN off the road",
+        ("coordinate",),
     ),
-}
+    _array(
+        "flow", "float32", "px", "way right and down to the next frame; NaN without depth", ("direction",)
+    ),
+    _array(
+        "marks", "uint8", "1", "bits: what changed the pixel, is out of sight in the next frame, is hazard"
+    ),
+)
+ARRAYS = {array.channel.name: array for array in _PIXELS}
+LABEL_ARRAYS = {array.channel.name: array for array in _LABELS}
 """Written where the grid asks for labels."""
 DIMENSION_SIZES = {"channel": 3, "axis": 3, "coordinate": 2, "direction": 2}
 
 
-def arrays_of(labels: bool) -> dict[str, tuple[str, tuple[str, ...], str]]:
-    """Type, further dimensions and meaning of the arrays of a dataset with or without labels."""
+def arrays_of(labels: bool) -> dict[str, PixelArray]:
+    """The arrays of a dataset with or without labels, by name."""
     return ARRAYS | LABEL_ARRAYS if labels else ARRAYS

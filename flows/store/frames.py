@@ -12,7 +12,8 @@ import numpy as np
 import zarr
 from zarr.codecs import BloscCodec, Crc32cCodec
 
-from flows.store.arrays import DIMENSION_SIZES, arrays_of
+from flows.store.arrays import DIMENSION_SIZES, PixelArray, arrays_of
+from flows.store.telemetry import channel_labels
 from manifests.canonical import sha256_of
 
 
@@ -21,8 +22,9 @@ def create_arrays(
 ) -> None:
     """Create the group and its arrays, once, before any clip is written."""
     group = zarr.create_group(path, overwrite=False, attributes=dict(attributes))
-    for name, (dtype, extra, meaning) in arrays_of(labels).items():
-        tail = (height, width, *(DIMENSION_SIZES[dimension] for dimension in extra))
+    for name, array in arrays_of(labels).items():
+        dtype = array.dtype
+        tail = (height, width, *(DIMENSION_SIZES[dimension] for dimension in array.dimensions))
         group.create_array(
             name,
             shape=(clips, frames, *tail),
@@ -34,8 +36,8 @@ def create_arrays(
                 BloscCodec(cname="zstd", clevel=3, shuffle="bitshuffle", typesize=np.dtype(dtype).itemsize),
                 Crc32cCodec(),
             ],
-            dimension_names=("clip", "frame", "y", "x", *extra),
-            attributes={"long_name": meaning},
+            dimension_names=("clip", "frame", "y", "x", *array.dimensions),
+            attributes=_labels(array),
         )
 
 
@@ -55,6 +57,18 @@ def buffer_hash(buffer: np.ndarray) -> str:
     """SHA-256 of the decoded pixels with their shape and type."""
     values = np.ascontiguousarray(buffer)
     return sha256_of([f"{values.dtype.str} {values.shape}\n".encode(), values.data.cast("B")])
+
+
+def _labels(array: PixelArray) -> dict[str, Any]:
+    """The words that a telemetry column of the same kind carries, and CF's attributes of codes."""
+    labels: dict[str, Any] = {"long_name": array.channel.description, **channel_labels(array.channel)}
+    if array.flags:
+        labels |= {"flag_values": list(range(len(array.flags))), "flag_meanings": " ".join(array.flags)}
+    if array.channel.name == "marks":
+        from tasks.render.labels import MARK_BITS
+
+        labels |= {"flag_masks": list(MARK_BITS.values()), "flag_meanings": " ".join(MARK_BITS)}
+    return labels
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array:

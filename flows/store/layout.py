@@ -68,7 +68,7 @@ class Layout:
 
     def frame_shard(self, array: str, index: int) -> Path:
         """The one file that holds a clip's frames of one array (Zarr v3 default chunk keys)."""
-        _, further, _ = arrays_of(labels=True)[array]
+        further = arrays_of(labels=True)[array].dimensions
         return self.frames.joinpath(array, "c", str(index), "0", "0", "0", *("0" for _ in further))
 
     def relative(self, path: Path) -> str:

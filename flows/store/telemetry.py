@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from manifests.canonical import sha256_of
-from tasks.conventions import CHANNELS_BY_NAME
+from tasks.conventions import CHANNELS_BY_NAME, Channel
 
 ROW_GROUP_ROWS = 100_000
 
@@ -33,7 +33,14 @@ def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | No
             arrays[name] = pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
         else:
             arrays[name] = pa.array(values)
-    fields = [pa.field(name, array.type, metadata=_labels(name)) for name, array in arrays.items()]
+    fields = [
+        pa.field(
+            name,
+            array.type,
+            metadata=channel_labels(CHANNELS_BY_NAME[name]) if name in CHANNELS_BY_NAME else None,
+        )
+        for name, array in arrays.items()
+    ]
     return pa.Table.from_arrays(list(arrays.values()), schema=pa.schema(fields))
 
 
@@ -90,10 +97,8 @@ def _constant_type(value: Any) -> pa.DataType:
     return pa.string() if isinstance(value, str) else pa.float64()
 
 
-def _labels(name: str) -> dict[str, str] | None:
-    channel = CHANNELS_BY_NAME.get(name)
-    if channel is None:
-        return None
+def channel_labels(channel: Channel) -> dict[str, str]:
+    """What a column's or array's metadata say of it; what is empty is left out."""
     labels = {
         "units": channel.unit,
         "symbol": channel.symbol,

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from torch.utils.data import DataLoader
 import musync
 from flows.query import VIEWS, schema, sql
 from flows.store.frames import read_clip
+from manifests.provenance import SOURCE_ROOT
 from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
 from tasks.errors import InputError
 
@@ -71,6 +73,33 @@ def test_xarray_reads_frames_lazily_with_named_dimensions(data, toy_dataset):
     picture = data.xarray()["rgb"].isel(clip=1, frame=3)
     assert picture.dims == ("y", "x", "channel")
     np.testing.assert_array_equal(picture.values, read_clip(toy_dataset.frames, 1, "rgb")[3])
+    same = data.xarray()["rgb"].sel(clip="dry/hump").isel(frame=3)
+    np.testing.assert_array_equal(same.values, picture.values)
+    assert str(same.clip_id.values) == data.manifest["clips"][1]["clip_id"]
+    assert (float(same.t), same.t.attrs["units"]) == (0.3, "s")
+
+
+def test_the_schema_of_the_arrays_is_that_of_the_zarr_store(data):
+    listed = {row["name"]: row for row in schema()["arrays"]}
+    for name, array in data.frames.arrays():
+        assert array.attrs["units"] == listed[name]["unit"]
+        assert array.attrs["description"] == listed[name]["description"]
+        assert list(array.metadata.dimension_names) == listed[name]["dimensions"]
+        assert array.dtype == listed[name]["dtype"]
+
+
+def test_the_python_of_the_analysts_page_runs_as_it_stands(data, toy_dataset):
+    """But for the dataset's name, and for windows that fit the toy's 11 frames, all of them in quarantine."""
+    pytest.importorskip("polars", reason="polars is optional")
+    pytest.importorskip("xarray", reason="xarray is optional")
+    page = (SOURCE_ROOT / "docs" / "analysts.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", page, flags=re.S)
+    code = "\n".join(blocks).replace("datasets/demo", str(toy_dataset.root))
+    code = code.replace("window=16, stride=8", "window=4, stride=4, quarantined=True")
+    code = code.replace("[3, 40]", "[3, 5]").replace("rain-50/flat-braking", "snow-3/flat")
+    assert len(blocks) == 4
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=SOURCE_ROOT)
+    assert done.returncode == 0, done.stderr
 
 
 def test_what_is_not_represented_is_null_and_left_out_of_an_average(data, toy_dataset):

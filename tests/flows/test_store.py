@@ -3,11 +3,12 @@ import pyarrow.parquet as pq
 import pytest
 import zarr
 
-from flows.store.arrays import ARRAYS
+from flows.store.arrays import ARRAYS, arrays_of
 from flows.store.frames import buffer_hash, create_arrays, read_clip, write_clip
 from flows.store.layout import Layout, clear_partial_files, write_atomically, write_json
 from flows.store.telemetry import columns_hash, labelled_table, read_columns, write_parquet
-from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
+from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS, SemanticClass
+from tasks.render.labels import MARK_BITS
 
 SHAPE = (3, 16, 24)
 
@@ -65,6 +66,23 @@ def test_arrays_say_their_dimensions_and_camera(layout):
     assert group.attrs["camera"] == "test"
     assert group["rgb"].metadata.dimension_names == ("clip", "frame", "y", "x", "channel")
     assert group["rgb"].chunks == (1, 1, 16, 24, 3)
+
+
+def test_arrays_carry_unit_and_meaning_and_the_names_of_their_codes(tmp_path):
+    create_arrays(tmp_path / "frames", 1, *SHAPE, True, {})
+    group = zarr.open_group(tmp_path / "frames", mode="r")
+    assert {name: array.attrs["units"] for name, array in group.arrays()} == {
+        "rgb": "1", "depth": "m", "class": "1", "normal": "1", "road": "m", "flow": "px", "marks": "1",
+    }  # fmt: skip
+    for name, array in arrays_of(labels=True).items():
+        assert group[name].attrs["long_name"] == group[name].attrs["description"] == array.channel.description
+    codes = dict(
+        zip(group["class"].attrs["flag_meanings"].split(), group["class"].attrs["flag_values"], strict=True)
+    )
+    assert codes["sky"] == SemanticClass.SKY and codes["terrain"] == SemanticClass.TERRAIN
+    assert len(codes) == len(SemanticClass)
+    marks = group["marks"].attrs
+    assert dict(zip(marks["flag_meanings"].split(), marks["flag_masks"], strict=True)) == MARK_BITS
 
 
 def test_hash_of_a_buffer_sees_values_type_and_shape():
