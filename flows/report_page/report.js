@@ -158,8 +158,10 @@ async function beside(clip, sibling) {
   $("label").textContent = clip.label;
   $("badge").className = `badge ${verdictOf(clip)}`;
   $("badge").textContent = { passed: "pose check passed", failed: "pose check failed", unjudged: "not judged: no frames" }[verdictOf(clip)];
-  $("labels").textContent = LABELS.map(([name, key, digits, unit, factor]) => ranged(clip.figures, name, key, digits, unit, factor))
-    .filter(Boolean).join(" · ");
+  $("labels").replaceChildren([...LABELS.map((label) => ranged(clip, ...label)), stopMissing(clip)].filter(Boolean).join(" · "),
+    " ", el("small", { textContent: "in brackets p05 to p95" }));
+  $("reasons").hidden = clip.verdict.reasons.length === 0;
+  $("reasons").textContent = clip.verdict.reasons.join("; ");
   $("changes").textContent = sibling ? changes(clip, sibling) : "";
   history.replaceState(null, "", `#${clip.clip_id}${sibling ? `+${sibling.clip_id}` : ""}`);
   markRows();
@@ -185,20 +187,28 @@ async function beside(clip, sibling) {
 const LABELS = [["friction", "surface_friction", 3, "", 1], ["stop", "stopping_distance", 1, " m", 1], ["peak pitch", "peak_pitch", 2, "°", 180 / Math.PI]];
 
 /** A label with its p05 and p95 under the surface's bounds; empty if the clip has no such figure. */
-function ranged(figures, name, key, digits, unit, factor) {
+function ranged({ figures }, name, key, digits, unit, factor) {
   const text = (k) => (typeof figures[k] === "number" ? (figures[k] * factor).toFixed(digits) : null);
   const [low, high] = [text(`${key}_p05`), text(`${key}_p95`)];
   const range = low === null && high === null ? "" : ` (${low ?? "–"} to ${high ?? "longer than the clip"})`;
   return text(key) === null ? "" : `${name} ${text(key)}${unit}${range}`;
 }
 
-/** What the sibling changes, in words: only figures that both have. */
+/** Why a clip has no stopping distance, in words; empty if it has one. */
+function stopMissing({ scenario, figures }) {
+  if (typeof figures.stopping_distance === "number") return "";
+  return scenario.peak_pressure_mpa > 0 ? "no stop within the clip" : "does not brake";
+}
+
+/** What the sibling changes, in words: the controls, then the figures that both have. */
 function changes(clip, sibling) {
   const parts = LABELS
     .filter(([, key]) => typeof clip.figures[key] === "number" && typeof sibling.figures[key] === "number")
     .map(([name, key, digits, unit, factor]) => `${name} ${signed((sibling.figures[key] - clip.figures[key]) * factor, digits)}${unit}`);
-  const fields = Object.keys(clip.scenario).filter((key) => clip.scenario[key] !== sibling.scenario[key]);
-  return `${sibling.label} differs in ${fields.join(", ")}: ${parts.join(", ") || "no figure that both have"}.`;
+  if (!stopMissing(clip) && stopMissing(sibling)) parts.push(stopMissing(sibling));
+  const turned = Object.keys(clip.scenario).filter((key) => clip.scenario[key] !== sibling.scenario[key])
+    .map((key) => `${key} ${clip.scenario[key] ?? "–"} → ${sibling.scenario[key] ?? "–"}`);
+  return `${sibling.label} beside it: ${turned.join(", ")}. This changes ${parts.join(", ") || "no figure that both have"}.`;
 }
 
 // ---- facts

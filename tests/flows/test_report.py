@@ -94,7 +94,8 @@ def test_a_click_on_a_head_sorts_and_another_turns_the_order(page, toy_dataset):
 
 
 def test_the_sibling_stands_beside_with_its_film_its_traces_and_what_it_changes(page, toy_dataset):
-    clips = {c["label"]: c["figures"] for c in json.loads(toy_dataset.manifest.read_bytes())["clips"]}
+    data = json.loads(toy_dataset.manifest.read_bytes())["clips"]
+    clips = {c["label"]: c["figures"] for c in data}
     page.click("#clips tbody tr:nth-child(2)")
     page.wait_for_function("traces.shown[0]?.label === 'dry/hump'")
     assert page.locator("#sibling option:checked").inner_text() == "snow-3/hump"
@@ -105,6 +106,13 @@ def test_the_sibling_stands_beside_with_its_film_its_traces_and_what_it_changes(
     own = clips["dry/hump"]
     low, high = own["surface_friction_p05"], own["surface_friction_p95"]
     assert f"friction {own['surface_friction']:.3f} ({low:.3f} to {high:.3f})" in page.inner_text("#labels")
+    assert "does not brake" in page.inner_text("#labels")
+    assert "weather dry → snow" in page.inner_text("#changes")
+    page.click("#clips tbody tr:nth-child(3)")
+    page.wait_for_function("traces.shown[0]?.label === 'snow-3/flat'")
+    assert "no stop within the clip" in page.inner_text("#labels")
+    (verdict,) = (c["verdict"] for c in data if c["label"] == "snow-3/flat")
+    assert page.inner_text("#reasons") == "; ".join(verdict["reasons"]) != ""
     page.select_option("#sibling", "")
     page.wait_for_function("traces.shown.length === 1")
     assert page.locator("video:visible").count() == 1
