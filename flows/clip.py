@@ -122,13 +122,7 @@ def make_clip(layout: Layout, index: int) -> dict[str, Any]:
     write_parquet(labelled_table(frames, identity | facts), layout.staged(clip.clip_id, "frames"))
     shards = {name: layout.frame_shard(name, index) for name in buffers}
     receipt = {
-        "index": clip.index,
-        "clip_id": clip.clip_id,
-        "label": clip.label,
-        "seed": clip.seed,
-        "scenario": clip.scenario.as_row(),
-        "split": clip.split,
-        "calibration": clip.calibration,
+        **clip.as_json(),
         "artifacts": {layout.relative(path): sha256_of_file(path) for path in shards.values()},
         "content": {name: buffer_hash(values) for name, values in buffers.items()}
         | {"ticks": columns_hash(ride.columns, [channel.name for channel in TICK_CHANNELS]),

@@ -1,7 +1,7 @@
 """From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,11 @@ class ClipPlan:
     split: str
     calibration: str
 
+    def as_json(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {
+            "scenario": self.scenario.as_row()
+        }
+
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
@@ -65,19 +70,23 @@ class Plan:
             "backend": self.backend,
             "inputs": dict(self.inputs),
             "made_with": {key: dict(value) for key, value in self.made_with.items()},
-            "clips": [
-                {
-                    "index": clip.index,
-                    "clip_id": clip.clip_id,
-                    "label": clip.label,
-                    "seed": clip.seed,
-                    "scenario": clip.scenario.as_row(),
-                    "split": clip.split,
-                    "calibration": clip.calibration,
-                }
-                for clip in self.clips
-            ],
+            "clips": [clip.as_json() for clip in self.clips],
         }
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "Plan":
+        """A plan from its JSON, or from a manifest's, whose clips say more."""
+        asked = [field.name for field in fields(ClipPlan)]
+        clips = [{name: clip[name] for name in asked} for clip in content["clips"]]
+        return cls(
+            run_id=content["run_id"],
+            settings=GridFile.model_validate(content["grid"]),
+            scene=content["scene"],
+            backend=content["backend"],
+            inputs=content["inputs"],
+            made_with=content["made_with"],
+            clips=tuple(ClipPlan(**clip | {"scenario": Scenario(**clip["scenario"])}) for clip in clips),
+        )
 
 
 def make_plan(
@@ -187,17 +196,7 @@ def read_plan(root: Path) -> Plan:
             f"{Layout(root).plan}: the plan must be of format {PLAN_FORMAT}; it is {content.get('format')!r}:"
             " read the dataset with the version that made it, or make it again"
         )
-    return Plan(
-        run_id=content["run_id"],
-        settings=GridFile.model_validate(content["grid"]),
-        scene=content["scene"],
-        backend=content["backend"],
-        inputs=content["inputs"],
-        made_with=content["made_with"],
-        clips=tuple(
-            ClipPlan(**clip | {"scenario": Scenario(**clip["scenario"])}) for clip in content["clips"]
-        ),
-    )
+    return Plan.of(content)
 
 
 def plan_differences(

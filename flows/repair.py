@@ -8,12 +8,10 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from catalogs.grids import GridFile
-from catalogs.scenario import Scenario
 from flows.generate import create_frame_arrays, fan_out
 from flows.input_changes import recorded_input
 from flows.orchestration import stage
-from flows.plan import ClipPlan, Plan, input_sources, read_plan
+from flows.plan import Plan, input_sources, read_plan
 from flows.runner import RunnerName
 from flows.seal import clips_table, pairs_table, preview_sheet, table_parts, write_part
 from flows.store.address import everything, publish, working
@@ -156,27 +154,7 @@ def _prepare(layout: Layout, scratch: Layout, manifest: Mapping[str, Any]) -> Pl
 
 def plan_of(manifest: Mapping[str, Any]) -> Plan:
     """The plan that a manifest was frozen from."""
-    clips = [_as_written(clip) for clip in manifest["clips"]]
-    return Plan(
-        run_id=manifest["run_id"],
-        settings=GridFile.model_validate(manifest["grid"]),
-        scene=manifest["scene"],
-        backend=manifest["backend"],
-        inputs=manifest["inputs"],
-        made_with=manifest["made_with"],
-        clips=tuple(
-            ClipPlan(
-                index=clip["index"],
-                clip_id=clip["clip_id"],
-                label=clip["label"],
-                seed=clip["seed"],
-                scenario=Scenario(**clip["scenario"]),
-                split=clip["split"],
-                calibration=clip["calibration"],
-            )
-            for clip in clips
-        ),
-    )
+    return Plan.of({**manifest, "clips": [_as_written(clip) for clip in manifest["clips"]]})
 
 
 def _remake_summaries(

@@ -4,7 +4,18 @@ from typing import Annotated
 
 import typer
 
-from flows.commands.console import CHECK_FAILED, Json, Out, Prefect, Runner, Scheduler, Workers, call, show
+from flows.commands.console import (
+    Json,
+    Out,
+    Prefect,
+    Runner,
+    Scheduler,
+    Workers,
+    call,
+    exit_unless,
+    show,
+    show_lines,
+)
 
 app = typer.Typer()
 
@@ -24,14 +35,8 @@ def audit(
     result = call(
         "audit", prefect, dataset, share=share, out=out, runner=runner, workers=workers, scheduler=scheduler
     )
-    if as_json:
-        show(result, as_json)
-    else:
-        from flows.audit import as_text
-
-        typer.echo(as_text(result), nl=False)
-    if not result["verified"]:
-        raise typer.Exit(CHECK_FAILED)
+    show_lines(result, as_json, "flows.audit")
+    exit_unless(result["verified"])
 
 
 @app.command()
@@ -44,8 +49,7 @@ def verify(
     """Verify every hash of a dataset and the seal of its manifest; make nothing."""
     result = call("verify", prefect, dataset, out=out)
     show(result, as_json)
-    if not result["verified"]:
-        raise typer.Exit(CHECK_FAILED)
+    exit_unless(result["verified"])
 
 
 @app.command()
@@ -61,8 +65,7 @@ def repair(
     """Make again what is broken or missing in a dataset; only the recorded bytes are put in place."""
     result = call("repair", prefect, dataset, out=out, runner=runner, workers=workers, scheduler=scheduler)
     show(result, as_json)
-    if not result["repaired"]:
-        raise typer.Exit(CHECK_FAILED)
+    exit_unless(result["repaired"])
 
 
 @app.command()
@@ -88,8 +91,7 @@ def audit_physics(
     keys = ("label", "passed", "laws", "column", "tightest")
     brief = result | {"clips": [{key: row[key] for key in keys} for row in result["clips"]]}
     show(result if as_json else brief, as_json)
-    if not result["verified"]:
-        raise typer.Exit(CHECK_FAILED)
+    exit_unless(result["verified"])
 
 
 @app.command()
@@ -102,12 +104,7 @@ def diff(
 ) -> None:
     """Compare two datasets: which clips differ, how far their labels moved, and which input can be why."""
     result = call("diff", prefect, a, b, out=out)
-    if as_json:
-        show(result, as_json)
-    else:
-        from flows.dataset_diff import as_text
-
-        typer.echo(as_text(result), nl=False)
+    show_lines(result, as_json, "flows.dataset_diff")
 
 
 @app.command()
@@ -120,14 +117,8 @@ def explain(
 ) -> None:
     """Follow one frame from the weather to the pixel, every number computed again beside the stored one."""
     result = call("explain", False, dataset, clip, frame, out=out)
-    if as_json:
-        show(result, as_json)
-    else:
-        from flows.explain import as_text
-
-        typer.echo(as_text(result), nl=False)
-    if not result["agrees"]:
-        raise typer.Exit(CHECK_FAILED)
+    show_lines(result, as_json, "flows.explain")
+    exit_unless(result["agrees"])
 
 
 @app.command("replay-audit")
@@ -143,5 +134,4 @@ def replay_audit(
     result = call("replay_audit", prefect, grid, seeds=seeds, frames=frames, out=out)
     brief = {key: value for key, value in result.items() if key != "largest_difference"}
     show(result if as_json else brief, as_json)
-    if not result["verified"]:
-        raise typer.Exit(CHECK_FAILED)
+    exit_unless(result["verified"])

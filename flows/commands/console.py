@@ -104,6 +104,21 @@ def show(value: dict[str, Any], as_json: bool) -> None:
             console.print(f"{key}: {_text(entry)}")
 
 
+def show_lines(result: dict[str, Any], as_json: bool, module: str) -> None:
+    """Print a result in the words that its module's ``as_text`` has for it."""
+    if as_json:
+        show(result, as_json)
+        return
+    from importlib import import_module
+
+    typer.echo(import_module(module).as_text(result), nl=False)
+
+
+def exit_unless(good: bool) -> None:
+    if not good:
+        raise typer.Exit(CHECK_FAILED)
+
+
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.5g}"

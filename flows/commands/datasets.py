@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from flows.commands.console import CHECK_FAILED, Json, Prefect, Runner, Scheduler, Workers, call, show
+from flows.commands.console import Json, Prefect, Runner, Scheduler, Workers, call, exit_unless, show
 from tasks.errors import InputError
 
 app = typer.Typer()
@@ -66,8 +66,7 @@ def generate(
         rows = report.quarantined.items()
         facts["quarantined"] = [{"clip": label, "why": "; ".join(reasons)} for label, reasons in rows]
     show(facts, as_json)
-    if differing:
-        raise typer.Exit(CHECK_FAILED)
+    exit_unless(not differing)
 
 
 @app.command()

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from flows.commands.console import CHECK_FAILED, Json, Out, Prefect, call, show
+from flows.commands.console import Json, Out, Prefect, call, exit_unless, show
 
 app = typer.Typer()
 
@@ -54,8 +54,7 @@ def controls(
     result = call("controls", prefect, dataset, out=out)
     rows = [{key: value for key, value in row.items() if key != "roc"} for row in result["rows"]]
     show(result if as_json else {**result, "rows": rows}, as_json)
-    if not result["all_detected"]:
-        raise typer.Exit(CHECK_FAILED)
+    exit_unless(result["all_detected"])
 
 
 @app.command()
@@ -71,8 +70,7 @@ def judge(
     """Judge any video's motion against the telemetry claimed for it, from its pixels and intrinsics alone."""
     result = call("judge", prefect, video, claim=claim, camera=camera, out=out, metric=metric)
     show(result, as_json)
-    if not result["passed"]:
-        raise typer.Exit(CHECK_FAILED)
+    exit_unless(result["passed"])
 
 
 @app.command()

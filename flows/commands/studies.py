@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from flows.commands.console import CHECK_FAILED, Json, Out, call, show
+from flows.commands.console import Json, Out, call, exit_unless, show
 
 app = typer.Typer()
 
@@ -15,8 +15,7 @@ def sensitivity(out: Out = None, as_json: Json = False) -> None:
     result = call("sensitivity", False, out=out)
     brief = {key: result[key] for key in ("solver_cases", "cpu_s", "beside_print")}
     show(result if as_json else brief, as_json)
-    if not all(row["agrees"] for row in result["beside_print"]):
-        raise typer.Exit(CHECK_FAILED)
+    exit_unless(all(row["agrees"] for row in result["beside_print"]))
 
 
 @app.command()
