@@ -26,7 +26,7 @@ from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.eval.severity import image_statistics, sampled_frames
 from tasks.eval.undistort import undistorted
 from tasks.eval.unroll import one_shutter
-from tasks.eval.unusable import unusable_pixels
+from tasks.eval.unusable import glossy_pixels, unusable_pixels
 
 Row = dict[str, Any]
 METHODS = ("photometric", "pnp", "essential")
@@ -125,7 +125,7 @@ def judge_clip(
         route_rotations=route,
     )
     hidden = unusable_pixels(still["class"], facts["film_depth_mm"])
-    with_depth = (still["rgb"], still["depth"], K, mount, hidden, route)
+    with_depth = (still["rgb"], still["depth"], K, mount)
     others = {name: read_trajectory(path) for name, path in (outside or {}).items()}
     sampled = rgb[sampled_frames(len(rgb))]
     small = rgb[[0, len(rgb) // 3, 2 * len(rgb) // 3]]
@@ -133,8 +133,10 @@ def judge_clip(
         facts=facts,
         frames=frames,
         motions={
-            "photometric": recover_motion_photometric(*with_depth),
-            "pnp": recover_motion_pnp(*with_depth),
+            "photometric": recover_motion_photometric(
+                *with_depth, hidden | glossy_pixels(still["class"]), route
+            ),
+            "pnp": recover_motion_pnp(*with_depth, hidden, route),
             "essential": recover_motion_essential(rgb, K, mount, route_rotations=route),
         }
         | {

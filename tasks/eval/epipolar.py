@@ -1,5 +1,6 @@
 """Two-view geometry of tracked points with known intrinsics: turn, direction, depth and length of a step."""
 
+import cv2
 import numpy as np
 
 from tasks.eval.motion import FrameStep
@@ -33,6 +34,30 @@ def fit_rotation(rays: Floats, later_rays: Floats, focal: float) -> tuple[Floats
         if np.abs(step).max() < 1e-9:
             break
     return R, float(np.median(size))
+
+
+def five_point_pose(
+    pixels: Floats, later_pixels: Floats, K: Floats, distance: float
+) -> tuple[Floats, Floats, int]:
+    """Turn and direction by five points at a time, whichever most others agree with (Nister 2004).
+
+    Parameters
+    ----------
+    pixels, later_pixels : float64 [N, 2] the points in both pictures [px]
+    K : float64 [3, 3] intrinsics [px]
+    distance : largest distance from the epipolar line at which a point agrees [px]
+
+    Returns
+    -------
+    ``R_later_earlier`` [3, 3], the direction of ``t_later_earlier`` [3], and how many points agree; 0 where
+    the points fix no pose
+    """
+    E, mask = cv2.findEssentialMat(pixels, later_pixels, K, cv2.RANSAC, 0.999, distance)
+    if E is None or E.shape != (3, 3):
+        return np.eye(3), np.zeros(3), 0
+    agreeing = int(mask.sum())
+    _, R, t, _ = cv2.recoverPose(E, pixels, later_pixels, K, mask=mask)
+    return R, t.ravel(), agreeing
 
 
 def refine_essential(

@@ -9,8 +9,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.corners import cell_size, corner_strength, grid_corners, track_corners
-from tasks.eval.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
+from tasks.eval.corners import cell_size, corner_strength, grid_corners
+from tasks.eval.epipolar import (
+    fit_rotation,
+    five_point_pose,
+    refine_essential,
+    scaled_step,
+    step_length,
+    triangulate,
+)
 from tasks.eval.motion import (
     MAX_GAP,
     FrameStep,
@@ -20,9 +27,10 @@ from tasks.eval.motion import (
     failed_step,
     integrate_motion,
 )
-from tasks.eval.rigid import Floats, invert_pose, viewing_rays
+from tasks.eval.point_pairs import PointPairs, track_pairs
+from tasks.eval.pose_links import Link, link_placements
+from tasks.eval.rigid import Floats, invert_pose
 from tasks.eval.solve_pnp import solve_pnp
-from tasks.eval.warp import bilinear_taps, view_from, warp_map
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +50,8 @@ class EssentialSettings:
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
     noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
+    link_span : frames that the longer steps beside the chain span [1]
+    link_stride : frames between their starts [1]
     """
 
     cells_across: int = 34
@@ -56,6 +66,8 @@ class EssentialSettings:
     min_inlier_share: float = 0.3
     noise_floor: float = 0.01
     noise_ceiling: float = 2.0
+    link_span: int = 8
+    link_stride: int = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,18 +82,6 @@ class _Key:
     inverse_depth: NDArray[np.float32]  # [H, W], a guess for every pixel
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Pairs:
-    """Points seen in two frames: first the earlier frame's corners, then the later frame's."""
-
-    rays: Floats
-    later_rays: Floats
-    pixels: Floats
-    later_pixels: Floats
-    kept: NDArray[np.bool_]
-    later_kept: NDArray[np.bool_]
-
-
 def recover_motion_essential(
     frames: NDArray[np.uint8],
     K: Floats,
@@ -92,9 +92,10 @@ def recover_motion_essential(
     """Ego motion up to scale by frame-to-frame essential matrices (Nister 2004, DOI 10.1109/TPAMI.2004.17).
 
     Each step's turn and direction come from the five-point method, refined on Sampson's error; its length
-    from the depth that the step before gave the same corners. While the car stands, frames are placed
-    against the last one that moved. Path and heave are those of the camera: the way from there to the
-    rig's origin is in metres, which the chain's unknown unit cannot express.
+    from the depth that the step before gave the same corners. Steps over more frames tie the chain together.
+    While the car stands, frames are placed against the last one that moved. Path and heave are those of
+    the camera: the way from there to the rig's origin is in metres, which the chain's unknown unit cannot
+    express.
 
     Parameters
     ----------
@@ -114,24 +115,35 @@ def recover_motion_essential(
     chosen = settings or EssentialSettings()
     key = _key(0, frames[0], chosen)
     placements: list[Placement] = []
+    poses, passed, links = [np.eye(4)], dict[int, _Key](), list[Link]()
     missed, velocity, T_key_last, last = 0, np.eye(4), np.eye(4), 0
     for k in range(1, len(frames)):
-        anchor = key.index
+        anchor, later = key.index, _key(k, frames[k], chosen)
         if missed > MAX_GAP:
             step, moved_on = failed_step(f"the track was lost after frame {last} and not found again", 0), key
         else:
             predicted = T_key_last @ np.linalg.matrix_power(velocity, k - last)
-            step, moved_on = _place(key, _key(k, frames[k], chosen), predicted, K, chosen)
+            step, moved_on = _place(key, later, predicted, K, chosen)
         missed = missed + 1 if step.failure else 0
         placements.append(Placement(anchor=anchor, step=step))
+        poses.append(poses[anchor] @ step.T_earlier_later)
+        start = passed.pop(k - chosen.link_span, None)
+        if start is not None and start.index % chosen.link_stride == 0 and not step.failure:
+            between = invert_pose(poses[start.index]) @ poses[k]
+            link, _ = _solve(start, later, between, chosen.track_levels, K, chosen, trusted=True)
+            links.append(Link(earlier=start.index, later=k, step=link))
         if not step.failure:
             if k - last == 1:
                 velocity = invert_pose(T_key_last) @ step.T_earlier_later
             T_key_last = step.T_earlier_later if moved_on is key else np.eye(4)
             key, last = moved_on, k
+            if key.index == k:
+                passed[k] = key
     turned = np.eye(4)
     turned[:3, :3] = T_rig_camera[:3, :3]
-    return integrate_motion("essential", placements, turned, route_rotations, metric=False)
+    return integrate_motion(
+        "essential", link_placements(placements, links), turned, route_rotations, metric=False
+    )
 
 
 def _key(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> _Key:
@@ -179,10 +191,20 @@ def _place(
 
 
 def _solve(
-    key: _Key, later: _Key, predicted: Floats, levels: int, K: Floats, settings: EssentialSettings
+    key: _Key,
+    later: _Key,
+    predicted: Floats,
+    levels: int,
+    K: Floats,
+    settings: EssentialSettings,
+    trusted: bool = False,
 ) -> tuple[FrameStep, _Key]:
+    """The step by the tracked points; a trusted prediction stands in for the random draws' first guess."""
     focal = float(K[0, 0] + K[1, 1]) / 2
-    pairs = _track(key, later, predicted, levels, K, settings)
+    tracker = (settings.window, levels, settings.forward_backward)
+    pairs = track_pairs(
+        (key.grey, key.corners), (later.grey, later.corners), key.inverse_depth, predicted, K, *tracker
+    )
     count = len(pairs.rays)
     if count < settings.min_points:
         return failed_step(f"{count} points tracked, at least {settings.min_points} are needed", count), key
@@ -190,16 +212,19 @@ def _solve(
     if parallax < settings.min_parallax:
         return _standing_step(key, turn, pairs, K, settings), key
 
-    E, mask = cv2.findEssentialMat(pairs.pixels, pairs.later_pixels, K, cv2.RANSAC, 0.999, settings.epipolar)
-    if E is None or E.shape != (3, 3):
-        return failed_step("the points fix no essential matrix", 0), key
-    inliers = int(mask.sum())
+    if trusted:
+        ahead = invert_pose(predicted)
+        R, t, inliers = ahead[:3, :3], ahead[:3, 3] / np.linalg.norm(ahead[:3, 3]), count
+    else:
+        R, t, inliers = five_point_pose(pairs.pixels, pairs.later_pixels, K, settings.epipolar)
+        if inliers == 0:
+            return failed_step("the points fix no essential matrix", 0), key
+    R, t, covariance, weight = refine_essential(
+        R, t, pairs.rays, pairs.later_rays, focal, settings.noise_floor
+    )
+    inliers = min(inliers, int((weight > 0).sum()))
     if inliers < max(settings.min_points, settings.min_inlier_share * count):
         return failed_step(f"{inliers} of {count} tracked points agree on a pose", inliers), key
-    _, R, t, _ = cv2.recoverPose(E, pairs.pixels, pairs.later_pixels, K, mask=mask)
-    R, t, covariance, weight = refine_essential(
-        R, t.ravel(), pairs.rays, pairs.later_rays, focal, settings.noise_floor
-    )
 
     depth, later_depth, precision = triangulate(pairs.rays, pairs.later_rays, R, t)
     precision = np.where((weight > 0) & (depth > 0) & (later_depth > 0), precision, 0.0)
@@ -209,7 +234,10 @@ def _solve(
         before = key.depth[pairs.kept], key.precision[pairs.kept]
         length, length_std = step_length(*before, depth[:split], precision[:split])
         if np.isnan(length):
-            return failed_step("no point links this step's length to the one before", inliers), key
+            if (key.precision[pairs.kept] > 0).sum() < settings.min_points:
+                return failed_step("no point links this step's length to the one before", inliers), key
+            # a nod on the spot: too short a way to see depth by, so the depth known before must do
+            return _standing_step(key, turn, pairs, K, settings), key
     placed = replace(
         later,
         depth=_scatter(later_depth[split:] * length, pairs.later_kept),
@@ -224,41 +252,8 @@ def _solve(
     return scaled_step(R, t, covariance, length, length_std, inliers), placed
 
 
-def _track(
-    key: _Key, later: _Key, predicted: Floats, levels: int, K: Floats, settings: EssentialSettings
-) -> _Pairs:
-    """Follow the corners of both frames, each into a view of the other picture from its own place.
-
-    A street looks alike from one frame to the next, so the key frame's depth serves for both views.
-    """
-    tracker = (settings.window, levels, settings.forward_backward)
-    to_later = warp_map(key.inverse_depth, invert_pose(predicted), K)
-    ahead, kept = track_corners(key.grey, view_from(later.grey, to_later), key.corners, *tracker)
-    seen_later, inside = _sample_map(to_later, ahead)
-    kept &= inside
-    to_key = warp_map(key.inverse_depth, predicted, K)
-    behind, later_kept = track_corners(later.grey, view_from(key.grey, to_key), later.corners, *tracker)
-    seen_key, inside = _sample_map(to_key, behind)
-    later_kept &= inside
-    pixels = np.concatenate([key.corners[kept], seen_key[later_kept]])
-    later_pixels = np.concatenate([seen_later[kept], later.corners[later_kept]])
-    return _Pairs(
-        rays=viewing_rays(pixels, K),
-        later_rays=viewing_rays(later_pixels, K),
-        pixels=pixels,
-        later_pixels=later_pixels,
-        kept=kept,
-        later_kept=later_kept,
-    )
-
-
-def _sample_map(where: NDArray[np.float32], at: NDArray[np.float32]) -> tuple[Floats, NDArray[np.bool_]]:
-    taps, weights, inside = bilinear_taps(at, where.shape[:2])
-    return (weights[..., None] * where[taps]).sum(axis=0), inside
-
-
 def _standing_step(
-    key: _Key, turn: Floats, pairs: _Pairs, K: Floats, settings: EssentialSettings
+    key: _Key, turn: Floats, pairs: PointPairs, K: Floats, settings: EssentialSettings
 ) -> FrameStep:
     """A frame taken from about where the key frame was: by the depth of its corners, or else as a turn."""
     T = np.eye(4)

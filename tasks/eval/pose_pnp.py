@@ -19,6 +19,7 @@ from tasks.eval.motion import (
     integrate_motion,
     place_frames,
 )
+from tasks.eval.pose_links import Link, chained_poses, link_placements
 from tasks.eval.rigid import Floats, advance_pose, invert_pose, project, viewing_rays
 from tasks.eval.solve_pnp import solve_pnp
 from tasks.eval.warp import bilinear_taps, view_from, warp_map
@@ -45,6 +46,9 @@ class PnpSettings:
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
     noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
+    depth_error : relative standard error of the rendered depth [1]
+    link_span : frames that the longer steps beside the chain span [1]
+    link_stride : frames between their starts [1]
     """
 
     cells_across: int = 60
@@ -62,6 +66,9 @@ class PnpSettings:
     min_inlier_share: float = 0.3
     noise_floor: float = 0.01
     noise_ceiling: float = 2.0
+    depth_error: float = 0.01
+    link_span: int = 4
+    link_stride: int = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +127,15 @@ def recover_motion_pnp(
         found = [_place(earlier, later, guess, K, chosen.search_levels, chosen) for guess in guesses]
         return max(found, key=lambda step: (not step.failure, step.inliers))
 
-    return integrate_motion("pnp", place_frames(len(frames), place), T_rig_camera, route_rotations)
+    placements = place_frames(len(frames), place)
+    poses, links = chained_poses(placements), []
+    for k in range(0, len(frames) - chosen.link_span, chosen.link_stride):
+        between = invert_pose(poses[k]) @ poses[k + chosen.link_span]
+        if np.isfinite(between).all():
+            pair = prepare(k), prepare(k + chosen.link_span)
+            step = _place(*pair, between, K, chosen.track_levels, chosen)
+            links.append(Link(earlier=k, later=k + chosen.link_span, step=step))
+    return integrate_motion("pnp", link_placements(placements, links), T_rig_camera, route_rotations)
 
 
 def _prepare(
@@ -226,6 +241,7 @@ def _track_and_solve(
         noise_floor=settings.noise_floor,
         noise_ceiling=settings.noise_ceiling,
         overlap=max(settings.window / cell_size(frame.grey.shape[1], settings.cells_across), 1.0) ** 2,
+        depth_error=settings.depth_error,
     )
 
 

@@ -19,6 +19,7 @@ def solve_pnp(
     noise_floor: float,
     noise_ceiling: float,
     overlap: float = 1.0,
+    depth_error: float = 0.0,
 ) -> FrameStep:
     """Minimise the reprojection error by Gauss-Newton with Tukey's weights, without random draws.
 
@@ -34,8 +35,10 @@ def solve_pnp(
     noise_floor : smallest error of a pixel believed [px]
     noise_ceiling : largest error of a pixel that still is a track of something [px]
     overlap : how many of the patches behind the pixels share each pixel, and so its error [1]
+    depth_error : relative standard error of the points' way from the earlier camera: what a pixel misses along
+        that ray's image counts by so much less [1]
     """
-    T = T_start
+    T, scale = T_start, noise_ceiling
     for _ in range(40):
         moved = points @ T[:3, :3].T + T[:3, 3]
         ahead = moved[:, 2] > 1e-3
@@ -43,19 +46,23 @@ def solve_pnp(
             return failed_step(f"{int(ahead.sum())} points lie ahead of the camera", int(ahead.sum()))
         moved[~ahead, 2] = 1.0
         residual = pixels - project(moved, K)
-        size = np.linalg.norm(residual, axis=-1)
+        J = projection_jacobian(moved, K)
+        # errors are white but for a, what the depth's error does to a pixel: their inverse covariance is
+        # 1 - b a', b = a / (1 + a'a), in squared pixel errors
+        a = np.einsum("nij,nj->ni", J[:, :, :3], moved - T[:3, 3]) * (depth_error / scale)
+        b = a / (1 + (a * a).sum(axis=1, keepdims=True))
+        size = np.sqrt((residual**2).sum(axis=1) - (a * residual).sum(axis=1) * (b * residual).sum(axis=1))
         # the median length of a 2-D Gaussian error is 1.1774 of its standard deviation
         scale = max(float(np.median(size[ahead])) / 1.1774, noise_floor)
         weight = np.where(ahead, np.maximum(1 - (size / (TUKEY * scale)) ** 2, 0.0) ** 2, 0.0)
-        J = projection_jacobian(moved, K)
-        JW = J * weight[:, None, None]
-        H = np.einsum("nij,nik->jk", JW, J)
+        JW = (J - b[:, :, None] * (a[:, None] @ J)) * weight[:, None, None]
+        H = JW.reshape(-1, 6).T @ J.reshape(-1, 6)
         try:
-            twist = np.linalg.solve(H, np.einsum("nij,ni->j", JW, residual))
+            twist = np.linalg.solve(H, JW.reshape(-1, 6).T @ residual.ravel())
         except np.linalg.LinAlgError:
             return failed_step("the points do not fix the pose", 0)
         T = pose_from_twist(twist) @ T
-        if np.abs(twist).max() < 1e-9:
+        if np.abs(twist).max() < 1e-7:  # a thousandth of what the sharpest tracks can tell
             break
     inliers = int((weight > 0).sum())
     if inliers < min_inliers:

@@ -21,3 +21,19 @@ def unusable_pixels(class_id: NDArray[np.uint8], film_depth_mm: float) -> NDArra
     """
     hidden = np.isin(class_id, (SemanticClass.SKY, SemanticClass.VEGETATION))
     return hidden | np.isin(class_id, ROAD_CLASSES) if film_depth_mm > 0 else hidden
+
+
+def glossy_pixels(class_id: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Vehicles, whose paint and panes mirror the street in soft gradients, and which may move.
+
+    A check by every grey level reads such gradients as motion. A corner is sharp, and so of the body itself.
+
+    Parameters
+    ----------
+    class_id : uint8 [F, H, W] semantic classes [1]
+
+    Returns
+    -------
+    bool [F, H, W]
+    """
+    return class_id == SemanticClass.VEHICLE

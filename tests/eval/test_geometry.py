@@ -109,6 +109,20 @@ def test_points_that_do_not_agree_are_a_failure() -> None:
     assert "40 of 50 tracked points agree" in solve_pnp(points, exact, np.eye(4), K, **limits).failure
 
 
+def test_an_error_of_depth_does_less_harm_where_it_is_expected() -> None:
+    points, rng = cloud(), np.random.default_rng(11)
+    _, exact = seen_by_both(points)
+    harm = {0.0: [], 0.02: []}  # by the depth error that the solver is told of
+    for _ in range(60):
+        wrong = points * (1 + rng.normal(0, 0.02, (len(points), 1)))
+        pixels = exact + rng.normal(0, 0.05, exact.shape)
+        for told, turns in harm.items():
+            step = solve_pnp(wrong, pixels, np.eye(4), K, 100, 1e-6, 5.0, depth_error=told)
+            off = step.T_earlier_later @ MOTION
+            turns.append([off[2, 1], off[0, 2], off[1, 0]])
+    assert np.std(harm[0.02]) < 0.7 * np.std(harm[0.0])
+
+
 def test_turn_direction_depth_and_length_come_out_of_two_views_exactly() -> None:
     points = cloud()
     rays, later_rays = (viewing_rays(p, K) for p in seen_by_both(points))
