@@ -80,7 +80,7 @@ def evaluate(
     folder = Path(out)
     write_json(folder / "evaluation.json", result)
     write_parquet(pa.Table.from_pylist(rows), folder / "evaluation.parquet")
-    write_atomically(folder / "evaluation.html", page(clips, rows, result["run_id"]).encode())
+    write_atomically(folder / "evaluation.html", page(clips, rows, result["run_id"], codec).encode())
     return result
 
 

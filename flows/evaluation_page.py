@@ -18,8 +18,9 @@ body { font: 15px/1.45 system-ui, sans-serif; max-width: 70rem; margin: 2rem aut
 h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; border-bottom: 1px solid #ddd; }
 table { border-collapse: collapse; font-size: 12.5px; } th, td { padding: .15rem .6rem; border-bottom: 1px solid #eee; }
 td.n { text-align: right; font-variant-numeric: tabular-nums; } th { text-align: left; }
-svg { max-width: 100%; height: auto; } img { width: 240px; margin: 2px; }
-.none { color: #a33; } figure { margin: .5rem 0; } figcaption { font-size: 13px; color: #444; }
+svg { max-width: 100%; height: auto; } .clips { display: grid; grid-template-columns: 1fr 1fr; gap: .2rem 1rem; }
+.clips p { margin: .3rem 0; font-size: 13px; } .clips img { width: 32.5%; margin-right: .5%; }
+.none { color: #999; text-align: right; } figure { margin: .5rem 0; } figcaption { font-size: 13px; color: #444; }
 """
 SHOWN_CLIPS = 12
 MEANING = {
@@ -43,7 +44,11 @@ MEANING = {
 }
 
 
-def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str) -> str:
+LEAST_SWING_DEG = 0.25
+"""Half of the least pitch that a plot spans, so that a drift of hundredths looks like one [deg]."""
+
+
+def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: str) -> str:
     """The whole page.
 
     Parameters
@@ -51,14 +56,17 @@ def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str) -> str:
     clips : as their judges saw them
     rows : every figure
     run_id : of the dataset
+    codec : what the pictures went through before they were judged
     """
     names = list(dict.fromkeys(row["metric"] for row in rows))
     parts = [
         f"<h1>Judged from the pixels: {escape(run_id)}</h1>",
+        f"<p>{len(clips)} clips; pictures: {escape(codec)}.</p>",
         "<p>Smoothing acts on the estimate alone, so even a perfect pose scores its floor: read no figure without"
         " it. Window 0 is none. The paper's figures come from VGGT on other videos.</p>",
-        "<h2>Summary</h2>", _summary(rows, names),
-        "<h2>Pitch: claimed and recovered</h2>", _figure(_pitch_plot(clips), "Claimed (black) and recovered [deg]."),
+        "<h2>Summary</h2>", "<p>Without smoothing, over all clips of the dataset.</p>", _summary(rows, names),
+        "<h2>Pitch: claimed and recovered</h2>",
+        _figure(_pitch_plot(clips), f"Claimed (black) and recovered; the first {SHOWN_CLIPS} clips at most."),
         *_geometry(rows),
         "<h2>Clips</h2>", _thumbnails(clips),
         "<h2>Every figure</h2>",
@@ -74,15 +82,17 @@ def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str) -> str:
 def _summary(rows: Sequence[Row], names: Sequence[str]) -> str:
     lines = []
     for name in names:
-        for method in dict.fromkeys(row["method"] for row in rows if row["metric"] == name):
+        methods = dict.fromkeys(row["method"] for row in rows if row["metric"] == name)
+        for first, method in zip([True] + [False] * len(methods), methods, strict=False):
             mine = [r for r in rows if r["metric"] == name and r["method"] == method and r["window"] == 0]
             values = [r["value"] for r in mine if r["value"] is not None]
             lines.append(
-                (name, method, float(np.mean(values)) if values else None, max(values) if values else None,
+                (name if first else "", method,
+                 float(np.mean(values)) if values else None, max(values) if values else None,
                  mine[0]["unit"], mine[0]["paper"], f"{len(values)} of {len(mine)}",
-                 "" if values else mine[0]["note"])
+                 mine[0]["note"] if not values else MEANING.get(name, "") if first else "")
             )  # fmt: skip
-    head = ("metric", "method", "mean", "largest", "unit", "paper", "scored", "note")
+    head = ("metric", "method", "mean", "largest", "unit", "paper", "scored", "")
     return _html_table(head, lines)
 
 
@@ -115,6 +125,12 @@ def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
             axis.plot(clip.times, np.rad2deg(motion.pitch), color=COLOURS.get(method), lw=0.8, label=method)
         axis.set_title(clip.facts["label"], fontsize=9)
         axis.tick_params(labelsize=7)
+        low, high = axis.get_ylim()
+        axis.set_ylim(min(low, -LEAST_SWING_DEG), max(high, LEAST_SWING_DEG))
+        axis.set_ylabel("pitch [deg]", fontsize=7)
+    for axis in axes[max(len(shown) - 3, 0) : len(shown)]:
+        axis.set_xlabel("time [s]", fontsize=7)
+        axis.tick_params(labelbottom=True)
     for axis in axes[len(shown) :]:
         axis.set_axis_off()
     axes[0].legend(fontsize=6)
@@ -149,6 +165,7 @@ def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
         axis.plot(windows, floors, "--", color="black", label="perfect pose")
         axis.set_title(name, fontsize=9)
         axis.set_xlabel("smoothing window [frames]", fontsize=8)
+        axis.set_ylabel("error over response [1]", fontsize=8)
         axis.set_ylim(bottom=0)
     axis.legend(fontsize=7)
     return figure
@@ -170,4 +187,4 @@ def _thumbnails(clips: Sequence[JudgedClip]) -> str:
                 f'<img alt="" src="data:image/jpeg;base64,{base64.b64encode(coded.tobytes()).decode()}">'
             )
         parts.append(f"<p>{escape(clip.facts['label'])}<br>{''.join(pictures)}</p>")
-    return "".join(parts)
+    return f'<div class="clips">{"".join(parts)}</div>'
