@@ -10,7 +10,7 @@ from tasks.eval.rigid import Floats, adjoint, invert_pose, pose_from_twist
 
 LEAST_STD = 1e-7
 """Error below which no step is believed [m, rad]: a step that states none would leave nothing to share out."""
-PASSES = 3
+PASSES = 2
 """Linear solutions in a row; the corrections are milliradians, so that the second already is rounding."""
 
 
