@@ -1,7 +1,9 @@
 """A Dask cluster that others started: do its workers compute as this machine does, and are their kernels compiled?"""
 
+import os
+import re
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from manifests.provenance import code_version, library_versions
@@ -10,6 +12,7 @@ from tasks.errors import InputError
 NOT_ON_WORKERS = ("prefect",)
 """Recorded libraries that no worker imports."""
 SHOWN_WORKERS = 3
+VISIBLE = "CUDA_VISIBLE_DEVICES"
 
 
 def facts_here() -> dict[str, str]:
@@ -66,6 +69,45 @@ def check_cluster(client: Any, address: str) -> None:
         raise InputError([f"--scheduler {address}: {problem}" for problem in problems])
 
 
+def share_gpus(client: Any) -> None:
+    """Give every worker one GPU of its machine, in turn, before anything on it looks for one.
+
+    Parameters
+    ----------
+    client : `distributed.Client` of the cluster
+    """
+    places = {worker: place for workers in _by_host(client).values() for place, worker in enumerate(workers)}
+    client.run(_take_gpu, places)
+
+
+def gpu_for(place: int, visible: str | None, present: Sequence[str]) -> str | None:
+    """The GPU of a worker; None where there is none to choose, because Slurm or dask-cuda has given it its one.
+
+    Parameters
+    ----------
+    place : of the worker among those of its machine, from 0
+    visible : ``CUDA_VISIBLE_DEVICES`` of the worker, None where it is not set
+    present : GPUs of the machine
+    """
+    choice = list(present) if visible is None else [name for name in visible.split(",") if name]
+    return choice[place % len(choice)] if len(choice) > 1 else None
+
+
+def _take_gpu(places: Mapping[str, int], dask_worker: Any) -> None:
+    present = sorted(re.findall(r"^nvidia(\d+)$", "\n".join(os.listdir("/dev")), flags=re.M), key=int)
+    chosen = gpu_for(places[dask_worker.address], os.environ.get(VISIBLE), present)
+    if chosen is not None:
+        os.environ[VISIBLE] = chosen
+
+
+def _by_host(client: Any) -> dict[str, list[str]]:
+    """Workers of each machine, in the order of their addresses."""
+    hosts: dict[str, list[str]] = {}
+    for worker, host in sorted(client.run(socket.gethostname).items()):
+        hosts.setdefault(host, []).append(worker)
+    return hosts
+
+
 def warm_cluster(client: Any, warm: Callable[[], Any], address: str) -> None:
     """Compile every kernel on each worker before work is handed out: one worker a machine first, whose cache all share.
 
@@ -80,9 +122,7 @@ def warm_cluster(client: Any, warm: Callable[[], Any], address: str) -> None:
     InputError
         If a worker cannot read what it needs, the dataset's folder above all.
     """
-    hosts: dict[str, list[str]] = {}
-    for worker, host in client.run(socket.gethostname).items():
-        hosts.setdefault(host, []).append(worker)
+    hosts = _by_host(client)
     first = [workers[0] for workers in hosts.values()]
     rest = [worker for workers in hosts.values() for worker in workers[1:]]
     for wave in (first, rest):

@@ -59,7 +59,7 @@ def open_executor(
 def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | None) -> Iterator[Any]:
     from distributed import Client, LocalCluster
 
-    from flows.cluster import check_cluster, warm_cluster
+    from flows.cluster import check_cluster, share_gpus, warm_cluster
 
     # a closing cluster says so in a dozen lines, and Prefect lets every library log
     logging.getLogger("distributed").setLevel(logging.ERROR)
@@ -68,6 +68,7 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
         )
         with cluster, Client(cluster) as client:
+            share_gpus(client)
             yield client
         return
     try:
@@ -81,6 +82,7 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
         raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
     with client:
         check_cluster(client, scheduler)
+        share_gpus(client)
         if warm is not None:
             warm_cluster(client, warm, scheduler)
         yield client

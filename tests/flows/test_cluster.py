@@ -16,7 +16,7 @@ import pytest
 from distributed import Client
 
 from flows.clip import warm_up
-from flows.cluster import check_cluster, facts_here, version_problems, warm_cluster
+from flows.cluster import check_cluster, facts_here, gpu_for, version_problems, warm_cluster
 from flows.generate import generate
 from flows.runner import open_executor
 from flows.store.layout import Layout
@@ -45,6 +45,29 @@ def test_a_worker_without_musync_is_told():
 
 def test_what_only_this_machine_needs_is_not_asked_of_workers():
     assert "prefect" not in facts_here() and {"numpy", "numba", "muSync's source"} <= facts_here().keys()
+
+
+@pytest.mark.parametrize(
+    ("place", "visible", "present", "gpu"),
+    [
+        (0, None, ["0", "1"], "0"),
+        (3, None, ["0", "1"], "1"),  # more workers than GPUs share them evenly
+        (1, "2,3", ["0", "1", "2", "3"], "3"),  # what the administrator left visible
+        (1, "GPU-8f2e", ["0", "1"], None),  # given its own by Slurm or dask-cuda
+        (1, "", ["0", "1"], None),  # told to use none
+        (1, None, [], None),
+        (1, None, ["0"], None),
+    ],
+)
+def test_workers_of_one_machine_take_its_gpus_in_turn(place, visible, present, gpu):
+    assert gpu_for(place, visible, present) == gpu
+
+
+def test_each_worker_process_sees_one_gpu_of_those_visible(monkeypatch):
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "0,1")
+    with open_executor("dask", 2) as executor:
+        seen = executor._client.run(os.getenv, "CUDA_VISIBLE_DEVICES")
+    assert sorted(seen.values()) == ["0", "1"]
 
 
 @contextmanager
