@@ -17,8 +17,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from flows.auditing.verify import compare_files
 from flows.store.layout import Layout
-from flows.verify import compare_files
 from manifests.canonical import sha256_of_file
 
 KILLS = 50

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from flows.generate import generate
+from flows.making.generate import generate
 
 WORKERS = 2
 

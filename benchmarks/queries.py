@@ -15,7 +15,7 @@ import pandas as pd
 import yaml
 
 import musync
-from flows.generate import generate
+from flows.making.generate import generate
 
 CLIPS = 1000
 LEVELS = 10

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from catalogs.grids import load_grid
-from flows.clip import frame_rows, load_catalogue, picture, rig_of
-from flows.driving import drive
-from flows.plan import freeze_grid
+from flows.making.clip import frame_rows, load_catalogue, picture, rig_of
+from flows.making.driving import drive
+from flows.making.plan import freeze_grid
 from flows.store.layout import write_atomically
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.severity import image_statistics, severity_agreement

@@ -15,7 +15,7 @@ for group in (datasets, audits, judging, studies, measured, scenes):
 
 def main() -> None:
     """Entry point: exit codes 0 done, 1 a check failed, 2 the input is wrong, 3 something broke."""
-    from flows.failures import ClipsFailed, disk_full_sentence
+    from flows.running.failures import ClipsFailed, disk_full_sentence
 
     try:
         app(standalone_mode=True)

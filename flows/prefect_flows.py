@@ -1,6 +1,6 @@
 """The pipeline's commands as Prefect flows, for a server, a schedule or a work pool.
 
-Each flow is the plain function of the same name; its stages (see `flows.orchestration`) become task runs, and
+Each flow is the plain function of the same name; its stages (see `flows.running.orchestration`) become task runs, and
 the clips fan out on the chosen runner from inside one of them. Results are never persisted by Prefect:
 receipts and hashes on disk decide what is done.
 """
@@ -24,33 +24,33 @@ Path(os.environ["PREFECT_HOME"]).mkdir(parents=True, exist_ok=True)
 
 from prefect import flow  # noqa: E402  (reads the environment when it is imported)
 
-from flows import audit as _audit  # noqa: E402
-from flows import bump_study as _bump_study  # noqa: E402
-from flows import calibration as _calibration  # noqa: E402
-from flows import closing as _closing  # noqa: E402
-from flows import closing_benchmark as _closing_benchmark  # noqa: E402
-from flows import controls as _controls  # noqa: E402
-from flows import dataset_diff as _dataset_diff  # noqa: E402
-from flows import describe as _describe  # noqa: E402
-from flows import evaluation as _evaluation  # noqa: E402
-from flows import explain as _explain  # noqa: E402
-from flows import foreign as _foreign  # noqa: E402
-from flows import freezing as _freezing  # noqa: E402
-from flows import generate as _generate  # noqa: E402
-from flows import importing as _importing  # noqa: E402
-from flows import physics as _physics  # noqa: E402
-from flows import previews as _previews  # noqa: E402
-from flows import protocol as _protocol  # noqa: E402
-from flows import query as _query  # noqa: E402
-from flows import reconstruction as _reconstruction  # noqa: E402
-from flows import repair as _repair  # noqa: E402
-from flows import replay as _replay  # noqa: E402
-from flows import report as _report  # noqa: E402
-from flows import scenes as _scenes  # noqa: E402
-from flows import sheets as _sheets  # noqa: E402
-from flows import stop_study as _stop_study  # noqa: E402
-from flows import studies as _studies  # noqa: E402
-from flows import verify as _verify  # noqa: E402
+from flows.auditing import audit as _audit  # noqa: E402
+from flows.auditing import dataset_diff as _dataset_diff  # noqa: E402
+from flows.auditing import explain as _explain  # noqa: E402
+from flows.auditing import repair as _repair  # noqa: E402
+from flows.auditing import verify as _verify  # noqa: E402
+from flows.judging import controls as _controls  # noqa: E402
+from flows.judging import evaluation as _evaluation  # noqa: E402
+from flows.judging import foreign as _foreign  # noqa: E402
+from flows.judging import physics as _physics  # noqa: E402
+from flows.making import freezing as _freezing  # noqa: E402
+from flows.making import generate as _generate  # noqa: E402
+from flows.making import reconstruction as _reconstruction  # noqa: E402
+from flows.making import replay as _replay  # noqa: E402
+from flows.making import scenes as _scenes  # noqa: E402
+from flows.measured import bump_study as _bump_study  # noqa: E402
+from flows.measured import calibration as _calibration  # noqa: E402
+from flows.measured import closing as _closing  # noqa: E402
+from flows.measured import closing_benchmark as _closing_benchmark  # noqa: E402
+from flows.measured import importing as _importing  # noqa: E402
+from flows.measured import protocol as _protocol  # noqa: E402
+from flows.measured import stop_study as _stop_study  # noqa: E402
+from flows.reading import describe as _describe  # noqa: E402
+from flows.reading import previews as _previews  # noqa: E402
+from flows.reading import query as _query  # noqa: E402
+from flows.reading import report as _report  # noqa: E402
+from flows.reading import sheets as _sheets  # noqa: E402
+from flows.studies import vehicle_model as _studies  # noqa: E402
 
 
 def as_flow(function: Callable[..., Any]) -> Any:

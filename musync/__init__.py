@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING, Any
 
-from flows.opening import Dataset, open
+from flows.reading.opening import Dataset, open
 from tasks.errors import InputError
 
 if TYPE_CHECKING:
-    from flows.windows import ClipWindows, SeededOrder
+    from flows.reading.windows import ClipWindows, SeededOrder
 
 __all__ = ["ClipWindows", "Dataset", "InputError", "SeededOrder", "open"]
 
@@ -14,7 +14,7 @@ __all__ = ["ClipWindows", "Dataset", "InputError", "SeededOrder", "open"]
 def __getattr__(name: str) -> Any:
     """Torch is imported with the classes that need it: it takes longer than a question to a dataset."""
     if name in {"ClipWindows", "SeededOrder"}:
-        from flows import windows
+        from flows.reading import windows
 
         return getattr(windows, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

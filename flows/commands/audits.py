@@ -35,7 +35,7 @@ def audit(
     result = call(
         "audit", prefect, dataset, share=share, out=out, runner=runner, workers=workers, scheduler=scheduler
     )
-    show_lines(result, as_json, "flows.audit")
+    show_lines(result, as_json, "flows.auditing.audit")
     exit_unless(result["verified"])
 
 
@@ -104,7 +104,7 @@ def diff(
 ) -> None:
     """Compare two datasets: which clips differ, how far their labels moved, and which input can be why."""
     result = call("diff", prefect, a, b, out=out)
-    show_lines(result, as_json, "flows.dataset_diff")
+    show_lines(result, as_json, "flows.auditing.dataset_diff")
 
 
 @app.command()
@@ -117,7 +117,7 @@ def explain(
 ) -> None:
     """Follow one frame from the weather to the pixel, every number computed again beside the stored one."""
     result = call("explain", False, dataset, clip, frame, out=out)
-    show_lines(result, as_json, "flows.explain")
+    show_lines(result, as_json, "flows.auditing.explain")
     exit_unless(result["agrees"])
 
 

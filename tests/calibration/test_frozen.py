@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from catalogs.calibration import FOLDER, load_procedure
 from catalogs.vehicles import load_vehicle, vehicle_names, vehicle_provenance, vehicle_source
-from flows.calibration import calibrate
 from flows.cli import app
-from flows.studies import agreement
+from flows.measured.calibration import calibrate
+from flows.studies.vehicle_model import agreement
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
 

@@ -6,7 +6,7 @@ import pytest
 
 from catalogs.references import trace_file
 from catalogs.vehicles import vehicle_provenance
-from flows.studies import agreement
+from flows.studies.vehicle_model import agreement
 from manifests.canonical import sha256_of_file
 
 # docs/calibration.md, "Before and after"; speed [m/s], pitch [deg], slip [1], wheel load [N]

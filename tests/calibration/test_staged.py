@@ -7,8 +7,8 @@ import yaml
 
 from catalogs.calibration import FOLDER, load_procedure
 from catalogs.references import read_reference
-from flows.calibration import calibrate, calibration_case
-from flows.studies import agreement_of
+from flows.measured.calibration import calibrate, calibration_case
+from flows.studies.vehicle_model import agreement_of
 from tasks.calibration.identifiability import knowledge
 from tasks.calibration.scalars import calibration_scalars, scalar_value, with_scalars
 from tasks.calibration.staged import calibrate as run_stages

@@ -12,7 +12,7 @@ from catalogs.scenes import load_scene, write_scene
 from catalogs.scenes.folder import read_scene, scene_hash
 from catalogs.scenes.gaussian_files import read_gaussians, write_gaussians
 from catalogs.scenes.route_files import read_route
-from flows.scenes import scene_import
+from flows.making.scenes import scene_import
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.scene.transform import moved

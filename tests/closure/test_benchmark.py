@@ -10,8 +10,8 @@ from catalogs.effects.truths import load_sizes, load_truths
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows import closing_benchmark
-from flows.closing_benchmark_summary import pair_outcome, summary
+from flows.measured import closing_benchmark
+from flows.measured.closing_benchmark_summary import pair_outcome, summary
 from tasks.closure.benchmark import exact_interval, synthetic_campaign
 from tasks.closure.drives import TRAINING
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from catalogs.learned_judges import load_judges
-from flows.learned_rows import learned_rows
+from flows.judging.learned_rows import learned_rows
 from tasks.errors import InputError
 from tasks.eval.learned_scores import CLIP_MEAN, CLIP_STD, ClipWeather, NeighbourDistance, WholeVideo
 

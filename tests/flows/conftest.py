@@ -3,7 +3,7 @@
 import pytest
 
 from catalogs.scenes import write_scene
-from flows.generate import generate
+from flows.making.generate import generate
 from flows.store.layout import Layout
 from tests.flows.test_pipeline import GRID
 from tests.toy_street import TOY_CAMERA, toy_street

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from flows.grown_vehicle import grown_vehicle
+from flows.measured.grown_vehicle import grown_vehicle
 from tasks.closure.answer import NamedEffect, Parameter, Verdict
 from tasks.closure.disturbance import Disturbance
 from tasks.vehicle.effects.forms import SHAPES, form_name

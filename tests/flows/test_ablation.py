@@ -9,7 +9,7 @@ import pytest
 
 from catalogs.scenario import Scenario
 from catalogs.studies.ablation import VARIANTS, cut
-from flows.ablation import ablation
+from flows.studies.ablation import ablation
 from tasks.errors import InputError
 
 

@@ -7,11 +7,11 @@ import shutil
 import numpy as np
 import pytest
 
-import flows.audit
+import flows.auditing.audit
 import manifests.explain
 from catalogs.scenes import load_scene, write_scene
-from flows.audit import as_text, audit
-from flows.generate import generate
+from flows.auditing.audit import as_text, audit
+from flows.making.generate import generate
 from flows.store.layout import Layout
 from tasks.errors import InputError
 from tests.flows.test_pipeline import GRID
@@ -70,7 +70,7 @@ def test_another_library_another_processor_and_another_code_are_named(copy, monk
     here["made_with"]["libraries"]["numpy"] = "9.9"
     here["made_with"]["code"]["source_sha256"] = "0" * 64
     here["processor"]["vector_extensions"] = "none"
-    monkeypatch.setattr("flows.input_changes.tools_here", lambda: here)
+    monkeypatch.setattr("flows.making.input_changes.tools_here", lambda: here)
     result = audited(copy)
     assert [line.split(":")[0] for line in result["differences"]] == [
         "code source_sha256", "libraries numpy", "processor vector_extensions"
@@ -107,7 +107,7 @@ def test_another_catalogue_or_code_does_not_go_into_the_same_folder_and_both_val
     own, tmp_path, monkeypatch
 ):
     (tmp_path / "camera.yaml").write_text(TOY_CAMERA.replace("{value: 80", "{value: 81"))
-    monkeypatch.setattr("flows.plan.code_version", lambda: {"version": "9", "source_sha256": "0" * 64})
+    monkeypatch.setattr("flows.making.plan.code_version", lambda: {"version": "9", "source_sha256": "0" * 64})
     with pytest.raises(InputError) as told:
         generate(str(tmp_path / "grid.yaml"), str(own.root), runner="threads")
     text = str(told.value)
@@ -117,7 +117,9 @@ def test_another_catalogue_or_code_does_not_go_into_the_same_folder_and_both_val
 
 def test_an_audit_left_to_itself_takes_another_number_of_workers_than_the_run_did(copy, monkeypatch):
     taken = []
-    monkeypatch.setattr(flows.audit, "remake_and_compare", lambda *given: taken.append(given[4]) or [])
+    monkeypatch.setattr(
+        flows.auditing.audit, "remake_and_compare", lambda *given: taken.append(given[4]) or []
+    )
     audited(copy, workers=None)
     audited(copy, workers=7)
     assert taken[0] not in (None, 0, len(os.sched_getaffinity(0))) and taken[1] == 7

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from catalogs.channel_maps import FOLDER
-from flows.bump_study import bump_study
-from flows.importing import import_measurements
+from flows.measured.bump_study import bump_study
+from flows.measured.importing import import_measurements
 from tasks.errors import InputError
 
 

@@ -15,10 +15,10 @@ from typer.testing import CliRunner
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
-from flows.closing import close_loop, verdict_json
-from flows.closing_ledger import record_reading
-from flows.grown_vehicle import grown_vehicle
-from flows.plan import make_plan
+from flows.making.plan import make_plan
+from flows.measured.closing import close_loop, verdict_json
+from flows.measured.closing_ledger import record_reading
+from flows.measured.grown_vehicle import grown_vehicle
 from tasks.closure.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.closure.benchmark import TOLERANCES, synthetic_campaign
 from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign

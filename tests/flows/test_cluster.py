@@ -15,10 +15,10 @@ from threading import Thread
 import pytest
 from distributed import Client
 
-from flows.clip import warm_up
-from flows.cluster import check_cluster, facts_here, gpu_for, version_problems, warm_cluster
-from flows.generate import generate
-from flows.runner import open_executor
+from flows.making.clip import warm_up
+from flows.making.generate import generate
+from flows.running.cluster import check_cluster, facts_here, gpu_for, version_problems, warm_cluster
+from flows.running.runner import open_executor
 from flows.store.layout import Layout
 from tasks.errors import InputError
 

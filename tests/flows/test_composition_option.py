@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from catalogs.grids import load_grid
-from flows.plan import freeze_grid
+from flows.making.plan import freeze_grid
 from tasks.errors import InputError
 
 

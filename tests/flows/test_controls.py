@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from catalogs.scenes import write_scene
-from flows.clip import catalogue_of
-from flows.controls import CONTROLS, controls, score_controls
-from flows.controls_figure import roc_figure
 from flows.drawing import as_svg
-from flows.generate import generate
-from flows.judged_clip import METHODS, JudgedClip
-from flows.physics import clip_columns, clip_facts
-from flows.plan import read_plan
+from flows.judging.controls import CONTROLS, controls, score_controls
+from flows.judging.controls_figure import roc_figure
+from flows.judging.judged_clip import METHODS, JudgedClip
+from flows.judging.physics import clip_columns, clip_facts
+from flows.making.clip import catalogue_of
+from flows.making.generate import generate
+from flows.making.plan import read_plan
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
 from tests.toy_street import TOY_CAMERA, toy_street

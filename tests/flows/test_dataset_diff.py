@@ -8,8 +8,8 @@ import yaml
 
 from catalogs.scenes import write_scene
 from catalogs.vehicles import FOLDER
-from flows.dataset_diff import as_text, diff
-from flows.generate import generate
+from flows.auditing.dataset_diff import as_text, diff
+from flows.making.generate import generate
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
 

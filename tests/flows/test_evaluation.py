@@ -7,10 +7,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.scenes import write_scene
-from flows.clip import catalogue_of
-from flows.evaluation import NOT_RUN, evaluate
-from flows.generate import generate
-from flows.physics import clip_columns, clip_facts
+from flows.judging.evaluation import NOT_RUN, evaluate
+from flows.judging.physics import clip_columns, clip_facts
+from flows.making.clip import catalogue_of
+from flows.making.generate import generate
 from tests.flows.test_trajectories import tum_lines
 from tests.toy_street import TOY_CAMERA, toy_street
 

@@ -9,8 +9,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.vehicles import load_vehicle
-from flows.explain import as_text, explain
-from flows.generate import generate
+from flows.auditing.explain import as_text, explain
+from flows.making.generate import generate
 from flows.store.layout import Layout
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError

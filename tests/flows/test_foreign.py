@@ -9,8 +9,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from benchmarks.synthetic_street import Clip, drive_clip
-from flows.foreign import LIMITS, judge, retention
-from flows.foreign_sources import LEVEL, ForeignCamera, intrinsics_at, read_camera, read_video
+from flows.judging.foreign import LIMITS, judge, retention
+from flows.judging.foreign_sources import LEVEL, ForeignCamera, intrinsics_at, read_camera, read_video
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
 from tasks.eval.motion import RecoveredMotion

@@ -5,12 +5,12 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-import flows.freezing
+import flows.making.freezing
 from catalogs.grids import load_grid
 from catalogs.studies import load_conditions
 from flows.cli import app
-from flows.freezing import freeze, frozen_run, problems_of, reproduce
-from flows.physics import audit_physics
+from flows.judging.physics import audit_physics
+from flows.making.freezing import freeze, frozen_run, problems_of, reproduce
 from manifests.frozen_run import frozen_names, parameters_that_matter, read_frozen, sealed
 from tasks.errors import InputError
 
@@ -123,7 +123,7 @@ def test_a_run_changed_by_hand_is_refused(small, tmp_path):
 
 def test_workers_that_compute_otherwise_are_found_after_the_run(small, tmp_path, monkeypatch):
     small["clips"][3]["ticks"] = "0" * 64
-    monkeypatch.setattr(flows.freezing, "problems_of", lambda _: [])
+    monkeypatch.setattr(flows.making.freezing, "problems_of", lambda _: [])
     _, differing = reproduce(written(small, tmp_path), str(tmp_path / "data"), runner="threads", workers=1)
     assert differing == ["depression-45kmh"]
 

@@ -8,8 +8,8 @@ import pytest
 
 from catalogs.effects import load_effects
 from catalogs.scenes import write_scene
-from flows.dataset_diff import diff
-from flows.generate import generate
+from flows.auditing.dataset_diff import diff
+from flows.making.generate import generate
 from tasks.closure.answer import NamedEffect
 from tests.flows.findings import found_effect, found_form, grown_file
 from tests.toy_street import TOY_CAMERA, toy_street

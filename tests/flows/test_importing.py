@@ -12,7 +12,7 @@ import yaml
 
 from catalogs.campaigns import read_campaign
 from catalogs.channel_maps import FOLDER, load_channel_map
-from flows.importing import import_measurements
+from flows.measured.importing import import_measurements
 from tasks.closure.campaign import CHANNELS
 from tasks.errors import InputError
 from tests.recordings.recorded import MAP, braking_columns, logged

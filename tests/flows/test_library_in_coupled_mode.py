@@ -13,7 +13,7 @@ import yaml
 from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
-from flows.grown_vehicle import grown_vehicle
+from flows.measured.grown_vehicle import grown_vehicle
 from tasks.closure.campaign import Run
 from tasks.closure.excitation import reached
 from tasks.closure.forms import PORT_STEP, RANGE, form_in_range

@@ -8,23 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import flows.generate
+import flows.making.generate
 import musync
-from flows.audit import audit
-from flows.clip import make_clip
-from flows.describe import describe
-from flows.explain import explain
-from flows.failure_report import report_failure
-from flows.generate import generate, prepare
-from flows.query import sql
-from flows.repair import repair
-from flows.scheduling import checked_parameters, dataset_place, scheduled_run
+from flows.auditing.audit import audit
+from flows.auditing.explain import explain
+from flows.auditing.repair import repair
+from flows.auditing.verify import gc, verify
+from flows.making.clip import make_clip
+from flows.making.generate import generate, prepare
+from flows.reading.describe import describe
+from flows.reading.query import sql
+from flows.scheduled.failure_report import report_failure
+from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
 from flows.store.address import reading, resumable, working
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.lease import LOCK, leased
 from flows.store.objects import Objects
-from flows.verify import gc, verify
 from tasks.errors import InputError
 from tests.flows.objects_server import ask, environment, kill, s3_server, start
 
@@ -145,7 +145,7 @@ def test_workers_on_other_machines_share_no_folder_with_the_run(machine, grid, t
     def make_elsewhere(layout: Layout, index: int) -> dict:
         return make_clip(Layout(Path("/a folder of the other machine/dataset"), layout.origin), index)
 
-    monkeypatch.setattr(flows.generate, "make_clip", make_elsewhere)
+    monkeypatch.setattr(flows.making.generate, "make_clip", make_elsewhere)
     address = "s3://data/sets/apart"
     assert generate(grid, address, runner="threads", workers=1).made == 4
     assert objects_of(address) == files_of(toy_dataset)

@@ -15,7 +15,7 @@ import pytest
 from torch.utils.data import DataLoader
 
 import musync
-from flows.query import VIEWS, schema, sql
+from flows.reading.query import VIEWS, schema, sql
 from flows.store.frames import read_clip
 from manifests.provenance import SOURCE_ROOT
 from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
@@ -135,7 +135,7 @@ def test_a_missing_table_is_told_with_what_to_do(toy_dataset, tmp_path):
 def test_a_question_needs_neither_torch_nor_what_makes_clips(toy_dataset):
     code = (
         "import sys, musync; musync.open(sys.argv[1]).sql('SELECT count(*) FROM ticks').fetchall();"
-        "print({'torch', 'numba', 'zarr', 'scipy', 'flows.clip'} & sys.modules.keys())"
+        "print({'torch', 'numba', 'zarr', 'scipy', 'flows.making.clip'} & sys.modules.keys())"
     )
     answer = subprocess.run(
         [sys.executable, "-c", code, toy_dataset.root], capture_output=True, text=True, check=True

@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.scenes import write_scene
-from flows.generate import generate
-from flows.physics import audit_physics, clip_columns, clip_facts, read_constants
+from flows.judging.physics import audit_physics, clip_columns, clip_facts, read_constants
+from flows.making.generate import generate
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.physics_audit import audit_clip

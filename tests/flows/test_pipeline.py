@@ -8,13 +8,13 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-import flows.generate
+import flows.making.generate
 from catalogs.scenes import write_scene
-from flows.audit import audit
-from flows.clip import make_clip
-from flows.describe import describe
-from flows.failures import ClipsFailed
-from flows.generate import generate
+from flows.auditing.audit import audit
+from flows.making.clip import make_clip
+from flows.making.generate import generate
+from flows.reading.describe import describe
+from flows.running.failures import ClipsFailed
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.telemetry import read_columns, write_parquet
@@ -170,7 +170,7 @@ def full_on_two(layout: Layout, index: int) -> dict:
 def test_what_is_made_before_a_failure_is_kept_and_resuming_makes_the_rest(
     dataset, grid, tmp_path, monkeypatch, fault, error, sentence
 ):
-    monkeypatch.setattr(flows.generate, "make_clip", fault)
+    monkeypatch.setattr(flows.making.generate, "make_clip", fault)
     layout = Layout(tmp_path / "data")
     with pytest.raises(error, match=sentence):
         generate(grid, str(layout.root), runner="threads", workers=1)
@@ -197,7 +197,7 @@ def test_a_second_writer_is_told(dataset, grid, tmp_path):
     from flows.store.lock import sole_writer
 
     layout = Layout(tmp_path / "data")
-    flows.generate.prepare(grid, layout, "cpu")
+    flows.making.generate.prepare(grid, layout, "cpu")
     with sole_writer(layout), pytest.raises(InputError, match="another run is writing"):
         generate(grid, str(layout.root), runner="threads")
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 from catalogs.scenes import write_scene
-from flows.generate import generate
+from flows.making.generate import generate
 from manifests.provenance import SOURCE_ROOT
 from tests.flows.test_pipeline import GRID
 from tests.toy_street import TOY_CAMERA, toy_street

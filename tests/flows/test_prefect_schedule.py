@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from benchmarks import scheduled_runs
-from flows.scheduling import checked_parameters
+from flows.scheduled.scheduling import checked_parameters
 from manifests.provenance import SOURCE_ROOT
 
 RUN = """
@@ -17,8 +17,8 @@ import json, sys
 from datetime import UTC, datetime
 from inspect import signature
 from types import SimpleNamespace
-from flows import prefect_schedule, scheduling
-from flows.failures import ClipsFailed
+from flows.scheduled import prefect_schedule, scheduling
+from flows.running.failures import ClipsFailed
 from prefect.client.orchestration import get_client
 from tasks.errors import InputError
 

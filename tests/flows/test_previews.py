@@ -4,8 +4,8 @@ import av
 import numpy as np
 import pytest
 
-from flows.film import through_film, write_film
-from flows.previews import preview
+from flows.reading.film import through_film, write_film
+from flows.reading.previews import preview
 from flows.store.frames import read_clip
 from flows.store.layout import read_json
 from tasks.errors import InputError

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from flows.bus_drives import synthetic_drives
-from flows.importing import import_measurements
-from flows.protocol import brake_protocol
+from flows.measured.bus_drives import synthetic_drives
+from flows.measured.importing import import_measurements
+from flows.measured.protocol import brake_protocol
 from tasks.errors import InputError
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from catalogs.scenes import write_scene
-from flows import replay
-from flows.clip import picture
-from flows.driving import drive
+from flows.making import replay
+from flows.making.clip import picture
+from flows.making.driving import drive
 from tasks.errors import InputError
 from tests.flows.test_pipeline import GRID
 from tests.toy_street import TOY_CAMERA, toy_street

@@ -10,8 +10,8 @@ from base64 import b64decode
 import numpy as np
 import pytest
 
-from flows.generate import generate
-from flows.report import packed, report
+from flows.making.generate import generate
+from flows.reading.report import packed, report
 from flows.store.telemetry import read_columns
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError

@@ -2,8 +2,8 @@ import os
 
 import pytest
 
-from flows.orchestration import stage
-from flows.runner import open_executor, run_unordered
+from flows.running.orchestration import stage
+from flows.running.runner import open_executor, run_unordered
 from tasks.errors import InputError
 
 
@@ -56,7 +56,7 @@ def test_a_running_dask_cluster_is_used_by_its_address():
 
 
 def test_a_scheduler_that_does_not_answer_is_an_input_error(monkeypatch):
-    monkeypatch.setattr("flows.runner.CONNECT_TIMEOUT", "1s")
+    monkeypatch.setattr("flows.running.runner.CONNECT_TIMEOUT", "1s")
     with (
         pytest.raises(InputError, match="no Dask scheduler answers"),
         open_executor("dask", 1, "tcp://127.0.0.1:9"),

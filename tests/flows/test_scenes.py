@@ -6,7 +6,7 @@ import pytest
 
 from catalogs.cameras import load_camera
 from catalogs.scenes import write_scene
-from flows.scenes import render_pose
+from flows.making.scenes import render_pose
 from tasks.errors import InputError
 from tasks.render.camera import viewmat
 from tests.toy_street import toy_street

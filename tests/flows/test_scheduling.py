@@ -7,11 +7,11 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-import flows.generate
-from flows.clip import make_clip
-from flows.failure_report import report_failure
-from flows.failures import ClipsFailed
-from flows.scheduling import checked_parameters, scheduled_run
+import flows.making.generate
+from flows.making.clip import make_clip
+from flows.running.failures import ClipsFailed
+from flows.scheduled.failure_report import report_failure
+from flows.scheduled.scheduling import checked_parameters, scheduled_run
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -49,7 +49,7 @@ def lightning_at_two(layout: Layout, index: int) -> dict:
 
 def test_an_unfinished_run_is_resumed_and_one_of_another_plan_left_alone(grid, tmp_path, monkeypatch):
     root = tmp_path / "root"
-    monkeypatch.setattr(flows.generate, "make_clip", lightning_at_two)
+    monkeypatch.setattr(flows.making.generate, "make_clip", lightning_at_two)
     with pytest.raises(ClipsFailed):
         scheduled_run(grid, str(root), at=AT, runner="threads", workers=1)
     monkeypatch.undo()

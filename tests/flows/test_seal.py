@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from flows.seal import spread
+from flows.making.seal import spread
 
 
 def test_a_short_run_shows_every_clip():

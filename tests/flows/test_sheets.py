@@ -3,7 +3,7 @@
 import cv2
 import pytest
 
-from flows.sheets import is_flat_twin, sheets
+from flows.reading.sheets import is_flat_twin, sheets
 from tasks.errors import InputError
 from tasks.render.contact_sheet import CAPTION, MARGIN, TILE_WIDTH
 

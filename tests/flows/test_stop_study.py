@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from flows.importing import import_measurements
-from flows.stop_study import stop_study
+from flows.measured.importing import import_measurements
+from flows.measured.stop_study import stop_study
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 

@@ -7,16 +7,16 @@ import pyarrow.parquet as pq
 import pytest
 
 import musync
-from flows.audit import audit
-from flows.describe import describe
-from flows.explain import explain
-from flows.generate import generate
-from flows.physics import audit_physics
-from flows.previews import preview
-from flows.query import sql
-from flows.repair import repair
+from flows.auditing.audit import audit
+from flows.auditing.explain import explain
+from flows.auditing.repair import repair
+from flows.auditing.verify import verify
+from flows.judging.physics import audit_physics
+from flows.making.generate import generate
+from flows.reading.describe import describe
+from flows.reading.previews import preview
+from flows.reading.query import sql
 from flows.store.layout import Layout
-from flows.verify import verify
 from tasks.errors import InputError
 
 

@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.synthetic_street import drive_clip
-from flows.foreign import judge
-from flows.trajectories import read_trajectory, trajectory_files
+from flows.judging.foreign import judge
+from flows.judging.trajectories import read_trajectory, trajectory_files
 from tasks.errors import InputError
 
 CAMERA = "width: 240\nheight: 160\nfocal_length: 200\n"

@@ -6,10 +6,10 @@ import shutil
 
 import pytest
 
-from flows.repair import repair
+from flows.auditing.repair import repair
+from flows.auditing.verify import gc, verify
 from flows.store.layout import Layout
 from flows.store.lock import sole_writer
-from flows.verify import gc, verify
 from manifests.canonical import canonical_bytes
 from manifests.manifest import recorded_files
 from tasks.errors import InputError

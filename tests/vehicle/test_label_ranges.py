@@ -9,7 +9,7 @@ from catalogs.scenario import Scenario
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.driving import controls_of, drive, hazard_of, ranges_of, weather_of
+from flows.making.driving import controls_of, drive, hazard_of, ranges_of, weather_of
 from tasks.vehicle.label_ranges import DRIVEN_PERCENTILES, label_ranges, sampled_friction
 from tasks.vehicle.rollout import rollout
 

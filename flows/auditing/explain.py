@@ -1,0 +1,137 @@
+"""Why one frame of a dataset is as it is: its numbers computed again, step by step, beside those stored."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from catalogs.cameras import load_camera
+from catalogs.scenario import Scenario
+from catalogs.scenes import load_scene
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from flows.making.driving import controls_of, hazard_of, weather_of
+from flows.making.plan import read_plan
+from flows.store.address import reading, telemetry
+from flows.store.layout import write_atomically, write_json
+from flows.store.sealed import read_manifest
+from flows.store.telemetry import read_columns
+from tasks.errors import InputError
+from tasks.explanation import force_steps, picture_steps, pitch_steps, surface_steps
+from tasks.scene.route import Route
+from tasks.vehicle.parameters import surface_response
+from tasks.vehicle.rollout import rollout
+
+
+def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> dict[str, Any]:
+    """Rain rate -> film -> mu_c -> mu_eff -> force -> dv/dt -> pitch -> pixel shift of one frame.
+
+    Parameters
+    ----------
+    dataset : a sealed dataset folder
+    clip : label or id of the clip
+    frame : frame number in the clip, from 0 [1]
+    out : folder for ``explain.json`` and ``explain.txt``; None writes none
+
+    Returns
+    -------
+    ``steps[]`` with quantity, symbol, paper equation, formula, unit, ``recomputed`` and ``stored``; ``agrees``,
+    whether all that must be equal is; ``effects`` that the vehicle adds to the paper's equations: where there are
+    any, a step that they enter differs by what they do.
+
+    Raises
+    ------
+    InputError
+        The folder is no sealed dataset, or has no such clip or frame.
+    """
+    layout = reading(dataset, telemetry)
+    manifest, plan = read_manifest(layout), read_plan(layout.root)
+    chosen = [c for c in plan.clips if clip in (c.clip_id, c.label)]
+    problems = []
+    if not chosen:
+        labels = ", ".join(c.label for c in plan.clips[:20])
+        problems.append(f"{dataset}: no clip {clip!r}; there are {labels}{', ...' * (len(plan.clips) > 20)}")
+    if not 0 <= frame < plan.settings.frames:
+        problems.append(f"frame must lie in 0 to {plan.settings.frames - 1}; it is {frame}")
+    if problems:
+        raise InputError(problems)
+    (planned,) = chosen
+    scenario = planned.scenario
+    folder = layout.telemetry / "frames" / f"family={scenario.weather}"
+    columns = read_columns(folder, planned.clip_id)
+    row, first = ({name: column[i] for name, column in columns.items()} for i in (frame, 0))
+    vehicle = load_vehicle(layout.inputs / "vehicle.yaml")
+    mode = plan.settings.vehicle_mode
+    hazard = hazard_of(scenario)
+    surface = load_surface(layout.inputs / "surface.yaml")
+    ride = rollout(
+        vehicle, scenario.weather, float(row["surface_friction"]), controls_of(scenario), hazard,
+        mode=mode, duration_s=plan.duration_s, snow_depth_mm=float(row["snow_depth_mm"]),
+    )  # fmt: skip
+    response = surface_response(vehicle, scenario.weather, float(row["surface_friction"]))
+    steps = [
+        *surface_steps(weather_of(scenario), surface, vehicle, row),
+        *force_steps(vehicle, response, hazard, mode, row),
+        *pitch_steps(vehicle, response, hazard, mode, row, ride.columns),
+        *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, _route(plan.settings.scene)),
+    ]  # fmt: skip
+    result = {
+        "dataset": str(layout.root),
+        "run_id": manifest["run_id"],
+        "clip_id": planned.clip_id,
+        "label": planned.label,
+        "frame": frame,
+        "t_s": int(row["t_ns"]) / 1e9,
+        "vehicle_mode": mode,
+        "effects": sorted(vehicle.effects) + [form.name for form in vehicle.forms],
+        "asked": _asked(scenario),
+        "steps": [asdict(step) | {"agrees": step.agrees} for step in steps],
+        "agrees": all(step.agrees for step in steps),
+    }
+    if out is not None:
+        write_json(Path(out) / "explain.json", result)
+        write_atomically(Path(out) / "explain.txt", as_text(result).encode())
+    return result
+
+
+def as_text(result: Mapping[str, Any]) -> str:
+    """The chain in lines for people.
+
+    Parameters
+    ----------
+    result : of `explain`
+    """
+    asked = ", ".join(f"{name} {value:g}" if isinstance(value, float) else value
+                      for name, value in result["asked"].items())  # fmt: skip
+    lines = [
+        f"{result['label']} frame {result['frame']}, t = {result['t_s']:g} s, {result['vehicle_mode']} mode",
+        asked,
+    ]
+    for step in result["steps"]:
+        lines.append(f"{step['quantity']}  [Eq. {step['equation']}]")
+        value = f"{step['symbol']} = {step['formula']} = {step['recomputed']:.6g} {step['unit'].removeprefix('1')}"
+        if step["stored"] is None:
+            lines.append(f"    {value.rstrip()}")
+        else:
+            word = "is stored" if step["agrees"] and step["exact"] else f"stored: {step['stored']:.6g}"
+            lines.append(f"    {value.rstrip()}; {word}")
+    if result["effects"]:
+        lines.append(f"the vehicle adds to these equations: {', '.join(result['effects'])}")
+    lines.append("all stored numbers follow" if result["agrees"] else "some stored numbers do not follow")
+    return "\n".join(lines) + "\n"
+
+
+def _asked(scenario: Scenario) -> dict[str, Any]:
+    row = scenario.as_row()
+    return {
+        name: v for name, v in row.items() if v not in (None, 0.0) and (isinstance(v, str) or isfinite(v))
+    }
+
+
+def _route(scene: str) -> Route | None:
+    """The scene's route; None where the scene has moved away, which leaves one step out."""
+    try:
+        return load_scene(scene).route
+    except InputError:
+        return None

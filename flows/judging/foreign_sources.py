@@ -1,0 +1,266 @@
+"""What a judge of foreign videos is given: footage, the claim and the camera, from files it did not make."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+from numpy.typing import NDArray
+
+from flows.judging.trajectories import SUFFIXES, read_trajectory
+from tasks.errors import InputError
+from tasks.eval.foreign_video import VideoClaim
+from tasks.eval.motion import RecoveredMotion
+from tasks.eval.outside_trajectory import motion_from_trajectory
+from tasks.eval.pose_essential import recover_motion_essential
+from tasks.eval.undistort import COEFFICIENTS, undistorted
+
+MOST_FRAMES, LEAST_FRAMES = 3000, 5
+LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+"""A camera that looks level ahead, for a camera file without a mount."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForeignCamera:
+    """The camera of a video.
+
+    Parameters
+    ----------
+    K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
+    width, height : the size they hold for [px]
+    mount : float64 [4, 4] T_rig_camera [m]
+    distortion : float64 [5] k1, k2, p1, p2, k3 as OpenCV has them; None without [1]
+    """
+
+    K: NDArray[np.float64]
+    width: int
+    height: int
+    mount: NDArray[np.float64]
+    distortion: NDArray[np.float64] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Footage:
+    """A video, or the camera trajectory that somebody recovered from one.
+
+    Parameters
+    ----------
+    name : of the file
+    times : float64 [F] from 0 [s]
+    frames : uint8 [F, H, W, 3] sRGB; None for a trajectory
+    poses : float64 [F, 4, 4] camera to world [m]; None for a video
+    """
+
+    name: str
+    times: NDArray[np.float64]
+    frames: NDArray[np.uint8] | None
+    poses: NDArray[np.float64] | None
+
+    def motion(
+        self, camera: ForeignCamera, rows: NDArray[np.int64] | None = None, *, metric: bool = False
+    ) -> RecoveredMotion:
+        """Ego motion: by the essential chain from a video, as it is told from a trajectory.
+
+        Parameters
+        ----------
+        camera : of the footage
+        rows : the frames to use; None for all
+        metric : whether a trajectory's lengths are metres
+
+        Raises
+        ------
+        InputError
+            If the intrinsics cannot be those of the video.
+        """
+        used = np.arange(len(self.times)) if rows is None else rows
+        if self.frames is None:
+            assert self.poses is not None
+            name = Path(self.name).stem
+            return motion_from_trajectory(
+                name, self.times[used], self.times, self.poses, camera.mount, metric=metric
+            )
+        height, width = self.frames.shape[1:3]
+        K = intrinsics_at(camera, width, height)
+        seen = undistorted({"rgb": self.frames[used]}, K, camera.distortion)["rgb"]
+        return recover_motion_essential(seen, K, camera.mount)
+
+
+def read_footage(path: Path) -> Footage:
+    """A video, or a trajectory by its suffix.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    if path.suffix in SUFFIXES:
+        times, poses = read_trajectory(path)
+        return Footage(name=path.name, times=times - times[0], frames=None, poses=poses)
+    frames, times = read_video(path)
+    return Footage(name=path.name, times=times, frames=frames, poses=None)
+
+
+def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Frames [F, H, W, 3] sRGB and their times [s].
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no video, breaks off, or has too few or too many frames.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; give a video.")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; give a video.")
+    stream = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    rate = stream.get(cv2.CAP_PROP_FPS)
+    frames: list[NDArray[Any]] = []
+    stamps: list[float] = []
+    while len(frames) <= MOST_FRAMES:
+        good, picture = stream.read()
+        if not good:
+            break
+        frames.append(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
+        stamps.append(stream.get(cv2.CAP_PROP_POS_MSEC))
+    announced = int(stream.get(cv2.CAP_PROP_FRAME_COUNT))
+    stream.release()
+    if not frames:
+        raise InputError(f"{path}: no frame can be read; the file is damaged or no video.")
+    if len(frames) > MOST_FRAMES:
+        raise InputError(f"{path}: at most {MOST_FRAMES} frames are judged at once; cut the video.")
+    if announced > len(frames) + 1:
+        raise InputError(
+            f"{path}: only {len(frames)} of {announced} frames can be read; the file breaks off."
+        )
+    if len(frames) < LEAST_FRAMES:
+        raise InputError(f"{path}: at least {LEAST_FRAMES} frames are needed; there are {len(frames)}.")
+    times = np.asarray(stamps) / 1000
+    if not (np.diff(times) > 0).all():
+        # a container without time stamps: the rate is all there is
+        if not rate > 0:
+            raise InputError(f"{path}: the video tells neither time stamps nor a frame rate.")
+        times = np.arange(len(frames)) / rate
+    return np.stack(frames), times - times[0]
+
+
+def read_claim(path: Path) -> VideoClaim:
+    """Claimed pitch and station over time.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or lacks or repeats what is needed.
+    """
+    try:
+        table = pq.read_table(path, partitioning=None)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"{path}: the claim must be a Parquet file; {str(error).splitlines()[0]}") from None
+    names = set(table.column_names)
+    problems = []
+    if not names & {"t_ns", "time"}:
+        problems.append(f"{path}: the claim lacks a column t_ns or time; it has {', '.join(sorted(names))}.")
+    if "pitch" not in names:
+        problems.append(f"{path}: the claim lacks the column pitch [rad].")
+    if not names & {"station", "speed"}:
+        problems.append(f"{path}: the claim lacks a column station [m] or speed [m/s].")
+    if "clip_id" in names and len(table["clip_id"].unique()) > 1:
+        problems.append(
+            f"{path}: the claim holds {len(table['clip_id'].unique())} clips; give one clip's rows."
+        )
+    if problems:
+        raise InputError(problems)
+
+    def column(name: str) -> NDArray[np.float64]:
+        return np.asarray(table[name].to_numpy(), np.float64)
+
+    time = column("t_ns") * 1e-9 if "t_ns" in names else column("time")
+    if len(time) < 2 or not (np.diff(time) > 0).all():
+        raise InputError(f"{path}: the claim's time must rise from row to row, over two rows at least.")
+    if "station" in names:
+        station = column("station")
+    else:
+        speed = column("speed")
+        station = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
+    told = VideoClaim(time=time - time[0], pitch=column("pitch"), station=station)
+    if not (np.isfinite(told.pitch).all() and np.isfinite(told.station).all()):
+        raise InputError(f"{path}: the claim's pitch and station must be finite throughout.")
+    return told
+
+
+def read_camera(path: Path) -> ForeignCamera:
+    """The camera of a video from YAML: focal_length or fx, fy, cx, cy; width and height; mount and distortion.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or lacks a number.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(
+            f"{path}: the camera must be readable YAML; {' '.join(str(error).split())}"
+        ) from None
+    if not isinstance(content, dict):
+        raise InputError(
+            f"{path}: the camera must be a table of width, height and focal_length or fx, fy, cx, cy."
+        )
+    numbers: dict[str, Any] = {k: v.get("value") if isinstance(v, dict) else v for k, v in content.items()}
+    if "focal_length" in numbers and {"width", "height"} <= numbers.keys():
+        f = numbers["focal_length"]
+        half = {k: v / 2 - 0.5 if isinstance(v, (int, float)) else v for k, v in numbers.items()}
+        numbers = {"fx": f, "fy": f, "cx": half["width"], "cy": half["height"]} | numbers
+    wrong = [
+        f"{path}: the camera's {key} must be a number above 0; it is {numbers.get(key)}."
+        for key in ("width", "height", "fx", "fy", "cx", "cy")
+        if not isinstance(numbers.get(key), (int, float)) or not numbers[key] > 0
+    ]
+    bends = {key: numbers.get(key) or 0.0 for key in COEFFICIENTS}
+    wrong += [
+        f"{path}: the camera's {key} must be a finite number; it is {value}."
+        for key, value in bends.items()
+        if not isinstance(value, (int, float)) or not np.isfinite(value)
+    ]
+    if wrong:
+        raise InputError(wrong)
+    K = np.array(
+        [[numbers["fx"], 0, numbers["cx"]], [0, numbers["fy"], numbers["cy"]], [0, 0, 1]], np.float64
+    )
+    mount = LEVEL.copy()
+    mount[:3, 3] = [-float(numbers.get("behind_front_axle") or 0), float(numbers.get("left_of_centre") or 0),
+                    float(numbers.get("height_above_road") or 0)]  # fmt: skip
+    distortion = np.array(list(bends.values()), np.float64) if any(bends.values()) else None
+    return ForeignCamera(
+        K=K, width=int(numbers["width"]), height=int(numbers["height"]), mount=mount, distortion=distortion
+    )
+
+
+def intrinsics_at(camera: ForeignCamera, width: int, height: int) -> NDArray[np.float64]:
+    """Intrinsics [3, 3] for a video that was scaled from the camera's size [px].
+
+    Parameters
+    ----------
+    camera : at its own size
+    width, height : of the video [px]
+
+    Raises
+    ------
+    InputError
+        If the video was cropped or squeezed: then they are unknown.
+    """
+    across, down = width / camera.width, height / camera.height
+    if abs(across / down - 1) > 0.02:
+        raise InputError(
+            f"The video is {width} x {height} and the camera {camera.width} x {camera.height}: not the same shape,"
+            " so the intrinsics are unknown; give the camera of the video as it is."
+        )
+    scaled = camera.K.copy()
+    scaled[:2, 2] += 0.5
+    scaled[0] *= across
+    scaled[1] *= down
+    scaled[:2, 2] -= 0.5
+    return scaled

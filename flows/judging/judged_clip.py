@@ -1,0 +1,152 @@
+"""One clip of a dataset as its judges see it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flows.judging.physics import clip_columns
+from flows.judging.trajectories import read_trajectory
+from flows.making.clip import PIXEL_CENTRE, catalogue_of
+from flows.making.plan import read_plan
+from flows.reading.film import through_film
+from flows.store.frames import read_clip
+from flows.store.layout import Layout
+from tasks.conventions import ROAD_CLASSES
+from tasks.eval.motion import RecoveredMotion
+from tasks.eval.no_reference import piqe, temporal_error
+from tasks.eval.outside_trajectory import motion_from_trajectory
+from tasks.eval.pose_essential import recover_motion_essential
+from tasks.eval.pose_photometric import recover_motion_photometric
+from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.severity import image_statistics, sampled_frames
+from tasks.eval.undistort import undistorted
+from tasks.eval.unroll import one_shutter
+from tasks.eval.unusable import glossy_pixels, unusable_pixels
+
+Row = dict[str, Any]
+METHODS = ("photometric", "pnp", "essential")
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgedClip:
+    """A clip as its judges saw it.
+
+    Parameters
+    ----------
+    facts : the clip's row
+    frames : columns of the frame table
+    motions : recovered motion by method
+    statistics : of its pictures
+    thumbnails : three of its frames, uint8 [3, h, w, 3] sRGB
+    quality : of its pictures, without a reference
+    """
+
+    facts: Row
+    frames: dict[str, NDArray[Any]]
+    motions: dict[str, RecoveredMotion]
+    statistics: dict[str, float]
+    thumbnails: NDArray[np.uint8]
+    quality: dict[str, float]
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Of the frames [s]."""
+        return np.asarray(self.frames["t_ns"] * 1e-9, np.float64)
+
+    @property
+    def opening(self) -> float | None:
+        """When the front axle meets the road feature's near edge [s]; None if there is none or it never does."""
+        edge = self.facts["hazard_center_m"] - self.facts["hazard_length_m"] / 2
+        if self.facts["hazard_height_m"] == 0 or self.frames["station"][-1] <= edge:
+            return None
+        return float(np.interp(edge, self.frames["station"], self.times))
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """How judges see a dataset: after a film's compression, if any, and with the lens's distortion taken out.
+
+    Parameters
+    ----------
+    root : a finished dataset
+    crf : constant rate factor of the H.264 that the pictures pass through; None leaves them as they are [1]
+    """
+
+    root: Path
+    crf: int | None = None
+
+    def arrays(self, index: int, *names: str) -> list[NDArray[Any]]:
+        """Arrays of the clip at that index, by name."""
+        buffers = {name: read_clip(Layout(self.root).frames, index, name) for name in names}
+        if self.crf is not None and "rgb" in buffers:
+            rate = read_plan(self.root).settings.frame_rate_hz
+            buffers["rgb"] = through_film(buffers["rgb"], rate, self.crf)
+        camera = catalogue_of(self.root).camera
+        return list(undistorted(buffers, camera.K - PIXEL_CENTRE, camera.distortion).values())
+
+
+def judge_clip(
+    view: View, facts: Row, outside: Mapping[str, Path] | None = None, *, metric: bool = False
+) -> JudgedClip:
+    """All three pose checks and the image statistics of one clip, and what others recovered of it.
+
+    Parameters
+    ----------
+    view : of the dataset
+    facts : the clip's row
+    outside : trajectory files by the name of what made them
+    metric : whether their lengths are metres
+
+    Raises
+    ------
+    InputError
+        For a trajectory that cannot be read or does not cover the clip.
+    """
+    cv2.setNumThreads(1)
+    catalogue = catalogue_of(view.root)
+    rgb, depth, kind = view.arrays(facts["index"], "rgb", "depth", "class")
+    frames = clip_columns(view.root, "frames", facts)
+    K, mount = catalogue.camera.K - PIXEL_CENTRE, catalogue.camera.T_rig_camera
+    route = catalogue.scene.route.pose(frames["station"])[:, :3, :3]
+    times = np.asarray(frames["t_ns"] * 1e-9, np.float64)
+    still = one_shutter(
+        {"rgb": rgb, "depth": depth, "class": kind},
+        K,
+        mount,
+        distortion=catalogue.camera.distortion,
+        line_delay_s=catalogue.camera.line_delay_s,
+        frame_interval_s=float(times[1] - times[0]),
+        film_depth_mm=facts["film_depth_mm"],
+        route_rotations=route,
+    )
+    hidden = unusable_pixels(still["class"], facts["film_depth_mm"])
+    with_depth = (still["rgb"], still["depth"], K, mount)
+    others = {name: read_trajectory(path) for name, path in (outside or {}).items()}
+    sampled = rgb[sampled_frames(len(rgb))]
+    small = rgb[[0, len(rgb) // 3, 2 * len(rgb) // 3]]
+    return JudgedClip(
+        facts=facts,
+        frames=frames,
+        motions={
+            "photometric": recover_motion_photometric(
+                *with_depth, hidden | glossy_pixels(still["class"]), route
+            ),
+            "pnp": recover_motion_pnp(*with_depth, hidden, route),
+            "essential": recover_motion_essential(rgb, K, mount, route_rotations=route),
+        }
+        | {
+            name: motion_from_trajectory(name, times, *told, mount, metric=metric, route_rotations=route)
+            for name, told in others.items()
+        },
+        statistics=image_statistics(rgb, np.isin(kind, ROAD_CLASSES)),
+        quality={
+            "piqe": float(np.mean([piqe(picture) for picture in sampled])),
+            "temporal_error": temporal_error(rgb),
+        },
+        thumbnails=np.stack([cv2.resize(p, (240, 240 * p.shape[0] // p.shape[1])) for p in small]),
+    )

@@ -1,0 +1,150 @@
+"""The physics audit: a dataset's stored telemetry held against the laws that it claims to follow."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import yaml
+
+from flows.running.orchestration import stage
+from flows.store.address import reading, telemetry
+from flows.store.layout import Layout, read_json, write_json
+from flows.store.telemetry import table_columns
+from tasks.conventions import FRAME_CHANNELS, TICK_CHANNELS
+from tasks.errors import InputError
+from tasks.eval.physics_audit import PhysicsVerdict, audit_clip
+from tasks.eval.physics_constants import Constants, TyreTables
+from tasks.eval.physics_laws import finite_rows
+
+
+def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
+    """Work every stored column out again from the others, and name the column of a clip that breaks a law.
+
+    Parameters
+    ----------
+    dataset : a finished dataset in the paper's vehicle mode
+    out : folder for physics.json
+
+    Raises
+    ------
+    InputError
+        If the folder is no finished dataset, a table lacks columns, or its mode's laws are not known here.
+    """
+    root = reading(dataset, telemetry).root
+    constants = read_constants(root)
+    clips = clip_facts(root)
+    held = [facts["label"] for facts in clips if facts["hold_speed"]]
+    if held:
+        raise InputError(
+            f"{dataset}: {len(held)} clips hold their speed until the brake ({held[0]} first), by a force that no"
+            " column records: the physics audit knows coasting cars only"
+        )
+    rows = [stage(_clip_row)(root, facts, constants) for facts in clips]
+    broken = [row for row in rows if not row["passed"]]
+    result = {
+        "verified": not broken,
+        "clips_checked": len(rows),
+        "laws_checked": sum(row["laws"] for row in rows),
+        "clips": rows,
+    }
+    if out is not None:
+        write_json(Path(out) / "physics.json", result)
+    return result
+
+
+def clip_facts(root: Path) -> list[dict[str, Any]]:
+    """The clips' rows: scenario, surface, outcome and check.
+
+    Raises
+    ------
+    InputError
+        If the table is missing.
+    """
+    path = Layout(root).telemetry / "clips.parquet"
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; is {root} a finished muSync dataset?")
+    rows: list[dict[str, Any]] = pq.read_table(path).to_pylist()
+    return rows
+
+
+def clip_columns(root: Path, table: str, facts: dict[str, Any]) -> dict[str, np.ndarray]:
+    """One clip's columns of the tick or the frame table.
+
+    Raises
+    ------
+    InputError
+        If the clip or one of the table's columns is not there.
+    """
+    folder = Layout(root).telemetry / table
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; is {root} a finished muSync dataset?")
+    found = pq.read_table(folder, filters=[("clip_id", "==", facts["clip_id"])])
+    channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
+    missing = [c.name for c in channels if c.name not in found.column_names]
+    if missing or found.num_rows == 0:
+        what = f"lacks {', '.join(missing)}" if missing else f"holds no row of clip {facts['clip_id']}"
+        raise InputError(f"{folder}: the {table} table {what}; make the dataset again.")
+    return table_columns(found)
+
+
+def read_constants(root: Path) -> Constants:
+    """The frozen car and pavement of a dataset, as numbers by name, in SI.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, or the dataset was made in another mode or with effects.
+    """
+    layout = Layout(root)
+    files = {name: layout.inputs / f"{name}.yaml" for name in ("vehicle", "surface")}
+    missing = [
+        f"{path}: no such file; is {root} a finished muSync dataset?"
+        for path in files.values()
+        if not path.is_file()
+    ]
+    if missing:
+        raise InputError(missing)
+    car, surface = (yaml.safe_load(path.read_text(encoding="utf-8")) for path in files.values())
+    mode = read_json(layout.plan)["grid"]["vehicle_mode"]
+    if mode != "paper" or car.get("effects"):
+        raise InputError(
+            f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"
+            f"{' with effects' if car.get('effects') else ''}, whose inner steps the stored ticks do not fix."
+        )
+    tyres = {
+        family: TyreTables(**{name: tuple(table[name]["value"]) for name in TyreTables.__dataclass_fields__})
+        for family, table in car["families"].items()
+    }
+    return Constants(car=_numbers(car), surface=_numbers(surface), tyres=tyres, mode=mode)
+
+
+def _numbers(entry: dict[str, Any]) -> dict[str, float]:
+    scalars = {
+        k: v for k, v in entry.items() if isinstance(v, dict) and isinstance(v.get("value"), (int, float))
+    }
+    return {
+        name: float(np.deg2rad(item["value"])) if item.get("unit") == "deg" else float(item["value"])
+        for name, item in scalars.items()
+    }
+
+
+def _clip_row(root: Path, facts: dict[str, Any], constants: Constants) -> dict[str, Any]:
+    ticks, frames = clip_columns(root, "ticks", facts), clip_columns(root, "frames", facts)
+    holes = [f"ticks.{c}" for c in finite_rows(ticks)]
+    verdict = audit_clip(ticks, frames, facts, constants)
+    return {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
+
+
+def _as_row(verdict: PhysicsVerdict) -> dict[str, Any]:
+    return {
+        "passed": verdict.passed,
+        "laws": len(verdict.laws),
+        "column": verdict.column,
+        "also": list(verdict.also),
+        "broken": [
+            {"law": x.name, "excess": min(x.excess, 1e300), "row": x.at, "columns": sorted(x.columns)}
+            for x in verdict.broken
+        ],
+        "tightest": max((x.excess for x in verdict.laws if not x.broken), default=0.0),
+    }

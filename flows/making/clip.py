@@ -1,0 +1,294 @@
+"""One clip from its scenario to its committed receipt: the work that is fanned out.
+
+A clip is made whole by one worker. Its frames and tables are written first and its receipt last, by rename:
+where the receipt exists, the clip is complete. Making a clip twice writes the same bytes.
+"""
+
+import resource
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from catalogs.cameras import load_camera
+from catalogs.gates import load_gates
+from catalogs.hazard_markings import load_marking
+from catalogs.scenario import Scenario
+from catalogs.scenes import load_scene
+from catalogs.studies import load_sensitivity_study
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from catalogs.weather import load_weather
+from flows.making.driving import drive, hazard_of, ranges_of
+from flows.making.plan import ClipPlan, Plan, read_plan
+from flows.store.address import here, publish
+from flows.store.frames import buffer_hash, write_clip
+from flows.store.layout import STAGED_TABLES, Layout, write_json
+from flows.store.telemetry import columns_hash, labelled_table, write_parquet
+from manifests.canonical import sha256_of_file
+from tasks.conventions import TICK_CHANNELS
+from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
+from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.undistort import undistorted
+from tasks.eval.unroll import one_shutter
+from tasks.eval.unusable import unusable_pixels
+from tasks.render.backend import select_backend
+from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
+from tasks.render.clip import render_clip
+from tasks.render.road_edit import RoadRelief, apply_road_profile
+from tasks.render.road_paint import HazardMarking, painted
+from tasks.render.road_refinement import refined_road
+from tasks.render.weather.parameters import WeatherParameters, WeatherState
+from tasks.scene.route import Route
+from tasks.scene.scene import Scene
+from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Rollout
+from tasks.vehicle.sensitivity import StudyProtocol
+
+TICK_RATE_HZ = 1000
+PIXEL_CENTRE = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
+"""The renderer puts pixel centres at +0.5, OpenCV and the judges at whole numbers [px]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Catalogue:
+    """The entries that a dataset was planned with, read from the dataset's own frozen copies."""
+
+    vehicle: Vehicle
+    surface: SurfaceParameters
+    camera: Camera
+    scene: Scene
+    looks: WeatherParameters
+    gates: PoseThresholds
+    study: StudyProtocol
+    marking: HazardMarking | None = None
+
+
+@lru_cache(maxsize=2)
+def catalogue_of(root: Path) -> Catalogue:
+    """Load a dataset's frozen inputs and its scene."""
+    return load_catalogue(Layout(root).inputs, read_plan(root).settings.scene)
+
+
+def load_catalogue(inputs: Path, scene: str) -> Catalogue:
+    """Load frozen inputs from their folder, and a scene."""
+    return Catalogue(
+        vehicle=load_vehicle(inputs / "vehicle.yaml"),
+        surface=load_surface(inputs / "surface.yaml"),
+        camera=load_camera(inputs / "camera.yaml"),
+        scene=load_scene(scene),
+        looks=load_weather(inputs / "weather"),
+        gates=load_gates(inputs / "gates.yaml"),
+        marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
+        study=load_sensitivity_study(inputs / "study.yaml")[0],
+    )
+
+
+def make_clip(layout: Layout, index: int) -> dict[str, Any]:
+    """Make and commit clip ``index`` of a dataset; returns its receipt."""
+    started = time.process_time(), time.perf_counter()
+    cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
+    layout = here(layout)
+    plan = read_plan(layout.root)
+    clip = plan.clips[index]
+    catalogue = catalogue_of(layout.root)
+
+    mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
+    facts, ride = drive(clip.scenario, catalogue.vehicle, catalogue.surface, mode, duration_s)
+    ranges = ranges_of(
+        clip.scenario, facts, catalogue.vehicle, catalogue.surface, catalogue.study, mode, duration_s
+    )
+    frames = frame_rows(ride, plan, catalogue)
+    buffers: dict[str, NDArray[Any]] = {}
+    if plan.settings.pictures:
+        rig_at = rig_of(ride, frames, catalogue)
+        buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed), rig_at)
+        frames |= judge(buffers, frames, facts["film_depth_mm"], catalogue)
+        write_clip(layout.frames, index, buffers)
+    else:
+        frames |= nothing_to_judge(len(frames["frame"]))
+    verdict = frames.pop("verdict")
+
+    identity = {"clip_id": clip.clip_id, "label": clip.label, "weather": clip.scenario.weather}
+    write_parquet(labelled_table(ride.columns, identity), layout.staged(clip.clip_id, "ticks"))
+    write_parquet(labelled_table(frames, identity | facts), layout.staged(clip.clip_id, "frames"))
+    shards = {name: layout.frame_shard(name, index) for name in buffers}
+    receipt = {
+        **clip.as_json(),
+        "artifacts": {layout.relative(path): sha256_of_file(path) for path in shards.values()},
+        "content": {name: buffer_hash(values) for name, values in buffers.items()}
+        | {"ticks": columns_hash(ride.columns, [channel.name for channel in TICK_CHANNELS]),
+           "frames": columns_hash(frames, sorted(frames))},
+        "figures": _json_numbers(facts | {
+            "stop_time": ride.stop_time,
+            "stopping_distance": ride.stopping_distance,
+            "peak_pitch": float(ride.columns["pitch"].max()),
+            "static_pitch": ride.static_pitch,
+            "calibration_extrapolated": ride.calibration_extrapolated,
+        } | ranges),
+        "verdict": verdict,
+    }  # fmt: skip
+    write_json(layout.receipt(clip.clip_id), receipt)
+    tables = [layout.staged(clip.clip_id, table) for table in STAGED_TABLES]
+    publish(layout, [*shards.values(), *tables], last=layout.receipt(clip.clip_id))
+    cost = {
+        "cpu_s": time.process_time() - started[0],
+        "wall_s": time.perf_counter() - started[1],
+        "peak_memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    return receipt | {"cost": cost}
+
+
+def warm_up(layout: Layout) -> None:
+    """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
+    root = here(layout).root
+    plan, catalogue = read_plan(root), catalogue_of(root)
+    short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
+    for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
+        facts, ride = drive(
+            clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, short.duration_s
+        )
+        frames = frame_rows(ride, short, catalogue)
+        if plan.settings.pictures:
+            rig_at = rig_of(ride, frames, catalogue)
+            buffers = picture(clip.scenario, facts, frames, short, catalogue, int(clip.seed), rig_at)
+            judge(buffers, frames, facts["film_depth_mm"], catalogue)
+
+
+def relief_of(hazard: RoadHazard, route: Route) -> RoadRelief:
+    """The road feature on its route, as the renderer takes it."""
+    return RoadRelief(
+        route=route,
+        elevation=lambda station: road_elevation(station, hazard),
+        slope=lambda station: road_slope(station, hazard),
+        near=hazard.center_m - hazard.length_m / 2,
+        far=hazard.center_m + hazard.length_m / 2,
+    )
+
+
+def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:
+    """The tick that each frame shows, and the rig pose at it."""
+    frame = np.arange(plan.settings.frames)
+    tick = np.rint(frame * TICK_RATE_HZ / plan.settings.frame_rate_hz).astype(np.int64)
+    rows = {"frame": frame, "tick": tick} | {name: column[tick] for name, column in ride.columns.items()}
+    vehicle = catalogue.vehicle
+    poses = body_poses(
+        catalogue.scene.route, rows["station"], rows["heave"], rows["pitch"],
+        cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
+    )  # fmt: skip
+    return rows | {"T_world_rig": poses.reshape(len(frame), 16)}
+
+
+def rig_of(ride: Rollout, frames: Mapping[str, NDArray[Any]], catalogue: Catalogue) -> RigAt:
+    """Rig poses about every frame, for a camera that moves while it sees one."""
+    vehicle, tick_s = catalogue.vehicle, 1 / TICK_RATE_HZ
+    time_s = np.arange(len(ride.columns["station"]), dtype=np.float64) * tick_s
+    return continuous_rig(
+        catalogue.scene.route, time_s,
+        ride.columns["station"], ride.columns["heave"], ride.columns["pitch"], frames["tick"] * tick_s,
+        cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
+    )  # fmt: skip
+
+
+def picture(
+    scenario: Scenario,
+    facts: Mapping[str, Any],
+    frames: Mapping[str, NDArray[Any]],
+    plan: Plan,
+    catalogue: Catalogue,
+    seed: int,
+    rig_at: RigAt,
+) -> dict[str, NDArray[Any]]:
+    """The clip's finished frames, depth and class."""
+    hazard = hazard_of(scenario)
+    weather = WeatherState(
+        kind=scenario.weather,
+        precipitation_mm_h=scenario.precipitation_mm_h,
+        film_depth_mm=facts["film_depth_mm"],
+        snow_depth_mm=facts["snow_depth_mm"],
+        snow_coverage=facts["snow_coverage"],
+    )
+    scene = catalogue.scene
+    gaussians, relief = scene.gaussians, None
+    if hazard.height_m != 0:
+        relief = relief_of(hazard, scene.route)
+        carriageway = scene.carriageway_left, scene.carriageway_right
+        gaussians = refined_road(gaussians, relief)
+        if catalogue.marking is not None and hazard.height_m > 0:
+            albedo = catalogue.looks.sky.asphalt_albedo
+            gaussians = painted(gaussians, relief, catalogue.marking, *carriageway, albedo)
+        gaussians, _ = apply_road_profile(gaussians, relief, *carriageway)
+    return render_clip(
+        gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
+        frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
+        backend=select_backend(plan.backend), relief=relief, to_sun=scene.to_sun,
+        labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
+        rig_at=rig_at, composition=plan.settings.composition,
+    )  # fmt: skip
+
+
+def judge(
+    buffers: Mapping[str, NDArray[Any]],
+    frames: Mapping[str, NDArray[Any]],
+    film_depth_mm: float,
+    catalogue: Catalogue,
+) -> dict[str, Any]:
+    """Motion recovered from the finished frames, held against the telemetry."""
+    K, route = catalogue.camera.K - PIXEL_CENTRE, catalogue.scene.route.pose(frames["station"])[:, :3, :3]
+    seen = one_shutter(
+        undistorted(
+            {name: buffers[name] for name in ("rgb", "depth", "class")}, K, catalogue.camera.distortion
+        ),
+        K,
+        catalogue.camera.T_rig_camera,
+        distortion=catalogue.camera.distortion,
+        line_delay_s=catalogue.camera.line_delay_s,
+        frame_interval_s=float(frames["t_ns"][1] - frames["t_ns"][0]) * 1e-9,
+        film_depth_mm=film_depth_mm,
+        route_rotations=route,
+    )
+    recovered = recover_motion_pnp(
+        seen["rgb"],
+        seen["depth"],
+        K,
+        catalogue.camera.T_rig_camera,
+        unusable=unusable_pixels(seen["class"], film_depth_mm),
+        route_rotations=route,
+    )
+    verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)
+    return {
+        "recovered_pitch": recovered.pitch,
+        "recovered_progress": recovered.progress,
+        "verdict": _json_numbers(asdict(verdict) | {"reasons": list(verdict.reasons)}),
+    }
+
+
+def nothing_to_judge(frames: int) -> dict[str, Any]:
+    """What `judge` returns where there is no picture: everything not represented."""
+    verdict = {figure.name: None for figure in fields(PoseVerdict)}
+    return {
+        "recovered_pitch": np.full(frames, np.nan),
+        "recovered_progress": np.full(frames, np.nan),
+        "verdict": verdict | {"reasons": ["no frames were made"]},
+    }
+
+
+def clip_plan_of(root: Path, clip_id: str) -> ClipPlan:
+    """The planned clip of that id."""
+    return next(clip for clip in read_plan(root).clips if clip.clip_id == clip_id)
+
+
+def _json_numbers(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Plain JSON values; NaN, which means "not represented", becomes null."""
+    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in values.items()}
+    return {
+        key: None if isinstance(value, float) and np.isnan(value) else value for key, value in plain.items()
+    }

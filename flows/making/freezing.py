@@ -1,0 +1,190 @@
+"""Frozen runs: made from a grid, held against what is here, and made again hash for hash."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from catalogs.grids import Grid, GridFile, expand_grid, grid_names, load_grid
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from flows.making.driving import drive
+from flows.making.generate import RunReport, generate
+from flows.making.plan import Plan, freeze_grid
+from flows.running.progress import progress_bar
+from flows.running.runner import RunnerName
+from flows.store.layout import read_json, write_atomically
+from flows.store.sealed import read_manifest
+from flows.store.telemetry import columns_hash
+from manifests.explain import as_sentences, tool_differences, tools_here
+from manifests.frozen_run import (
+    FOLDER,
+    differences,
+    differing_clips,
+    frozen_names,
+    parameters_that_matter,
+    read_frozen,
+    sealed,
+)
+from manifests.provenance import processor
+from tasks.conventions import TICK_CHANNELS
+from tasks.errors import InputError
+
+SHOWN_DIFFERENCES = 8
+
+
+def freeze(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]:
+    """Freeze the run of a grid, or anew those that ship with the project.
+
+    Parameters
+    ----------
+    grid : grid file, or the name of one that ships; None takes every frozen run that ships
+    out : file to write; None writes where the project keeps its own, and then the grid has to be one that ships
+
+    Returns
+    -------
+    ``frozen[]`` with ``name``, ``clips``, ``file``, and ``changed``: whether anything but the record of tools differs
+    from what the file held before
+
+    Raises
+    ------
+    InputError
+        For a faulty grid, or one that is not the project's own and goes to no file.
+    """
+    names = [grid] if grid is not None else list(frozen_names())
+    if out is not None and grid is None:
+        raise InputError("--out FILE: name the grid whose run is to be frozen in it")
+    if out is None and (strange := [name for name in names if name not in grid_names()]):
+        raise InputError(
+            [f"{name}: is no grid of the project: say with --out FILE where to freeze it" for name in strange]
+        )
+    rows = []
+    with progress_bar("frozen", len(names)) as advance:
+        for name in names:
+            run = frozen_run(load_grid(name))
+            file = Path(out) if out is not None else FOLDER / f"{run['name']}.json"
+            before = read_json(file) if file.is_file() else {}
+            changed = any(before.get(key) != run[key] for key in ("grid", "parameters", "clips"))
+            if changed or out is not None:
+                # keys keep their order: that of the axes is the order of the clips
+                write_atomically(file, (json.dumps(run, indent=1, allow_nan=False) + "\n").encode())
+            rows.append(
+                {"name": run["name"], "clips": len(run["clips"]), "file": str(file), "changed": changed}
+            )
+            advance(name)
+    return {"frozen": rows}
+
+
+def frozen_run(grid: Grid) -> dict[str, Any]:
+    """The frozen run of a grid, with the telemetry that comes out here."""
+    plan, inputs = _planned(grid)
+    ticks = ticks_of(plan)
+    return sealed({
+        "name": grid.settings.name,
+        "grid": grid.settings.model_dump(mode="json", exclude_defaults=True),
+        "parameters": _parameters(plan, inputs),
+        "clips": [clip | {"ticks": ticks[clip["label"]]} for clip in _records(plan)],
+        "scene": dict(plan.scene),
+        "made_with": {key: dict(value) for key, value in plan.made_with.items()},
+        "processor": processor(),
+    })  # fmt: skip
+
+
+def problems_of(frozen: Mapping[str, Any]) -> list[str]:
+    """Why a frozen run cannot be made again here, a sentence each; empty when it can.
+
+    Every clip is driven and its telemetry compared: some milliseconds a clip, whatever its frames would cost.
+    """
+    try:
+        plan, inputs = _planned(_grid_of(frozen))
+    except InputError as error:
+        return list(error.problems)
+    found = differences(frozen, _parameters(plan, inputs), _records(plan))
+    if found:
+        return found
+    differing = differing_clips(frozen, ticks_of(plan))
+    if not differing:
+        return []
+    tools = "; ".join(as_sentences(tool_differences(frozen, tools_here()))) or "none that is recorded"
+    return [
+        f"the telemetry of {len(differing)} of {len(frozen['clips'])} clips comes out otherwise ({differing[0]} first),"
+        f" from the same scenarios and parameters; tools that differ: {tools}"
+    ]
+
+
+def reproduce(
+    manifest: str,
+    out: str,
+    *,
+    runner: RunnerName = "dask",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    backend: str = "auto",
+) -> tuple[RunReport, list[str]]:
+    """Make the dataset of a frozen run again.
+
+    Parameters
+    ----------
+    manifest : name of a frozen run that ships, or a file
+    out : dataset folder, as in `flows.making.generate.generate`
+
+    Returns
+    -------
+    The report, and the labels of the clips whose telemetry is not the frozen one, which is none on a machine whose
+    workers compute as this one does
+
+    Raises
+    ------
+    InputError
+        Before anything is written, if what is here does not make the frozen telemetry: with each difference.
+    """
+    frozen = read_frozen(manifest)
+    problems = problems_of(frozen)
+    if problems:
+        rest = len(problems) - SHOWN_DIFFERENCES
+        raise InputError([
+            *(f"manifest {manifest}: {problem}" for problem in problems[:SHOWN_DIFFERENCES]),
+            *([f"manifest {manifest}: and {rest} more differences"] if rest > 0 else []),
+            f"manifest {manifest}: what to do: musync generate GRID makes a dataset with what is here; musync freeze"
+            f" freezes it anew; source {frozen['made_with']['code']['source_sha256'][:12]} of version"
+            f" {frozen['made_with']['code']['version']} makes it as it was",
+        ])  # fmt: skip
+    report = generate(
+        _grid_of(frozen), out, runner=runner, workers=workers, scheduler=scheduler, backend=backend
+    )
+    made = {clip["label"]: clip["content"]["ticks"] for clip in read_manifest(report.layout)["clips"]}
+    return report, differing_clips(frozen, made)
+
+
+def ticks_of(plan: Plan) -> dict[str, str]:
+    """Label to the hash of a clip's telemetry, of every clip of a plan; nothing is written."""
+    names = [channel.name for channel in TICK_CHANNELS]
+    vehicle, surface = load_vehicle(plan.settings.vehicle), load_surface(plan.settings.surface)
+    return {
+        clip.label: columns_hash(
+            drive(clip.scenario, vehicle, surface, plan.settings.vehicle_mode, plan.duration_s)[1].columns,
+            names,
+        )
+        for clip in plan.clips
+    }
+
+
+def _grid_of(frozen: Mapping[str, Any]) -> Grid:
+    return expand_grid(GridFile.model_validate(frozen["grid"]), f"manifest {frozen['name']}")
+
+
+def _planned(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
+    # no id of a clip is kept, so it does not matter which rasteriser the plan names
+    return freeze_grid(grid, grid.settings.name, "cpu")
+
+
+def _parameters(plan: Plan, inputs: Mapping[str, bytes]) -> dict[str, Any]:
+    parsed = {name: yaml.safe_load(content) for name, content in inputs.items()}
+    return parameters_that_matter(parsed, plan.settings.pictures)
+
+
+def _records(plan: Plan) -> list[dict[str, Any]]:
+    kept = ("label", "seed", "scenario", "split", "calibration")
+    return [{key: clip[key] for key in kept} for clip in plan.as_json()["clips"]]

@@ -1,0 +1,205 @@
+"""A grid to a dataset: plan, make the missing clips, seal."""
+
+from dataclasses import dataclass, field
+from functools import partial
+
+from catalogs.grids import Grid
+from flows.making.clip import make_clip, warm_up
+from flows.making.input_changes import frozen_inputs
+from flows.making.plan import Plan, make_plan, plan_differences, read_plan
+from flows.making.seal import needed_to_seal, seal
+from flows.running.failures import ClipsFailed, disk_full_sentence
+from flows.running.orchestration import stage
+from flows.running.progress import progress_bar
+from flows.running.runner import RunnerName, open_executor, run_unordered
+from flows.store.address import bring, claim, publish, reading, resumable, working
+from flows.store.frames import create_arrays
+from flows.store.layout import Layout, clear_partial_files, read_json, write_atomically, write_json
+from flows.store.lock import sole_writer
+from manifests.manifest import is_quarantined
+from tasks.errors import InputError
+
+SHOWN = 8
+"""Differences told when a folder holds another run."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunReport:
+    """What a generating run did.
+
+    Parameters
+    ----------
+    layout : where it lies
+    run_id : of its frozen plan
+    clips, made : clips of the dataset, and of these those made now
+    quarantined : why the pose check failed, by label of the clip; they stay in the dataset, marked
+    cost : CPU and wall seconds and peak memory by label of what was made now
+    """
+
+    layout: Layout
+    run_id: str
+    clips: int
+    made: int
+    quarantined: dict[str, list[str]]
+    cost: dict[str, dict[str, float]] = field(default_factory=dict)
+
+
+def generate(
+    grid: str | Grid,
+    out: str,
+    *,
+    runner: RunnerName = "dask",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    backend: str = "auto",
+    vehicle: str | None = None,
+    pictures: bool = True,
+) -> RunReport:
+    """Make the dataset of ``grid`` in ``out``, or what is missing of it; ``vehicle`` takes the grid's place.
+
+    Without ``pictures`` nothing is rendered: telemetry alone, of the same clips.
+
+    Raises
+    ------
+    InputError
+        For a faulty grid, or a folder that holds something else.
+    ClipsFailed
+        If clips failed, and not for want of an input; run the same command again to make just those.
+    """
+    missing: list[int] = []
+    cost: dict[str, dict[str, float]] = {}
+    with working(out, resumable) as layout:
+        plan = stage(prepare)(grid, layout, backend, vehicle, pictures)
+        if not layout.manifest.is_file():
+            with sole_writer(layout):
+                clear_partial_files(layout)
+                missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
+                cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
+                bring(layout, needed_to_seal(layout, plan))
+                stage(seal)(layout, plan)
+    return _report(reading(out, summary), plan, len(missing), cost)
+
+
+def summary(name: str) -> bool:
+    """What is shown of a run when it has ended."""
+    return name.startswith("previews/")
+
+
+def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, float]]) -> RunReport:
+    clips = read_json(layout.manifest)["clips"]
+    return RunReport(
+        layout=layout,
+        run_id=plan.run_id,
+        clips=len(plan.clips),
+        made=made,
+        quarantined={clip["label"]: clip["verdict"]["reasons"] for clip in clips if is_quarantined(clip)},
+        cost=cost,
+    )
+
+
+def prepare(
+    grid: str | Grid, layout: Layout, backend: str, vehicle: str | None = None, pictures: bool = True
+) -> Plan:
+    """Check and freeze the plan, and lay out the folder; resumes a folder that holds the same plan."""
+    from tasks.render.backend import select_backend
+
+    plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
+    if layout.plan.is_file():
+        existing = read_plan(layout.root)
+        if existing.run_id != plan.run_id:
+            theirs = frozen_inputs(layout, existing.inputs)
+            differences = plan_differences(existing.as_json(), plan.as_json(), theirs, inputs)
+            raise InputError(
+                [
+                    f"{layout}: holds the dataset of another run: {difference}"
+                    for difference in differences[:SHOWN]
+                ]
+                + [f"{layout}: give an empty folder, or go on there with what made it"]
+            )
+        return existing
+    if layout.root.exists() and (not layout.root.is_dir() or any(layout.root.iterdir())):
+        raise InputError(
+            f"{layout}: must be an empty or new folder, or a muSync dataset; it holds other files"
+        )
+    for name, content in inputs.items():
+        write_atomically(layout.inputs / name, content)
+    write_json(layout.inputs / "grid.json", plan.settings.model_dump(mode="json"))
+    create_frame_arrays(layout, plan)
+    prepared = [path for path in layout.root.rglob("*") if path.is_file()]
+    # last: where the plan exists, the folder is ready to be filled
+    write_json(layout.plan, plan.as_json())
+    publish(layout, prepared)
+    claim(layout, layout.plan)
+    return plan
+
+
+def create_frame_arrays(layout: Layout, plan: Plan) -> None:
+    """Create the empty Zarr arrays of a plan; none where it makes telemetry alone."""
+    if not plan.settings.pictures:
+        return
+    from catalogs.cameras import load_camera
+    from tasks.render.lens import Lens
+
+    camera = load_camera(layout.inputs / "camera.yaml")
+    attributes = {
+        "camera": camera.name,
+        "K": camera.K.tolist(),
+        "T_rig_camera": camera.T_rig_camera.tolist(),
+        "frame_rate_hz": plan.settings.frame_rate_hz,
+        "axes": "rig: x forward, y left, z up (ISO 8855); camera: x right, y down, z forward",
+    }
+    if not camera.plain:
+        attributes |= {
+            "distortion": {
+                name: getattr(camera.lens or Lens(), name) for name in ("k1", "k2", "p1", "p2", "k3")
+            },
+            "line_delay_s": camera.line_delay_s,
+            "motion_blur_s": camera.exposure_s if camera.motion_blur else 0.0,
+            "frame_time": "of the middle of the picture, in the middle of its exposure; rows are read downwards",
+        }
+    clips, frames = len(plan.clips), plan.settings.frames
+    create_arrays(layout.frames, clips, frames, camera.height, camera.width, plan.settings.labels, attributes)
+
+
+def fan_out(
+    layout: Layout,
+    plan: Plan,
+    indices: list[int],
+    runner: RunnerName,
+    workers: int | None,
+    scheduler: str | None,
+) -> dict[str, dict[str, float]]:
+    """Make the clips on the runner; returns what each cost (CPU and wall seconds, peak memory)."""
+    cost: dict[str, dict[str, float]] = {}
+    failures: dict[str, BaseException] = {}
+    labels = {clip.index: clip.label for clip in plan.clips}
+    with (
+        open_executor(runner, workers, scheduler, partial(warm_up, layout)) as executor,
+        progress_bar("clips", len(indices)) as advance,
+    ):
+        for (_, index), future in run_unordered(executor, make_clip, ((layout, index) for index in indices)):
+            error = future.exception()
+            if error is None:
+                cost[labels[index]] = future.result()["cost"]
+                advance(labels[index])
+            elif disk_full_sentence(error) is not None:
+                raise InputError(
+                    f"{layout}: the disk is full; {len(cost)} of {len(indices)} clips are committed and kept:"
+                    " free space and run the same command again"
+                )
+            else:
+                failures[labels[index]] = error
+                advance(f"{labels[index]} failed")
+    wrong = [
+        problem for error in failures.values() if isinstance(error, InputError) for problem in error.problems
+    ]
+    if wrong and all(isinstance(error, InputError) for error in failures.values()):
+        raise InputError(list(dict.fromkeys(wrong)))
+    if failures:
+        first = next(iter(failures.values()))
+        names = ", ".join(sorted(failures))
+        raise ClipsFailed(
+            f"{layout}: {len(failures)} of {len(indices)} clips failed ({names}); the first said:"
+            f" {type(first).__name__}: {first}; the others are kept: run the same command again to make just these"
+        ) from first
+    return cost

@@ -1,0 +1,74 @@
+"""What a dataset was made from beside what its clips would be made from again: inputs, parameters, scene and tools."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from catalogs.grids import GridFile
+from catalogs.scenes import scene_identity
+from flows.making.plan import input_sources
+from flows.store.layout import Layout, read_json
+from manifests.canonical import sha256_of, sha256_of_file
+from manifests.explain import input_differences, parameter_differences, tools_here
+from tasks.errors import InputError
+
+
+def input_changes(layout: Layout, manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Every input that is no longer the recorded one, down to the value where the recorded bytes are still known.
+
+    Parameters
+    ----------
+    layout, manifest : of a sealed dataset
+
+    Returns
+    -------
+    Rows as of `manifests.explain.input_differences`, recorded value first.
+
+    Raises
+    ------
+    InputError
+        The dataset's plan is missing or no JSON, or its scene cannot be found.
+    """
+    plan = read_json(layout.plan)
+    present = frozen_inputs(layout, manifest["inputs"])
+    here = {
+        **manifest,
+        **tools_here(),
+        "grid": plan["grid"],
+        "inputs": {name: sha256_of([content]) for name, content in present.items()},
+        "scene": {"sha256": scene_identity(plan["grid"]["scene"])},
+    }
+    sources = input_sources(GridFile.model_validate(manifest["grid"]))
+    recorded = {
+        name: file.read_bytes()
+        for name, digest in manifest["inputs"].items()
+        if (file := recorded_input(layout, sources, name, digest)) is not None
+    }
+    return input_differences(manifest, here, recorded, present) + parameter_differences(manifest, plan)
+
+
+def recorded_input(
+    layout: Layout, sources: Mapping[str, Callable[[], Path]], name: str, digest: str
+) -> Path | None:
+    """A file with the recorded bytes of an input, from the dataset or else from the catalogue; None if neither has it.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    sources : `flows.making.plan.input_sources` of its grid
+    name, digest : of the input
+    """
+    for find in (lambda: layout.inputs / name, sources.get(name)):
+        try:
+            file = find() if find is not None else None
+        except InputError:
+            continue
+        if file is not None and file.is_file() and sha256_of_file(file) == digest:
+            return file
+    return None
+
+
+def frozen_inputs(layout: Layout, names: Iterable[str]) -> dict[str, bytes]:
+    """The catalogue files that a dataset keeps, by name; those that are missing are left out."""
+    files = {name: layout.inputs / name for name in names}
+    return {name: file.read_bytes() for name, file in files.items() if file.is_file()}

@@ -1,0 +1,1 @@
+"""Measured runs: in, calibrated on, and what the model lacks."""

@@ -1,0 +1,198 @@
+"""Calibration of what is known: fit a vehicle's scalars to reference traces, freeze it, say how well it is known."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from catalogs.calibration import load_procedure, procedure_source
+from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
+from catalogs.vehicles import load_vehicle, vehicle_source
+from catalogs.vehicles.frozen import frozen_text
+from flows.store.layout import write_atomically, write_json
+from flows.studies.vehicle_model import agreement_of
+from manifests.canonical import sha256_of_file
+from manifests.provenance import code_version
+from tasks.calibration.identifiability import identifiability
+from tasks.calibration.residual import WHEELS, CalibrationCase
+from tasks.calibration.scalars import calibration_scalars, scalar_value, with_scalars
+from tasks.calibration.staged import Procedure
+from tasks.calibration.staged import calibrate as run_stages
+from tasks.errors import InputError
+from tasks.vehicle.effects.numbers import EFFECT_UNITS, NUMBERS_OF_EFFECTS
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Mode
+
+DIGITS = 6
+"""Significant digits that a frozen file keeps of a calibrated scalar."""
+
+
+def calibrate(
+    traces: str,
+    *,
+    out: str,
+    vehicle: str = "paper-reference",
+    procedure: str = "paper-staged",
+    split: str = "development",
+    name: str = "calibrated",
+) -> dict[str, Any]:
+    """Calibrate a vehicle in stages on one split of a folder of traces, and freeze it.
+
+    Parameters
+    ----------
+    traces : folder with cases.json and NAME.parquet or */NAME.parquet
+    out : folder for ``NAME.yaml`` and ``calibration.json``
+    vehicle : catalogue name or file to start from
+    procedure : catalogue name or file of the stages
+    split : which cases are fitted; the others are never looked at
+    name : of the frozen vehicle
+
+    Raises
+    ------
+    InputError
+        Listing every problem of traces, vehicle or procedure.
+    """
+    start = load_vehicle(vehicle)
+    steps, interval = load_procedure(procedure)
+    reference = read_reference(Path(traces), split=split)
+    before = agreement_of(start, reference, steps.mode)
+    cases = [
+        calibration_case(case, columns, row["window"], interval, steps.yardstick.start_s, start.wheelbase)
+        for (case, columns), row in zip(reference, before["cases"], strict=True)
+    ]
+    fitted, records = run_stages(start, cases, steps)
+    fitted = _rounded(fitted, steps)
+    target = Path(out) / f"{name}.yaml"
+    data = {case.case: sha256_of_file(trace_file(Path(traces), case.case)) for case, _ in reference}
+    write_atomically(target, _frozen(fitted, vehicle, procedure, steps, split, data).encode())
+    frozen = load_vehicle(target)
+    after = agreement_of(frozen, reference, steps.mode)
+    result = {
+        "vehicle_file": str(target),
+        "vehicle_sha256": sha256_of_file(target),
+        "base": vehicle,
+        "procedure": procedure,
+        "mode": steps.mode,
+        "split": split,
+        "cases": [case.name for case in cases],
+        "data_sha256": data,
+        "stages": [asdict(record) for record in records],
+        "before": before["groups"],
+        "after": after["groups"],
+        "without": _without(frozen, reference, steps.mode),
+        "identifiability": asdict(identifiability(frozen, cases, steps)),
+    }
+    write_json(Path(out) / "calibration.json", result)
+    return result
+
+
+def calibration_case(
+    case: ReferenceCase,
+    columns: Traces,
+    window: Sequence[float],
+    interval: float,
+    head_s: float,
+    wheelbase: float,
+) -> CalibrationCase:
+    """One trace as the fit takes it: the judge's event window and what leads from the brake onset to it.
+
+    Parameters
+    ----------
+    case : its conditions
+    columns : the trace
+    window : begin and end of what counts [s]
+    interval : spacing of the samples [s]
+    head_s : how long every sample counts at first [s]
+    wheelbase : of the model [m]
+    """
+    time = columns["time"]
+    onset = case.brake_onset_s if case.braked and case.brake_onset_s is not None else window[0]
+    inside = np.flatnonzero((time >= min(onset, window[0]) - 1e-9) & (time <= window[1] + 1e-9))
+    every = max(1, round(interval / float(np.median(np.diff(time)))))
+    head = inside[time[inside] <= time[inside[0]] + head_s + 1e-9]
+    chosen = np.union1d(inside[::every], head)
+    return CalibrationCase(
+        name=case.case,
+        kind=case.facts(wheelbase).kind,
+        family=case.weather,
+        surface_friction=case.surface_coefficient,
+        controls=case.controls(),
+        hazard=case.hazard(),
+        time=time[chosen],
+        event_start=window[0],
+        speed=columns["speed"][chosen],
+        pitch=columns["pitch"][chosen],
+        slip=np.stack([columns[f"slip_{wheel}"][chosen] for wheel in WHEELS]),
+        wheel_load=np.stack([columns[f"wheel_load_{wheel}"][chosen] for wheel in WHEELS]),
+        stopping_distance=case.stopping_distance_m if case.hazard_height_m == 0 and case.braked else None,
+    )
+
+
+def _without(
+    vehicle: Vehicle, reference: list[tuple[ReferenceCase, Traces]], mode: Mode
+) -> list[dict[str, Any]]:
+    """Mean agreement with each effect of the vehicle switched off and nothing fitted again: what it is worth.
+
+    A vehicle that no longer stops without an effect has no figures, and a sentence instead.
+    """
+    rows: list[dict[str, Any]] = []
+    for effect, numbers in NUMBERS_OF_EFFECTS.items():
+        if any(vehicle.effects.get(number) for number in numbers):
+            off = replace(vehicle, effects={**vehicle.effects, **dict.fromkeys(numbers, 0.0)})
+            try:
+                rows.append({"effect": effect, "mean": agreement_of(off, reference, mode)["mean"]})
+            except InputError as error:
+                rows.append({"effect": effect, "mean": None, "note": error.problems[0]})
+    return rows
+
+
+def _rounded(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
+    scalars = calibration_scalars(vehicle, procedure.groups)
+    return with_scalars(vehicle, {s: float(f"{scalar_value(vehicle, s):.{DIGITS}g}") for s in scalars})
+
+
+def _frozen(
+    fitted: Vehicle, base: str, procedure_name: str, procedure: Procedure, split: str, data: dict[str, str]
+) -> str:
+    """The frozen file: the base's entry with the calibrated values in it, and where they come from."""
+    source = vehicle_source(base)
+    entry = yaml.safe_load(source.read_text(encoding="utf-8"))
+    entry.pop("provenance", None)
+    note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
+    for group in procedure.groups:
+        if group in EFFECT_UNITS:
+            number = {"value": fitted.effects[group], "unit": EFFECT_UNITS[group], "source": note}
+            entry.setdefault("effects", {})[group] = number
+            continue
+        if group == "cg_to_front_axle":
+            entry["cg_to_rear_axle"] |= {"value": fitted.cg_to_rear_axle, "source": note}
+        if hasattr(fitted, group):
+            value = getattr(fitted, group)
+            in_entry = degrees(value) if entry[group]["unit"] == "deg" else value
+            entry[group] |= {"value": float(f"{in_entry:.{DIGITS}g}"), "source": note}
+            continue
+        for family, table in fitted.families.items():
+            entry["families"][family][group] |= {"value": list(getattr(table, group)), "source": note}
+    provenance = {
+        "mode": procedure.mode,
+        "base": source.stem,
+        "base_sha256": sha256_of_file(source),
+        "procedure": Path(procedure_name).stem,
+        "procedure_sha256": sha256_of_file(procedure_source(procedure_name)),
+        "version": code_version()["version"],
+        "split": split,
+        "data_sha256": data,
+        "stages": [
+            {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(stage).items()}
+            for stage in procedure.stages
+        ],
+        "bounds": {
+            group: {"unit": bounds.unit, "lower": bounds.lower, "upper": bounds.upper}
+            for group, bounds in procedure.bounds.items()
+        },
+    }
+    return frozen_text(entry, provenance, f"{fitted.name} with its scalars {note}. Frozen: do not edit.")

@@ -1,0 +1,163 @@
+"""Closing the loop: a measured campaign in, a verdict, a grown vehicle and a report out."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catalogs.campaigns import read_campaign
+from catalogs.effects import LIBRARY_FILE, load_effects
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle, vehicle_source
+from flows.measured.closing_ledger import record_reading
+from flows.measured.closing_report import report_html
+from flows.measured.grown_vehicle import grown_vehicle
+from flows.store.layout import write_atomically, write_json
+from manifests.canonical import sha256_of_file
+from manifests.provenance import code_version
+from tasks.closure.answer import ChannelError, NamedEffect, Parameter, Verdict
+from tasks.closure.campaign import Campaign
+from tasks.closure.excitation import reached
+from tasks.closure.verdict import attribute
+
+
+def close_loop(
+    campaign: str, *, out: str, vehicle: str | None = None, surface: str = "dense-asphalt"
+) -> dict[str, Any]:
+    """Trace what a measured campaign shows that the model lacks, and write the model with it.
+
+    The split is hashed and written before anything is fitted; every reading of held-out runs goes into a ledger.
+
+    Parameters
+    ----------
+    campaign : folder with campaign.yaml, runs.csv and runs/*.parquet
+    out : folder for ``verdict.json``, ``split.json``, ``report.html`` and the grown vehicle
+    vehicle : catalogue name or file; None takes the campaign's
+    surface : pavement of the weather mapping, by catalogue name or file
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the campaign, the vehicle or the surface.
+    """
+    measured = read_campaign(Path(campaign))
+    name = vehicle or measured.vehicle
+    model, road = load_vehicle(name), load_surface(surface)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_json(folder / "split.json", split_of(measured))
+    earlier = record_reading(measured, sha256_of_file(vehicle_source(name)))
+    trace = attribute(measured, model, road, load_effects())
+    result = verdict_json(trace.verdict)
+    result["held_out_readings_before"] = earlier
+    if earlier:
+        result["reasons"].append(
+            f"the held-out runs of this campaign have been read {earlier} time(s) before: this is no first look"
+        )
+    verdict, runs = trace.verdict, [run.model for run in trace.end.evidence.train]
+    forms = {effect.variable for effect in verdict.effects if effect.effect_class == "form"}
+    ranges = {variable: reached(runs, verdict.theta, verdict.slots, variable) for variable in forms}
+    text, missing = grown_vehicle(name, verdict, ranges)
+    result["vehicle_file"] = None
+    if text is not None:
+        path = folder / f"{Path(name).stem}-grown.yaml"
+        write_atomically(path, text.encode())
+        load_vehicle(path)
+        result["vehicle_file"] = str(path)
+    result["not_carried_by_coupled_mode"] = missing
+    write_json(folder / "verdict.json", result)
+    write_atomically(folder / "report.html", report_html(trace, result, measured).encode())
+    result["report"] = str(folder / "report.html")
+    return result
+
+
+def split_of(campaign: Campaign) -> dict[str, Any]:
+    """What is fixed before anything is fitted: hashes and the two parts of the split."""
+    return {
+        "campaign": campaign.name,
+        "content_sha256": campaign.content_hash,
+        "split_sha256": campaign.split_hash,
+        "train": [run.name for run in campaign.train],
+        "held_out": [run.name for run in campaign.held_out],
+    }
+
+
+def verdict_json(verdict: Verdict) -> dict[str, Any]:
+    """A verdict as plain values."""
+    experiment = verdict.experiment
+    return {
+        "campaign": verdict.campaign,
+        "verdict": verdict.verdict,
+        "effects": [effect_json(effect) for effect in verdict.effects],
+        "rivals": [{"of": of, **effect_json(effect)} for of, effect in verdict.rivals],
+        "discriminating_experiment": None
+        if experiment is None
+        else {
+            "plan": experiment.plan,
+            "between": list(experiment.between),
+            "expected_d2": experiment.expected_d2,
+        },
+        "error": {channel: _error(e) for channel, e in verdict.error.items()},
+        "manoeuvre_error": {figure: _error(e) for figure, e in verdict.manoeuvre_error.items()},
+        "residual_input_correlation": {
+            channel: {
+                "input": "brake_pressure",
+                "lag_s": c.lags.tolist(),
+                "frozen": c.frozen.tolist(),
+                "after": c.after.tolist(),
+                "band": c.band,
+            }
+            for channel, c in verdict.correlation.items()
+        },
+        "reasons": list(verdict.reasons),
+        "tried": [effect_json(effect) for effect in verdict.tried],
+        "session_pulls_sigma": {
+            name: {"before": before, "after": after}
+            for name, (before, after) in verdict.session_pulls.items()
+        },
+        "noise": {name: {"ar1": r, "sigma": s} for name, (r, s) in verdict.noise.items()},
+        "disturbance": asdict(verdict.disturbance),
+        "runs_left_out": list(verdict.torn),
+        # JSON has no infinity: an effect that this campaign cannot show at any size is null
+        "minimum_detectable": {
+            name: value if np.isfinite(value) else None for name, value in verdict.detectable.items()
+        },
+        "content_sha256": verdict.content_hash,
+        "split_sha256": verdict.split_hash,
+        "library_sha256": sha256_of_file(LIBRARY_FILE),
+        "made_with": code_version(),
+    }
+
+
+def _error(e: ChannelError) -> dict[str, Any]:
+    return {
+        **{key: getattr(e, key) for key in ("frozen", "retuned", "after", "ci_low", "ci_high", "unit")},
+        "change_ci_low": e.change_low,
+        "change_ci_high": e.change_high,
+        "runs_better": e.wins,
+        "worst_run": e.worst_run,
+    }
+
+
+def effect_json(effect: NamedEffect) -> dict[str, Any]:
+    """A named effect as plain values."""
+    return {
+        "name": effect.name,
+        "class": effect.effect_class,
+        "port": effect.port,
+        "variable": effect.variable,
+        "parameters": {p.name: _parameter(p) for p in effect.parameters},
+        "score": effect.score,
+        "gain": effect.gain,
+        "inflation": effect.inflation,
+        "held_out_gain": effect.held_out_gain,
+        "win_share": effect.win_share,
+    }
+
+
+def _parameter(p: Parameter) -> dict[str, Any]:
+    return {
+        "value": p.value, "ci_low": p.ci_low, "ci_high": p.ci_high, "unit": p.unit,
+        "lower_bound": p.lower, "upper_bound": p.upper,
+    }  # fmt: skip

@@ -1,0 +1,166 @@
+"""The close-loop's own error rates: campaigns with a known truth, judged one by one, counted with exact intervals."""
+
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from catalogs.effects import load_effects
+from catalogs.effects.truths import Truth, load_sizes, load_truths
+from catalogs.studies.closing import load_closing_study
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from flows.measured.closing_benchmark_summary import pair_outcome, summary
+from flows.measured.closing_benchmark_tables import benchmark_tables
+from flows.store.layout import write_atomically, write_json
+from manifests.canonical import sha256_of
+from manifests.provenance import code_version, source_hashes
+from tasks.closure.answer import Verdict
+from tasks.closure.benchmark import covered, outcome, synthetic_campaign
+from tasks.closure.drives import RICH, Drive
+from tasks.closure.verdict import attribute
+
+FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
+FIRST_NULL, FIRST_TRUTH, FIRST_SIZE = 200_000, 300_000, 400_000
+FIRST_PAIR, FIRST_POOR, FIRST_POOR_NULL = 500_000, 600_000, 700_000
+"""Seeds: of the first null, of the first campaign of the first truth, size and pair; 100 apart from one truth, size or
+pair to the next. None of them has been used while the engine was made."""
+SIZE_SEEDS = 5
+"""Campaigns of each size of the power table."""
+JUDGES = (
+    "tasks/closure/",
+    "tasks/vehicle/",
+    "tasks/surface/",
+    "catalogs/effects/",
+    "catalogs/vehicles/paper",
+)
+"""Sources that a verdict depends on: campaigns judged by the same ones belong to one table."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planned:
+    """A campaign to be judged: its kind, the effects in its data (none, one or two), its seed and its runs."""
+
+    kind: str
+    truths: tuple[Truth, ...] = ()
+    seed: int
+    design: tuple[Drive, ...] = RICH
+
+    @property
+    def name(self) -> str | None:
+        """Of its truths; None where there is none."""
+        return " + ".join(truth.name for truth in self.truths) or None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Effect parameters of all its truths."""
+        return {name: value for truth in self.truths for name, value in truth.values.items()}
+
+
+def close_loop_benchmark(
+    *,
+    out: str,
+    seeds: int = 10,
+    nulls: int = 100,
+    harder: int = 1,
+    minutes: float = 1e9,
+    vehicle: str = "paper-reference",
+) -> dict[str, Any]:
+    """Judge synthetic campaigns with known truths; what an earlier call with the same engine made is kept.
+
+    Every campaign is a line of ``campaigns.jsonl`` as soon as it is judged, so a stop at any time loses nothing. Seeds
+    go round by round over all truths, so that whatever time there is covers them evenly.
+
+    Parameters
+    ----------
+    out : folder for ``closing-benchmark.json``, its tables in Markdown and ``campaigns.jsonl``
+    seeds : campaigns of each truth
+    nulls : campaigns of a model that lacks nothing
+    harder : campaigns of each pair of effects, and of each truth on a poor design
+    minutes : no campaign is begun after so long
+    vehicle : catalogue name or file
+    """
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    log, engine = folder / LOG, engine_hash()
+    lines = log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
+    rows: list[dict[str, Any]] = [row for row in map(json.loads, lines) if row["engine"] == engine]
+    done = {(row["truth"], row["seed"]) for row in rows}
+    model, surface, effects = load_vehicle(vehicle), load_surface("dense-asphalt"), load_effects()
+    started = time.monotonic()
+    for planned in _plan(seeds, nulls, harder):
+        if (planned.name, planned.seed) in done:
+            continue
+        if time.monotonic() - started > 60.0 * minutes:
+            break
+        left_out = {name for truth in planned.truths for name in truth.left_out}
+        before = time.process_time()
+        campaign = synthetic_campaign(
+            model, surface, planned.values, planned.seed,
+            slots=tuple(slot for truth in planned.truths for slot in truth.slots), design=planned.design,
+        )  # fmt: skip
+        made = time.process_time()
+        verdict = attribute(
+            campaign, model, surface, tuple(e for e in effects if e.name not in left_out)
+        ).verdict
+        row = {
+            "kind": planned.kind,
+            "truth": planned.name,
+            "values": planned.values,
+            "seed": planned.seed,
+            "verdict": verdict.verdict,
+            "outcome": _outcome(verdict, planned.truths),
+            "named": [effect.name for effect in verdict.effects],
+            "rivals": [rival.name for _, rival in verdict.rivals],
+            "ports": [[effect.port, effect.variable] for effect in verdict.effects],
+            "tried": [[effect.name, effect.score, effect.held_out_gain] for effect in verdict.tried[:3]],
+            "covered": covered(verdict, planned.name, planned.values) if planned.name else None,
+            "reasons": list(verdict.reasons),
+            "cpu_s": time.process_time() - made,
+            "made_cpu_s": made - before,
+            "engine": engine,
+        }
+        rows.append(row)
+        with log.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+    result = summary(rows) | {"campaigns": rows, "engine_sha256": engine, "made_with": code_version()}
+    write_json(folder / FILE, result)
+    write_atomically(folder / TABLES, benchmark_tables(result).encode())
+    return result
+
+
+def engine_hash() -> str:
+    """SHA-256 over the sources that a verdict depends on."""
+    judging = {path: digest for path, digest in source_hashes().items() if path.startswith(JUDGES)}
+    return sha256_of(f"{path} {digest}\n".encode() for path, digest in sorted(judging.items()))
+
+
+def _outcome(verdict: Verdict, truths: tuple[Truth, ...]) -> str:
+    if len(truths) < 2:
+        return outcome(verdict, truths[0].name if truths else None, truths[0].form if truths else None)
+    named, rivals = [e.name for e in verdict.effects], [rival.name for _, rival in verdict.rivals]
+    return pair_outcome(verdict.verdict, named, rivals, [truth.name for truth in truths])
+
+
+def _plan(seeds: int, nulls: int, harder: int) -> Iterator[Planned]:
+    """Every campaign, round by round over all truths, nulls and sizes spread over them; then the harder ones."""
+    truths, sizes, study = load_truths(), load_sizes(), load_closing_study()
+    library = tuple(truth for truth in truths if truth.in_library)
+    rounds = max(seeds, 1)
+    for i in range(rounds):
+        for n in range(i * nulls // rounds, (i + 1) * nulls // rounds):
+            yield Planned(kind="null", seed=FIRST_NULL + n)
+        for j, truth in enumerate(truths if i < seeds else ()):
+            kind = "library" if truth.in_library else "outside"
+            yield Planned(kind=kind, truths=(truth,), seed=FIRST_TRUTH + 100 * j + i)
+        for j, size in enumerate(sizes if i < min(seeds, SIZE_SEEDS) else ()):
+            yield Planned(kind="size", truths=(size,), seed=FIRST_SIZE + 100 * j + i)
+    poor = study.drives()
+    for i in range(harder):
+        for j, pair in enumerate(study.pairs(library)):
+            yield Planned(kind="pair", truths=pair, seed=FIRST_PAIR + 100 * j + i)
+        for j, truth in enumerate(library):
+            yield Planned(kind="poor", truths=(truth,), seed=FIRST_POOR + 100 * j + i, design=poor)
+            yield Planned(kind="poor null", seed=FIRST_POOR_NULL + 100 * j + i, design=poor)

@@ -1,0 +1,1 @@
+"""A finished dataset for people: queries, windows, films, pages."""

@@ -1,0 +1,1 @@
+"""Where the work happens, and what is told meanwhile."""

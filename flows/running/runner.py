@@ -1,0 +1,101 @@
+"""Where the work of a run happens: threads, processes or Dask, behind one executor protocol."""
+
+import logging
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from multiprocessing import get_context
+from typing import Any, Literal
+
+from tasks.errors import InputError
+
+RunnerName = Literal["threads", "processes", "dask"]
+CONNECT_TIMEOUT = "10s"
+ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""One frame per worker, one thread each: measured faster than threads within a frame, and repeatable."""
+
+
+@contextmanager
+def open_executor(
+    runner: RunnerName,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    warm: Callable[[], Any] | None = None,
+) -> Iterator[Executor]:
+    """An executor for the length of a run.
+
+    Parameters
+    ----------
+    runner : ``threads`` in this process, ``processes`` on this machine, or ``dask``
+    workers : how many at once; None takes the processors this process may use [1]
+    scheduler : address of a running Dask scheduler (tcp:// or tls://); None starts a local cluster
+    warm : what each worker of a running cluster does before it is given work
+
+    Raises
+    ------
+    InputError
+        If a scheduler is named for another runner, none answers at the address, or its workers are not set up like
+        this machine.
+    """
+    if scheduler is not None and runner != "dask":
+        raise InputError(f"--scheduler {scheduler} belongs to --runner dask; the runner is {runner}")
+    count = workers or len(os.sched_getaffinity(0))
+    for name in ONE_THREAD:
+        os.environ.setdefault(name, "1")
+    if runner == "threads":
+        with ThreadPoolExecutor(count) as executor:
+            yield executor
+    elif runner == "processes":
+        # spawn: a forked child would inherit the locks of OpenCV's and Arrow's threads
+        with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as executor:
+            yield executor
+    else:
+        with _dask_client(count, scheduler, warm) as client, client.get_executor(pure=False) as executor:
+            yield executor
+
+
+@contextmanager
+def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | None) -> Iterator[Any]:
+    from distributed import Client, LocalCluster
+
+    from flows.running.cluster import check_cluster, share_gpus, warm_cluster
+
+    # a closing cluster says so in a dozen lines, and Prefect lets every library log
+    logging.getLogger("distributed").setLevel(logging.ERROR)
+    if scheduler is None:
+        cluster = LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+        )
+        with cluster, Client(cluster) as client:
+            share_gpus(client)
+            yield client
+        return
+    try:
+        client = Client(scheduler, timeout=CONNECT_TIMEOUT)
+    except TypeError:  # what Dask raises for tls:// without certificates
+        raise InputError(
+            f"--scheduler {scheduler}: tls needs certificates; name them in Dask's configuration "
+            "(distributed.comm.tls.ca-file, .client.cert, .client.key)"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
+    with client:
+        check_cluster(client, scheduler)
+        share_gpus(client)
+        if warm is not None:
+            warm_cluster(client, warm, scheduler)
+        yield client
+
+
+def run_unordered(
+    executor: Executor, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]
+) -> Iterator[tuple[tuple[Any, ...], Future[Any]]]:
+    """Submit every call, and yield its arguments and finished future as the calls end."""
+    futures = {executor.submit(function, *call): call for call in arguments}
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future
+    finally:
+        for future in futures:
+            future.cancel()

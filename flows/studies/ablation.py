@@ -1,0 +1,168 @@
+"""The paper's ablation (Section 4.4): stopping distance over the weather and pitch at a hump, coupling by coupling."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from catalogs.references import Traces, read_reference
+from catalogs.studies import Condition
+from catalogs.studies.ablation import VARIANTS, Ablation, Variant, cut, load_ablation
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle, vehicle_provenance
+from flows.drawing import as_svg
+from flows.making.driving import drive
+from flows.store.layout import write_atomically, write_json
+from flows.store.telemetry import write_parquet
+from flows.studies.ablation_figure import ablation_figure
+from tasks.errors import InputError
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Mode, Rollout
+
+STOP_S, PITCH_S = 15.0, 10.0
+"""Length of a drive to the stop on the slipperiest road, and of one whose pitch is compared [s]."""
+
+Rows = list[dict[str, Any]]
+
+
+def ablation(
+    *, out: str, vehicle: str = "multibody-grown", mode: Mode | None = None, traces: str | None = None
+) -> dict[str, Any]:
+    """Cut one coupling at a time and say what stops being true.
+
+    Parameters
+    ----------
+    out : folder for ablation.json, ablation.parquet (the pitch curves) and ablation.svg
+    vehicle : catalogue name or file
+    mode : paper or coupled; None takes the one a frozen vehicle was fitted in, and paper for any other
+    traces : folder of reference traces whose pitch stands for the oracle; None leaves it out
+
+    Returns
+    -------
+    ``stops[]`` a row a variant and rate, ``pitch[]`` a row a variant, ``reference`` the oracle's figure or why
+    there is none
+
+    Raises
+    ------
+    InputError
+        If the traces do not hold the condition that is compared.
+    """
+    study, car, surface = load_ablation(), load_vehicle(vehicle), load_surface("dense-asphalt")
+    provenance = vehicle_provenance(vehicle)
+    chosen: Mode = mode or (provenance.mode if provenance else "paper")
+    oracle = None if traces is None else oracle_trace(Path(traces), study.pitch)
+    stops = stop_rows(study, car, surface, chosen)
+    rides = {name: _ride(study.pitch, name, car, surface, chosen) for name in VARIANTS}
+    pitch = [pitch_row(name, ride, study.pitch, car) for name, ride in rides.items()]
+    curves: dict[str, NDArray[np.float64]] = {
+        name: np.rad2deg(ride.columns["pitch"] + ride.static_pitch) for name, ride in rides.items()
+    }
+    time = next(iter(rides.values())).columns["t_ns"] * 1e-9
+    reference: dict[str, Any] = {"printed_pitch_rmse_deg": study.reference_pitch_rmse_deg}
+    if oracle is None:
+        reference["note"] = "not run: no reference traces given"
+    else:
+        curves["reference"] = np.interp(time, oracle["time"], oracle["pitch"], right=np.nan)
+        reference |= {f"{name}_pitch_rmse_deg": _rmse(curves[name], curves["reference"]) for name in VARIANTS}
+    result = {
+        "vehicle": vehicle, "mode": chosen, "pitch_condition": study.pitch.name,
+        "stops": stops, "pitch": pitch, "reference": reference,
+    }  # fmt: skip
+    folder = Path(out)
+    write_json(folder / "ablation.json", result)
+    write_parquet(
+        pa.table({"time": time} | {f"pitch_deg_{name.replace('-', '_')}": c for name, c in curves.items()}),
+        folder / "ablation.parquet",
+    )
+    figure = ablation_figure(stops, time, curves, {row["variant"]: row for row in pitch})
+    write_atomically(folder / "ablation.svg", as_svg(figure).encode())
+    return result
+
+
+def stop_rows(study: Ablation, car: Vehicle, surface: SurfaceParameters, mode: Mode) -> Rows:
+    """Friction and stopping distance of every variant that brakes, at every rate.
+
+    Parameters
+    ----------
+    study : where to compare
+    car, surface : what drives and on what
+    mode : paper or coupled
+    """
+    rows: Rows = []
+    for kind, scenarios in study.stops.items():
+        for variant in VARIANTS:
+            if variant == "vertical-only":
+                continue
+            for scenario in scenarios:
+                held = replace(cut(scenario, variant), hold_speed=True)
+                _, ride = drive(held, car, surface, mode, STOP_S)
+                rows.append({
+                    "variant": variant,
+                    "weather": kind,
+                    "precipitation_mm_h": scenario.precipitation_mm_h,
+                    "surface_friction": ride.surface_friction,
+                    "stopping_distance_m": ride.stopping_distance,
+                })  # fmt: skip
+    return rows
+
+
+def pitch_row(variant: Variant, ride: Rollout, condition: Condition, car: Vehicle) -> dict[str, Any]:
+    """When a variant meets the hump, how far its nose is down there and how far it dips in all.
+
+    Parameters
+    ----------
+    variant : its name
+    ride : its drive
+    condition : with the hump
+    car : that drives
+    """
+    scenario = condition.scenario
+    near, far = (scenario.hazard_center_m + side * scenario.hazard_length_m / 2 for side in (-1, 1))
+    station, time = ride.columns["station"], ride.columns["t_ns"] * 1e-9
+    pitch = np.rad2deg(ride.columns["pitch"] + ride.static_pitch)
+    met, left = (
+        float(np.interp(edge, station, time)) if station[-1] > edge else None for edge in (near, far)
+    )
+    return {
+        "variant": variant,
+        "brake_onset_s": None if np.isnan(ride.brake_onset_time) else ride.brake_onset_time,
+        "front_axle_meets_hump_s": met,
+        "front_axle_leaves_hump_s": left,
+        "rear_axle_meets_hump_s": (
+            float(np.interp(near + car.wheelbase, station, time))
+            if station[-1] > near + car.wheelbase
+            else None
+        ),
+        "pitch_before_hump_deg": None if met is None else float(np.interp(met, time, pitch)),
+        "peak_pitch_deg": float(pitch.max()),
+        "stop_time_s": None if np.isnan(ride.stop_time) else ride.stop_time,
+    }
+
+
+def oracle_trace(folder: Path, condition: Condition) -> Traces:
+    """The reference simulator's trace of a condition.
+
+    Raises
+    ------
+    InputError
+        If the folder has none.
+    """
+    for case, columns in read_reference(folder):
+        if case.case == condition.name:
+            return columns
+    raise InputError(f"{folder}: the ablation compares the pitch of {condition.name}; no case has that name")
+
+
+def _ride(
+    condition: Condition, variant: Variant, car: Vehicle, surface: SurfaceParameters, mode: Mode
+) -> Rollout:
+    held = replace(cut(condition.scenario, variant), hold_speed=True)
+    return drive(held, car, surface, mode, PITCH_S)[1]
+
+
+def _rmse(curve: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.nanmean((curve - reference) ** 2)))
