@@ -22,6 +22,7 @@ from tasks.closure.derivation import fit_disturbance, rederived, rescaled, white
 from tasks.closure.disturbance import Disturbance
 from tasks.closure.fit import Fit, fall, fit, misfit_by_run
 from tasks.closure.forms import RIDGE, form_hypotheses, is_constant, scan, spline_slopes
+from tasks.closure.gauge import is_feigned
 from tasks.closure.hypothesis import library_hypothesis
 from tasks.closure.screening import Evidence, inflation
 
@@ -288,7 +289,7 @@ def best_form(
     least: float = 0.0,
     splines: tuple[NDArray[np.float64], ...] | None = None,
 ) -> Candidate | None:
-    """The form that explains most of what a fit leaves over, refined and judged; None if nothing is left.
+    """The form that explains most of what a fit leaves over, refined and judged; None if nothing real is left.
 
     Parameters
     ----------
@@ -306,8 +307,11 @@ def best_form(
     judged = [
         judge(evidence, base, held_out, h) for x in leftovers for h in form_hypotheses(x, evidence.samples)
     ]
-    best = max(judged, key=lambda c: c.score)
-    return settle(evidence, base, best)[1]
+    runs = [run.model.run for run in evidence.train]
+    real = [candidate for candidate in judged if not is_feigned(candidate, runs)]
+    if not real:
+        return None
+    return settle(evidence, base, max(real, key=lambda c: c.score))[1]
 
 
 def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found, Found, Candidate | None]:
