@@ -1,23 +1,17 @@
 """Fitting a hypothesis through the simulation: Gauss-Newton with every nuisance integrated out."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.closure.campaign import SESSION
 from tasks.closure.evidence import SESSION_INDEX, RunEvidence
-from tasks.closure.forward import Slot
 from tasks.closure.hypothesis import Hypothesis, compose
+from tasks.closure.place import Place, misfits, places_at, relinearised, settled
 
-SETTLING = 4
-"""Moves of a run's point of linearisation before its misfit is taken."""
 HELD = 1e18
 """Prior precision that holds a nuisance at 0."""
-SLACK = 1.0
-"""Rise of a run's misfit that is taken for rounding when its point of linearisation moves."""
-SETTLED = 0.05
-"""Change of a run's misfit by a full move of its point of linearisation below which it is moved no further."""
 MISSED = 0.3
 """Relative miss of the foreseen fall of the misfit from which derivatives are taken anew."""
 
@@ -26,26 +20,6 @@ TRIALS = ((1.0, True), (0.4, True), (1.0, False), (0.4, False), (0.16, False), (
 
 Slopes = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Derivatives by parameters and session, float64 [M, K + 7], and what the nuisances can take from them."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Place:
-    """A run at some parameters, linearised about its own offsets.
-
-    Parameters
-    ----------
-    offsets : float64 [D] about which it is linearised
-    residual : float64 [M] whitened
-    projected : float64 [D] what the nuisances can take from it
-    misfit : marginalised
-    doubt : by how much the last full move of the offsets changed the misfit: 0 where the linearisation holds
-    """
-
-    offsets: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    projected: NDArray[np.float64]
-    misfit: float
-    doubt: float = np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +93,7 @@ def fit(
     taken = [SESSION.index(name) for part in parts for name in part.names if name in SESSION]
     s[taken], prior[taken] = 0.0, HELD
     k = len(x)
-    places = _settled(evidence, parts, x, s) if offsets is None else _places(evidence, parts, x, s, offsets)
+    places = settled(evidence, parts, x, s) if offsets is None else places_at(evidence, parts, x, s, offsets)
     objective = _objective(places, prior, s)
     slopes: list[Slopes] = []
     normal = np.eye(k + len(s))
@@ -155,14 +129,14 @@ def fit(
                 place.offsets + share * together * (d - place.offsets)
                 for place, d in zip(places, ahead, strict=True)
             )
-            trial = _places(evidence, parts, x_try, s_try, own)
+            trial = places_at(evidence, parts, x_try, s_try, own)
             better = _objective(trial, prior, s_try) < objective
             if better or foreseen < 0.1:
                 break
         if not better:
             break
         x, s = x_try, s_try
-        places = trial if together else _relinearised(evidence, parts, x, s, trial)
+        places = trial if together else relinearised(evidence, parts, x, s, trial)
         objective = _objective(places, prior, s)
         fell = before - objective
         if abs(fell) < 0.3 and foreseen < 0.5:
@@ -173,7 +147,7 @@ def fit(
     covariance = np.asarray(inverse[:k, :k], dtype=np.float64)
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
-        by_run=_misfits(places), covariance=covariance,
+        by_run=misfits(places), covariance=covariance,
         residuals=tuple(place.residual for place in places), offsets=tuple(place.offsets for place in places),
     )  # fmt: skip
 
@@ -231,8 +205,8 @@ def misfit_by_run(
     evidence: tuple[RunEvidence, ...], fitted: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Marginalised misfit of runs under a fit made on other runs, and how far it is from settled; float64 [R]."""
-    places = _settled(evidence, fitted.parts, fitted.values, fitted.session)
-    return _misfits(places), np.array([place.doubt for place in places])
+    places = settled(evidence, fitted.parts, fitted.values, fitted.session)
+    return misfits(places), np.array([place.doubt for place in places])
 
 
 def fall(
@@ -249,69 +223,5 @@ def fall(
     return float(np.sum(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0)))
 
 
-def _settled(
-    evidence: tuple[RunEvidence, ...],
-    parts: tuple[Hypothesis, ...],
-    x: NDArray[np.float64],
-    s: NDArray[np.float64],
-) -> tuple[Place, ...]:
-    places = _places(evidence, parts, x, s, (None,) * len(evidence))
-    for _ in range(SETTLING):
-        places = _relinearised(evidence, parts, x, s, places)
-    return places
-
-
-def _relinearised(
-    evidence: tuple[RunEvidence, ...],
-    parts: tuple[Hypothesis, ...],
-    x: NDArray[np.float64],
-    s: NDArray[np.float64],
-    places: tuple[Place, ...],
-) -> tuple[Place, ...]:
-    """Move every run's point of linearisation towards its posterior, as far as the run does not fit worse."""
-    theta, slots = compose(parts, x, s)
-    after = list(places)
-    for i, (run, place) in enumerate(zip(evidence, places, strict=True)):
-        if place.doubt < SETTLED:
-            continue
-        move = run.offsets(place.projected) - place.offsets
-        doubt = np.inf
-        for share in (1.0, 0.4):
-            trial = _place(run, theta, slots, place.offsets + share * move)
-            if share == 1.0:
-                doubt = abs(trial.misfit - place.misfit)
-            after[i] = replace(place, doubt=doubt)
-            if trial.misfit <= place.misfit + SLACK:
-                after[i] = replace(trial, doubt=doubt)
-                break
-    return tuple(after)
-
-
-def _places(
-    evidence: tuple[RunEvidence, ...],
-    parts: tuple[Hypothesis, ...],
-    x: NDArray[np.float64],
-    s: NDArray[np.float64],
-    offsets: tuple[NDArray[np.float64] | None, ...],
-) -> tuple[Place, ...]:
-    theta, slots = compose(parts, x, s)
-    return tuple(_place(run, theta, slots, d) for run, d in zip(evidence, offsets, strict=True))
-
-
-def _place(
-    run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64] | None
-) -> Place:
-    residual = run.residual(theta, slots, offsets)
-    projected = run.project(residual)
-    return Place(
-        offsets=np.zeros(run.nuisance.shape[1]) if offsets is None else offsets, residual=residual,
-        projected=projected, misfit=float(residual @ residual - projected @ projected),
-    )  # fmt: skip
-
-
-def _misfits(places: tuple[Place, ...]) -> NDArray[np.float64]:
-    return np.array([place.misfit for place in places])
-
-
 def _objective(places: tuple[Place, ...], prior: NDArray[np.float64], session: NDArray[np.float64]) -> float:
-    return float(_misfits(places).sum() + np.sum(prior * session**2))
+    return float(misfits(places).sum() + np.sum(prior * session**2))

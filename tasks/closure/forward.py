@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from tasks.closure.campaign import CHANNELS, Run
+from tasks.closure.gauge import braking_pressure
 from tasks.closure.rollout import CONSTANTS, N_STATES, OUTPUTS, drive
 from tasks.surface.friction import surface_friction
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
@@ -18,8 +19,6 @@ from tasks.vehicle.parameters import Vehicle, surface_response
 
 MASKED_SPEED = 2.0
 """Below it the pitch rule and the slip denominator are not force-consistent: runs end there [m/s]."""
-RESTING_PRESSURE = 0.02
-"""Mean over 0.07 s below which the brake is taken to be off [MPa]."""
 SUBSTEPS = 10
 """Integration steps between samples at 100 Hz; halving the step is a check of its own."""
 COARSE_SUBSTEPS = 5
@@ -111,11 +110,8 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     slow = np.flatnonzero(speed < MASKED_SPEED)
     pressed = np.flatnonzero(run.pressure > 0.1)
     lead = min(100, int(pressed[0])) if pressed.size else 100
-    # A gauge that cannot read below 0 turns its noise into pressure while no brake is on.
-    smooth = np.convolve(np.pad(run.pressure, 3, mode="edge"), np.ones(7) / 7.0, mode="valid")
-    run = replace(run, pressure=np.where(smooth < RESTING_PRESSURE, 0.0, run.pressure))
     return RunModel(
-        run=run,
+        run=replace(run, pressure=braking_pressure(run.pressure)),
         constants=np.array([values[name] for name in CONSTANTS]),
         samples=int(slow[0]) if slow.size else len(speed),
         initial_speed=float(np.polyfit(np.arange(max(lead, 5)), speed[: max(lead, 5)], 1)[1]),

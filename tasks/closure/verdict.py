@@ -10,13 +10,14 @@ from tasks.closure.attribution import RIVAL_SPAN
 from tasks.closure.campaign import CHANNELS, SESSION, Campaign
 from tasks.closure.correlation import residual_input_correlation
 from tasks.closure.derivation import prepare
+from tasks.closure.discovery import search_all
 from tasks.closure.experiment import next_experiment
 from tasks.closure.fit import fit
 from tasks.closure.held_out import held_out_error
 from tasks.closure.hypothesis import compose
 from tasks.closure.intervals import curvature_interval, profile_interval
 from tasks.closure.rivals import Compared, compare, detectable
-from tasks.closure.search import Found, search_all
+from tasks.closure.search import Found
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
