@@ -11,6 +11,7 @@ from tasks.closure.disturbance import Disturbance, prior_precision
 from tasks.closure.evidence import RunEvidence, run_evidence, with_disturbance
 from tasks.closure.fit import Fit
 from tasks.closure.forward import SUBSTEPS, RunModel, predict, run_model
+from tasks.closure.gauge import braking_pressure
 from tasks.closure.hypothesis import compose
 from tasks.closure.noise import channel_noise, whiten
 from tasks.closure.screening import Evidence
@@ -39,7 +40,8 @@ def prepare(
     rho, sigma = channel_noise(campaign)
     plain = np.zeros(len(ALL_PARAMETERS))
     guess = Disturbance()
-    models = [run_model(run, vehicle, surface) for run in campaign.runs]
+    runs = [replace(run, pressure=braking_pressure(run.pressure)) for run in campaign.runs]
+    models = [run_model(run, vehicle, surface) for run in runs]
     torn = tuple(m.run.name for m in models if step_change(m, rho, sigma) > TORN)
 
     def derived(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from tasks.closure.campaign import CHANNELS, Run
-from tasks.closure.gauge import braking_pressure
+from tasks.closure.gauge import at_rest
 from tasks.closure.rollout import CONSTANTS, N_STATES, OUTPUTS, drive
 from tasks.surface.friction import surface_friction
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
@@ -111,7 +111,7 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     pressed = np.flatnonzero(run.pressure > 0.1)
     lead = min(100, int(pressed[0])) if pressed.size else 100
     return RunModel(
-        run=replace(run, pressure=braking_pressure(run.pressure)),
+        run=replace(run, pressure=at_rest(run.pressure)),
         constants=np.array([values[name] for name in CONSTANTS]),
         samples=int(slow[0]) if slow.size else len(speed),
         initial_speed=float(np.polyfit(np.arange(max(lead, 5)), speed[: max(lead, 5)], 1)[1]),

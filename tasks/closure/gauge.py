@@ -13,12 +13,24 @@ RESTING_PRESSURE = 0.02
 RESTING_SPAN = 7
 LAG = 4
 """Samples apart at which the gauge's noise is taken for independent: right up to a correlation of about 0.6."""
+LONGEST = 0.8
+"""Correlation above which a change from sample to sample is the driver's doing and not noise [1]."""
 NORMAL = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution."""
 HALF_WIDTHS = (1, 2, 4, 8, 16, 32)
 """Half widths of the windows of the mean that are tried [samples]."""
 AGREEING = 2.0
 """Half width of the intervals that must intersect, in standard deviations of each mean."""
+
+
+def at_rest(measured: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The pressure with 0 where the brake is off: a gauge that cannot read below 0 turns its noise into pressure.
+
+    Parameters
+    ----------
+    measured : float64 [N] [MPa] at a fixed rate
+    """
+    return np.where(_mean(measured, RESTING_SPAN // 2) < RESTING_PRESSURE, 0.0, measured)
 
 
 def braking_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -34,15 +46,14 @@ def braking_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Returns
     -------
-    float64 [N] [MPa]; 0 where the brake is off, for a gauge that cannot read below 0 turns noise into pressure
+    float64 [N] [MPa], 0 where the brake is off
     """
-    off = _mean(measured, RESTING_SPAN // 2) < RESTING_PRESSURE
-    sigma, rho = gauge_noise(measured[~off])
+    best = at_rest(measured)
+    alive = best > 0.0
+    sigma, rho = gauge_noise(measured[alive])
     if sigma == 0.0:
-        return np.where(off, 0.0, measured)
-    best = measured.copy()
+        return best
     low, high = measured - AGREEING * sigma, measured + AGREEING * sigma
-    alive = ~off
     for half in HALF_WIDTHS:
         mean = _mean(measured, half)
         n = 2 * half + 1
@@ -52,14 +63,16 @@ def braking_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
         alive &= low <= high
         alive[:half], alive[-half:] = False, False
         best = np.where(alive, mean, best)
-    return np.where(off, 0.0, best)
+    return best
 
 
 def gauge_noise(pressure: NDArray[np.float64]) -> tuple[float, float]:
     """Standard deviation [MPa] and correlation from sample to sample [1] of the gauge's noise.
 
-    From second differences, which no slope enters: at lag 1 their variance is (6 - 8 rho + 2 rho^2) sigma^2, at `LAG`
-    it is 6 sigma^2. Medians leave the corners of ramps out. (0, 0) where there are too few samples or no noise.
+    From differences of first-order autoregressive noise, whose medians leave the corners of ramps out. The variance of
+    second ones is (6 - 8 rho + 2 rho^2) sigma^2 at lag 1 and 6 sigma^2 at `LAG`: their ratio gives rho. That of fourth
+    ones, which what a foot can do hardly enters, is (70 - 112 rho + 56 rho^2 - 16 rho^3 + 2 rho^4) sigma^2.
+    (0, 0) where there are too few samples or no noise.
 
     Parameters
     ----------
@@ -67,14 +80,20 @@ def gauge_noise(pressure: NDArray[np.float64]) -> tuple[float, float]:
     """
     if len(pressure) <= 4 * LAG:
         return 0.0, 0.0
-    second = (pressure[2 * k :] - 2.0 * pressure[k:-k] + pressure[: -2 * k] for k in (1, LAG))
-    near, far = (NORMAL * float(np.median(np.abs(difference))) for difference in second)
+    second = pressure[2:] - 2.0 * pressure[1:-1] + pressure[:-2]
+    near, fourth = _spread(second), _spread(np.diff(second, 2))
+    far = _spread(pressure[2 * LAG :] - 2.0 * pressure[LAG:-LAG] + pressure[: -2 * LAG])
     if far == 0.0:
         return 0.0, 0.0
     share = min((near / far) ** 2, 1.0)
-    return far / np.sqrt(6.0), 2.0 - float(np.sqrt(1.0 + 3.0 * share))
+    rho = min(2.0 - float(np.sqrt(1.0 + 3.0 * share)), LONGEST)
+    return fourth / float(np.sqrt(np.polyval((2.0, -16.0, 56.0, -112.0, 70.0), rho))), rho
 
 
 def _mean(x: NDArray[np.float64], half: int) -> NDArray[np.float64]:
     n = 2 * half + 1
     return np.convolve(np.pad(x, half, mode="edge"), np.ones(n) / n, mode="valid")
+
+
+def _spread(x: NDArray[np.float64]) -> float:
+    return NORMAL * float(np.median(np.abs(x)))

@@ -50,6 +50,11 @@ def test_ramps_and_steps_stay_within_the_noise(pressure: NDArray[np.float64]) ->
         assert np.abs(found - pressure)[braking].max() < 6.0 * 0.01
 
 
+def test_a_foot_that_trembles_is_no_noise_of_the_gauge() -> None:
+    trembling = STOP * (1.0 + 0.02 * np.sin(2.0 * np.pi * 5.0 * TIME))
+    assert np.abs(braking_pressure(trembling) - trembling).max() < 0.15 * 0.04
+
+
 def test_a_gauge_that_cannot_read_below_zero_brakes_no_wheel_at_rest() -> None:
     off = TIME < 0.9
     assert np.all(braking_pressure(np.maximum(STOP + noise(0.02), 0.0))[off] == 0.0)
