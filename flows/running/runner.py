@@ -65,7 +65,11 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
     logging.getLogger("distributed").setLevel(logging.ERROR)
     if scheduler is None:
         cluster = LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=40,
         )
         with cluster, Client(cluster) as client:
             share_gpus(client)

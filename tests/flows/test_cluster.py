@@ -182,7 +182,7 @@ def test_a_cluster_without_workers_is_refused(tmp_path):
     from distributed import Client, LocalCluster
 
     with (
-        LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as cluster,
         Client(cluster) as client,
         pytest.raises(InputError, match="has no workers"),
     ):

@@ -42,7 +42,9 @@ def test_processes_are_other_processes():
 def test_a_running_dask_cluster_is_used_by_its_address():
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+    ) as cluster:
         address = cluster.scheduler_address
         with (
             pytest.raises(InputError, match="belongs to --runner dask"),
@@ -50,9 +52,15 @@ def test_a_running_dask_cluster_is_used_by_its_address():
         ):
             pass
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, protocol="tcp"
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", protocol="tcp"
     ) as cluster, open_executor("dask", None, cluster.scheduler_address) as executor:  # fmt: skip
         assert executor.submit(square_or_fail, 7).result() == 49
+
+
+def test_two_runs_on_one_machine_do_not_quarrel_about_a_port(recwarn):
+    with open_executor("dask", 1, None), open_executor("dask", 1, None) as second:
+        assert second.submit(square_or_fail, 7).result() == 49
+    assert not [str(w.message) for w in recwarn if "in use" in str(w.message)]
 
 
 def test_a_scheduler_that_does_not_answer_is_an_input_error(monkeypatch):
