@@ -1,13 +1,24 @@
-"""The paper's own figures of its video metrics."""
+"""The paper's own figures of its video metrics, each with the clips that it is a mean over."""
 
+from functools import cache
 from pathlib import Path
+from typing import Annotated, Literal
 
 import yaml
+from pydantic import TypeAdapter
+
+from catalogs.quantities import Scalar, checked
 
 PAPER_METRICS = Path(__file__).with_name("paper_metrics.yaml")
 
+ClipSet = Literal["stops", "rain-stops", "snow-stops", "dry-features"]
+"""Braking clips on a flat road in every weather, in rain, in snow; dry clips with a road feature."""
+FILE = TypeAdapter(dict[str, dict[ClipSet, Annotated[Scalar, checked("1")]]])
+"""What the file must hold: printed figures by metric and by the clips that they are a mean over."""
 
-def paper_values() -> dict[str, float]:
-    """Value by metric name; a metric without a printed value is left out."""
-    entries = yaml.safe_load(PAPER_METRICS.read_text(encoding="utf-8"))
-    return {name: float(entry["value"]) for name, entry in entries.items()}
+
+@cache
+def paper_values() -> dict[str, dict[ClipSet, float]]:
+    """Value by metric and set of clips; a metric without a printed value is left out [1]."""
+    entries = FILE.validate_python(yaml.safe_load(PAPER_METRICS.read_text(encoding="utf-8")))
+    return {metric: {over: one.value for over, one in sets.items()} for metric, sets in entries.items()}

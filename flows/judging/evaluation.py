@@ -9,6 +9,7 @@ import pyarrow as pa
 
 from catalogs.gates import load_gates
 from catalogs.learned_judges import load_judges
+from flows.judging.evaluation_means import mean_rows
 from flows.judging.evaluation_page import page
 from flows.judging.evaluation_rows import control_of, figure_row, weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View, judge_clip
@@ -35,6 +36,15 @@ from tasks.eval.video_motion import (
 NOT_RUN = {
     "motion_retention": "not run: a dataset holds no editor's input and output pair",
 }
+TEXT = ("metric", "method", "condition", "unit", "note")
+SCHEMA = pa.schema(
+    [
+        *((name, pa.string()) for name in TEXT),
+        *((name, pa.float64()) for name in ("value", "paper", "floor", "uncertainty", "seed_std")),
+        *((name, pa.int64()) for name in ("window", "averaged")),
+    ]
+)
+"""Columns of the table of figures; those that no figure of a dataset fills keep their type."""
 
 
 def evaluate(
@@ -73,13 +83,14 @@ def evaluate(
     rows += stage(road_edit_rows)(view, clips)
     rows += learned_rows(view, clips, judges)
     rows += [figure_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
+    rows += list(mean_rows(rows, clips))
     codec = "lossless" if crf is None else f"H.264 crf {crf}"
     result = {
         "run_id": read_json(Layout(root).manifest)["run_id"], "codec": codec, "clips": len(clips), "rows": rows
     }  # fmt: skip
     folder = Path(out)
     write_json(folder / "evaluation.json", result)
-    write_parquet(pa.Table.from_pylist(rows), folder / "evaluation.parquet")
+    write_parquet(pa.Table.from_pylist(rows, SCHEMA), folder / "evaluation.parquet")
     write_atomically(folder / "evaluation.html", page(clips, rows, result["run_id"], codec).encode())
     return result
 

@@ -64,7 +64,9 @@ def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: s
         f"<p>{len(clips)} clips; pictures: {escape(codec)}.</p>",
         "<p>Smoothing acts on the estimate alone, so even a perfect pose scores its floor: read no figure without"
         " it. Window 0 is none. The paper's figures come from VGGT on other videos.</p>",
-        "<h2>Summary</h2>", "<p>Without smoothing, over all clips of the dataset.</p>", _summary(rows, names),
+        "<h2>Summary</h2>",
+        "<p>Without smoothing: means over all clips, and over the clips that the paper's protocol takes, within each"
+        " visual seed and then over seeds.</p>", _summary(rows, names),
         "<h2>Pitch: claimed and recovered</h2>",
         _figure(_pitch_plot(clips), f"Claimed (black) and recovered; the first {SHOWN_CLIPS} clips at most."),
         *_geometry(rows),
@@ -82,23 +84,42 @@ def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: s
 def _summary(rows: Sequence[Row], names: Sequence[str]) -> str:
     lines = []
     for name in names:
-        methods = dict.fromkeys(row["method"] for row in rows if row["metric"] == name)
-        for first, method in zip([True] + [False] * len(methods), methods, strict=False):
-            mine = [r for r in rows if r["metric"] == name and r["method"] == method and r["window"] == 0]
-            values = [r["value"] for r in mine if r["value"] is not None]
+        mine = [row for row in rows if row["metric"] == name and row["window"] == 0]
+        meaning = MEANING.get(name, "")
+        means = [r for r in mine if r["condition"] == "all" or r["condition"].startswith("paper/")]
+        for row in means or mine[:1]:
+            single = [r["value"] for r in mine if r["method"] == row["method"] and _is_single(r)]
+            scored = [value for value in single if value is not None]
             lines.append(
-                (name if first else "", method,
-                 float(np.mean(values)) if values else None, max(values) if values else None,
-                 mine[0]["unit"], mine[0]["paper"], f"{len(values)} of {len(mine)}",
-                 mine[0]["note"] if not values else MEANING.get(name, "") if first else "")
+                (name, row["method"], row["condition"], row["value"], row["seed_std"],
+                 max(scored) if scored and row["condition"] == "all" else None,
+                 row["unit"], row["paper"], row["note"], meaning)
             )  # fmt: skip
-    head = ("metric", "method", "mean", "largest", "unit", "paper", "scored", "")
+            name = meaning = ""
+    head = ("metric", "method", "clips", "mean", "SD over seeds", "largest", "unit", "paper", "note", "")
     return _html_table(head, lines)
 
 
+def _is_single(row: Row) -> bool:
+    """Whether a row is one clip's or family's figure, not a mean."""
+    return row["averaged"] is None
+
+
 def _table(rows: Sequence[Row]) -> str:
-    head = ("condition", "method", "window", "value", "floor", "uncertainty", "unit", "paper", "note")
-    return _html_table(head, [tuple(row[key] for key in head) for row in rows])
+    head = (
+        "condition",
+        "method",
+        "window",
+        "value",
+        "seed_std",
+        "floor",
+        "uncertainty",
+        "unit",
+        "paper",
+        "note",
+    )
+    means_first = sorted(rows, key=_is_single)
+    return _html_table(head, [tuple(row[key] for key in head) for row in means_first])
 
 
 def _html_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -153,7 +174,7 @@ def _geometry(rows: Sequence[Row]) -> list[str]:
 def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
     figure = Figure(figsize=(4.5 * len(names), 3), layout="constrained")
     for axis, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
-        mine = [r for r in rows if r["metric"] == name and r["value"] is not None]
+        mine = [r for r in rows if r["metric"] == name and r["value"] is not None and _is_single(r)]
         windows = sorted({r["window"] for r in mine})
         for method in dict.fromkeys(r["method"] for r in mine):
             means = [

@@ -1,11 +1,11 @@
 """A figure's row, and which clip a clip is held against."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from catalogs.paper_metrics import paper_values
 from catalogs.scenario import SCENARIO_FIELDS
 from flows.judging.judged_clip import JudgedClip, Row
 
@@ -13,6 +13,7 @@ from flows.judging.judged_clip import JudgedClip, Row
 def figure_row(
     metric: str, method: str, condition: str, value: float | None, unit: str, *, note: str = "",
     window: int | None = None, floor: float | None = None, uncertainty: float | None = None,
+    paper: float | None = None, averaged: int | None = None, seed_std: float | None = None,
 ) -> Row:  # fmt: skip
     """One figure of an evaluation; a missing one says why.
 
@@ -25,6 +26,9 @@ def figure_row(
     window : of the smoothing; None for none [frames]
     floor : what a perfect estimate scores [unit]
     uncertainty : standard [unit]
+    paper : what the paper prints for the same clips [unit]
+    averaged : how many figures it is a mean of; None for a single figure [1]
+    seed_std : of a mean, sample standard deviation over visual seeds [unit]
     """
     finite = value is not None and np.isfinite(value)
     return {
@@ -33,16 +37,24 @@ def figure_row(
         "condition": condition,
         "value": value if finite else None,
         "unit": unit,
-        "paper": paper_values().get(metric),
+        "paper": paper,
         "window": window or 0,
         "floor": floor,
         "uncertainty": uncertainty if uncertainty is not None and np.isfinite(uncertainty) else None,
         "note": note if finite or note else "not a number",
+        "averaged": averaged,
+        "seed_std": seed_std,
     }
 
 
+def visual_seed(label: str) -> str:
+    """The visual seed in a clip's label; empty in a dataset of one seed."""
+    found = re.search(r"(?:^|/)seed-(\d+)$", label)
+    return found[1] if found else ""
+
+
 def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> JudgedClip | None:
-    """The clip that differs in nothing but a dry sky, or in nothing but a flat road; None if there is none.
+    """The clip of one visual seed that differs in nothing but a dry sky, or a flat road; None if there is none.
 
     Parameters
     ----------
@@ -54,7 +66,8 @@ def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> J
         "hazard_center_m", "hazard_length_m", "hazard_height_m"
     }  # fmt: skip
     held = set(SCENARIO_FIELDS) - free
-    for other in clips:
+    seed = visual_seed(clip.facts["label"])
+    for other in (c for c in clips if visual_seed(c.facts["label"]) == seed):
         plain = other.facts["weather"] == "dry" if weather else other.facts["hazard_height_m"] == 0
         if plain and other is not clip and all(_same(clip.facts.get(k), other.facts.get(k)) for k in held):
             return None if weather and clip.facts["weather"] == "dry" else other
