@@ -13,6 +13,7 @@ from catalogs.campaigns import read_campaign
 from catalogs.effects import load_effects
 from tasks.errors import InputError
 from tasks.vehicle.effects.library import PARAMETER_INDEX
+from tests.conftest import DATA
 
 TOLERANCES = {
     "pressure_gain": 0.02, "mass": 0.01, "pitch_gain": 0.02, "wheel_radius": 0.005, "suspension_damping": 0.04,
@@ -90,12 +91,21 @@ def test_the_hash_changes_with_any_sample(folder: Path) -> None:
     ("channel", "damage", "words"),
     [
         ("pitch", lambda x: np.where(np.arange(300) == 7, np.nan, x), "channel pitch has a gap"),
-        ("speed", lambda x: x * 3.6, "another unit"),
+        ("speed", lambda x: x * 3.6, "channels speed and wheel_speed_front give a rolling radius"),
         ("brake_pressure", lambda x: x * 1e3, "channel brake_pressure reaches"),
         ("time", lambda x: x + 0.5 * (np.arange(300) > 100), "channel time must advance"),
         ("pitch_rate", lambda x: np.full(300, 0.1), "channel pitch_rate is frozen"),
-        ("pitch", lambda x: -x, "nose-down positive"),
-        ("longitudinal_acceleration", lambda x: -x, "must be negative under braking"),
+        ("time", lambda x: 1.02 * x, "300 samples take"),
+        ("pitch", lambda x: -x, "channel pitch runs against the deceleration"),
+        ("longitudinal_acceleration", lambda x: -x, "channel longitudinal_acceleration runs against"),
+        ("longitudinal_acceleration", lambda x: x / 9.81, "it looks like g"),
+        ("brake_pressure", lambda x: x * 10, "channel brake_pressure gives 0.2"),
+        ("brake_pressure", lambda x: np.full(300, 0.7), "channel brake_pressure is frozen: it holds 0.7 MPa"),
+        ("brake_pressure", lambda x: np.zeros(300), "channel brake_pressure is 0 over the whole run"),
+        ("speed", lambda x: np.where(abs(np.arange(300) - 170) < 20, x[150], x), "channel speed is frozen"),
+        ("vertical_acceleration", lambda x: x + 9.81, "must exclude gravity"),
+        ("wheel_speed_rear", lambda x: x * 3.6, "channels speed and wheel_speed_rear give"),
+        ("wheel_speed_rear", lambda x: x * 0.32 * 3.6, "(one looks like km/h)"),
     ],
 )
 def test_what_is_wrong_is_named_with_run_and_channel(folder: Path, channel: str, damage, words: str) -> None:  # type: ignore[no-untyped-def]
@@ -104,6 +114,47 @@ def test_what_is_wrong_is_named_with_run_and_channel(folder: Path, channel: str,
     write_run(folder, "run-02", columns)
     text = problems_of(folder)
     assert "run-02" in text and words in text
+
+
+def test_what_only_several_channels_tell_is_found(folder: Path) -> None:
+    in_radians, torn = braking_columns(1), braking_columns(2)
+    for channel in ("pitch", "pitch_rate"):
+        in_radians[channel] = np.radians(in_radians[channel])
+    kept = np.r_[0:150, 210:300]
+    torn = {name: values[: len(kept)] if name == "time" else values[kept] for name, values in torn.items()}
+    write_run(folder, "run-02", in_radians)
+    write_run(folder, "run-03", torn)
+    text = problems_of(folder)
+    assert "run-02: channel pitch gives 0.00" in text and "run-03: channel speed must not jump" in text
+
+
+def test_all_faults_of_a_run_are_told_at_once(folder: Path) -> None:
+    columns = braking_columns(1)
+    columns["pitch"][7] = np.nan
+    columns["vertical_acceleration"] += 9.81
+    columns["wheel_speed_rear"] *= 3.6
+    columns["time"] += 0.4 * (np.arange(300) > 100)
+    write_run(folder, "run-02", columns)
+    text = problems_of(folder)
+    for words in ("pitch has a gap", "exclude gravity", "wheel_speed_rear give", "time must advance"):
+        assert words in text
+
+
+def test_coarse_sensors_and_locked_wheels_are_no_faults(folder: Path) -> None:
+    columns = braking_columns(1)
+    for channel, step in (("speed", 0.0625 / 3.6), ("pitch", 0.05), ("wheel_speed_front", 0.1)):
+        columns[channel] = np.round(columns[channel] / step) * step
+    columns["wheel_speed_rear"][170:210] = 0.0
+    write_run(folder, "run-02", columns)
+    assert len(read_campaign(folder).runs) == 6
+
+
+def test_every_measured_campaign_at_hand_is_sound() -> None:
+    folders = sorted(path.parent for path in (DATA / "measured" / "campaigns").glob("*/campaign.yaml"))
+    if not folders:
+        pytest.skip("no campaigns; set MUSYNC_DATA to the folder that holds measured/")
+    for path in folders:
+        assert len(read_campaign(path).runs) >= 6
 
 
 def test_a_missing_channel_and_a_missing_file_are_both_listed(folder: Path) -> None:
