@@ -1,12 +1,15 @@
 """The ledger of held-out readings: whoever looks twice at runs that only judge says so."""
 
+import hashlib
 import json
 import os
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
 from manifests.provenance import code_version
-from tasks.closure.campaign import Campaign
+from tasks.closure.campaign import Campaign, Run
 
 LEDGER = Path(".musync") / "held-out-readings.jsonl"
 """Under the working folder, unless MUSYNC_LEDGER names another file."""
@@ -15,7 +18,8 @@ LEDGER = Path(".musync") / "held-out-readings.jsonl"
 def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
     """Write down that the held-out runs of a campaign have been read, and count the earlier readings.
 
-    Readings are known by the hash of the held-out split and the data, wherever the verdict was written.
+    A reading is known by what the held-out runs measured, so that neither another name, comment, tolerance or split
+    of the same runs nor another way of writing them makes it the first one.
 
     Parameters
     ----------
@@ -24,16 +28,18 @@ def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
 
     Returns
     -------
-    Number of readings before this one.
+    Number of readings before this one that had a held-out run of it among theirs.
     """
     path = Path(os.environ.get("MUSYNC_LEDGER", LEDGER))
     path.parent.mkdir(parents=True, exist_ok=True)
     lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
     known = [json.loads(line) for line in lines if line.strip()]
+    held_out = [data_hash(run) for run in campaign.held_out]
     entry = {
         "campaign": campaign.name,
         "content_sha256": campaign.content_hash,
         "split_sha256": campaign.split_hash,
+        "held_out_data_sha256": held_out,
         "vehicle_sha256": vehicle_sha256,
         "source_sha256": code_version()["source_sha256"],
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -41,6 +47,19 @@ def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
     with open(path, "a", encoding="utf-8") as file:
         file.write(json.dumps(entry) + "\n")
     return sum(
-        e["content_sha256"] == campaign.content_hash and e["split_sha256"] == campaign.split_hash
+        not set(held_out).isdisjoint(e.get("held_out_data_sha256", ()))
+        or e["content_sha256"] == campaign.content_hash
         for e in known
     )
+
+
+def data_hash(run: Run) -> str:
+    """SHA-256 of what a run measured: interval, pressure and responses as numbers, whatever file held them.
+
+    Parameters
+    ----------
+    run : of a campaign
+    """
+    columns = np.column_stack((run.pressure, run.response))
+    head = f"{run.interval!r} {columns.shape}".encode()
+    return hashlib.sha256(head + np.ascontiguousarray(columns, "<f8").tobytes()).hexdigest()

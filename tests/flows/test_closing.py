@@ -121,13 +121,46 @@ def test_the_report_needs_no_other_file_and_the_split_is_on_disk(closed: Path) -
     assert not set(split["train"]) & set(split["held_out"])
 
 
+def judging(seed: int, content_hash: str) -> Campaign:
+    """A campaign whose runs but the first only judge."""
+    made = synthetic_campaign(VEHICLE, SURFACE, {}, seed, design=SHORT)
+    runs = tuple(replace(run, held_out=k > 0) for k, run in enumerate(made.runs))
+    return replace(made, runs=runs, content_hash=content_hash)
+
+
 def test_a_second_reading_of_the_same_held_out_runs_is_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MUSYNC_LEDGER", str(tmp_path / "ledger.jsonl"))
-    made = synthetic_campaign(VEHICLE, SURFACE, {}, 1, design=SHORT)
-    first, other = replace(made, content_hash="a", split_hash="s"), replace(made, content_hash="b")
+    first, other = judging(1, "a"), judging(2, "b")
     assert [record_reading(c, "v") for c in (first, first, other, first)] == [0, 1, 0, 2]
+
+
+def test_no_edit_beside_the_measured_values_makes_a_reading_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MUSYNC_LEDGER", str(tmp_path / "ledger.jsonl"))
+    made = judging(1, "a")
+    commented = replace(made, content_hash="with a comment", name="another")
+    renamed = tuple(replace(run, name=f"x-{run.name}") for run in made.runs)
+    variants = (
+        made,
+        commented,
+        replace(commented, content_hash="renamed", split_hash="r", runs=renamed[::-1]),
+        replace(commented, content_hash="fewer", split_hash="f", runs=made.runs[:-1]),
+    )
+    assert [record_reading(c, "v") for c in variants] == [0, 1, 2, 3]
+    kept = json.loads((tmp_path / "ledger.jsonl").read_text().splitlines()[1])
+    assert kept["content_sha256"] == "with a comment"
+
+
+def test_a_ledger_from_before_runs_were_hashed_still_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "ledger.jsonl"
+    path.write_text('{"content_sha256": "a", "split_sha256": "s"}\n{"content_sha256": "b"}\n')
+    monkeypatch.setenv("MUSYNC_LEDGER", str(path))
+    assert record_reading(judging(1, "a"), "v") == 1
 
 
 def parameter(name: str, value: float, unit: str = "1") -> Parameter:
