@@ -1,7 +1,8 @@
 """Harder campaigns for close-loop than one effect on a rich design: two effects at once, and too few manoeuvres."""
 
+import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -10,6 +11,8 @@ from catalogs.quantities import CatalogueEntry, read_entry
 from tasks.closure.drives import TRAINING, Drive
 
 FILE = Path(__file__).with_name("closing.yaml")
+ERROR_RATES = Path(__file__).with_name("closing_error_rates.json")
+"""What `musync close-loop-benchmark` counted, without the campaigns one by one."""
 
 Positive = Annotated[float, Field(gt=0)]
 
@@ -65,3 +68,9 @@ def load_closing_study(path: str | Path = FILE) -> ClosingStudy:
         With every rule the file breaks.
     """
     return read_entry(ClosingStudy, Path(path), "study")
+
+
+def load_error_rates() -> dict[str, Any]:
+    """Counts of the benchmark that ships, with the hash of the engine that was judged."""
+    rates: dict[str, Any] = json.loads(ERROR_RATES.read_text(encoding="utf-8"))
+    return rates

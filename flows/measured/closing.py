@@ -12,6 +12,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_source
 from flows.measured.closing_ledger import record_reading
 from flows.measured.closing_report import report_html
+from flows.measured.closing_residuals import residual_rmse
 from flows.measured.grown_vehicle import grown_vehicle
 from flows.store.layout import write_atomically, write_json
 from manifests.canonical import sha256_of_file
@@ -50,6 +51,7 @@ def close_loop(
     earlier = record_reading(measured, sha256_of_file(vehicle_source(name)))
     trace = attribute(measured, model, road, load_effects())
     result = verdict_json(trace.verdict)
+    result["residual_rmse"] = residual_rmse(trace)
     result["held_out_readings_before"] = earlier
     if earlier:
         result["reasons"].append(

@@ -23,6 +23,7 @@ from tasks.closure.drives import RICH, Drive
 from tasks.closure.verdict import attribute
 
 FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
+RATES = "closing_error_rates.json"
 FIRST_NULL, FIRST_TRUTH, FIRST_SIZE = 200_000, 300_000, 400_000
 FIRST_PAIR, FIRST_POOR, FIRST_POOR_NULL = 500_000, 600_000, 700_000
 """Seeds: of the first null, of the first campaign of the first truth, size and pair; 100 apart from one truth, size or
@@ -34,6 +35,8 @@ JUDGES = (
     "tasks/vehicle/",
     "tasks/surface/",
     "catalogs/effects/",
+    "catalogs/studies/closing.yaml",
+    "catalogs/surfaces/",
     "catalogs/vehicles/paper",
 )
 """Sources that a verdict depends on: campaigns judged by the same ones belong to one table."""
@@ -75,7 +78,8 @@ def close_loop_benchmark(
 
     Parameters
     ----------
-    out : folder for ``closing-benchmark.json``, its tables in Markdown and ``campaigns.jsonl``
+    out : folder for ``closing-benchmark.json``, its tables in Markdown, ``campaigns.jsonl``, and the counts alone, as
+        they ship in ``catalogs/studies/closing_error_rates.json``
     seeds : campaigns of each truth
     nulls : campaigns of a model that lacks nothing
     harder : campaigns of each pair of effects, and of each truth on a poor design
@@ -127,6 +131,7 @@ def close_loop_benchmark(
             file.write(json.dumps(row) + "\n")
     result = summary(rows) | {"campaigns": rows, "engine_sha256": engine, "made_with": code_version()}
     write_json(folder / FILE, result)
+    write_json(folder / RATES, {key: value for key, value in result.items() if key != "campaigns"})
     write_atomically(folder / TABLES, benchmark_tables(result).encode())
     return result
 

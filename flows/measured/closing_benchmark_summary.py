@@ -81,6 +81,19 @@ def summary(rows: Rows) -> dict[str, Any]:
             truth: dict(sorted(Counter(row["outcome"] for row in single if row["truth"] == truth).items()))
             for truth in dict.fromkeys(row["truth"] for row in single)
         },
+        "named_instead": {
+            truth: dict(sorted(found.items()))
+            for truth in dict.fromkeys(row["truth"] or "nothing" for row in single + of["null"])
+            if (
+                found := Counter(
+                    name
+                    for row in single + of["null"]
+                    if (row["truth"] or "nothing") == truth
+                    for name in row["named"]
+                    if name != truth
+                )
+            )
+        },
         "power": [
             {"truth": truth, "values": json.loads(values), **_count(group, "right")}
             for (truth, values), group in _grouped(of["size"]).items()

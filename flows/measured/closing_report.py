@@ -5,6 +5,8 @@ from html import escape
 from typing import Any
 
 from flows.measured import closing_figures as figures
+from flows.measured.closing_error_rates import error_rates_html
+from flows.measured.closing_residuals import residuals_over_time
 from tasks.closure.campaign import Campaign
 from tasks.closure.verdict import Trace
 from tasks.vehicle.effects.library import Effect
@@ -56,6 +58,7 @@ def report_html(trace: Trace, result: Mapping[str, Any], campaign: Campaign) -> 
             "What is left that goes with the brake pressure",
             _image(figures.correlations(trace)) + CORRELATION,
         ),
+        _section("Residual of the training runs over time", _image(residuals_over_time(trace))),
         _section("Held-out runs", _image(figures.traces(trace))),
         _section("Pulls of the session", _image(figures.pulls(trace))),
         _section("Next experiment", _experiment(result["discriminating_experiment"])),
@@ -63,6 +66,7 @@ def report_html(trace: Trace, result: Mapping[str, Any], campaign: Campaign) -> 
             "What this campaign could show at all",
             _detectable(result["minimum_detectable"], trace.start.evidence.effects),
         ),
+        _section("How often this tool is right", error_rates_html([e["name"] for e in result["effects"]])),
         _section("Data and split, fixed before any fit", _data(result, campaign)),
     ]
     return (
@@ -186,7 +190,7 @@ def _ladder(trace: Trace) -> str:
 
 def _experiment(plan: Mapping[str, Any] | None) -> str:
     if plan is None:
-        return "<p>Nothing is named, so there is nothing to tell apart.</p>"
+        return "<p>Nothing is named, or no planned run would tell more than this campaign does.</p>"
     return (
         f"<p>{escape(plan['plan'])}: tells {escape(plan['between'][0])} from {escape(plan['between'][1])} by an"
         f" expected D&sup2; of {plan['expected_d2']:.3g} a run, session and disturbances taken out.</p>"

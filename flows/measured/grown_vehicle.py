@@ -69,15 +69,17 @@ def grown_vehicle(
             missing += [f"{effect.name}: {p.name}" for p in effect.parameters]
             continue
         for parameter in effect.parameters:
-            _apply(entry, parameter, _source(effect, parameter, verdict), again=parameter.name in bounds)
+            _apply(entry, parameter, _source(effect, parameter, verdict))
             bounds[parameter.name] = _limits(parameter)
     if not bounds:
         return None, missing
+    rivals = [rival.name for _, rival in verdict.rivals]
+    untold = f"; the runs cannot tell it from {', '.join(rivals)}" if rivals else ""
     provenance = {
         "mode": "coupled",
         "base": source.stem,
         "base_sha256": sha256_of_file(source),
-        "procedure": f"close-loop, verdict {verdict.verdict}: {', '.join(e.name for e in verdict.effects)}",
+        "procedure": f"close-loop, verdict {verdict.verdict}: {', '.join(e.name for e in verdict.effects)}{untold}",
         "procedure_sha256": sha256_of_file(LIBRARY_FILE),
         "version": code_version()["version"],
         "split": f"train of {verdict.campaign}",
@@ -124,8 +126,7 @@ def _source(effect: NamedEffect, p: Parameter, verdict: Verdict) -> str:
     )
 
 
-def _apply(entry: dict[str, Any], p: Parameter, source: str, *, again: bool) -> None:
-    # two effects that share a number, as air drag and headwind do, add up; what the base had is found anew
+def _apply(entry: dict[str, Any], p: Parameter, source: str) -> None:
     if p.name in SCALED or p.name in SHIFTED:
         for key in SCALED.get(p.name, ()) or SHIFTED[p.name]:
             value = entry[key]["value"]
@@ -141,5 +142,10 @@ def _apply(entry: dict[str, Any], p: Parameter, source: str, *, again: bool) -> 
             }
     else:
         effects = entry.setdefault("effects", {})
-        value = p.value + effects[p.name]["value"] if again else p.value
-        effects[p.name] = {"value": float(value), "unit": EFFECT_UNITS[p.name], "source": source}
+        # two effects that share a number, as air drag and headwind do, add up; so does what the base had
+        before = effects.get(p.name, {"value": 0.0, "source": ""})
+        effects[p.name] = {
+            "value": float(before["value"] + p.value),
+            "unit": EFFECT_UNITS[p.name],
+            "source": f"{before['source']}; {source}".removeprefix("; "),
+        }

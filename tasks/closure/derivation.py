@@ -42,19 +42,22 @@ def prepare(
     guess = Disturbance()
     runs = [replace(run, pressure=braking_pressure(run.pressure)) for run in campaign.runs]
     models = [run_model(run, vehicle, surface) for run in runs]
-    torn = tuple(m.run.name for m in models if step_change(m, rho, sigma) > TORN)
+    used: list[str] = []
 
     def derived(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
         own = [m for m in models if m.run.held_out == held_out]
+        sound = [m for m in own if step_change(m, rho, sigma) <= TORN]
         # too few sound runs to do without the others
-        kept = [m for m in own if m.run.name not in torn]
+        kept = sound if len(sound) >= FEWEST else own
+        used.extend(m.run.name for m in kept)
         return tuple(
-            run_evidence(model, rho, sigma, plain, library, campaign.tolerances, guess)
-            for model in (kept if len(kept) >= FEWEST else own)
+            run_evidence(model, rho, sigma, plain, library, campaign.tolerances, guess) for model in kept
         )
 
+    train, held_out = derived(False, effects), derived(True, ())
+    torn = tuple(run.name for run in campaign.runs if run.name not in used)
     return Evidence(
-        train=derived(False, effects), held_out=derived(True, ()), effects=effects,
+        train=train, held_out=held_out, effects=effects,
         tolerances=campaign.tolerances, disturbance=guess, torn=torn,
     )  # fmt: skip
 

@@ -14,6 +14,9 @@ from tasks.closure.screening import Evidence
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
 
+TELLING = 1.0
+"""Expected D2 below which a run says nothing."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
@@ -34,8 +37,8 @@ class Experiment:
 
 def next_experiment(
     evidence: Evidence, first: Fit, second: Fit, vehicle: Vehicle, surface: SurfaceParameters
-) -> Experiment:
-    """The planned run with the largest nuisance-marginalised D2 between two fits.
+) -> Experiment | None:
+    """The planned run with the largest nuisance-marginalised D2 between two fits; None if none tells them apart.
 
     Parameters
     ----------
@@ -65,5 +68,7 @@ def next_experiment(
         distance = float(change @ change - q @ q - shared @ np.linalg.solve(session, shared))
         if distance > best[1]:
             best = (plan, distance)
+    if best[1] < TELLING:
+        return None
     names = (first.parts[-1].name, second.parts[-1].name if second.parts else "the model as it stands")
     return Experiment(between=names, plan=best[0], expected_d2=best[1])

@@ -9,10 +9,11 @@ from scipy.signal import lfilter
 from tasks.closure.campaign import CHANNELS, Run
 from tasks.closure.gauge import at_rest
 from tasks.closure.rollout import CONSTANTS, N_STATES, OUTPUTS, drive
+from tasks.errors import InputError
 from tasks.surface.friction import surface_friction
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
 from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, DISC_COOLING
-from tasks.vehicle.effects.library import ALL_PARAMETERS, PARAMETER_INDEX
+from tasks.vehicle.effects.library import ALL_PARAMETERS, PARAMETER_INDEX, parameter_vector
 from tasks.vehicle.effects.ports import PARAMETERS
 from tasks.vehicle.effects.slots import Slot, slot_tables
 from tasks.vehicle.parameters import Vehicle, surface_response
@@ -33,12 +34,16 @@ class RunModel:
     ----------
     run : the measured run
     constants : float64 [len(CONSTANTS)]
+    own : float64 [len(ALL_PARAMETERS)] effects that the vehicle has already: what is fitted comes on top
+    forms : forms that it has already
     samples : how many samples are used (to the masked speed)
     initial_speed : speed at the first sample, from the line through the speed before the brake [m/s]
     """
 
     run: Run
     constants: NDArray[np.float64]
+    own: NDArray[np.float64]
+    forms: tuple[Slot, ...]
     samples: int
     initial_speed: float
 
@@ -56,7 +61,20 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     run : measured run
     vehicle : the model's vehicle
     surface : pavement of the surface mapping
+
+    Raises
+    ------
+    InputError
+        If the vehicle has effects that coupled mode alone knows.
     """
+    foreign = [
+        name for name, value in vehicle.effects.items() if value != 0.0 and name not in PARAMETER_INDEX
+    ]
+    if foreign:
+        raise InputError(
+            f"vehicle {vehicle.name} has effects that only coupled mode knows ({', '.join(foreign)}): no campaign can"
+            " be held against it; use the vehicle that it was grown from"
+        )
     weather = Weather(
         kind=run.weather,  # type: ignore[arg-type]
         precipitation_mm_h=run.precipitation_mm_h,
@@ -113,6 +131,8 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     return RunModel(
         run=replace(run, pressure=at_rest(run.pressure)),
         constants=np.array([values[name] for name in CONSTANTS]),
+        own=parameter_vector({name: v for name, v in vehicle.effects.items() if name in PARAMETER_INDEX}),
+        forms=tuple(form.slot for form in vehicle.forms),
         samples=int(slow[0]) if slow.size else len(speed),
         initial_speed=float(np.polyfit(np.arange(max(lead, 5)), speed[: max(lead, 5)], 1)[1]),
     )
@@ -143,8 +163,8 @@ def roll(
     Parameters
     ----------
     model : the run
-    theta : float64 [len(ALL_PARAMETERS)] effects
-    slots : further forms at the ports
+    theta : float64 [len(ALL_PARAMETERS)] effects on top of the vehicle's own
+    slots : forms on top of the vehicle's own
     initial_speed : replaces the model's [m/s]
     start : sample, states and outputs of an earlier rollout to branch off from
     substeps : integration steps between samples
@@ -153,8 +173,8 @@ def roll(
     -------
     outputs float64 [samples, len(OUTPUTS)] and states float64 [samples, N_STATES]
     """
-    motion = np.ascontiguousarray(theta[: len(PARAMETERS)])
-    keys, grids, tables = slot_tables(slots)
+    motion = np.ascontiguousarray((model.own + theta)[: len(PARAMETERS)])
+    keys, grids, tables = slot_tables((*model.forms, *slots))
     if start is None:
         first, out, states = 0, np.zeros((model.samples, len(OUTPUTS))), np.zeros((model.samples, N_STATES))
         v0 = starting_speed(model, theta) if initial_speed is None else initial_speed

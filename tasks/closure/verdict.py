@@ -1,18 +1,18 @@
 """The decision: what is missing, how sure, and what it does to the error on runs that no fit has seen."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tasks.closure.answer import ChannelError, NamedEffect, Verdict, VerdictName, named_effect
-from tasks.closure.attribution import RIVAL_SPAN
+from tasks.closure.attribution import RIVAL_SPAN, Candidate
 from tasks.closure.campaign import CHANNELS, SESSION, Campaign
 from tasks.closure.correlation import residual_input_correlation
 from tasks.closure.derivation import prepare
 from tasks.closure.discovery import search_all
 from tasks.closure.experiment import next_experiment
-from tasks.closure.fit import fit
+from tasks.closure.fit import Fit, fit
 from tasks.closure.held_out import held_out_error
 from tasks.closure.hypothesis import compose
 from tasks.closure.intervals import curvature_interval, profile_interval
@@ -65,7 +65,7 @@ def attribute(
     The verdict and what it stands on; nothing in it has been fitted to a held-out run.
     """
     progress("derivatives")
-    evidence = prepare(campaign, vehicle, surface, effects)
+    evidence = prepare(campaign, vehicle, surface, tuple(e for e in effects if not _fixed(e, vehicle)))
     reasons: list[str] = []
     progress("search")
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
@@ -107,13 +107,13 @@ def attribute(
         )
     if not named and not reasons:
         reasons.append("no candidate passes the score, held-out and bound gates together")
+    present = [name for name, value in vehicle.effects.items() if value] + [f.name for f in vehicle.forms]
+    if present:
+        reasons.append(f"{vehicle.name} already has {', '.join(present)}: what is named comes on top of that")
     experiment = None
     if compared:
-        first = compared[0]
-        ranked = sorted((*first.near, *first.others), key=lambda pair: -pair[0].score)
-        other = first.near[0][0] if first.near else ranked[0][0] if ranked else None
-        second = other.fitted if other is not None else start.base
-        experiment = next_experiment(start.evidence, first.own.fitted, second, vehicle, surface)
+        pair = _to_tell_apart(compared, near_form, start)
+        experiment = next_experiment(start.evidence, *pair, vehicle, surface)
     theta, slots = compose(found.base.parts, found.base.values, np.zeros(len(SESSION)))
     grown = compose(found.base.parts, found.base.values, found.base.session)
     sigma, lead = evidence.session_sigma, evidence.train[0]
@@ -146,6 +146,26 @@ def _worse(error: Mapping[str, ChannelError]) -> list[str]:
     return [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
 
 
+def _fixed(effect: Effect, vehicle: Vehicle) -> bool:
+    """Whether the vehicle has an effect of several parameters already: those cannot be found as a change of it."""
+    return len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
+
+
+def _to_tell_apart(
+    compared: Sequence[Compared], near_form: Candidate | None, start: Found
+) -> tuple[Fit, Fit]:
+    """The two explanations to tell apart next: rivals first, else the best of the others, else the plain model."""
+    first = compared[0].own.fitted
+    if near_form is not None:
+        return first, near_form.fitted
+    near = [(c.own, other) for c in compared for other, _ in c.near]
+    others = [(compared[0].own, other) for other, _ in compared[0].others]
+    if not (near or others):
+        return first, start.base
+    own, other = max(near or others, key=lambda pair: pair[1].score)
+    return own.fitted, other.fitted
+
+
 def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
     if not named:
         return "NOTHING"
@@ -154,8 +174,6 @@ def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> Verd
         return "UNKNOWN_FORM"
     if near:
         return "SET"
-    if classes == {"retune"}:
-        return "RETUNE"
-    if classes == {"sensor"}:
-        return "SENSOR"
-    return "FOUND"
+    if "effect" in classes:
+        return "FOUND"
+    return "RETUNE" if "retune" in classes else "SENSOR"

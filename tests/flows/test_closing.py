@@ -114,7 +114,7 @@ def test_a_lag_leaves_a_residual_that_goes_with_the_pressure_until_it_is_named(c
 
 def test_the_report_needs_no_other_file_and_the_split_is_on_disk(closed: Path) -> None:
     page = (closed / "report.html").read_text()
-    assert "brake_lag" in page and page.count("data:image/png;base64,") == 6
+    assert "brake_lag" in page and page.count("data:image/png;base64,") == 7
     assert 'src="http' not in page and "href=" not in page
     split = json.loads((closed / "split.json").read_text())
     assert split["split_sha256"] == json.loads((closed / "verdict.json").read_text())["split_sha256"]

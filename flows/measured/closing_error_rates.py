@@ -1,0 +1,42 @@
+"""How often close-loop itself is right, for the page of a verdict: from the benchmark that ships."""
+
+from html import escape
+from typing import Any
+
+from catalogs.studies.closing import load_error_rates
+from flows.measured.closing_benchmark import engine_hash
+
+
+def error_rates_html(named: list[str]) -> str:
+    """What the benchmark says about nulls, library effects, and the effects that this verdict names.
+
+    Parameters
+    ----------
+    named : effects of the verdict
+    """
+    rates = load_error_rates()
+    nulls, exact = rates["false_discoveries"], rates["summary"][0]
+    lines = [
+        f"campaigns where nothing is missing: something named in {_share(nulls)}",
+        f"campaigns with one library effect: named exactly in {_share(exact)}",
+    ]
+    for name in named:
+        outcomes = rates["confusion"].get(name)
+        if outcomes is None:
+            lines.append(f"{name}: not among the effects that were tried")
+            continue
+        told = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
+        others = {
+            truth: of[name] for truth, of in rates["named_instead"].items() if truth != name and name in of
+        }
+        wrong = ", ".join(f"{truth} ({count})" for truth, count in others.items()) or "none"
+        lines.append(f"{name} in the data: {told}; named where the data held something else: {wrong}")
+    if rates["engine_sha256"] != engine_hash():
+        lines.append(
+            f"counted with engine {rates['engine_sha256'][:12]}; this verdict is of {engine_hash()[:12]}"
+        )
+    return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
+
+
+def _share(share: dict[str, Any]) -> str:
+    return f"{share['hits']} of {share['of']} (95 % interval {100 * share['low']:.1f} to {100 * share['high']:.1f} %)"

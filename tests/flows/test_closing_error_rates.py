@@ -1,0 +1,43 @@
+"""The page of a verdict says how often such verdicts are right, by the benchmark that ships."""
+
+from html import unescape
+
+import pytest
+
+from catalogs.studies.closing import load_error_rates
+from flows.measured import closing_error_rates
+from flows.measured.closing_benchmark_summary import summary
+from flows.measured.closing_error_rates import error_rates_html
+
+
+def row(kind: str, truth: str | None, outcome: str, named: list[str], seed: int) -> dict[str, object]:
+    return {
+        "kind": kind, "truth": truth, "values": {}, "seed": seed, "verdict": "FOUND", "outcome": outcome,
+        "named": named, "rivals": [], "covered": None, "cpu_s": 1.0,
+    }  # fmt: skip
+
+
+def test_it_names_what_was_right_and_what_was_taken_for_the_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [
+        row("null", None, "right", [], 1),
+        row("null", None, "false discovery", ["brake_lag"], 2),
+        row("library", "brake_lag", "right", ["brake_lag"], 3),
+        row("library", "brake_lag", "refused", [], 4),
+        row("library", "brake_dead_time", "wrong", ["brake_lag"], 5),
+    ]
+    rates = summary(rows) | {"engine_sha256": "e" * 64}
+    monkeypatch.setattr(closing_error_rates, "load_error_rates", lambda: rates)
+    monkeypatch.setattr(closing_error_rates, "engine_hash", lambda: "f" * 64)
+    page = unescape(error_rates_html(["brake_lag", "headwind"]))
+    assert "nothing is missing: something named in 1 of 2 (95 % interval 1.3 to 98.7 %)" in page
+    assert "named exactly in 1 of 3" in page
+    assert "brake_lag in the data: 1 refused, 1 right" in page
+    assert "named where the data held something else: brake_dead_time (1), nothing (1)" in page
+    assert "headwind: not among the effects that were tried" in page
+    assert "counted with engine eeeeeeeeeeee; this verdict is of ffffffffffff" in page
+
+
+def test_the_counts_that_ship_have_nulls_and_every_library_truth_ten_times() -> None:
+    rates = load_error_rates()
+    assert rates["false_discoveries"]["of"] == 100
+    assert rates["summary"][0]["of"] == 280

@@ -1,0 +1,56 @@
+"""A vehicle grown twice carries both, and its file says what the runs could not tell."""
+
+from pathlib import Path
+
+import numpy as np
+
+from catalogs.vehicles import load_vehicle
+from flows.measured.grown_vehicle import grown_vehicle
+from tasks.closure.answer import NamedEffect, Parameter, Verdict
+from tasks.closure.disturbance import Disturbance
+
+
+def drag(value: float, name: str = "aerodynamic_drag") -> NamedEffect:
+    parameter = Parameter(
+        name="drag_area",
+        value=value,
+        ci_low=value - 0.1,
+        ci_high=value + 0.1,
+        lower=0.0,
+        upper=3.0,
+        unit="m^2",
+    )
+    return NamedEffect(
+        name=name, effect_class="effect", port="longitudinal_force", variable="speed", parameters=(parameter,),
+        score=50.0, gain=60.0, inflation=1.0, held_out_gain=9.0, win_share=1.0,
+    )  # fmt: skip
+
+
+def verdict_of(
+    effect: NamedEffect, campaign: str, rivals: tuple[tuple[str, NamedEffect], ...] = ()
+) -> Verdict:
+    return Verdict(
+        verdict="SET" if rivals else "FOUND", effects=(effect,), rivals=rivals, tried=(), error={}, manoeuvre_error={},
+        correlation={}, session_pulls={}, noise={}, disturbance=Disturbance(), detectable={}, campaign=campaign,
+        content_hash="c" * 64, split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, torn=(), reasons=(),
+    )  # fmt: skip
+
+
+def grown(base: str, verdict: Verdict, path: Path) -> Path:
+    text, missing = grown_vehicle(base, verdict, {})
+    assert text is not None and missing == []
+    path.write_text(text)
+    return path
+
+
+def test_what_a_second_campaign_finds_comes_on_top_of_what_the_first_found(tmp_path: Path) -> None:
+    once = grown("paper-reference", verdict_of(drag(0.5), "spring"), tmp_path / "once.yaml")
+    twice = grown(str(once), verdict_of(drag(0.2), "autumn"), tmp_path / "twice.yaml")
+    assert load_vehicle(twice).effects["drag_area"] == 0.7
+    assert "spring" in twice.read_text() and "autumn" in twice.read_text()
+
+
+def test_what_the_runs_could_not_tell_from_it_stands_in_its_provenance(tmp_path: Path) -> None:
+    rivals = (("aerodynamic_drag", drag(0.1, "headwind")),)
+    path = grown("paper-reference", verdict_of(drag(0.5), "spring", rivals), tmp_path / "set.yaml")
+    assert "the runs cannot tell it from headwind" in " ".join(path.read_text().split())
