@@ -3,15 +3,20 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from catalogs.learned_judges import LoadedJudge
-from flows.judging.evaluation_rows import figure_row, weather_families
+from flows.judging.evaluation_rows import control_of, figure_row, weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View
-from tasks.eval.learned_scores import ClipWeather, NeighbourDistance, VideoJudge, WholeVideo
+from tasks.eval.learned_scores import (
+    ClipWeather,
+    FlowAlignedDistance,
+    VideoJudge,
+    WholeVideo,
+    dover_scores,
+)
 from tasks.eval.severity import severity_agreement
 
-METRICS = {"dover": "dover_overall", "fast_vqa": "fast_vqa", "lpips": "temporal_lpips"}
-"""Metric of each judge that scores a clip by itself."""
 FEATURES = {"dry": 0, "rain": 1, "snow": 2}
 """Rows of CLIP's text features."""
 
@@ -25,23 +30,63 @@ def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJu
     clips : as the other judges saw them
     judges : from `catalogs.learned_judges.load_judges`
     """
-    for name, metric in METRICS.items():
-        loaded = judges[name]
-        if loaded.network is None:
-            yield figure_row(metric, "-", "-", None, "1", note=loaded.note)
-            continue
-        judge: VideoJudge = (NeighbourDistance if name == "lpips" else WholeVideo)(network=loaded.network)
-        for clip in clips:
-            value = _score(view, clip, judge)
-            yield figure_row(metric, "TorchScript", clip.facts["label"], value, "1", note=loaded.note)
+    yield from _dover(view, clips, judges["dover"])
+    yield from _fast_vqa(view, clips, judges["fast_vqa"])
+    yield from _temporal_lpips(view, clips, judges["lpips"])
     yield from _severity(view, clips, judges["clip"])
+
+
+def _dover(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
+    names = ("dover_overall", "dover_technical", "dover_aesthetic")
+    if loaded.network is None:
+        yield from _missing(names, loaded.note)
+        return
+    judge = WholeVideo(network=loaded.network)
+    scores = {clip.facts["label"]: dover_scores(judge.numbers(_pictures(view, clip))) for clip in clips}
+    for name in names:
+        given = {label: found[name] for label, found in scores.items() if name in found}
+        if not given:
+            yield from _missing((name,), "not run: the checkpoint gives the overall score alone")
+        for label, value in given.items():
+            yield figure_row(name, "TorchScript", label, value, "1", note=loaded.note)
+
+
+def _fast_vqa(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
+    if loaded.network is None:
+        yield from _missing(("fast_vqa",), loaded.note)
+        return
+    judge = WholeVideo(network=loaded.network)
+    for clip in clips:
+        value = _score(view, clip, judge)
+        yield figure_row("fast_vqa", "TorchScript", clip.facts["label"], value, "1", note=loaded.note)
+
+
+def _temporal_lpips(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
+    """Each clip's own, and what it exceeds that of its dry control by."""
+    names = ("temporal_lpips", "temporal_lpips_excess")
+    if loaded.network is None:
+        yield from _missing(names, loaded.note)
+        return
+    judge = FlowAlignedDistance(network=loaded.network)
+    scores = {clip.facts["clip_id"]: _score(view, clip, judge) for clip in clips}
+    for clip in clips:
+        label, value = clip.facts["label"], scores[clip.facts["clip_id"]]
+        yield figure_row(names[0], "TorchScript", label, value, "1", note=loaded.note)
+        control = control_of(clip, clips, weather=True)
+        if control is not None:
+            excess = value - scores[control.facts["clip_id"]]
+            yield figure_row(names[1], "TorchScript", label, excess, "1", note=loaded.note)
+
+
+def _missing(names: tuple[str, ...], note: str) -> Iterator[Row]:
+    for name in names:
+        yield figure_row(name, "-", "-", None, "1", note=note)
 
 
 def _severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> Iterator[Row]:
     names = ("clip_severity_rho", "clip_adjacent_accuracy")
     if clip_judge.network is None or clip_judge.text_features is None:
-        for name in names:
-            yield figure_row(name, "-", "-", None, "1", note=clip_judge.note)
+        yield from _missing(names, clip_judge.note)
         return
     network, features = clip_judge.network, clip_judge.text_features
     for kind, condition, levels in weather_families(clips):
@@ -60,4 +105,8 @@ def _severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> I
 
 
 def _score(view: View, clip: JudgedClip, judge: VideoJudge) -> float:
-    return judge.score(view.arrays(clip.facts["index"], "rgb")[0])
+    return judge.score(_pictures(view, clip))
+
+
+def _pictures(view: View, clip: JudgedClip) -> NDArray[np.uint8]:
+    return view.arrays(clip.facts["index"], "rgb")[0]

@@ -6,7 +6,6 @@ memory, so nothing in this module reads a file, and nothing anywhere asks a netw
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, Protocol
 
 import cv2
@@ -14,12 +13,23 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from tasks.errors import InputError
 from tasks.eval.severity import SAMPLED_FRAMES
 
 CLIP_SIDE = 224
 CLIP_MEAN = (0.48145466, 0.4578275, 0.40821073)
 CLIP_STD = (0.26862954, 0.26130258, 0.27577711)
 """Input side [px] and colour statistics [1] of CLIP (Radford et al. 2021, arXiv:2103.00020)."""
+
+PAIRS = 40
+"""Neighbouring frames that temporal LPIPS looks at (paper, Appendix D); which is not printed: evenly spread [1]."""
+ROADSIDE, ROADSIDE_FRAME = ((0, 60, 150, 240), (330, 60, 480, 240)), (480, 320)
+"""Its two regions as left, top, right, bottom, and the width and height of their frame (paper, Appendix D) [px]."""
+FARNEBACK = (0.5, 4, 21, 4, 7, 1.5, 0)
+"""Pyramid scale, levels, window, iterations, poly_n, poly_sigma and flags of its flow. Appendix D prints none:
+these are T-IoU's (Appendix A.6)."""
+DOVER_TECHNICAL, DOVER_AESTHETIC = (0.1107, 0.07355, 0.6104), (-0.08285, 0.03774, 0.3896)
+"""Mean, spread and weight of DOVER's two raw scores (its authors' code: VQAssessment/DOVER, `fuse_results`) [1]."""
 
 Network = Callable[..., Any]
 """A TorchScript module, or anything that is called like one."""
@@ -63,25 +73,68 @@ class ClipWeather:
 
 @dataclass(frozen=True, kw_only=True)
 class WholeVideo:
-    """A no-reference video judge, such as DOVER or FAST-VQA, with its sampling and fusion inside the module.
+    """A no-reference video judge, such as DOVER or FAST-VQA, with its sampling inside the module.
 
     Parameters
     ----------
-    network : float32 [1, 3, F, H, W] in 0 to 1, to one number
+    network : float32 [1, 3, F, H, W] in 0 to 1, to a tensor of one number or more
     """
 
     network: Network
 
-    def score(self, frames: NDArray[np.uint8]) -> float:
-        """What the network says of all frames."""
+    def numbers(self, frames: NDArray[np.uint8]) -> tuple[float, ...]:
+        """All that the network says of all frames."""
         video = torch.from_numpy(np.ascontiguousarray(frames.transpose(3, 0, 1, 2)[None])).float() / 255
         with torch.inference_mode():
-            return float(self.network(video))
+            return tuple(float(x) for x in self.network(video).reshape(-1))
+
+    def score(self, frames: NDArray[np.uint8]) -> float:
+        """The one number that the network says.
+
+        Raises
+        ------
+        InputError
+            If it says more.
+        """
+        found = self.numbers(frames)
+        if len(found) != 1:
+            raise InputError(f"A video judge's module must give one number; it gives {len(found)}.")
+        return found[0]
+
+
+def dover_scores(numbers: tuple[float, ...]) -> dict[str, float]:
+    """DOVER's scores by name: the overall one alone, or the two raw ones and what its authors' code makes of them [1].
+
+    Parameters
+    ----------
+    numbers : the overall score, or technical and aesthetic [1]
+
+    Raises
+    ------
+    InputError
+        If there are neither one nor two.
+    """
+    if len(numbers) == 1:
+        return {"dover_overall": numbers[0]}
+    if len(numbers) != 2:
+        raise InputError(f"DOVER's module must give one number or two; it gives {len(numbers)}.")
+    fused = sum(
+        weight * (raw - mean) / spread
+        for raw, (mean, spread, weight) in zip(numbers, (DOVER_TECHNICAL, DOVER_AESTHETIC), strict=True)
+    )
+    return {
+        "dover_overall": float(1 / (1 + np.exp(-fused))),
+        "dover_technical": numbers[0],
+        "dover_aesthetic": numbers[1],
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
-class NeighbourDistance:
-    """Mean perceptual distance of neighbouring frames, such as temporal LPIPS.
+class FlowAlignedDistance:
+    """Perceptual distance of a frame and its predecessor laid over it by flow (paper, Appendix D, temporal LPIPS).
+
+    Declared, since the paper prints no more: the flow's constants are T-IoU's, the predecessor is sampled bilinearly
+    with edges held, both regions count alike, and they scale with the frame.
 
     Parameters
     ----------
@@ -91,11 +144,44 @@ class NeighbourDistance:
     network: Network
 
     def score(self, frames: NDArray[np.uint8]) -> float:
-        """Mean over all pairs of neighbours; 0 for a still picture under any distance."""
-        pictures = torch.from_numpy(np.ascontiguousarray(frames.transpose(0, 3, 1, 2))).float() / 127.5 - 1
+        """Mean over 40 pairs and the two roadside regions; not a number for fewer than two frames."""
+        if len(frames) < 2:
+            return float("nan")
+        later = np.linspace(1, len(frames) - 1, min(PAIRS, len(frames) - 1)).astype(int)
+        return float(np.mean([self._distance(frames[k - 1], frames[k]) for k in later]))
+
+    def _distance(self, before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> float:
+        pictures = [
+            torch.from_numpy(picture.transpose(2, 0, 1)[None].astype(np.float32)) / 127.5 - 1
+            for picture in (laid_over(before, frame), frame)
+        ]
+        height, width = frame.shape[:2]
+        scale = np.array((width, height) * 2) / (ROADSIDE_FRAME * 2)
         with torch.inference_mode():
-            pairs = [float(self.network(a[None], b[None])) for a, b in pairwise(pictures)]
-        return float(np.mean(pairs))
+            return float(
+                np.mean(
+                    [
+                        float(self.network(*(p[..., top:bottom, left:right].contiguous() for p in pictures)))
+                        for left, top, right, bottom in np.rint(np.array(ROADSIDE) * scale).astype(int)
+                    ]
+                )
+            )
+
+
+def laid_over(before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A picture warped onto its successor by Farneback's backward flow (Farneback 2003, DOI 10.1007/3-540-45103-X_50).
+
+    Parameters
+    ----------
+    before, frame : uint8 [H, W, 3] sRGB [1]
+    """
+    here, there = (cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY) for picture in (frame, before))
+    flow = cv2.calcOpticalFlowFarneback(here, there, np.zeros((*here.shape, 2), np.float32), *FARNEBACK)
+    y, x = np.mgrid[: here.shape[0], : here.shape[1]].astype(np.float32)
+    warped = cv2.remap(
+        before, x + flow[..., 0], y + flow[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    return np.asarray(warped, np.uint8)
 
 
 def sampled(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -3,14 +3,23 @@
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 import torch
 
+from catalogs.clip_prompts import load_prompts
 from catalogs.learned_judges import load_judges
 from flows.judging.learned_rows import learned_rows
 from tasks.errors import InputError
-from tasks.eval.learned_scores import CLIP_MEAN, CLIP_STD, ClipWeather, NeighbourDistance, WholeVideo
+from tasks.eval.learned_scores import (
+    CLIP_MEAN,
+    CLIP_STD,
+    ClipWeather,
+    FlowAlignedDistance,
+    WholeVideo,
+    dover_scores,
+)
 
 
 class MeanColour(torch.nn.Module):
@@ -23,6 +32,11 @@ class MeanColour(torch.nn.Module):
 class Brightness(torch.nn.Module):
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return x.mean()
+
+
+class TwoSides(torch.nn.Module):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return torch.stack([x.mean(), -x.mean()])
 
 
 class SquaredDistance(torch.nn.Module):
@@ -63,12 +77,62 @@ def test_clip_sees_sixteen_frames_from_first_to_last():
     np.testing.assert_allclose(back[[0, -1]] * 255, (0, 80), atol=1e-3)
 
 
-def test_whole_video_and_neighbour_judges_see_their_scales():
+def textured(width: int, height: int) -> np.ndarray:
+    """Smooth grey noise, uint8 [H, W, 3]."""
+    noise = np.random.default_rng(3).uniform(0, 255, (height, width)).astype(np.float32)
+    smooth = cv2.GaussianBlur(noise, (0, 0), 4)
+    grey = cv2.normalize(smooth, None, 30, 220, cv2.NORM_MINMAX)
+    return np.repeat(grey[..., None], 3, axis=2).astype(np.uint8)
+
+
+def test_whole_video_judges_see_their_scale():
     assert WholeVideo(network=torch.jit.script(Brightness())).score(video([0, 255])) == pytest.approx(0.5)
-    distance = NeighbourDistance(network=torch.jit.script(SquaredDistance()))
-    assert distance.score(video([51, 51, 51])) == 0
-    # from -1 to 1: steps of 0.4 and 1.6
-    assert distance.score(video([0, 51, 255])) == pytest.approx((0.4**2 + 1.6**2) / 2)
+    with pytest.raises(InputError, match="it gives 2"):
+        WholeVideo(network=lambda x: torch.ones(2)).score(video([0, 255]))
+
+
+def test_dover_fuses_its_raw_scores_as_the_papers_own_rows_of_them_are_fused():
+    # paper, visual_quality_full_supp (a), VACE: means of videos, so that their fusion is near the mean fused score
+    found = dover_scores((-0.1009, 0.0345))
+    assert found["dover_overall"] == pytest.approx(0.3679, abs=0.002)
+    assert (found["dover_technical"], found["dover_aesthetic"]) == (-0.1009, 0.0345)
+    assert dover_scores((0.2,)) == {"dover_overall": 0.2}
+    with pytest.raises(InputError, match="it gives 3"):
+        dover_scores((1.0, 2.0, 3.0))
+
+
+def test_temporal_distance_takes_off_what_moves_and_sees_what_flickers():
+    wide = textured(300, 160)
+    moving = np.stack([wide[:, 3 * k : 3 * k + 240] for k in range(12)])
+    distance = FlowAlignedDistance(network=torch.jit.script(SquaredDistance()))
+    plain = np.mean((np.diff(moving.astype(float), axis=0) / 127.5) ** 2)
+    assert distance.score(moving) < 0.02 * plain
+    flicker = np.stack([wide[:, :240] + np.uint8(20 * (k % 2)) for k in range(12)])
+    assert distance.score(flicker) == pytest.approx((20 / 127.5) ** 2, rel=0.1)
+
+
+def test_temporal_distance_looks_at_forty_pairs_in_two_roadside_boxes_that_scale_with_the_frame():
+    seen = []
+
+    def network(a, b):
+        seen.append((a, b))
+        return torch.tensor(float(len(seen) % 2))
+
+    columns = np.broadcast_to(np.arange(240, dtype=np.uint8)[None, :, None], (160, 240, 3))
+    assert FlowAlignedDistance(network=network).score(np.stack([columns] * 81)) == 0.5
+    assert len(seen) == 2 * 40
+    (left, _), (right, _) = seen[:2]
+    assert left.shape == right.shape == (1, 3, 90, 75)
+    np.testing.assert_allclose(left[0, 0, 0, [0, -1]], np.array((0, 74)) / 127.5 - 1, atol=1e-5)
+    np.testing.assert_allclose(right[0, 0, 0, [0, -1]], np.array((165, 239)) / 127.5 - 1, atol=1e-5)
+    assert np.isnan(FlowAlignedDistance(network=network).score(columns[None]))
+
+
+def test_the_prompts_are_twelve_sentences_in_the_order_of_the_features():
+    prompts = load_prompts()
+    assert list(prompts) == ["dry", "rain", "snow"]
+    assert len({sentence for four in prompts.values() for sentence in four}) == 12
+    assert all(word in " ".join(prompts[word]) for word in prompts)
 
 
 def clips(rates: dict[str, float]) -> list[SimpleNamespace]:
@@ -105,14 +169,43 @@ def test_rows_hold_scores_where_there_is_a_checkpoint_and_the_reason_where_there
     assert by_metric["clip_adjacent_accuracy"][0]["value"] in (0.0, 1.0)
     assert by_metric["fast_vqa"][0]["note"] == "not run: checkpoint missing"
     assert by_metric["temporal_lpips"][0]["note"] == "not run: checkpoint missing: nowhere.pt"
-    for missing in ("fast_vqa", "temporal_lpips"):
+    assert by_metric["dover_technical"][0]["note"] == "not run: the checkpoint gives the overall score alone"
+    for missing in (
+        "fast_vqa",
+        "temporal_lpips",
+        "temporal_lpips_excess",
+        "dover_technical",
+        "dover_aesthetic",
+    ):
         assert [row["value"] for row in by_metric[missing]] == [None]
+
+
+def test_temporal_lpips_stands_beside_its_excess_over_the_dry_clip_and_dover_beside_its_parts(tmp_path):
+    save(SquaredDistance(), tmp_path / "lpips.pt")
+    save(TwoSides(), tmp_path / "dover.pt")
+    (tmp_path / "judges.yaml").write_text(
+        "lpips: {checkpoint: lpips.pt, source: made here}\ndover: {checkpoint: dover.pt, source: made here}\n"
+    )
+    steps = [10, 30]
+    view = SimpleNamespace(arrays=lambda index, *names: [video([100, 100 + steps[index]])])
+    rows = list(
+        learned_rows(view, clips({"dry": 0.0, "rain-50": 50.0}), load_judges(tmp_path / "judges.yaml"))
+    )
+    found = {(row["metric"], row["condition"]): row["value"] for row in rows}
+    raw = [(step / 127.5) ** 2 for step in steps]
+    assert found["temporal_lpips", "dry"] == pytest.approx(raw[0], rel=1e-5)
+    assert found["temporal_lpips_excess", "rain-50"] == pytest.approx(raw[1] - raw[0], rel=1e-5)
+    assert ("temporal_lpips_excess", "dry") not in found
+    assert found["dover_technical", "dry"] == pytest.approx(105 / 255)
+    assert found["dover_aesthetic", "dry"] == pytest.approx(-105 / 255)
+    assert 0 < found["dover_overall", "dry"] < 1
 
 
 def test_without_a_list_every_judge_is_missing():
     rows = list(learned_rows(SimpleNamespace(), clips({"dry": 0.0}), load_judges(None)))
     assert {row["metric"] for row in rows} == {
-        "clip_severity_rho", "clip_adjacent_accuracy", "dover_overall", "fast_vqa", "temporal_lpips",
+        "clip_severity_rho", "clip_adjacent_accuracy", "dover_overall", "dover_technical", "dover_aesthetic",
+        "fast_vqa", "temporal_lpips", "temporal_lpips_excess",
     }  # fmt: skip
     assert all(row["value"] is None and row["note"] == "not run: checkpoint missing" for row in rows)
 
