@@ -20,6 +20,10 @@ from tasks.eval.pose_essential import recover_motion_essential
 from tasks.eval.undistort import COEFFICIENTS, undistorted
 
 MOST_FRAMES, LEAST_FRAMES = 3000, 5
+MOST_PIXELS = 960 * 540
+"""Size that frames are judged at; larger ones are reduced by area, so that the longest video fills 5 GB."""
+CHUNK = 64
+"""Frames that are undistorted at once."""
 LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 """A camera that looks level ahead, for a camera file without a mount."""
 
@@ -51,14 +55,17 @@ class Footage:
     ----------
     name : of the file
     times : float64 [F] from 0 [s]
-    frames : uint8 [F, H, W, 3] sRGB; None for a trajectory
+    frames : uint8 [F, H, W, 3] sRGB at the size that is judged; None for a trajectory
     poses : float64 [F, 4, 4] camera to world [m]; None for a video
+    width, height : of the video as it is stored [px]; None for a trajectory
     """
 
     name: str
     times: NDArray[np.float64]
     frames: NDArray[np.uint8] | None
     poses: NDArray[np.float64] | None
+    width: int | None = None
+    height: int | None = None
 
     def motion(
         self, camera: ForeignCamera, rows: NDArray[np.int64] | None = None, *, metric: bool = False
@@ -76,7 +83,7 @@ class Footage:
         InputError
             If the intrinsics cannot be those of the video.
         """
-        used = np.arange(len(self.times)) if rows is None else rows
+        used = slice(None) if rows is None else _as_slice(rows)
         if self.frames is None:
             assert self.poses is not None
             name = Path(self.name).stem
@@ -85,8 +92,19 @@ class Footage:
             )
         height, width = self.frames.shape[1:3]
         K = intrinsics_at(camera, width, height)
-        seen = undistorted({"rgb": self.frames[used]}, K, camera.distortion)["rgb"]
+        seen = self.frames[used]
+        if camera.distortion is not None:
+            bent, seen = seen, np.empty_like(seen)
+            for first in range(0, len(bent), CHUNK):
+                part = slice(first, first + CHUNK)
+                seen[part] = undistorted({"rgb": bent[part]}, K, camera.distortion)["rgb"]
         return recover_motion_essential(seen, K, camera.mount)
+
+
+def _as_slice(rows: NDArray[np.int64]) -> slice | NDArray[np.int64]:
+    """Rows in a row as a slice, which copies no frame."""
+    in_a_row = len(rows) > 0 and bool((np.diff(rows) == 1).all())
+    return slice(int(rows[0]), int(rows[-1]) + 1) if in_a_row else rows
 
 
 def read_footage(path: Path) -> Footage:
@@ -100,12 +118,12 @@ def read_footage(path: Path) -> Footage:
     if path.suffix in SUFFIXES:
         times, poses = read_trajectory(path)
         return Footage(name=path.name, times=times - times[0], frames=None, poses=poses)
-    frames, times = read_video(path)
-    return Footage(name=path.name, times=times, frames=frames, poses=None)
+    frames, times, (width, height) = read_video(path)
+    return Footage(name=path.name, times=times, frames=frames, poses=None, width=width, height=height)
 
 
-def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Frames [F, H, W, 3] sRGB and their times [s].
+def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64], tuple[int, int]]:
+    """Frames [F, H, W, 3] sRGB, at most `MOST_PIXELS` each, their times [s], and the stored width and height [px].
 
     Raises
     ------
@@ -118,33 +136,49 @@ def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
         raise InputError(f"{path}: the file is empty; give a video.")
     stream = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     rate = stream.get(cv2.CAP_PROP_FPS)
-    frames: list[NDArray[Any]] = []
+    announced = int(stream.get(cv2.CAP_PROP_FRAME_COUNT))
+    frames, size = np.empty((0, 0, 0, 3), np.uint8), (0, 0)
     stamps: list[float] = []
-    while len(frames) <= MOST_FRAMES:
+    while len(stamps) <= MOST_FRAMES:
         good, picture = stream.read()
         if not good:
             break
-        frames.append(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
+        count = len(stamps)
+        if count == 0:
+            size = picture.shape[1], picture.shape[0]
+            room = announced + 1 if 0 < announced < MOST_FRAMES else MOST_FRAMES + 1
+            frames = np.empty((room, *_judged_size(*size)[::-1], 3), np.uint8)
+        elif count == len(frames):
+            frames = np.concatenate((frames, np.empty_like(frames)))
+        height, width = frames.shape[1:3]
+        if (width, height) != size:
+            picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
+        cv2.cvtColor(picture, cv2.COLOR_BGR2RGB, dst=frames[count])
         stamps.append(stream.get(cv2.CAP_PROP_POS_MSEC))
-    announced = int(stream.get(cv2.CAP_PROP_FRAME_COUNT))
     stream.release()
-    if not frames:
+    if not stamps:
         raise InputError(f"{path}: no frame can be read; the file is damaged or no video.")
-    if len(frames) > MOST_FRAMES:
+    if len(stamps) > MOST_FRAMES:
         raise InputError(f"{path}: at most {MOST_FRAMES} frames are judged at once; cut the video.")
-    if announced > len(frames) + 1:
+    if announced > len(stamps) + 1:
         raise InputError(
-            f"{path}: only {len(frames)} of {announced} frames can be read; the file breaks off."
+            f"{path}: only {len(stamps)} of {announced} frames can be read; the file breaks off."
         )
-    if len(frames) < LEAST_FRAMES:
-        raise InputError(f"{path}: at least {LEAST_FRAMES} frames are needed; there are {len(frames)}.")
+    if len(stamps) < LEAST_FRAMES:
+        raise InputError(f"{path}: at least {LEAST_FRAMES} frames are needed; there are {len(stamps)}.")
     times = np.asarray(stamps) / 1000
     if not (np.diff(times) > 0).all():
         # a container without time stamps: the rate is all there is
         if not rate > 0:
             raise InputError(f"{path}: the video tells neither time stamps nor a frame rate.")
-        times = np.arange(len(frames)) / rate
-    return np.stack(frames), times - times[0]
+        times = np.arange(len(stamps)) / rate
+    return frames[: len(stamps)], times - times[0], size
+
+
+def _judged_size(width: int, height: int) -> tuple[int, int]:
+    """Width and height that a video is judged at [px]: its own up to `MOST_PIXELS`, else of the same shape."""
+    scale = min(1.0, float(np.sqrt(MOST_PIXELS / (width * height))))
+    return int(scale * width), int(scale * height)
 
 
 def read_claim(path: Path) -> VideoClaim:

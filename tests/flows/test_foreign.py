@@ -1,5 +1,6 @@
 """Any video against a claim: other sizes, rates and codecs; damaged files in one clear line."""
 
+import tracemalloc
 from pathlib import Path
 
 import cv2
@@ -9,11 +10,20 @@ import pyarrow.parquet as pq
 import pytest
 
 from benchmarks.synthetic_street import Clip, drive_clip
+from flows.judging import foreign_sources
 from flows.judging.foreign import LIMITS, judge, retention
-from flows.judging.foreign_sources import LEVEL, ForeignCamera, intrinsics_at, read_camera, read_video
+from flows.judging.foreign_sources import (
+    LEVEL,
+    MOST_PIXELS,
+    ForeignCamera,
+    intrinsics_at,
+    read_camera,
+    read_video,
+)
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
 from tasks.eval.motion import RecoveredMotion
+from tasks.eval.undistort import undistorted
 from tests.flows.test_trajectories import tum_lines
 
 
@@ -72,6 +82,61 @@ def test_half_the_frames_at_half_the_rate_are_judged_by_their_own_times(street: 
     result = judge(str(video), **write_inputs(tmp_path, street))
     assert result["frame_rate_hz"] == pytest.approx(8.0, rel=0.01)
     assert result["pitch_rmse_deg"] < 0.1
+
+
+def test_large_frames_are_judged_reduced_and_held_once(street: Clip, tmp_path: Path) -> None:
+    large = np.stack([cv2.resize(f, (1440, 960), interpolation=cv2.INTER_CUBIC) for f in street.frames])
+    video = encode(tmp_path / "v.mp4", large, 16.0, "mp4v")
+    tracemalloc.start()
+    frames, times, size = read_video(video)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert size == (1440, 960) and frames.shape == (24, 587, 881, 3) and len(times) == 24
+    assert MOST_PIXELS > 881 * 587 and peak < 1.1 * frames.nbytes + 8 * large[0].nbytes
+    reduced = cv2.resize(large[0], (881, 587), interpolation=cv2.INTER_AREA)
+    assert np.abs(frames[0].astype(int) - reduced).mean() < 3.0
+    result = judge(str(video), **write_inputs(tmp_path, street))
+    assert result["passed"], result["reasons"]
+    assert (result["width"], result["height"]) == (1440, 960)
+    assert (result["judged_width"], result["judged_height"]) == (881, 587)
+
+
+def test_what_fits_is_read_as_it_is_and_more_frames_than_announced_too(
+    street: Clip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    video = encode(tmp_path / "v.mp4", street.frames, 16.0, "mp4v")
+    frames, _, _ = read_video(video)
+    assert frames.shape == street.frames.shape
+    assert np.abs(frames.astype(int) - street.frames).mean() < 4.0
+
+    class Short:
+        """A container that announces fewer frames than it holds."""
+
+        def __init__(self, *given: object) -> None:
+            self.stream = cv2_capture(*given)
+            self.read, self.release = self.stream.read, self.stream.release
+
+        def get(self, key: int) -> float:
+            return 5.0 if key == cv2.CAP_PROP_FRAME_COUNT else float(self.stream.get(key))
+
+    cv2_capture = cv2.VideoCapture
+    monkeypatch.setattr(cv2, "VideoCapture", Short)
+    assert (read_video(video)[0] == frames).all()
+
+
+def test_undistortion_in_parts_is_that_of_the_whole(street: Clip, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[np.ndarray] = []
+    monkeypatch.setattr(foreign_sources, "CHUNK", 5)
+    monkeypatch.setattr(
+        foreign_sources, "recover_motion_essential", lambda frames, *rest: seen.append(frames)
+    )
+    height, width = street.frames.shape[1:3]
+    bent = np.array([-0.2, 0.05, 0.001, -0.001, 0.0])
+    camera = ForeignCamera(K=street.K, width=width, height=height, mount=LEVEL, distortion=bent)
+    film = foreign_sources.Footage(name="v", times=np.arange(24) / 16, frames=street.frames, poses=None)
+    film.motion(camera, np.arange(2, 20))
+    whole = undistorted({"rgb": street.frames[2:20]}, street.K, bent)["rgb"]
+    assert (seen[0] == whole).all()
 
 
 def test_damaged_and_empty_files_get_one_line_each(street: Clip, tmp_path: Path) -> None:
