@@ -19,13 +19,12 @@ WINDOWS: tuple[int | None, ...] = (None, 5, 7, 9)
 
 @dataclass(frozen=True, kw_only=True)
 class MotionProtocol:
-    """The fixed choices of Appendix A.5.
+    """The fixed choices of Appendix A.5. The paper's event window opens 2.2 s into its clips; here the caller says when.
 
     Parameters
     ----------
     event : event window from its opening [s]
     before, after : flanking intervals of the local baseline, from the same opening [s]
-    opening : when the event window opens in the paper's clips [s]
     order : of the Savitzky-Golay polynomial [1]
     grid : samples of the common progress grid of the path error [1]
     """
@@ -33,7 +32,6 @@ class MotionProtocol:
     event: tuple[float, float] = (0.0, 1.6)
     before: tuple[float, float] = (-0.5, -0.05)
     after: tuple[float, float] = (1.65, 2.1)
-    opening: float = 2.2
     order: int = 2
     grid: int = 101
 

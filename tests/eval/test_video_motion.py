@@ -5,6 +5,8 @@ import pytest
 
 from tasks.errors import InputError
 from tasks.eval.video_motion import (
+    MotionProtocol,
+    event_response,
     geometry_error,
     motion_retention,
     normalised_progress,
@@ -22,6 +24,15 @@ HUMP = 0.02 * np.sin(2 * np.pi * (TIMES - 2.2) / 1.6) * ((TIMES > 2.2) & (TIMES 
 def test_a_perfect_pitch_scores_zero_and_no_response_scores_one() -> None:
     assert geometry_error(TIMES, HUMP, HUMP, 2.2, None) == pytest.approx(0.0, abs=1e-12)
     assert geometry_error(TIMES, 0 * HUMP, HUMP, 2.2, None) == pytest.approx(1.0)
+
+
+def test_the_windows_are_the_papers_where_they_open_as_in_its_clips() -> None:
+    chosen = MotionProtocol()
+    spans = [tuple(2.2 + t for t in span) for span in (chosen.event, chosen.before, chosen.after)]
+    np.testing.assert_allclose(spans, [(2.2, 3.8), (1.7, 2.15), (3.85, 4.3)])
+    assert len(event_response(TIMES, HUMP, 2.2, chosen)) == 17
+    # a feature met between two frames opens the window at the next
+    assert len(event_response(TIMES, HUMP, 2.22, chosen)) == 16
 
 
 def test_amplitude_and_sign_are_never_fitted() -> None:
