@@ -1,4 +1,4 @@
-"""The limits a generated clip must keep."""
+"""The limits that a generated clip, and that any other video, must keep."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,27 +7,48 @@ from catalogs.quantities import CatalogueEntry, Scalar, checked, read_entry
 from tasks.eval.motion_agreement import PoseThresholds
 
 GATES = Path(__file__).with_name("gates.yaml")
+FOREIGN_GATES = Path(__file__).with_name("foreign_gates.yaml")
 
 
-class GateEntry(CatalogueEntry):
-    """What a gate file must hold; the meanings stand at ``PoseThresholds``."""
+class ForeignGateEntry(CatalogueEntry):
+    """What a gate file for any video must hold; the meanings stand at ``PoseThresholds``."""
 
-    pitch_rmse_deg: Annotated[Scalar, checked("deg", above=0)]
     pitch_relative_error: Annotated[Scalar, checked("1", above=0)]
     pitch_correlation: Annotated[Scalar, checked("1", minimum=-1, maximum=1)]
     response_deg: Annotated[Scalar, checked("deg", minimum=0)]
-    progress_rmse_m: Annotated[Scalar, checked("m", above=0)]
     normalised_progress_rmse: Annotated[Scalar, checked("1", above=0)]
     failed_share: Annotated[Scalar, checked("1", minimum=0, maximum=1)]
 
 
+class GateEntry(ForeignGateEntry):
+    """What a gate file for generated clips must hold: with depth, degrees and metres are judged too."""
+
+    pitch_rmse_deg: Annotated[Scalar, checked("deg", above=0)]
+    progress_rmse_m: Annotated[Scalar, checked("m", above=0)]
+
+
 def load_gates(path: Path = GATES) -> PoseThresholds:
-    """Read the limits.
+    """Read the limits for generated clips.
 
     Raises
     ------
     InputError
         Listing every problem of the file.
     """
-    entry = read_entry(GateEntry, path, "gate file")
-    return PoseThresholds(**{name: getattr(entry, name).value for name in GateEntry.model_fields})
+    return PoseThresholds(**_values(read_entry(GateEntry, path, "gate file")))
+
+
+def load_foreign_gates(path: Path = FOREIGN_GATES) -> PoseThresholds:
+    """Read the limits for any video: what only depth can tell is left unjudged.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file.
+    """
+    values = _values(read_entry(ForeignGateEntry, path, "gate file"))
+    return PoseThresholds(pitch_rmse_deg=float("inf"), progress_rmse_m=None, **values)
+
+
+def _values(entry: ForeignGateEntry) -> dict[str, float]:
+    return {name: getattr(entry, name).value for name in type(entry).model_fields}

@@ -4,22 +4,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from catalogs.gates import load_foreign_gates
 from flows.judging.foreign_sources import read_camera, read_claim, read_footage
 from flows.store.layout import write_json
 from tasks.errors import InputError
 from tasks.eval.foreign_video import claim_at, judge_motion
-from tasks.eval.motion_agreement import PoseThresholds
 from tasks.eval.video_motion import motion_retention
 
-LIMITS = PoseThresholds(
-    pitch_rmse_deg=float("inf"),
-    pitch_relative_error=0.20,
-    pitch_correlation=0.98,
-    response_deg=0.20,
-    progress_rmse_m=None,
-    normalised_progress_rmse=0.02,
-)
-"""Camera-only limits: E0 at most 0.20 sees an amplitude 20 % wrong; drift over long clips is no reason alone."""
 NEEDS_DEPTH = (
     "pose by photometric alignment",
     "pose by points with depth",
@@ -50,7 +41,7 @@ def judge(
     footage, told, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
     at = claim_at(told, footage.times)
     recovered = footage.motion(lens, at.rows, metric=metric)
-    verdict = judge_motion(recovered, at, LIMITS)
+    verdict = judge_motion(recovered, at, load_foreign_gates())
     times, is_video = footage.times, footage.frames is not None
     result = {
         "video": footage.name,
