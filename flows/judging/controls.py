@@ -10,6 +10,7 @@ from catalogs.gates import load_gates
 from catalogs.studies.ablation import VARIANTS, Variant, cut
 from flows.drawing import as_svg
 from flows.judging.controls_figure import roc_figure
+from flows.judging.evaluation_rows import control_of
 from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
 from flows.making.clip import TICK_RATE_HZ, Catalogue, catalogue_of
@@ -20,6 +21,7 @@ from flows.store.address import reading
 from flows.store.layout import write_atomically, write_json
 from tasks.errors import InputError
 from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
+from tasks.eval.video_motion import path_error, weather_error
 
 CUTS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu")
 """The paper's ablations, as false claims."""
@@ -30,6 +32,14 @@ CONTROLS: dict[str, str] = {
     "sign-flip": "pitch upside down",
     "other-clip": "telemetry of another clip",
 }
+UNREAD: dict[str, str] = {
+    **dict.fromkeys(("localised_edit_rate", "anchor_error", "temporal_iou"), "paired-lab"),
+    **dict.fromkeys(("twin_ssim", "twin_flip"), "off the feature"),
+    **dict.fromkeys(("severity_rank_correlation", "severity_adjacent_accuracy"), "image statistics"),
+    **dict.fromkeys(("piqe", "temporal_error"), "no reference"),
+}
+"""Metrics of the evaluation that no claim of pitch and way enters, by their method."""
+BLIND_BY_DESIGN = "never reads the claim"
 LEAST_PITCH, LEAST_WAY = np.deg2rad(0.05), 0.2
 """A copy that differs by less in pitch [rad] and way [m] is no fault."""
 
@@ -37,10 +47,12 @@ LEAST_PITCH, LEAST_WAY = np.deg2rad(0.05), 0.2
 def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """Desynchronise a dataset in seven ways and say which metric sees which fault, and from what threshold.
 
+    All are detected only if each could be tried; `undetected` says of the others what kept them.
+
     Parameters
     ----------
     dataset : a finished dataset folder
-    out : folder for controls.json and controls.svg
+    out : folder for controls.json and, if any control was tried, controls.svg
 
     Raises
     ------
@@ -52,46 +64,106 @@ def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")
     clips = [stage(judge_clip)(View(root=root), row) for row in facts]
-    rows = list(score_controls(clips, read_plan(root), catalogue_of(root)))
+    false = false_claims(clips, read_plan(root), catalogue_of(root))
+    rows = list(score_controls(clips, false))
+    result = {**summary(rows, untried(clips, false)), "rows": [*rows, *unread_rows()]}
+    if out is not None:
+        write_json(Path(out) / "controls.json", result)
+        if rows:
+            write_atomically(Path(out) / "controls.svg", as_svg(roc_figure(rows, CONTROLS)).encode())
+    return result
+
+
+def summary(rows: list[dict[str, Any]], kept: dict[str, str]) -> dict[str, Any]:
+    """What became of every control: who sees it, or why nobody does.
+
+    Parameters
+    ----------
+    rows : of `score_controls`
+    kept : controls that could not be tried, and why
+    """
     seen: dict[str, list[str]] = {name: [] for name in CONTROLS}
     for row in rows:
         if row["verdict"] == "sees":
             seen[row["control"]].append(f"{row['metric']} by {row['method']}")
-    tried = {row["control"] for row in rows}
-    result = {
+    reasons = {name: kept.get(name, "" if seen[name] else "no metric sees it") for name in CONTROLS}
+    return {
         "controls": [
-            {"control": name, "meaning": meaning, "tried": name in tried, "seen_by": seen[name]}
+            {
+                "control": name,
+                "meaning": meaning,
+                "tried": name not in kept,
+                "seen_by": seen[name],
+                "reason": reasons[name],
+            }
             for name, meaning in CONTROLS.items()
         ],
-        "all_detected": all(seen[name] for name in tried),
-        "blind": [f"{r['metric']} by {r['method']}: {r['control']}" for r in rows if r["verdict"] == "blind"],
-        "rows": rows,
+        "all_detected": not any(reasons.values()),
+        "undetected": [f"{name}: {reason}" for name, reason in reasons.items() if reason],
+        "blind": [f"{r['metric']} by {r['method']}: {r['control']}" for r in rows if r["verdict"] == "blind"]
+        + [f"{metric} by {method}: every control, it {BLIND_BY_DESIGN}" for metric, method in UNREAD.items()],
     }
-    if out is not None:
-        write_json(Path(out) / "controls.json", result)
-        write_atomically(Path(out) / "controls.svg", as_svg(roc_figure(rows, CONTROLS)).encode())
-    return result
 
 
-def score_controls(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) -> Iterator[dict[str, Any]]:
-    """One row for each control, method and metric.
+def false_claims(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) -> list[dict[str, Claim]]:
+    """The faulty claims of each clip by control; those that say what the true one says are left out.
 
     Parameters
     ----------
     clips : as their judges saw them
     plan, catalogue : the dataset's
     """
+    true = _true_claims(clips)
+    return [dict(_copies(k, clips, true, plan, catalogue)) for k in range(len(clips))]
+
+
+def untried(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> dict[str, str]:
+    """Controls that no method could be tried on, and why.
+
+    Parameters
+    ----------
+    clips : as their judges saw them
+    false : of `false_claims`
+    """
+    kept = {}
+    for name in CONTROLS:
+        changed = [clip for clip, claims in zip(clips, false, strict=True) if name in claims]
+        if not changed:
+            kept[name] = (
+                f"not tried: in none of {len(clips)} clips does it change the claim by"
+                f" {np.rad2deg(LEAST_PITCH):.2g} deg or {LEAST_WAY:g} m; add clips in which it does"
+            )
+        elif not any(_whole(clip, method) for clip in changed for method in METHODS):
+            kept[name] = (
+                f"not tried: in the {len(changed)} clips whose claim it changes every method misses the pose of a"
+                " frame; add clips that can be tracked"
+            )
+    return kept
+
+
+def score_controls(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> Iterator[dict[str, Any]]:
+    """One row for each control, method and metric.
+
+    Parameters
+    ----------
+    clips : as their judges saw them
+    false : of `false_claims`
+    """
     response = float(np.deg2rad(load_gates().response_deg))
-    true = [Claim(pitch=c.frames["pitch"], station=c.frames["station"]) for c in clips]
-    false = [dict(_copies(k, clips, true, plan, catalogue)) for k in range(len(clips))]
+    true = _true_claims(clips)
+    dry = [control_of(clip, clips, weather=True) for clip in clips]
+
+    def scores(k: int, method: str, claim: Claim) -> dict[str, float]:
+        return _scores(clips[k], dry[k], method, claim, response)
+
     for method in METHODS:
-        whole = [k for k, c in enumerate(clips) if not c.motions[method].failed.any()]
-        sound = [_scores(clips[k], method, true[k], response) for k in whole]
+        whole = [k for k, clip in enumerate(clips) if _whole(clip, method)]
+        sound = [scores(k, method, true[k]) for k in whole]
         for name in CONTROLS:
-            faulty = [_scores(clips[k], method, false[k][name], response) for k in whole if name in false[k]]
-            for metric in sorted({m for scores in faulty for m in scores}):
-                good = [scores[metric] for scores in sound if metric in scores]
-                bad = [scores[metric] for scores in faulty if metric in scores]
+            faulty = [scores(k, method, false[k][name]) for k in whole if name in false[k]]
+            for metric in sorted({m for scored in faulty for m in scored}):
+                good = [scored[metric] for scored in sound if metric in scored]
+                bad = [scored[metric] for scored in faulty if metric in scored]
                 if not good:
                     continue
                 found = separate(good, bad)
@@ -105,18 +177,59 @@ def score_controls(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) ->
                     "detection_rate": found.detection_rate,
                     "auc": found.auc,
                     "verdict": found.verdict,
+                    "reason": BLIND_BY_DESIGN if metric == "e_path" else "",
                     "roc": {"false_alarms": list(found.false_alarms), "detections": list(found.detections)},
                 }
 
 
-def _scores(clip: JudgedClip, method: str, claim: Claim, response: float) -> dict[str, float]:
-    return claim_scores(clip.motions[method], claim, response, clip.times, clip.opening)
+def unread_rows() -> Iterator[dict[str, Any]]:
+    """One row for each control and metric that no claim enters: blind, whatever the pixels are."""
+    for name in CONTROLS:
+        for metric, method in UNREAD.items():
+            yield {
+                "control": name,
+                "metric": metric,
+                "method": method,
+                "sound": 0,
+                "faulty": 0,
+                "threshold": None,
+                "detection_rate": 0.0,
+                "auc": 0.5,
+                "verdict": "blind",
+                "reason": BLIND_BY_DESIGN,
+                "roc": {"false_alarms": [0.0, 1.0], "detections": [0.0, 1.0]},
+            }
+
+
+def _true_claims(clips: list[JudgedClip]) -> list[Claim]:
+    return [Claim(pitch=clip.frames["pitch"], station=clip.frames["station"]) for clip in clips]
+
+
+def _whole(clip: JudgedClip, method: str) -> bool:
+    return not clip.motions[method].failed.any()
+
+
+def _scores(
+    clip: JudgedClip, dry: JudgedClip | None, method: str, claim: Claim, response: float
+) -> dict[str, float]:
+    """Scores of a claim on its clip and, where both were tracked, on the clip and its dry sibling."""
+    motion = clip.motions[method]
+    scores = claim_scores(motion, claim, response, clip.times, clip.opening)
+    if dry is None or not _whole(dry, method) or not claim.station[-1] > claim.station[0]:
+        return scores
+    seen, control = motion.normalised_path, dry.motions[method].normalised_path
+    if min(np.ptp(seen[:, 0]), np.ptp(control[:, 0])) > 0:  # neither stands
+        scores["e_weather"] = weather_error(
+            seen[:, 0], control[:, 0], claim.station, dry.frames["station"], None
+        )
+        scores["e_path"] = path_error(seen[:, :2], control[:, :2])
+    return scores
 
 
 def _copies(
     k: int, clips: list[JudgedClip], true: list[Claim], plan: Plan, catalogue: Catalogue
 ) -> Iterator[tuple[str, Claim]]:
-    """Faulty claims of one clip; those that say what the true one says are left out."""
+    """Faulty claims of one clip that differ from its true one."""
     scenario = next(c.scenario for c in plan.clips if c.clip_id == clips[k].facts["clip_id"])
     made = {"one-frame-delay": delayed(true[k], 1), "amplitude-0.8": scaled(true[k], 0.8),
             "sign-flip": scaled(true[k], -1.0), "other-clip": true[(k + 1) % len(true)]}  # fmt: skip

@@ -1,14 +1,28 @@
 """Negative controls on clips whose pixels are replaced by their exact motion: what each control changes."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from catalogs.scenes import write_scene
+from flows.cli import app
 from flows.drawing import as_svg
-from flows.judging.controls import CONTROLS, controls, score_controls
+from flows.judging import controls as judging_controls
+from flows.judging.controls import (
+    BLIND_BY_DESIGN,
+    CONTROLS,
+    UNREAD,
+    controls,
+    false_claims,
+    score_controls,
+    summary,
+    unread_rows,
+    untried,
+)
 from flows.judging.controls_figure import roc_figure
 from flows.judging.judged_clip import METHODS, JudgedClip
 from flows.judging.physics import clip_columns, clip_facts
@@ -17,6 +31,7 @@ from flows.making.generate import generate
 from flows.making.plan import read_plan
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
+from tasks.eval.negative_controls import Claim
 from tests.toy_street import TOY_CAMERA, toy_street
 
 GRID = """
@@ -27,6 +42,7 @@ frames: 41
 frame_rate_hz: 10
 axes:
   weather:
+    dry: {{weather: dry}}
     rain-50: {{weather: rain, precipitation_mm_h: 50}}
     snow-3: {{weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1}}
   road:
@@ -75,10 +91,15 @@ def clips(dataset: Path) -> list[JudgedClip]:
     return made
 
 
+@pytest.fixture(scope="module")
+def false(dataset: Path, clips: list[JudgedClip]) -> list[dict[str, Claim]]:
+    return false_claims(clips, read_plan(dataset), catalogue_of(dataset))
+
+
 def test_a_good_pose_check_sees_all_seven_and_the_blind_are_named(
-    dataset: Path, clips: list[JudgedClip]
+    clips: list[JudgedClip], false: list[dict[str, Claim]]
 ) -> None:
-    rows = list(score_controls(clips, read_plan(dataset), catalogue_of(dataset)))
+    rows = list(score_controls(clips, false))
     seen = {row["control"] for row in rows if row["verdict"] == "sees"}
     assert seen == set(CONTROLS)
     blind = {(row["control"], row["metric"]) for row in rows if row["verdict"] == "blind"}
@@ -86,21 +107,91 @@ def test_a_good_pose_check_sees_all_seven_and_the_blind_are_named(
 
 
 def test_each_fault_has_a_panel_with_the_curves_of_its_metrics(
-    dataset: Path, clips: list[JudgedClip]
+    clips: list[JudgedClip], false: list[dict[str, Claim]]
 ) -> None:
-    rows = list(score_controls(clips, read_plan(dataset), catalogue_of(dataset)))
+    rows = list(score_controls(clips, false))
     drawing = as_svg(roc_figure(rows, CONTROLS))
     tried = {row["control"] for row in rows}
     assert all(name in drawing for name in tried)
     assert as_svg(roc_figure(rows, CONTROLS)) == drawing
 
 
-def test_a_clip_whose_track_was_lost_is_not_scored(dataset: Path, clips: list[JudgedClip]) -> None:
+def test_a_clip_whose_track_was_lost_is_not_scored(
+    clips: list[JudgedClip], false: list[dict[str, Claim]]
+) -> None:
     lost = replace(clips[0].motions["pnp"], failed=np.ones(41, bool))
     broken = [replace(clips[0], motions={**clips[0].motions, "pnp": lost}), *clips[1:]]
-    rows = list(score_controls(broken, read_plan(dataset), catalogue_of(dataset)))
-    assert {row["sound"] for row in rows if row["method"] == "pnp"} == {1}
-    assert {row["sound"] for row in rows if row["method"] == "essential"} == {2}
+    rows = list(score_controls(broken, false))
+    paired = ("e_weather", "e_path")
+    alone = [row for row in rows if row["metric"] not in paired]
+    assert {row["sound"] for row in alone if row["method"] == "pnp"} == {2}
+    assert {row["sound"] for row in alone if row["method"] == "essential"} == {3}
+    # the first clip is the dry sibling of the other two
+    assert {row["method"] for row in rows if row["metric"] in paired} == {"photometric", "essential"}
+
+
+def test_the_change_against_the_dry_sibling_is_held_against_the_claim(
+    clips: list[JudgedClip], false: list[dict[str, Claim]]
+) -> None:
+    rows = list(score_controls(clips, false))
+    weather = {row["control"]: row for row in rows if row["metric"] == "e_weather"}
+    assert weather["appearance-only"]["verdict"] == "sees" and weather["appearance-only"]["sound"] == 2
+    assert weather["sign-flip"]["verdict"] == "blind" and weather["sign-flip"]["threshold"] < 0.01
+    path = [row for row in rows if row["metric"] == "e_path"]
+    assert path and all(row["verdict"] == "blind" and row["reason"] == BLIND_BY_DESIGN for row in path)
+
+
+def test_metrics_that_no_claim_enters_are_blind_to_every_control(
+    clips: list[JudgedClip], false: list[dict[str, Claim]]
+) -> None:
+    rows = list(unread_rows())
+    assert {(row["control"], row["metric"]) for row in rows} == {(c, m) for c in CONTROLS for m in UNREAD}
+    assert {"localised_edit_rate", "severity_rank_correlation", "piqe"} <= set(UNREAD)
+    assert all(row["verdict"] == "blind" and row["reason"] == BLIND_BY_DESIGN for row in rows)
+    told = summary(list(score_controls(clips, false)), untried(clips, false))
+    assert told["all_detected"] and told["undetected"] == []
+    assert "piqe by no reference: every control, it never reads the claim" in told["blind"]
+
+
+def test_a_control_that_could_not_be_tried_is_not_detected(
+    clips: list[JudgedClip], false: list[dict[str, Claim]]
+) -> None:
+    without = [{name: claim for name, claim in f.items() if name != "fixed-mu"} for f in false]
+    told = summary(list(score_controls(clips, without)), untried(clips, without))
+    assert not told["all_detected"] and len(told["undetected"]) == 1
+    assert told["undetected"][0].startswith("fixed-mu: not tried: in none of 3 clips does it change")
+    by_name = {row["control"]: row for row in told["controls"]}
+    assert not by_name["fixed-mu"]["tried"] and by_name["sign-flip"]["tried"]
+
+
+def test_a_dataset_without_a_single_track_says_so_of_every_control(
+    clips: list[JudgedClip], false: list[dict[str, Claim]]
+) -> None:
+    lost = [
+        replace(
+            c, motions={name: replace(motion, failed=np.ones(41, bool)) for name, motion in c.motions.items()}
+        )
+        for c in clips
+    ]
+    told = summary(list(score_controls(lost, false)), untried(lost, false))
+    assert not told["all_detected"] and len(told["undetected"]) == len(CONTROLS)
+    assert all("every method misses the pose" in line for line in told["undetected"])
+
+
+def test_the_command_fails_and_names_what_could_not_be_tried(
+    dataset: Path, clips: list[JudgedClip], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made = {clip.facts["clip_id"]: clip for clip in clips}
+    monkeypatch.setattr(judging_controls, "judge_clip", lambda view, facts: made[facts["clip_id"]])
+    monkeypatch.setattr(judging_controls, "stage", lambda work: work)
+    arguments = ["controls", str(dataset), "--out", str(tmp_path / "out")]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    monkeypatch.setattr(judging_controls, "LEAST_PITCH", 9.0)
+    monkeypatch.setattr(judging_controls, "LEAST_WAY", 900.0)
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 1 and "sign-flip: not tried" in result.output
+    told = json.loads((tmp_path / "out" / "controls.json").read_text())
+    assert not told["all_detected"] and {row["metric"] for row in told["rows"]} == set(UNREAD)
 
 
 def test_a_folder_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
