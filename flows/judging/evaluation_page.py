@@ -41,6 +41,13 @@ MEANING = {
     "temporal_error": "mean square of a frame less its flow-warped successor",
     "severity_rank_correlation": "Spearman of an image statistic with the rate; a stand-in for CLIP",
     "severity_adjacent_accuracy": "neighbouring levels in that order; a stand-in for CLIP",
+    "clip_severity_rho": "Appendix D: Spearman of CLIP's weather-minus-dry similarity with the rate",
+    "clip_adjacent_accuracy": "Appendix D: share of neighbouring levels whose similarity rises",
+    "dover_overall": "Appendix D: DOVER's fused score",
+    "dover_technical": "Appendix D: DOVER's raw technical field",
+    "dover_aesthetic": "Appendix D: DOVER's raw aesthetic field",
+    "temporal_lpips": "Appendix D: flow-aligned neighbours, two roadside regions",
+    "temporal_lpips_excess": "the same less that of the dry control; visible rain and snow raise it",
 }
 
 

@@ -19,7 +19,7 @@ WINDOWS: tuple[int | None, ...] = (None, 5, 7, 9)
 
 @dataclass(frozen=True, kw_only=True)
 class MotionProtocol:
-    """The fixed choices of Appendix A.5. The paper's event window opens 2.2 s into its clips; here the caller says when.
+    """The fixed choices of Appendix A.5. The paper's event window opens 2.2 s into a clip; here the caller says when.
 
     Parameters
     ----------
