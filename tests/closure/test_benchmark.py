@@ -86,9 +86,16 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
     assert [row["truth"] for row in again["campaigns"]] == [None]
 
 
+WRONG = {"wrong", "false discovery"}
+
+
 def row(truth: str | None, outcome: str, *, in_library: bool = True, covered: bool | None = None) -> dict:
     kind = "null" if truth is None else "library" if in_library else "outside"
-    return {"kind": kind, "truth": truth, "outcome": outcome, "values": {}, "covered": covered, "cpu_s": 1.0}
+    named = [truth] if outcome == "right" and truth else ["brake_dead_time"] if outcome in WRONG else []
+    return {
+        "kind": kind, "truth": truth, "outcome": outcome, "values": {}, "covered": covered, "cpu_s": 1.0,
+        "named": named,
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -133,3 +140,4 @@ def test_the_summary_counts_each_kind_once() -> None:
     assert shares["poor design: refused"] == (1, 1)
     # sizes and poor designs have shares of their own
     assert result["confusion"]["brake_lag"] == {"right": 1, "wrong": 1}
+    assert result["named_instead"] == {"brake_lag": {"brake_dead_time": 1}, "nothing": {"brake_dead_time": 1}}

@@ -12,12 +12,14 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
 from catalogs.effects import load_effects
 from tasks.closure.attribution import Candidate, judge
+from tasks.closure.benchmark import synthetic_campaign
+from tasks.closure.derivation import prepare
 from tasks.closure.disturbance import Disturbance
 from tasks.closure.evidence import run_evidence
 from tasks.closure.fit import fit, misfit_by_run
 from tasks.closure.forward import predict, run_model
 from tasks.closure.hypothesis import library_hypothesis
-from tasks.closure.intervals import curvature_interval, profile_interval, quantile
+from tasks.closure.intervals import anew, curvature_interval, profile_interval, quantile
 from tasks.closure.screening import Evidence
 from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
 
@@ -99,3 +101,19 @@ def test_intervals_stay_within_the_bounds_of_their_parameters(
     for low, high in (curvature_interval(wide), profile_interval(wide, evidence)):
         assert np.all(low >= h.lower) and np.all(high <= h.upper)
     assert np.array_equal(curvature_interval(wide)[0], h.lower)
+
+
+def test_with_derivatives_taken_at_it_an_estimate_forgets_where_it_started() -> None:
+    rolling = next(e for e in LIBRARY if e.name == "rolling_resistance")
+    campaign = synthetic_campaign(VEHICLE, SURFACE, {"rolling_coefficient": 0.012}, 56)
+    evidence = prepare(campaign, VEHICLE, SURFACE, (rolling,))
+    null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
+    part = library_hypothesis(rolling)
+    far = fit(evidence.train, (part,), evidence.session_sigma, session=null.session, iterations=8)
+    true = np.array([0.012])
+    here, settled, _ = anew(evidence, far, [])
+    near = fit(here.train, (part,), here.session_sigma, values=true, session=far.session, iterations=8)
+    sigma = np.sqrt(settled.covariance[0, 0])
+    assert abs(settled.values[0] - near.values[0]) < 0.3 * sigma < abs(far.values[0] - near.values[0])
+    # what the stale derivatives promised was too much
+    assert sigma > 1.3 * np.sqrt(far.covariance[0, 0])
