@@ -199,8 +199,9 @@ def _experiment(plan: Mapping[str, Any] | None) -> str:
 
 def _detectable(values: Mapping[str, float | None], effects: Sequence[Effect]) -> str:
     rows = [(e.name, e.parameters[0].name, values[e.name], e.parameters[0].unit) for e in effects]
-    return "<p>Smallest first parameter of each library effect that would pass the score.</p>" + _table(
-        ("effect", "parameter", "smallest", "unit"), rows
+    return (
+        "<p>Smallest first parameter of each library effect that would pass the score; - where none within its bounds would.</p>"
+        + _table(("effect", "parameter", "smallest", "unit"), rows)
     )
 
 

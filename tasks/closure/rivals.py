@@ -88,13 +88,14 @@ def _credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
 def detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
     """Smallest first parameter whose linear gain would pass the score gate, at the level of the null's inflation.
 
+    Infinite where the library's bounds end before.
+
     Parameters
     ----------
     evidence : the runs
     base : fit without effects
     """
     level = inflation(evidence, base, None)
-    needed = 2.0 * level * (ACCEPT_SCORE + np.log(evidence.samples))
     library = np.zeros((len(evidence.effects),) * 2)
     cross = np.zeros((len(evidence.effects), len(SESSION)))
     session = np.diag(1.0 / np.square(evidence.session_sigma))
@@ -104,7 +105,10 @@ def detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
         cross += run.library.T @ run.session - q.T @ run.session_q
         session += run.session.T @ run.session - run.session_q.T @ run.session_q
     information = np.diag(library) - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(session), cross)
-    return {
-        e.name: float(np.sqrt(needed / i)) if i > 0 else float("inf")
-        for e, i in zip(evidence.effects, information, strict=True)
-    }
+    sizes = {}
+    for effect, known in zip(evidence.effects, information, strict=True):
+        needed = 2.0 * level * (ACCEPT_SCORE + len(effect.parameters) * np.log(evidence.samples))
+        first = effect.parameters[0]
+        size = float(np.sqrt(needed / known)) if known > 0 else np.inf
+        sizes[effect.name] = size if size <= max(first.upper, -first.lower) else np.inf
+    return sizes

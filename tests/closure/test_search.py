@@ -21,7 +21,8 @@ from tasks.closure.experiment import next_experiment
 from tasks.closure.fit import fall, fit
 from tasks.closure.forward import run_model
 from tasks.closure.hypothesis import library_hypothesis
-from tasks.closure.screening import Evidence, look_alikes
+from tasks.closure.rivals import detectable
+from tasks.closure.screening import Evidence, inflation, look_alikes
 from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
@@ -107,3 +108,16 @@ def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> 
         for also in (frozenset[str](), frozenset({"rolling_resistance"}))
     )
     assert plain == {"brake_fade"} and asked == {"brake_fade", "rolling_resistance"}
+
+
+def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bounds() -> None:
+    evidence = evidence_of(np.zeros(len(ALL_PARAMETERS)), "rolling_resistance", "wet_friction_speed")
+    null = fit(evidence.train, (), evidence.session_sigma)
+    sizes = detectable(evidence, null)
+    assert 0.0 < sizes["rolling_resistance"] < 0.05
+    rolling = LIBRARY["rolling_resistance"]
+    found = fit(evidence.train, (library_hypothesis(rolling),), evidence.session_sigma)
+    one = 2.0 * (25.0 + np.log(evidence.samples)) * inflation(evidence, null, None)
+    assert sizes["rolling_resistance"] == pytest.approx(np.sqrt(one * found.covariance[0, 0]), rel=0.3)
+    # stops on a dry road say nothing of wet friction
+    assert sizes["wet_friction_speed"] == np.inf
