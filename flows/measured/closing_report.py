@@ -199,10 +199,8 @@ def _experiment(plan: Mapping[str, Any] | None) -> str:
 
 def _detectable(values: Mapping[str, float | None], effects: Sequence[Effect]) -> str:
     rows = [(e.name, e.parameters[0].name, values[e.name], e.parameters[0].unit) for e in effects]
-    return (
-        "<p>Smallest first parameter of each library effect that would pass the score; - where none within its bounds would.</p>"
-        + _table(("effect", "parameter", "smallest", "unit"), rows)
-    )
+    text = "Smallest first parameter of each library effect that would pass the score; - where none in bounds would."
+    return f"<p>{text}</p>" + _table(("effect", "parameter", "smallest", "unit"), rows)
 
 
 def _data(result: Mapping[str, Any], campaign: Campaign) -> str:

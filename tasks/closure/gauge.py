@@ -19,8 +19,10 @@ NORMAL = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution."""
 HALF_WIDTHS = (1, 2, 4, 8, 16, 32)
 """Half widths of the windows of the mean that are tried [samples]."""
-AGREEING = 2.0
-"""Half width of the intervals that must intersect, in standard deviations of each mean."""
+AGREEING = 1.2
+"""Half width of the intervals that must intersect, in standard deviations of each mean: of 0.4, 0.8, 1.2 and 2 the one
+with which campaigns that lack nothing predict their held-out runs best. A larger one rounds the corners of ramps, and
+the brake gain comes out up to 1 % too high."""
 
 
 def at_rest(measured: NDArray[np.float64]) -> NDArray[np.float64]:
