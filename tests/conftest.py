@@ -1,9 +1,13 @@
-"""Where test data outside the repository lies, when there is any."""
+"""Where test data outside the repository lies, when there is any; and one thread for linear algebra."""
 
 import os
 from pathlib import Path
 
 import pytest
+
+# small matrices: more threads than one cost twice the time (read by numpy when it is first imported)
+for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(library, "1")
 
 DATA = Path(os.environ.get("MUSYNC_DATA", Path(__file__).resolve().parents[2] / "shared"))
 
