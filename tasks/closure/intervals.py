@@ -21,7 +21,7 @@ CLOSE = 0.05
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
-def anew(
+def refitted(
     evidence: Evidence, base: Fit, candidates: Sequence[Candidate]
 ) -> tuple[Evidence, Fit, list[Candidate]]:
     """What is named, fitted with derivatives that are taken at it.

@@ -15,7 +15,7 @@ from tasks.closure.experiment import next_experiment
 from tasks.closure.fit import Fit, fit
 from tasks.closure.held_out import held_out_error
 from tasks.closure.hypothesis import compose
-from tasks.closure.intervals import anew, curvature_interval, profile_interval
+from tasks.closure.intervals import curvature_interval, profile_interval, refitted
 from tasks.closure.rivals import Compared, compare, detectable
 from tasks.closure.search import Found
 from tasks.surface.state import SurfaceParameters
@@ -91,7 +91,7 @@ def attribute(
         error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     progress("intervals")
     if compared:
-        here, settled, again = anew(found.evidence, found.base, [c.own for c in compared])
+        here, settled, again = refitted(found.evidence, found.base, [c.own for c in compared])
         found = replace(found, evidence=here, base=settled)
         compared = [replace(c, own=own) for c, own in zip(compared, again, strict=True)]
         error, manoeuvres = held_out_error(start.evidence, start.base, found.base)

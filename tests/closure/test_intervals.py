@@ -19,7 +19,7 @@ from tasks.closure.evidence import run_evidence
 from tasks.closure.fit import fit, misfit_by_run
 from tasks.closure.forward import predict, run_model
 from tasks.closure.hypothesis import library_hypothesis
-from tasks.closure.intervals import anew, curvature_interval, profile_interval, quantile
+from tasks.closure.intervals import curvature_interval, profile_interval, quantile, refitted
 from tasks.closure.screening import Evidence
 from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
 
@@ -111,7 +111,7 @@ def test_with_derivatives_taken_at_it_an_estimate_forgets_where_it_started() -> 
     part = library_hypothesis(rolling)
     far = fit(evidence.train, (part,), evidence.session_sigma, session=null.session, iterations=8)
     true = np.array([0.012])
-    here, settled, _ = anew(evidence, far, [])
+    here, settled, _ = refitted(evidence, far, [])
     near = fit(here.train, (part,), here.session_sigma, values=true, session=far.session, iterations=8)
     sigma = np.sqrt(settled.covariance[0, 0])
     assert abs(settled.values[0] - near.values[0]) < 0.3 * sigma < abs(far.values[0] - near.values[0])

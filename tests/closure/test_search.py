@@ -119,5 +119,9 @@ def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bo
     found = fit(evidence.train, (library_hypothesis(rolling),), evidence.session_sigma)
     one = 2.0 * (25.0 + np.log(evidence.samples)) * inflation(evidence, null, None)
     assert sizes["rolling_resistance"] == pytest.approx(np.sqrt(one * found.covariance[0, 0]), rel=0.3)
+    (first,) = rolling.parameters
+    tight = replace(rolling, parameters=(replace(first, lower=0.0, upper=0.9 * sizes["rolling_resistance"]),))
+    bounded = replace(evidence, effects=(tight, *evidence.effects[1:]))
+    assert detectable(bounded, null)["rolling_resistance"] == np.inf
     # stops on a dry road say nothing of wet friction
     assert sizes["wet_friction_speed"] == np.inf
