@@ -17,9 +17,12 @@ from tasks.scene.scene import LOWEST_SUN_DEG, Scene, sun_problems
 
 SCENE_FORMAT = "musync-scene/1"
 GAUSSIAN_ARRAYS = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
+OPTIONAL_ARRAYS = ("surroundings",)
 BLENDING_RULES = ("antialiased", "display_encoded")
 SCENE_ARRAYS = (*GAUSSIAN_ARRAYS, "station", "T_world_rig", "environment")
-ARRAY_FILES = tuple(f"{name}.npy" for name in SCENE_ARRAYS)
+ARRAY_FILES, OPTIONAL_FILES = (
+    tuple(f"{name}.npy" for name in names) for names in (SCENE_ARRAYS, OPTIONAL_ARRAYS)
+)
 
 
 def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
@@ -53,7 +56,7 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
             **{name: getattr(scene.gaussians, name) for name in BLENDING_RULES},
             "carriageway_left": scene.carriageway_left,
             "carriageway_right": scene.carriageway_right,
-            "sha256": {name: _file_hash(partial / name) for name in ARRAY_FILES},
+            "sha256": {path.name: _file_hash(path) for path in sorted(partial.glob("*.npy"))},
         }
         if scene.sun_direction_deg is not None:
             content["sun_direction_deg"] = list(scene.sun_direction_deg)
@@ -89,7 +92,8 @@ def read_scene(folder: Path) -> Scene:
     if problems:
         raise InputError(problems)
     try:
-        arrays = {name: np.load(folder / f"{name}.npy", allow_pickle=False) for name in SCENE_ARRAYS}
+        held = [*SCENE_ARRAYS, *(name for name in OPTIONAL_ARRAYS if f"{name}.npy" in content["sha256"])]
+        arrays = {name: np.load(folder / f"{name}.npy", allow_pickle=False) for name in held}
     except (OSError, ValueError) as error:
         raise InputError(f"{folder}: {error}") from None
     sky = arrays["environment"]
@@ -99,7 +103,8 @@ def read_scene(folder: Path) -> Scene:
             f" its shape is {sky.shape}"
         )
     gaussians = Gaussians(
-        **{name: arrays[name] for name in GAUSSIAN_ARRAYS}, **{name: content[name] for name in BLENDING_RULES}
+        **{name: arrays[name] for name in (*GAUSSIAN_ARRAYS, *OPTIONAL_ARRAYS) if name in arrays},
+        **{name: content[name] for name in BLENDING_RULES},
     )
     check_gaussians(gaussians, str(folder))
     return Scene(
@@ -125,7 +130,9 @@ def scene_hash(folder: Path) -> str:
 
 
 def _arrays(scene: Scene) -> dict[str, NDArray[Any]]:
-    arrays: dict[str, NDArray[Any]] = {name: getattr(scene.gaussians, name) for name in GAUSSIAN_ARRAYS}
+    names = (*GAUSSIAN_ARRAYS, *OPTIONAL_ARRAYS)
+    held = {name: getattr(scene.gaussians, name) for name in names}
+    arrays: dict[str, NDArray[Any]] = {name: array for name, array in held.items() if array is not None}
     return arrays | {
         "station": scene.route.station,
         "T_world_rig": scene.route.T_world_rig,
@@ -157,8 +164,8 @@ def _read_facts(folder: Path) -> dict[str, Any]:
         f"sun_direction_deg, where given, must be azimuth and elevation [deg], the latter {LOWEST_SUN_DEG:g} to 90": (
             _is_sun(content.get("sun_direction_deg"))
         ),
-        f"sha256 must name {', '.join(ARRAY_FILES)}": (
-            isinstance(hashes, dict) and set(hashes) == set(ARRAY_FILES)
+        f"sha256 must name {', '.join(ARRAY_FILES)}, may name {', '.join(OPTIONAL_FILES)}, and nothing else": (
+            isinstance(hashes, dict) and set(ARRAY_FILES) <= set(hashes) <= {*ARRAY_FILES, *OPTIONAL_FILES}
         ),
     }
     problems = [f"{path}: {rule}; it is not so" for rule, kept in rules.items() if not kept]

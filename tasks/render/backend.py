@@ -1,5 +1,6 @@
 """Which rasteriser draws: the CPU's own, or gsplat where a GPU is proven to give the same picture."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
@@ -97,6 +98,15 @@ def probe(backend: Backend) -> str:
     What differs by more than `PROBE_TOLERANCE`; empty if nothing does
     """
     gaussians, viewmat, K = probe_scene()
+    covered = np.tile(np.array([2.0, 1.0], np.float32), (len(gaussians), 1))
+    return _difference(backend, gaussians, viewmat, K) or _difference(
+        backend, replace(gaussians, antialiased=True, surroundings=covered), viewmat, K
+    )
+
+
+def _difference(
+    backend: Backend, gaussians: Gaussians, viewmat: NDArray[np.float64], K: NDArray[np.float64]
+) -> str:
     width, height = 64, 48
     drawn = backend.rasterise(backend.prepare(gaussians), viewmat, K, width, height)
     wanted = rasteriser.rasterise(rasteriser.prepare(gaussians), viewmat, K, width, height)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tasks.render.blending import MAX_ALPHA, SURFACE_RATIO
 from tasks.render.gbuffer import GBuffer
+from tasks.render.painters_bias_torch import means_nearer
 from tasks.render.projection import NEAR, low_pass
 from tasks.render.view import view_of
 from tasks.scene.gaussians import Gaussians, check_gaussians
@@ -33,6 +34,7 @@ class DeviceGaussians:
     sh: torch.Tensor
     normals: torch.Tensor
     class_id: torch.Tensor
+    surroundings: torch.Tensor | None
     antialiased: bool
 
 
@@ -68,6 +70,7 @@ class GsplatBackend:
             sh=self._tensor(gaussians.sh),
             normals=self._tensor(gaussians.normals),
             class_id=self._tensor(gaussians.class_id),
+            surroundings=None if gaussians.surroundings is None else self._tensor(gaussians.surroundings),
             antialiased=gaussians.antialiased,
         )
 
@@ -87,8 +90,19 @@ class GsplatBackend:
         colours = (gsplat.spherical_harmonics(degree, direction, prepared.sh) + 0.5).clamp_min(0)
         away = (prepared.normals * direction).sum(dim=1, keepdim=True) > 0
         facing = torch.where(away, -prepared.normals, prepared.normals)
+        means = prepared.means
+        if prepared.surroundings is not None:
+            means = means_nearer(
+                means,
+                prepared.quats,
+                prepared.scales,
+                prepared.normals,
+                prepared.surroundings,
+                view,
+                low_pass(prepared.antialiased),
+            )
         blended, alpha, splats = gsplat.rasterization(
-            means=prepared.means,
+            means=means,
             quats=prepared.quats,
             scales=prepared.scales,
             opacities=prepared.opacities,

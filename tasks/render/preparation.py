@@ -10,7 +10,7 @@ from tasks.scene.gaussians import Gaussians, check_gaussians
 BLOCK = 64
 """Gaussians per block: one block is culled, projected and shaded as a whole, one vector lane each."""
 
-OFFSET, AXES, LOG_OPACITY, NORMAL, SH = 0, 3, 12, 13, 16
+OFFSET, AXES, LOG_OPACITY, NORMAL, SURROUNDINGS, SH = 0, 3, 12, 13, 16, 18
 """First plane of each quantity inside a block; SH coefficient k of channel c is plane ``SH + 3 k + c``."""
 
 _MORTON_BITS = 21
@@ -27,13 +27,14 @@ class PreparedGaussians:
 
     Parameters
     ----------
-    blocks : float32 [B, 16 + 3 K, 64] centre offset from the block's origin [m], local axes times
-        standard deviation (axis-major) [m], natural logarithm of opacity [1], normal [1], SH [1]
+    blocks : float32 [B, 18 + 3 K, 64] centre offset from the block's origin [m], local axes times
+        standard deviation (axis-major) [m], natural logarithm of opacity [1], normal [1], surroundings [1], SH [1]
     origins : float64 [B, 3] middle of each block's bounding box, world frame [m]
     radii : float64 [B] distance from the origin to the furthest centre of the block [m]
     reach : float64 [B] largest standard deviation within the block [m]
     class_id : uint8 [64 B] `SemanticClass`
     order : int64 [N] index in the original cloud of each Gaussian along the curve
+    level : the surroundings are known, and splats are drawn without the painter's bias
     antialiased, display_encoded : carried over from `Gaussians`
     """
 
@@ -43,6 +44,7 @@ class PreparedGaussians:
     reach: NDArray[np.float64]
     class_id: NDArray[np.uint8]
     order: NDArray[np.int64]
+    level: bool
     antialiased: bool
     display_encoded: bool
 
@@ -142,6 +144,7 @@ def prepare(gaussians: Gaussians) -> PreparedGaussians:
         reach=reach,
         class_id=gaussians.class_id[members].ravel(),
         order=order,
+        level=gaussians.surroundings is not None,
         antialiased=gaussians.antialiased,
         display_encoded=gaussians.display_encoded,
     )
@@ -161,6 +164,8 @@ def _pack(
     blocks[:, OFFSET:AXES] = offsets.transpose(0, 2, 1)
     blocks[:, AXES:LOG_OPACITY] = axes.transpose(0, 3, 2, 1).reshape(count, 9, BLOCK)
     blocks[:, LOG_OPACITY] = np.log(gaussians.opacities[members].astype(np.float64))
-    blocks[:, NORMAL:SH] = gaussians.normals[members].transpose(0, 2, 1)
+    blocks[:, NORMAL:SURROUNDINGS] = gaussians.normals[members].transpose(0, 2, 1)
+    if gaussians.surroundings is not None:
+        blocks[:, SURROUNDINGS:SH] = gaussians.surroundings[members].transpose(0, 2, 1)
     blocks[:, SH:] = gaussians.sh[members].reshape(count, BLOCK, -1).transpose(0, 2, 1)
     return origins, np.sqrt((offsets**2).sum(axis=2)).max(axis=1), scales.max(axis=(1, 2))

@@ -15,7 +15,17 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.preparation import AXES, BLOCK, LOG_OPACITY, NORMAL, OFFSET, SH, PreparedGaussians
+from tasks.render.painters_bias import FURTHEST, lead
+from tasks.render.preparation import (
+    AXES,
+    BLOCK,
+    LOG_OPACITY,
+    NORMAL,
+    OFFSET,
+    SH,
+    SURROUNDINGS,
+    PreparedGaussians,
+)
 from tasks.render.spherical_harmonics import shade_lanes
 from tasks.render.view import View
 
@@ -37,6 +47,7 @@ its normal [m], negative as it faces the eye: at a pixel, the camera z of that p
 _EDGE_ON = np.float32(1e-12)
 _NEAR, _LOG_CUT = np.float32(NEAR), np.float32(LOG_CUT)
 _LARGEST_DET = np.float32(1e37)
+_FACING = np.float32(1e-20)
 _ZERO, _HALF, _ONE, _TWO = (np.float32(c) for c in (0, 0.5, 1, 2))
 
 # A block's geometry and the records made from it, plane after plane in one flat scratch array: with offsets
@@ -52,12 +63,12 @@ def low_pass(antialiased: bool) -> float:
 def visible_blocks(prepared: PreparedGaussians, view: View) -> NDArray[np.int64]:
     """Blocks of which some Gaussian may touch the picture; never leaves out one that does.
 
-    A splat's half width is at most 3.33 sqrt(variance), and its variance at most
+    A splat's half width is at most 3.33 sqrt(variance), it is moved by at most 2.5, and its variance is at most
     (f sigma / z)^2 (1 + ray^2) plus the low pass, so "outside one edge" is a half-space of camera coordinates.
     """
     x, y, z = view.to_camera(prepared.origins).T
     keep = z + prepared.radii >= NEAR
-    extent = np.sqrt(-2 * LOG_CUT)
+    extent = np.sqrt(-2 * LOG_CUT) + (FURTHEST if prepared.level else 0.0)
     blur = extent * np.sqrt(low_pass(prepared.antialiased)) + 1.0
     limits = view.ray_limits
     for p, f, c, size, ray in ((x, 0, 0, view.width, limits[:2]), (y, 1, 1, view.height, limits[2:])):
@@ -93,7 +104,7 @@ def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32
     records = room[line : line + len(wanted) * BLOCK * RECORD].reshape(-1, RECORD)
     slots = np.empty(len(records), dtype=np.int64)
     count = _project_blocks(
-        prepared.blocks, prepared.class_id, prepared.antialiased, wanted,
+        prepared.blocks, prepared.class_id, prepared.antialiased, prepared.level, wanted,
         view.to_camera(prepared.origins[wanted]).astype(np.float32),
         from_eye.astype(np.float32), rotation, lens, np.float32(view.width), np.float32(view.height), records, slots
     )  # fmt: skip
@@ -102,7 +113,19 @@ def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _project_blocks(  # type: ignore[no-untyped-def]
-    blocks, class_id, antialiased, wanted, in_camera, from_eye, rotation, lens, width, height, records, slots
+    blocks,
+    class_id,
+    antialiased,
+    level,
+    wanted,
+    in_camera,
+    from_eye,
+    rotation,
+    lens,
+    width,
+    height,
+    records,
+    slots,
 ):
     s = np.empty((SH + RECORD) * BLOCK, dtype=np.float32)
     directions, colours = np.empty(3 * BLOCK, dtype=np.float32), s[_RECORD + RED * BLOCK :]
@@ -113,7 +136,10 @@ def _project_blocks(  # type: ignore[no-untyped-def]
         for plane in range(SH):
             for l in range(BLOCK):
                 s[plane * BLOCK + l] = block[plane, l]
-        if not _project_lanes(s, antialiased, in_camera[i], rotation, lens, width, height, visible):
+        _project_lanes(s, antialiased, in_camera[i], rotation, lens, visible)
+        if level:
+            _move_nearer(s, antialiased, rotation, lens)
+        if not _find_visible(s, width, height, visible):
             continue
         _face_camera(s, from_eye[i], directions)
         shade_lanes(directions, block, colours)
@@ -129,7 +155,8 @@ def _project_blocks(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _project_lanes(s, antialiased, origin, rotation, lens, width, height, visible):  # type: ignore[no-untyped-def]
+def _project_lanes(s, antialiased, origin, rotation, lens, drawable):  # type: ignore[no-untyped-def]
+    """Records but for planes and colours; whether the Gaussian is in front and single precision can hold its splat."""
     r00, r01, r02 = rotation[0]
     r10, r11, r12 = rotation[1]
     r20, r21, r22 = rotation[2]
@@ -166,27 +193,67 @@ def _project_lanes(s, antialiased, origin, rotation, lens, width, height, visibl
         m01, m02, m12 = p0 * q1 - p1 * q0, p0 * q2 - p2 * q0, p1 * q2 - p2 * q1
         sharp_det = m01 * m01 + m02 * m02 + m12 * m12
         det = sharp_det + blur * (pp + qq) + blur * blur
-        xx, yy = pp + blur, qq + blur
+        yy = qq + blur
         log_alpha = s[LOG_OPACITY * BLOCK + l]
         if antialiased:
             log_alpha += _HALF * np.log(max(sharp_det / det, _EDGE_ON))
         reach = _TWO * max(log_alpha - _LOG_CUT, _ZERO)
-        half_width, half_height = np.sqrt(reach * xx), np.sqrt(reach * yy)
-        u, v = fx * ray_x + cx, fy * ray_y + cy
-        s[_RECORD + X * BLOCK + l] = u
-        s[_RECORD + Y * BLOCK + l] = v
+        s[_RECORD + X * BLOCK + l] = fx * ray_x + cx
+        s[_RECORD + Y * BLOCK + l] = fy * ray_y + cy
         s[_RECORD + SLOPE * BLOCK + l] = pq / yy
         s[_RECORD + COLUMN_FALLOFF * BLOCK + l] = _HALF * yy / det
         s[_RECORD + ROW_FALLOFF * BLOCK + l] = _HALF / yy
         s[_RECORD + LOG_ALPHA * BLOCK + l] = log_alpha
-        s[_RECORD + HALF_HEIGHT * BLOCK + l] = half_height
+        s[_RECORD + HALF_HEIGHT * BLOCK + l] = np.sqrt(reach * yy)
         s[_RECORD + DEPTH * BLOCK + l] = z
-        # Whether the splat's box holds a pixel centre of the picture, and single precision can hold the splat.
+        drawable[l] = (z >= _NEAR) & (reach > _ZERO) & (det < _LARGEST_DET)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def]
+    """Undo the painter's bias: every splat moves along its surface by its lead."""
+    r00, r01, r02 = rotation[0]
+    r10, r11, r12 = rotation[1]
+    r20, r21, r22 = rotation[2]
+    fx, fy, cx, cy = lens[0], lens[1], lens[2], lens[3]
+    blur = np.float32(ANTIALIASED_LOW_PASS if antialiased else CLASSIC_LOW_PASS)
+    for l in range(BLOCK):
+        nx, ny, nz = s[NORMAL * BLOCK + l], s[(NORMAL + 1) * BLOCK + l], s[(NORMAL + 2) * BLOCK + l]
+        u, v = s[_RECORD + X * BLOCK + l], s[_RECORD + Y * BLOCK + l]
+        # Inverse depth on the disc's plane is proportional to a (u - cx) + b (v - cy) + c.
+        a, b = (r00 * nx + r01 * ny + r02 * nz) / fx, (r10 * nx + r11 * ny + r12 * nz) / fy
+        slant = a * (u - cx) + b * (v - cy) + (r20 * nx + r21 * ny + r22 * nz)
+        # The covariance again: xx - pq^2 / yy = 1 / (2 column_falloff), pq = slope yy, yy = 1 / (2 row_falloff).
+        yy = _HALF / s[_RECORD + ROW_FALLOFF * BLOCK + l]
+        pq = s[_RECORD + SLOPE * BLOCK + l] * yy
+        xx = _HALF / s[_RECORD + COLUMN_FALLOFF * BLOCK + l] + s[_RECORD + SLOPE * BLOCK + l] * pq
+        along_x, along_y = xx * a + pq * b, pq * a + yy * b
+        # Variances along the gradient, times its square: of the splat, of the pixel in it, of the neighbours.
+        own = max(a * along_x + b * along_y, _FACING)
+        pixel = blur * (a * a + b * b)
+        size = s[(SURROUNDINGS + 1) * BLOCK + l]
+        neighbours = max(size * size * (own - pixel) + pixel, _FACING)
+        closeness = np.sqrt(own) / max(abs(slant), _FACING) * (_ONE - pixel / own)
+        way = lead(s[SURROUNDINGS * BLOCK + l], np.sqrt(own / neighbours), closeness) / np.sqrt(own)
+        way = way if slant > _ZERO else -way
+        s[_RECORD + X * BLOCK + l] = u + way * along_x
+        s[_RECORD + Y * BLOCK + l] = v + way * along_y
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _find_visible(s, width, height, visible):  # type: ignore[no-untyped-def]
+    """Leave of the drawable splats those whose box holds a pixel centre of the picture; returns whether any is left."""
+    for l in range(BLOCK):
+        u, v = s[_RECORD + X * BLOCK + l], s[_RECORD + Y * BLOCK + l]
+        slope, half_height = s[_RECORD + SLOPE * BLOCK + l], s[_RECORD + HALF_HEIGHT * BLOCK + l]
+        # half_height^2 = reach yy; half_width^2 = reach xx
+        share = s[_RECORD + ROW_FALLOFF * BLOCK + l] / s[_RECORD + COLUMN_FALLOFF * BLOCK + l]
+        half_width = half_height * np.sqrt(share + slope * slope)
         left, right = np.ceil(u - half_width - _HALF), np.floor(u + half_width - _HALF)
         top, bottom = np.ceil(v - half_height - _HALF), np.floor(v + half_height - _HALF)
         across = max(left, _ZERO) <= min(right, width - _ONE)
         down = max(top, _ZERO) <= min(bottom, height - _ONE)
-        visible[l] = across & down & (z >= _NEAR) & (reach > _ZERO) & (det < _LARGEST_DET)
+        visible[l] &= across & down
     count = 0
     for l in range(BLOCK):
         count += visible[l]

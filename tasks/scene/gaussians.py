@@ -22,6 +22,9 @@ class Gaussians:
         colour = max(SH(direction) + 0.5, 0) [1]
     normals : float32 [N, 3] unit normals, world frame [1]
     class_id : uint8 [N] `SemanticClass`
+    surroundings : float32 [N, 2] overlap of the surface about each Gaussian, and root mean square size of its
+        neighbours by its own, see `tasks.scene.surroundings`: the cloud is drawn without the painter's bias
+        (`tasks.render.painters_bias`) [1]; None: as its trainer drew it, bias and all
     antialiased : splats narrower than a pixel fade instead of growing (Yu et al. 2024, Mip-Splatting,
         doi:10.1109/CVPR52733.2024.01839); False: the rule of the INRIA code, for which most files are made
     display_encoded : the colours blend in sRGB display space (scenes trained on pictures) and the
@@ -35,6 +38,7 @@ class Gaussians:
     sh: NDArray[np.float32]
     normals: NDArray[np.float32]
     class_id: NDArray[np.uint8]
+    surroundings: NDArray[np.float32] | None = None
     antialiased: bool = False
     display_encoded: bool = False
 
@@ -49,6 +53,8 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
     shapes = {
         "means": (n, 3), "quats_wxyz": (n, 4), "scales": (n, 3), "opacities": (n,), "normals": (n, 3), "class_id": (n,),
     }  # fmt: skip
+    if gaussians.surroundings is not None:
+        shapes["surroundings"] = (n, 2)
     for name, shape in shapes.items():
         if getattr(gaussians, name).shape != shape:
             problems.append(
@@ -66,7 +72,7 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
         problems.append(f"{place}: sh must have shape ({n}, 1|4|9|16, 3); it has {gaussians.sh.shape}")
     if problems:
         raise InputError(problems)
-    for name in ("means", "quats_wxyz", "scales", "opacities", "sh", "normals"):
+    for name in (*(name for name in shapes if name != "class_id"), "sh"):
         finite = np.isfinite(getattr(gaussians, name))
         bad = np.flatnonzero(~finite.all(axis=tuple(range(1, finite.ndim))))
         if len(bad):
@@ -77,6 +83,7 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
         for name, ok, rule in (
             ("scales", (gaussians.scales > 0).all(axis=1), "positive"),
             ("opacities", (gaussians.opacities > 0) & (gaussians.opacities <= 1), "in (0, 1]"),
+            ("surroundings", _is_surrounded(gaussians), "an overlap of 0 or more and a positive size"),
         ):
             if not ok.all():
                 bad = np.flatnonzero(~ok)
@@ -85,3 +92,9 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
                 )
     if problems:
         raise InputError(problems)
+
+
+def _is_surrounded(gaussians: Gaussians) -> NDArray[np.bool_]:
+    if gaussians.surroundings is None:
+        return np.ones(len(gaussians), dtype=np.bool_)
+    return (gaussians.surroundings[:, 0] >= 0) & (gaussians.surroundings[:, 1] > 0)

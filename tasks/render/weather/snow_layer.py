@@ -154,6 +154,7 @@ def snow_layer(
         sh=sh,
         normals=normal.astype(np.float32),
         class_id=gaussians.class_id[index],
+        surroundings=_about(gaussians, index, hidden[on]),
     )
     buried = index[(kept == 1) & (hidden_share(depth, p) >= BURIED)]
     return SnowLayer(gaussians=layer, anchors=index, buried=buried)
@@ -234,6 +235,17 @@ def _snow_colour(
     """Radiance of snow: hollows get and give less light than lumps, wheels press it grey."""
     shade = (1 + p.relief * np.clip(np.asarray(lumps), -2.5, 1.5)) * (1 - p.tracks.compaction * tracks)
     return shade[:, None] * (np.array(p.albedo) * np.asarray(white))
+
+
+def _about(
+    gaussians: Gaussians, index: NDArray[np.int64], opacity: NDArray[np.float64]
+) -> NDArray[np.float32] | None:
+    """Surroundings of a layer with this opacity on these Gaussians: theirs, as much thinner as it is fainter."""
+    if gaussians.surroundings is None:
+        return None
+    about = gaussians.surroundings[index].copy()
+    about[:, 0] *= opacity / gaussians.opacities[index]
+    return about
 
 
 def _lying(

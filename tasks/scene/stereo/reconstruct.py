@@ -23,6 +23,7 @@ from tasks.scene.stereo.road_plane import fit_road_plane, route_below, settled
 from tasks.scene.stereo.sequence import StereoSequence, StereoSettings
 from tasks.scene.stereo.sky import fit_sky, panorama, sky_mask, sky_view
 from tasks.scene.stereo.surfels import Surfels, joined, sample
+from tasks.scene.surroundings import with_surroundings
 
 CLIPPED = 254
 """Pixel values from here on may stand for any brighter light."""
@@ -119,8 +120,14 @@ def reconstruct(sequence: StereoSequence, settings: StereoSettings | None = None
 
     scene = Scene(
         name=sequence.name,
-        gaussians=refine(
-            cloud.gaussians, cloud.rays, training_view, len(training), settings.refinement_passes
+        gaussians=with_surroundings(
+            refine(
+                with_surroundings(cloud.gaussians),
+                cloud.rays,
+                training_view,
+                len(training),
+                settings.refinement_passes,
+            )
         ),
         route=route,
         environment=environment,

@@ -100,7 +100,7 @@ def refine(
 
     Returns
     -------
-    Gaussians, less those that became transparent
+    Gaussians, less those that became transparent, without `Gaussians.surroundings`
     """
     prepared = prepare(gaussians)
     along = np.asarray(rays, dtype=np.float32)[prepared.order]
@@ -177,6 +177,6 @@ def _unpacked(gaussians: Gaussians, prepared: PreparedGaussians) -> Gaussians:
     sh[prepared.order, 0] = planes[SH : SH + 3].T
     opacities[prepared.order] = np.exp(planes[LOG_OPACITY])
     kept = opacities >= FAINTEST
-    refined = replace(gaussians, means=means, sh=sh, opacities=opacities)
+    refined = replace(gaussians, means=means, sh=sh, opacities=opacities, surroundings=None)
     names = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
     return replace(refined, **{name: getattr(refined, name)[kept] for name in names})

@@ -18,6 +18,7 @@ from tasks.scene.street.sky import panorama
 from tasks.scene.street.surfels import THICKNESS, join
 from tasks.scene.street.vegetation import LEAF_EXTINCTION, gardens, trees
 from tasks.scene.street.vehicles import car_boxes, cars, footprints
+from tasks.scene.surroundings import with_surroundings
 
 __all__ = ["StreetLayout", "build_street"]
 
@@ -74,15 +75,17 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
     thickness = np.minimum(THICKNESS, 0.5 * surfels.scale.min(axis=1, keepdims=True))
     return Scene(
         name="street",
-        gaussians=Gaussians(
-            means=line.to_world(surfels.centre).astype(np.float32),
-            quats_wxyz=line.quaternions(station, surfels.axes).astype(np.float32),
-            scales=np.concatenate([surfels.scale, thickness], axis=1).astype(np.float32),
-            opacities=surfels.opacity.astype(np.float32),
-            sh=((radiance - 0.5) / _SH_BAND_0).astype(np.float32)[:, None, :],
-            normals=line.directions(station, surfels.axes[:, 2]).astype(np.float32),
-            class_id=surfels.class_id,
-            antialiased=True,
+        gaussians=with_surroundings(
+            Gaussians(
+                means=line.to_world(surfels.centre).astype(np.float32),
+                quats_wxyz=line.quaternions(station, surfels.axes).astype(np.float32),
+                scales=np.concatenate([surfels.scale, thickness], axis=1).astype(np.float32),
+                opacities=surfels.opacity.astype(np.float32),
+                sh=((radiance - 0.5) / _SH_BAND_0).astype(np.float32)[:, None, :],
+                normals=line.directions(station, surfels.axes[:, 2]).astype(np.float32),
+                class_id=surfels.class_id,
+                antialiased=True,
+            )
         ),
         route=route(layout, line),
         environment=panorama(layout, seed),

@@ -1,0 +1,106 @@
+"""The painter's bias: of one surface, what is nearer covers what is further, and the picture slides.
+
+Gaussians are blended in the order of their centres' depth. On a road, of the discs that overlap at a pixel, those
+whose centres lie below it, nearer, come first: the road's picture sits some tenths of a pixel too high, by another
+share of a pixel at every distance, and slides under a car that drives. This module says how far, so that `projection`
+can draw every disc as much nearer, down a road, as the order takes away.
+
+Discs of overlap kappa, the mean optical depth of their surface, lie as a random scatter. Along the direction t in
+which the picture of the surface comes nearer, all in standard deviations of the disc, one at 0 is seen at t with
+
+    w(t) = phi(t) exp(-kappa Phi(r t)),
+
+phi and Phi the normal density and distribution, r the disc's size by its neighbours': at t the neighbours that are
+nearer than the disc have optical depth kappa Phi(r t). Its picture lies where the mean of w is, at -lead.
+
+That is so if the surface has the same scale all over a disc. It has not: towards the horizon, a distance of y standard
+deviations away, it shrinks by 1 + t / y. A disc of the surface is no Gaussian in the picture but reaches further down,
+its middle by Var(t) / y; EWA draws the Gaussian. And neighbours further down are larger: the optical depth before the
+disc grows by 2 kappa phi(r t) / (r y). With both, to the first order in 1 / y,
+
+    lead = -E(t) + (Var(t) + 2 kappa Cov(t, phi(r t)) / r) / y        under w.
+"""
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+OVERLAP_SCALE = 3.0
+"""Overlap in the middle of the table: it is even in overlap / (overlap + scale) [1]."""
+INTERVALS = 32
+"""Of the table, each way [1]."""
+MOST_OVERLAP, MOST_RATIO = 30.0, 30.0
+"""Largest overlap and size by the neighbours' that the table holds [1]."""
+STEEPEST = 0.1
+"""Largest 1 / y for which the first order is taken: a disc nearer the horizon counts as this [1]."""
+FURTHEST = 2.5
+"""No lead is longer [1]."""
+
+_SCALE, _INTERVALS, _STEEPEST, _FURTHEST = (
+    np.float32(c) for c in (OVERLAP_SCALE, INTERVALS, STEEPEST, FURTHEST)
+)
+_LAST = np.float32(INTERVALS - 1)
+_ZERO, _ONE = np.float32(0), np.float32(1)
+
+
+def lead_terms(overlap: float, ratio: float) -> tuple[float, float]:
+    """Lead on a surface without perspective, and what perspective adds to it by 1 / y.
+
+    Parameters
+    ----------
+    overlap : kappa [1]
+    ratio : r, size of the disc by its neighbours', above 0 [1]
+
+    Returns
+    -------
+    The two terms of the lead, in standard deviations of the disc [1]
+    """
+    t = np.linspace(-8, 8, 1601)
+    density = np.exp(-((ratio * t) ** 2) / 2) / np.sqrt(2 * np.pi)
+    weight = np.exp(-(t**2) / 2 - overlap * ndtr(ratio * t))
+    weight /= weight.sum()
+    mean = float((weight * t).sum())
+    variance = float((weight * (t - mean) ** 2).sum())
+    shading = float((weight * (t - mean) * density).sum())
+    return -mean, variance + 2 * overlap * shading / ratio
+
+
+def _table() -> NDArray[np.float32]:
+    """Both terms on an even grid of overlap / (overlap + scale) and ratio / (1 + ratio), float32 [33, 33, 2].
+
+    Rounded, so that the last bit of a processor's exponential does not reach a picture.
+    """
+    share = np.arange(INTERVALS + 1) / INTERVALS
+    with np.errstate(divide="ignore"):
+        overlaps = np.minimum(OVERLAP_SCALE * share / (1 - share), MOST_OVERLAP)
+        ratios = np.clip(share / (1 - share), 1e-3, MOST_RATIO)
+    terms = [[lead_terms(overlap, ratio) for ratio in ratios] for overlap in overlaps]
+    return np.array(terms).round(6).astype(np.float32)
+
+
+LEADS = _table()
+"""Both terms of `lead_terms`, float32 [33, 33, 2]."""
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def lead(overlap, ratio, closeness):  # type: ignore[no-untyped-def]
+    """How many standard deviations nearer a disc must be drawn to be seen in its place, float32.
+
+    Parameters
+    ----------
+    overlap : kappa [1]
+    ratio : r, size of the disc by its neighbours' along the gradient, in the picture [1]
+    closeness : 1 / y, a standard deviation by the way to the horizon [1]
+    """
+    i = overlap / (overlap + _SCALE) * _INTERVALS
+    j = ratio / (ratio + _ONE) * _INTERVALS
+    row, column = int(min(i, _LAST)), int(min(j, _LAST))
+    down, across = i - np.float32(row), j - np.float32(column)
+    near = min(closeness, _STEEPEST)
+    total = _ZERO
+    for di in range(2):
+        for dj in range(2):
+            share = (down if di else _ONE - down) * (across if dj else _ONE - across)
+            total += share * (LEADS[row + di, column + dj, 0] + near * LEADS[row + di, column + dj, 1])
+    return min(total, _FURTHEST)

@@ -1,0 +1,80 @@
+"""What surrounds a Gaussian: overlap and size of its neighbours in one surface."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tasks.errors import InputError
+from tasks.scene.gaussians import Gaussians, check_gaussians
+from tasks.scene.surroundings import with_surroundings
+from tests.render.clouds import cloud
+
+SPACING, SIZE, OPACITY = 0.04, 0.03, 0.9
+OVERLAP = 2 * np.pi * SIZE**2 * OPACITY / SPACING**2
+
+
+def floor(scatter: bool = False) -> Gaussians:
+    """A square of 41 x 41 level discs, on a grid or at random."""
+    side = np.arange(-20, 21) * SPACING
+    x, y = (axis.ravel() for axis in np.meshgrid(side, side))
+    if scatter:
+        x, y = np.random.default_rng(2).uniform(-20.5 * SPACING, 20.5 * SPACING, (2, len(x)))
+    means = np.column_stack((x, y, 0 * x))
+    return cloud(means, scales=(SIZE, SIZE, 1e-3), opacities=OPACITY, normals=(0, 0, 1))
+
+
+def inside(gaussians: Gaussians) -> np.ndarray:
+    return np.abs(gaussians.means[:, :2]).max(axis=1) < 12 * SPACING
+
+
+@pytest.mark.parametrize("scatter", [False, True])
+def test_overlap_is_opacity_times_area_per_area(scatter):
+    ground = with_surroundings(floor(scatter))
+    assert ground.surroundings[inside(ground), 0].mean() == pytest.approx(OVERLAP, rel=0.08)
+    assert ground.surroundings[inside(ground), 1] == pytest.approx(1, rel=1e-6)
+
+
+def test_neighbours_count_in_their_own_surface_only():
+    ground = floor()
+    wall = replace(
+        ground,
+        means=ground.means[:, [2, 1, 0]],
+        normals=ground.normals[:, [2, 1, 0]].copy(),
+        scales=ground.scales[:, [2, 1, 0]].copy(),
+    )
+    names = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
+    joined = {name: np.concatenate((getattr(ground, name), getattr(wall, name))) for name in names}
+    both = with_surroundings(replace(ground, **joined))
+    corner = np.abs(both.means[:, [0, 2]]).max(axis=1) < 0.5 * SPACING
+    away = np.flatnonzero(inside(both) & (np.abs(both.means[:, 0]) > 8 * SPACING))
+    assert both.surroundings[away, 0].mean() == pytest.approx(OVERLAP, rel=0.08)
+    assert both.surroundings[corner, 0].max() < 1.5 * OVERLAP
+
+
+def test_grit_among_larger_discs_knows_that_they_are_larger():
+    ground = floor()
+    scales = ground.scales.copy()
+    grit = len(ground) // 2
+    scales[grit, :2] = SIZE / 5
+    ground = with_surroundings(replace(ground, scales=scales))
+    assert ground.surroundings[grit, 1] == pytest.approx(5, rel=0.01)
+
+
+def test_size_of_the_scene_does_not_matter():
+    ground = floor(scatter=True)
+    large = replace(ground, means=8 * ground.means, scales=8 * ground.scales)
+    a, b = with_surroundings(ground), with_surroundings(large)
+    assert a.surroundings == pytest.approx(b.surroundings, rel=1e-5)
+
+
+def test_one_gaussian_has_no_neighbours():
+    assert with_surroundings(cloud((0, 0, 1))).surroundings.tolist() == [[0, 1]]
+
+
+def test_surroundings_out_of_range_are_named():
+    ground = with_surroundings(floor())
+    with pytest.raises(InputError, match=r"surroundings must have shape \(1681, 2\)"):
+        check_gaussians(replace(ground, surroundings=ground.surroundings[:5]))
+    with pytest.raises(InputError, match="surroundings must be an overlap of 0 or more and a positive size"):
+        check_gaussians(replace(ground, surroundings=-ground.surroundings))
