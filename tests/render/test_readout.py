@@ -1,4 +1,4 @@
-"""Lens, rolling shutter and motion blur against closed forms, and against the renders that they stand for."""
+"""Lens, rolling shutter and motion blur against closed forms, on a wall."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,31 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from catalogs.cameras import load_camera
-from catalogs.weather import load_weather
-from tasks.errors import InputError
-from tasks.eval.image_quality import psnr
 from tasks.eval.unroll import row_times, unrolled
-from tasks.render.backend import CpuBackend
-from tasks.render.camera import body_poses, continuous_rig, viewmat
-from tasks.render.clip import render_clip
-from tasks.render.composition import compose, encode_8bit
-from tasks.render.environment import environment_view
+from tasks.render.composition import encode_8bit
 from tasks.render.labels import row_flow
-from tasks.render.lens import Lens, distorted
+from tasks.render.lens import distorted
 from tasks.render.readout import read_out, sensor_field
 from tasks.render.sight import row_points
-from tasks.render.weather.attribution import LAYER_BITS
-from tasks.render.weather.parameters import WeatherState
-from tasks.render.weather.scene_light import appended
-from tasks.scene.route import route_from_positions
-from tests.render.weather.scenes import clear_sky, road, surfels
+from tests.render.rolling_cameras import ALL, CAMERA, LENS, ROLLING, K
 
-K = np.array([[200.0, 0, 120], [0, 200, 80], [0, 0, 1]])
-LENS = Lens(k1=-0.25, k2=0.05, p1=1e-3, p2=-5e-4)
-CAMERA = replace(load_camera("dashcam-480x320"), width=240, height=160, K=K, exposure_s=0.01)
-ROLLING = replace(CAMERA, line_delay_s=1.5e-4)
-ALL = replace(ROLLING, lens=LENS, motion_blur=True)
 WALL = 10.0
 
 
@@ -216,150 +199,3 @@ def test_the_judge_takes_rows_back_to_one_shutter():
     apart = np.abs(seen["rgb"][1].astype(int) - encode_8bit(light))[inside]
     assert apart.max() <= 3
     assert np.abs(rgb[1].astype(int) - encode_8bit(light))[inside].max() > 20
-
-
-ROUTE = route_from_positions(np.stack([np.arange(100.0), np.zeros(100), np.zeros(100)], axis=1))
-TICKS = np.arange(201) * 1e-3
-
-
-def rig(speed=16.0):
-    return continuous_rig(
-        ROUTE, TICKS, 1.0 + speed * TICKS, 0.02 * np.sin(9 * TICKS), 0.03 * np.sin(7 * TICKS),
-        np.array((0.0, 0.1, 0.2)), cg_behind_front_axle=1.2, cg_height=0.55,
-    )  # fmt: skip
-
-
-def test_poses_between_ticks_meet_those_of_the_frames_and_go_on_beyond_the_ends():
-    at = rig()
-    exact = body_poses(
-        ROUTE, np.array([2.6]), np.array([0.02 * np.sin(0.9)]), np.array([0.03 * np.sin(0.7)]),
-        cg_behind_front_axle=1.2, cg_height=0.55,
-    )  # fmt: skip
-    np.testing.assert_allclose(at(1, np.zeros(1)), exact, atol=1e-12)
-    before, first, after = at(0, np.array((-0.01, 0.0, 0.01)))
-    np.testing.assert_allclose(before[:3, 3], 2 * first[:3, 3] - after[:3, 3], atol=1e-3)
-    np.testing.assert_allclose(first @ np.linalg.inv(after) @ first, before, atol=1e-12)
-    assert at(2, np.array((0.015,)))[0, 0, 3] == pytest.approx(at(2, np.zeros(1))[0, 0, 3] + 0.24, abs=2e-3)
-
-
-@pytest.fixture(scope="module")
-def parameters():
-    return load_weather()
-
-
-@pytest.fixture(scope="module")
-def street():
-    """A road with a striped wall beside it and posts before the wall."""
-    x, z = (part.ravel() for part in np.meshgrid(np.arange(3, 24, 0.08), np.arange(0, 4, 0.08)))
-    stripes = 0.15 + 0.5 * ((np.floor(2 * x) + np.floor(2 * z)) % 2)
-    wall = surfels(
-        np.column_stack((x, np.full(x.size, 4.0), z)), (0, -1, 0), 0.06, stripes[:, None] * np.ones(3), 6
-    )
-    foot, height = (part.ravel() for part in np.meshgrid(np.arange(8.0, 20, 3), np.arange(0, 3, 0.05)))
-    post = surfels(np.column_stack((foot, np.full(foot.size, 2.5), height)), (-1, 0, 0), 0.05, 0.8, 8)
-    return appended(appended(road(length=22), wall), post)
-
-
-def clip(street, camera, parameters, state=None, **more):
-    at = rig()
-    poses = np.concatenate([at(k, np.zeros(1)) for k in range(3)])
-    state = state or WeatherState(kind="dry")
-    return render_clip(
-        street, clear_sky(), ROUTE, camera, poses, frame_rate_hz=10, weather=state, looks=parameters, seed=1,
-        backend=CpuBackend(), rig_at=at, **more,
-    )  # fmt: skip
-
-
-def drawn(street, camera, pose):
-    backend = CpuBackend()
-    gbuffer = backend.rasterise(backend.prepare(street), viewmat(pose), camera.K, camera.width, camera.height)
-    sky = environment_view(clear_sky(), viewmat(pose), camera.K, camera.width, camera.height)
-    return compose(gbuffer, sky, street.display_encoded), gbuffer
-
-
-def test_with_all_three_off_the_bytes_are_those_of_the_plain_composition(street, parameters):
-    assert CAMERA.plain
-    made = clip(street, CAMERA, parameters)
-    for k in range(3):
-        picture, gbuffer = drawn(street, CAMERA, rig()(k, np.zeros(1))[0] @ CAMERA.T_rig_camera)
-        assert made["rgb"][k].tobytes() == encode_8bit(picture).tobytes()
-        assert made["class"][k].tobytes() == gbuffer.class_id.tobytes()
-
-
-def test_the_paper_s_composition_changes_only_pixels_of_falling_rain(street, parameters):
-    """Elsewhere the 8-bit difference is none, and the picture is the linear one; dry weather has no particles."""
-    state = WeatherState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263)
-    ours, theirs = (
-        clip(street, CAMERA, parameters, state, composition=name, labelled=lambda s: 0.0 * s)
-        for name in ("linear", "paper")
-    )
-    differs = (ours["rgb"] != theirs["rgb"]).any(axis=-1)
-    assert 0 < differs.mean() < 0.5
-    # a mark says half a grey level on the wet street; the residual is taken off the street before it is wet
-    falls = ours["marks"] & LAYER_BITS["particles"] > 0
-    assert np.abs(ours["rgb"].astype(int) - theirs["rgb"])[~falls].max() <= 4
-    assert ours["marks"].tobytes() == theirs["marks"].tobytes()
-    dry = [
-        clip(street, CAMERA, parameters, composition=name)["rgb"].tobytes() for name in ("linear", "paper")
-    ]
-    assert dry[0] == dry[1]
-
-
-def test_rows_and_blur_are_near_the_renders_that_they_stand_for(street, parameters):
-    """Rolling rows against a render for every eighth row's pose, blur against 32 renders; ignoring them is far off."""
-    at, plain = rig(), clip(street, CAMERA, parameters)["rgb"][1]
-
-    def pose(time):
-        return at(1, np.array([time]))[0] @ CAMERA.T_rig_camera
-
-    rows = np.arange(4, 160, 8)
-    exact = np.stack([drawn(street, CAMERA, pose(ROLLING.row_times[1][r]))[0][r] for r in rows])
-    seen = clip(street, ROLLING, parameters)["rgb"][1]
-    rolled = psnr(encode_8bit(exact), seen[rows])
-    assert rolled > 33
-    assert rolled > psnr(encode_8bit(exact), plain[rows]) + 10
-    shares = (np.arange(32) + 0.5) / 32 - 0.5
-    blurred = replace(CAMERA, motion_blur=True)
-    exact = np.mean(
-        [drawn(street, CAMERA, pose(s * CAMERA.exposure_s))[0] for s in shares], axis=0, dtype=np.float32
-    )
-    found = psnr(encode_8bit(exact), clip(street, blurred, parameters)["rgb"][1])
-    assert found > 38
-    assert found > psnr(encode_8bit(exact), plain) + 4
-
-
-def test_blur_of_a_camera_that_stands_leaves_falling_snow_as_it_is(street, parameters):
-    """A streak has its exposure already: it is not blurred again, and nothing else moves."""
-    pose = ROUTE.pose(np.array((5.0, 5.0)))
-    state = WeatherState(kind="snow", precipitation_mm_h=2, snow_depth_mm=20, snow_coverage=1.0)
-    plain, blurred = (
-        render_clip(
-            street, clear_sky(), ROUTE, camera, pose, frame_rate_hz=10, weather=state, looks=parameters, seed=1,
-            backend=CpuBackend(), rig_at=lambda k, t: np.repeat(pose[:1], len(t), axis=0),
-        )["rgb"]
-        for camera in (CAMERA, replace(CAMERA, motion_blur=True))
-    )  # fmt: skip
-    assert blurred.tobytes() == plain.tobytes()
-    assert plain[0].tobytes() != plain[1].tobytes()
-
-
-def test_labels_follow_rows_and_lens(street, parameters):
-    """Station and height of what a pixel sees come from its own ray and time: road pixels lie on the road."""
-    made = clip(street, ALL, parameters, labelled=lambda s: 0.0 * s)
-    field, poses = sensor_field(ALL), rig()(1, ALL.row_times[1]) @ ALL.T_rig_camera
-    points = row_points(field.directions, made["depth"][1], poses)
-    on_road = np.isfinite(made["road"][1][..., 0])
-    assert on_road.mean() > 0.2
-    assert np.quantile(np.abs(points[on_road][:, 2]), 0.99) < 0.01
-    np.testing.assert_allclose(made["road"][1][on_road], points[on_road][:, :2], atol=5e-3)
-    assert (
-        clip(street, ALL, parameters, labelled=lambda s: 0.0 * s)["flow"].tobytes() == made["flow"].tobytes()
-    )
-
-
-def test_a_camera_that_moves_during_a_frame_needs_poses_between_frames(street, parameters):
-    with pytest.raises(InputError, match="needs rig poses between frames"):
-        render_clip(
-            street, clear_sky(), ROUTE, ALL, np.eye(4)[None].repeat(2, 0), frame_rate_hz=10,
-            weather=WeatherState(kind="dry"), looks=parameters, seed=1, backend=CpuBackend(),
-        )  # fmt: skip

@@ -1,0 +1,150 @@
+"""Gaussians trained elsewhere: .ply by its layout, packed forms by the .ply that they were made from."""
+
+from dataclasses import replace
+
+import gaussforge
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from catalogs.scenes.gaussian_files import read_gaussians, write_gaussians
+from tasks.errors import InputError
+from tests.toy_street import toy_street
+
+SCENE = toy_street()
+SH_0 = 0.28209479177387814
+
+
+def ply(path, count=50, nan_at=None, column="x"):
+    """An INRIA .ply written by hand: the layout is the reference, not a library."""
+    draw = np.random.default_rng(3)
+    names = ["x", "y", "z", "nx", "ny", "nz", *(f"f_dc_{i}" for i in range(3)), *(f"f_rest_{i}" for i in range(45)),
+             "opacity", *(f"scale_{i}" for i in range(3)), *(f"rot_{i}" for i in range(4))]  # fmt: skip
+    rows = draw.normal(size=(count, len(names))).astype("<f4")
+    rows[:, names.index("scale_0") : names.index("scale_2") + 1] -= 3
+    if nan_at is not None:
+        rows[nan_at, names.index(column)] = np.nan
+    header = "ply\nformat binary_little_endian 1.0\n" + f"element vertex {count}\n"
+    header += "".join(f"property float {name}\n" for name in names) + "end_header\n"
+    path.write_bytes(header.encode() + rows.tobytes())
+    return {name: rows[:, i] for i, name in enumerate(names)}
+
+
+def test_an_inria_ply_is_decoded_as_its_layout_says(tmp_path):
+    raw = ply(tmp_path / "a.ply")
+    cloud = read_gaussians(tmp_path / "a.ply")
+    np.testing.assert_array_equal(cloud.means, np.stack([raw["x"], raw["y"], raw["z"]], axis=1))
+    np.testing.assert_allclose(cloud.scales[:, 1], np.exp(raw["scale_1"]), rtol=1e-6)
+    np.testing.assert_allclose(cloud.opacities, 1 / (1 + np.exp(-raw["opacity"])), rtol=1e-5)
+    np.testing.assert_array_equal(cloud.sh[:, 0, 2], raw["f_dc_2"])
+    # f_rest is channel-major: coefficient k of channel c stands at 15 c + k
+    np.testing.assert_array_equal(cloud.sh[:, 1 + 4, 2], raw["f_rest_34"])
+    q = np.stack([raw[f"rot_{i}"] for i in range(4)], axis=1)
+    np.testing.assert_allclose(cloud.quats_wxyz, q / np.linalg.norm(q, axis=1, keepdims=True), atol=1e-6)
+    assert cloud.display_encoded
+
+
+def test_the_normal_is_the_shortest_axis(tmp_path):
+    ply(tmp_path / "a.ply")
+    cloud = read_gaussians(tmp_path / "a.ply")
+    axes = Rotation.from_quat(cloud.quats_wxyz, scalar_first=True).as_matrix()
+    shortest = axes[np.arange(50), :, cloud.scales.argmin(axis=1)]
+    np.testing.assert_allclose(cloud.normals, shortest, atol=1e-5)
+
+
+@pytest.mark.parametrize(("ending", "tolerance"), [("compressed.ply", 5e-3), ("splat", 1e-6), ("spz", 5e-4)])
+def test_packed_formats_hold_the_same_cloud(tmp_path, ending, tolerance):
+    ply(tmp_path / "a.ply")
+    forge = gaussforge.GaussForge()
+    packed = forge.convert((tmp_path / "a.ply").read_bytes(), "ply", ending)["data"]
+    (tmp_path / f"b.{ending}").write_bytes(packed)
+    plain, back = read_gaussians(tmp_path / "a.ply"), read_gaussians(tmp_path / f"b.{ending}")
+    distance = np.linalg.norm(back.means[:, None] - plain.means[None], axis=2)
+    nearest = distance.argmin(axis=1)
+    assert sorted(nearest) == list(range(50)), "each Gaussian is there once"
+    assert distance.min(axis=1).max() < tolerance
+    np.testing.assert_allclose(back.opacities, plain.opacities[nearest], atol=0.01)
+    # .splat keeps colours in [0, 1] only
+    expected = np.clip(plain.sh[nearest, 0], -0.5 / SH_0, 0.5 / SH_0)
+    np.testing.assert_allclose(np.clip(back.sh[:, 0], -0.5 / SH_0, 0.5 / SH_0), expected, atol=0.15)
+
+
+@pytest.mark.parametrize("ending", ["ply", "splat", "spz"])
+def test_a_truncated_file_is_refused_with_its_name(tmp_path, ending):
+    ply(tmp_path / "a.ply")
+    whole = (tmp_path / "a.ply").read_bytes()
+    if ending != "ply":
+        whole = gaussforge.GaussForge().convert(whole, "ply", ending)["data"]
+    (tmp_path / f"cut.{ending}").write_bytes(whole[: len(whole) - 37])
+    with pytest.raises(InputError, match=f"cut.{ending}"):
+        read_gaussians(tmp_path / f"cut.{ending}")
+
+
+def test_a_ply_with_nan_is_refused_with_the_gaussian(tmp_path):
+    ply(tmp_path / "a.ply", nan_at=17)
+    with pytest.raises(InputError, match=r"means must be finite; 1 of 50 .* number 17"):
+        read_gaussians(tmp_path / "a.ply")
+
+
+def test_an_unknown_ending_lists_the_known_ones(tmp_path):
+    with pytest.raises(InputError, match=r"\.spz"):
+        read_gaussians(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda b: b[:150], "end_header"),
+        (lambda b: b[:-37], "50 Gaussians in 13927 bytes; the file holds 13890"),
+        (lambda b: b"solid" + b, "must begin with the word ply"),
+        (
+            lambda b: b.replace(b"binary_little_endian", b"ascii"),
+            "binary_little_endian 1.0; it is 'ascii 1.0'",
+        ),
+        (lambda b: b.replace(b" opacity", b" opaque"), "must have opacity"),
+        (lambda b: b.replace(b"f_rest_44", b"g_rest_44"), "there are 44"),
+        (lambda b: b.replace(b"float rot_3", b"uchar rot_3"), "uchar rot_3"),
+        (lambda b: b.replace(b"vertex", b"face"), "must have vertex elements"),
+    ],
+)
+def test_a_ply_with_a_wrong_header_or_missing_bytes_says_what_is_wrong(tmp_path, change, sentence):
+    ply(tmp_path / "a.ply")
+    (tmp_path / "a.ply").write_bytes(change((tmp_path / "a.ply").read_bytes()))
+    with pytest.raises(InputError, match=sentence):
+        read_gaussians(tmp_path / "a.ply")
+
+
+def test_a_quaternion_that_is_no_number_is_refused(tmp_path):
+    ply(tmp_path / "a.ply", nan_at=17, column="rot_2")
+    with pytest.raises(InputError, match=r"quats_wxyz must be finite; 1 of 50 .* number 17"):
+        read_gaussians(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize("coefficients", [1, 4, 9, 16])
+def test_a_written_ply_reads_back(tmp_path, coefficients):
+    draw = np.random.default_rng(2)
+    count = len(SCENE.gaussians)
+    cloud = replace(
+        SCENE.gaussians,
+        sh=draw.normal(size=(count, coefficients, 3)).astype(np.float32),
+        display_encoded=True,
+    )
+    write_gaussians(cloud, tmp_path / "out.ply")
+    back = read_gaussians(tmp_path / "out.ply")
+    for name in ("means", "quats_wxyz", "sh"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(cloud, name))
+    np.testing.assert_allclose(back.scales, cloud.scales, rtol=1e-5)
+    np.testing.assert_allclose(back.opacities, cloud.opacities, rtol=1e-5)
+
+
+def test_reading_prints_nothing_where_json_is_printed(tmp_path, capfd):
+    ply(tmp_path / "a.ply")
+    forge = gaussforge.GaussForge()
+    for ending in ("spz", "splat"):
+        (tmp_path / f"b.{ending}").write_bytes(
+            forge.convert((tmp_path / "a.ply").read_bytes(), "ply", ending)["data"]
+        )
+    capfd.readouterr()
+    for name in ("a.ply", "b.spz", "b.splat"):
+        read_gaussians(tmp_path / name)
+    assert capfd.readouterr().out == ""
