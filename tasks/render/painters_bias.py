@@ -5,7 +5,8 @@ whose centres lie below it, nearer, come first: the road's picture sits some ten
 share of a pixel at every distance, and slides under a car that drives. This module says how far, so that `projection`
 can draw every disc as much nearer, down a road, as the order takes away.
 
-Discs of overlap kappa, the mean optical depth of their surface, lie as a random scatter. Along the direction t in
+Discs of overlap kappa, their opacity times area by the area of the surface, lie as a random scatter: the mean share
+of light that passes all of them is exp(-kappa). Along the direction t in
 which the picture of the surface comes nearer, all in standard deviations of the disc, one at 0 is seen at t with
 
     w(t) = phi(t) exp(-kappa Phi(r t)),
@@ -95,7 +96,8 @@ def lead(overlap, ratio, closeness):  # type: ignore[no-untyped-def]
     """
     i = overlap / (overlap + _SCALE) * _INTERVALS
     j = ratio / (ratio + _ONE) * _INTERVALS
-    row, column = int(min(i, _LAST)), int(min(j, _LAST))
+    # In this order a NaN, of a splat that is not drawn, gives the last cell and no place outside the table.
+    row, column = int(min(_LAST, i)), int(min(_LAST, j))
     down, across = i - np.float32(row), j - np.float32(column)
     near = min(closeness, _STEEPEST)
     total = _ZERO

@@ -6,6 +6,7 @@ The rules of `tasks.render.projection`, on tensors.
 import torch
 
 from tasks.render.painters_bias import FURTHEST, INTERVALS, LEADS, OVERLAP_SCALE, STEEPEST
+from tasks.render.projection import NEAR
 from tasks.render.view import View
 
 _FACING = 1e-20
@@ -20,7 +21,7 @@ def means_nearer(
     view: View,
     low_pass: float,
 ) -> torch.Tensor:
-    """World centres whose projection is where the splats belong; camera z, and so the order, stays.
+    """World centres whose projection is where the splats belong; camera z, and so the order, stays but for rounding.
 
     Parameters
     ----------
@@ -30,13 +31,14 @@ def means_nearer(
 
     Returns
     -------
-    float32 [N, 3]; what lies in the camera's plane or behind it stays where it is [m]
+    float32 [N, 3]; what is nearer than the near plane or behind it stays where it is [m]
     """
     R, t = means.new_tensor(view.viewmat[:3, :3]), means.new_tensor(view.viewmat[:3, 3])
     focal = means.new_tensor((view.K[0, 0], view.K[1, 1]))
     limits = means.new_tensor(view.ray_limits.reshape(2, 2))
     in_camera = means @ R.T + t
-    z = in_camera[:, 2:]
+    drawn = in_camera[:, 2:] >= NEAR
+    z = torch.where(drawn, in_camera[:, 2:], 1.0)
     ray = in_camera[:, :2] / z
     bounded = ray.clamp(limits[:, 0], limits[:, 1])
     axes = (_rotations(quats_wxyz) * scales[:, None, :]).transpose(1, 2) @ R.T
@@ -56,13 +58,13 @@ def means_nearer(
         _lead(overlap, (own / neighbours).sqrt(), closeness) / own.sqrt() * torch.where(slant > 0, 1.0, -1.0)
     )
     shift = torch.cat((way[:, None] * along / focal * z, torch.zeros_like(z)), dim=1) @ R
-    return means + torch.where(z > 0, shift, 0.0)
+    return means + torch.where(drawn, shift, 0.0)
 
 
 def _lead(overlap: torch.Tensor, ratio: torch.Tensor, closeness: torch.Tensor) -> torch.Tensor:
     """`tasks.render.painters_bias.lead`."""
     i, j = overlap / (overlap + OVERLAP_SCALE) * INTERVALS, ratio / (ratio + 1) * INTERVALS
-    row, column = i.long().clamp_max(INTERVALS - 1), j.long().clamp_max(INTERVALS - 1)
+    row, column = (place.long().clamp(0, INTERVALS - 1) for place in (i, j))
     terms = overlap.new_tensor(LEADS)
     down, across = i - row, j - column
     total = torch.zeros_like(overlap)

@@ -223,13 +223,17 @@ def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def
         # Inverse depth on the disc's plane is proportional to a (u - cx) + b (v - cy) + c.
         a, b = (r00 * nx + r01 * ny + r02 * nz) / fx, (r10 * nx + r11 * ny + r12 * nz) / fy
         slant = a * (u - cx) + b * (v - cy) + (r20 * nx + r21 * ny + r22 * nz)
-        # The covariance again: xx - pq^2 / yy = 1 / (2 column_falloff), pq = slope yy, yy = 1 / (2 row_falloff).
-        yy = _HALF / s[_RECORD + ROW_FALLOFF * BLOCK + l]
-        pq = s[_RECORD + SLOPE * BLOCK + l] * yy
-        xx = _HALF / s[_RECORD + COLUMN_FALLOFF * BLOCK + l] + s[_RECORD + SLOPE * BLOCK + l] * pq
-        along_x, along_y = xx * a + pq * b, pq * a + yy * b
+        # The covariance again, as a sum of squares: in a row, and from row to row along the slope.
+        within, across = (
+            _HALF / s[_RECORD + COLUMN_FALLOFF * BLOCK + l],
+            _HALF / s[_RECORD + ROW_FALLOFF * BLOCK + l],
+        )
+        slope = s[_RECORD + SLOPE * BLOCK + l]
+        down = a * slope + b
+        along_y = across * down
+        along_x = within * a + slope * along_y
         # Variances along the gradient, times its square: of the splat, of the pixel in it, of the neighbours.
-        own = max(a * along_x + b * along_y, _FACING)
+        own = max(_FACING, within * a * a + across * down * down)
         pixel = blur * (a * a + b * b)
         size = s[(SURROUNDINGS + 1) * BLOCK + l]
         neighbours = max(size * size * (own - pixel) + pixel, _FACING)

@@ -87,4 +87,7 @@ def _pieces(
     out["means"] = (out["means"] + place[kept, None] * direction).astype(np.float32)
     out["scales"][:, axis] = short
     out["opacities"] = opacity[kept].astype(np.float32)
+    if "surroundings" in out:
+        # They dim as the whole did, but cover more: opacity adds up where optical depth is shared out.
+        out["surroundings"][:, 0] *= opacity[kept].sum() / (times * gaussians.opacities[k])
     return out

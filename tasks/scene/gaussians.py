@@ -55,6 +55,8 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
     }  # fmt: skip
     if gaussians.surroundings is not None:
         shapes["surroundings"] = (n, 2)
+        if not gaussians.antialiased:
+            problems.append(f"{place}: surroundings are counted for antialiased Gaussians; these are not")
     for name, shape in shapes.items():
         if getattr(gaussians, name).shape != shape:
             problems.append(

@@ -13,15 +13,17 @@ NEIGHBOURS = 24
 ALIKE, IN_PLANE = 0.8, 0.3
 """Neighbours of one surface: least cosine between the normals, and largest sine of the angle between the plane of
 the Gaussian and the line to its neighbour [1]."""
+MOST_OVERLAP = 100.0
+"""No overlap is counted larger: nothing is seen through so much [1]."""
 _AT_ONCE = 65536
 
 
 def with_surroundings(gaussians: Gaussians) -> Gaussians:
     """The cloud with `Gaussians.surroundings`, as `tasks.render.painters_bias` wants them.
 
-    The overlap of a surface is its Gaussians' opacity times area, added up, per area: the mean optical depth along its
-    normal. It is counted over the `NEIGHBOURS` next Gaussians, out to the last of them, as far as they belong to the
-    same surface. A random scatter has one less than that number within that radius, a regular grid just that number:
+    The overlap of a surface is its Gaussians' opacity times area, added up, per area. It is counted over the
+    `NEIGHBOURS` next Gaussians, out to the last of them, as far as they belong to the same surface. A random scatter
+    has one less than that number within that radius, a regular grid just that number:
     half of one is taken off.
 
     Parameters
@@ -63,5 +65,6 @@ def _look_about(first, near, radius, means, normals, area, square, out):  # type
                 spread += area[j] * square[j]
         counted = (near.shape[1] - 1.5) / near.shape[1]
         disc = np.pi * radius[i] * radius[i]
-        out[i, 0] = counted * covered / disc if disc > 0 else 0.0
+        # Coincident points cover more than any number says.
+        out[i, 0] = min(counted * covered / disc, MOST_OVERLAP) if disc > 0 else MOST_OVERLAP
         out[i, 1] = np.sqrt(spread / covered / square[own])

@@ -102,6 +102,17 @@ def test_centres_for_a_gpu_project_where_the_kernel_puts_the_splats():
     assert np.abs(K[1, 1] * y / z + K[1, 2] - records[:, Y]).max() < 2e-3
 
 
+def test_centres_in_the_camera_s_plane_stay_on_a_gpu():
+    level = surrounded(random_cloud(50))
+    means = level.means.copy()
+    means[::3, 2] = 0.0
+    arrays = (means, level.quats_wxyz, level.scales, level.normals, level.surroundings)
+    view = view_of(AHEAD, K, WIDTH, HEIGHT)
+    moved = means_nearer(*(torch.from_numpy(array) for array in arrays), view, ANTIALIASED_LOW_PASS).numpy()
+    assert np.isfinite(moved).all()
+    assert np.array_equal(moved[::3], means[::3])
+
+
 def test_a_cloud_without_surroundings_is_drawn_as_its_trainer_drew_it():
     plain = random_cloud(200)
     prepared = prepare(plain)

@@ -8,6 +8,7 @@ import pytest
 from tasks.conventions import SemanticClass
 from tasks.render.rasteriser import prepare, rasterise
 from tasks.render.road_refinement import LENGTH_BY_FEATURE, refined_road
+from tasks.scene.surroundings import with_surroundings
 from tasks.surface.road_profile import RoadHazard
 from tests.render.test_road_edit import relief_of
 from tests.toy_street import toy_street
@@ -69,3 +70,13 @@ def test_a_flat_road_of_pieces_is_as_bright_as_before():
     assert changed.sum() > 300
     assert np.abs(whole.alpha - cut.alpha).max() < 0.04
     assert cut.rgb[changed].mean() == pytest.approx(whole.rgb[changed].mean(), rel=0.02)
+
+
+def test_pieces_know_how_densely_they_cover():
+    """As a count of the cut road says, in the middle of a feature long enough to be all pieces there."""
+    ground = with_surroundings(replace(SCENE.gaussians, antialiased=True))
+    fine = refined_road(ground, relief_of(replace(HAZARD, length_m=1.5)))
+    on = np.flatnonzero((fine.class_id == SemanticClass.ROAD) & (np.abs(fine.means[:, 0] - 10.1) < 0.3))
+    counted = with_surroundings(fine).surroundings
+    assert len(fine.surroundings) == len(fine)
+    assert np.median(fine.surroundings[on, 0] / counted[on, 0]) == pytest.approx(1, abs=0.15)

@@ -7,7 +7,7 @@ import pytest
 
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians, check_gaussians
-from tasks.scene.surroundings import with_surroundings
+from tasks.scene.surroundings import MOST_OVERLAP, with_surroundings
 from tests.render.clouds import cloud
 
 SPACING, SIZE, OPACITY = 0.04, 0.03, 0.9
@@ -21,7 +21,8 @@ def floor(scatter: bool = False) -> Gaussians:
     if scatter:
         x, y = np.random.default_rng(2).uniform(-20.5 * SPACING, 20.5 * SPACING, (2, len(x)))
     means = np.column_stack((x, y, 0 * x))
-    return cloud(means, scales=(SIZE, SIZE, 1e-3), opacities=OPACITY, normals=(0, 0, 1))
+    discs = cloud(means, scales=(SIZE, SIZE, 1e-3), opacities=OPACITY, normals=(0, 0, 1))
+    return replace(discs, antialiased=True)
 
 
 def inside(gaussians: Gaussians) -> np.ndarray:
@@ -70,6 +71,18 @@ def test_size_of_the_scene_does_not_matter():
 
 def test_one_gaussian_has_no_neighbours():
     assert with_surroundings(cloud((0, 0, 1))).surroundings.tolist() == [[0, 1]]
+
+
+def test_points_at_one_place_have_a_finite_overlap():
+    heap = floor()
+    heap = with_surroundings(replace(heap, means=np.zeros_like(heap.means)))
+    assert (heap.surroundings[:, 0] == MOST_OVERLAP).all()
+
+
+def test_surroundings_without_antialiasing_are_refused():
+    ground = with_surroundings(floor())
+    with pytest.raises(InputError, match="surroundings are counted for antialiased Gaussians; these are not"):
+        check_gaussians(replace(ground, antialiased=False))
 
 
 def test_surroundings_out_of_range_are_named():

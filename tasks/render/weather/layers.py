@@ -25,7 +25,7 @@ from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.render.weather.particles import Shutter, visible_streaks
 from tasks.render.weather.precipitation import Population, population
 from tasks.render.weather.relief import clear_light, overcast_light, relit
-from tasks.render.weather.scene_light import appended, ground_light, without, without_sun
+from tasks.render.weather.scene_light import ground_light, without_sun
 from tasks.render.weather.sky import (
     SkyLight,
     cloud_transmittance,
@@ -34,7 +34,7 @@ from tasks.render.weather.sky import (
     sky_light,
 )
 from tasks.render.weather.snow_field import SnowField, snow_field
-from tasks.render.weather.snow_layer import snow_layer, whitened
+from tasks.render.weather.snow_layer import snow_layer, snowed_over, whitened
 from tasks.render.weather.streaks import draw_streaks
 from tasks.render.weather.wet_road import wet_layer
 from tasks.scene.gaussians import Gaussians
@@ -175,7 +175,7 @@ def weather_scene(
         amount = (state.snow_coverage, state.snow_depth_mm, p.snow_cover)
         lift = None if relief is None else road_lift(scene, relief)
         snow = snow_layer(scene, field, white, *amount, lift)
-        scene = appended(without(whitened(scene, field, white, *amount), snow.buried), snow.gaussians)
+        scene = snowed_over(whitened(scene, field, white, *amount), snow)
     falling = Falling(
         population=falls,
         air=air,

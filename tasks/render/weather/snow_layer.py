@@ -9,7 +9,7 @@ from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.spherical_harmonics import C0
 from tasks.render.weather.coverage_field import FieldParameters, height_field
 from tasks.render.weather.road_anchors import AnchorParameters, road_anchors
-from tasks.render.weather.scene_light import recoloured, to_display_unclipped
+from tasks.render.weather.scene_light import appended, recoloured, to_display_unclipped, without
 from tasks.render.weather.shelter import open_share
 from tasks.render.weather.snow_field import SnowField, coverage_rank, local_depth_mm, tracks_at
 from tasks.render.weather.wheel_tracks import TrackParameters
@@ -62,11 +62,13 @@ class SnowLayer:
     ----------
     gaussians : to append to the scene; they keep their anchors' class
     anchors : int64 [A] the road Gaussian under each [1]
+    share : float64 [A] share of it that is hidden [1]
     buried : int64 [B] road Gaussians that nobody sees any more [1]
     """
 
     gaussians: Gaussians
     anchors: NDArray[np.int64]
+    share: NDArray[np.float64]
     buried: NDArray[np.int64]
 
 
@@ -154,10 +156,37 @@ def snow_layer(
         sh=sh,
         normals=normal.astype(np.float32),
         class_id=gaussians.class_id[index],
-        surroundings=_about(gaussians, index, hidden[on]),
+        surroundings=None,
     )
-    buried = index[(kept == 1) & (hidden_share(depth, p) >= BURIED)]
-    return SnowLayer(gaussians=layer, anchors=index, buried=buried)
+    share = hidden_share(depth, p)
+    buried = (kept == 1) & (share >= BURIED)
+    if gaussians.surroundings is not None:
+        # Where the ground is not buried its discs lie among those of the snow, and both cover as much as both.
+        about = gaussians.surroundings[index].astype(np.float64)
+        about[:, 0] *= share + ~buried
+        about[:, 1] *= _size(gaussians.scales[index]) / _size(scales)
+        layer = replace(layer, surroundings=about.astype(np.float32))
+    return SnowLayer(gaussians=layer, anchors=index, share=share, buried=index[buried])
+
+
+def snowed_over(gaussians: Gaussians, snow: SnowLayer) -> Gaussians:
+    """The scene with the layer on it, less what it buries.
+
+    Parameters
+    ----------
+    gaussians : the scene that the layer was made for, in whatever colours
+    snow : the layer
+
+    Returns
+    -------
+    Gaussians
+        The layer comes last.
+    """
+    if gaussians.surroundings is not None:
+        about = gaussians.surroundings.copy()
+        about[snow.anchors, 0] *= (1 + snow.share).astype(np.float32)
+        gaussians = replace(gaussians, surroundings=about)
+    return appended(without(gaussians, snow.buried), snow.gaussians)
 
 
 def whitened(
@@ -237,15 +266,9 @@ def _snow_colour(
     return shade[:, None] * (np.array(p.albedo) * np.asarray(white))
 
 
-def _about(
-    gaussians: Gaussians, index: NDArray[np.int64], opacity: NDArray[np.float64]
-) -> NDArray[np.float32] | None:
-    """Surroundings of a layer with this opacity on these Gaussians: theirs, as much thinner as it is fainter."""
-    if gaussians.surroundings is None:
-        return None
-    about = gaussians.surroundings[index].copy()
-    about[:, 0] *= opacity / gaussians.opacities[index]
-    return about
+def _size(scales: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Root of the two largest variances' sum, [A] [m]."""
+    return np.sqrt((np.sort(scales.astype(np.float64), axis=1)[:, 1:] ** 2).sum(axis=1))
 
 
 def _lying(

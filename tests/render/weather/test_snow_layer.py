@@ -14,8 +14,9 @@ from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.road_anchors import road_anchors
 from tasks.render.weather.scene_light import appended, mean_colours, without
 from tasks.render.weather.snow_field import coverage_rank, local_depth_mm, snow_field, tracks_at
-from tasks.render.weather.snow_layer import hidden_share, snow_layer, whitened
+from tasks.render.weather.snow_layer import hidden_share, snow_layer, snowed_over, whitened
 from tasks.scene.route import Route
+from tasks.scene.surroundings import with_surroundings
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import ASPHALT, road, surfels
 
@@ -223,3 +224,16 @@ def test_scenes_that_blend_display_colours_get_the_same_snow(street, parameters)
     layer = layer_at(display, parameters, 1.0, 30.0).gaussians
     linear = layer_at(street, parameters, 1.0, 30.0).gaussians
     assert mean_colours(layer) == pytest.approx(mean_colours(linear), rel=1e-4)
+
+
+@pytest.mark.parametrize(("coverage", "depth_mm"), [(1.0, 30.0), (1.0, 1.0), (0.6, 12.0)])
+def test_snow_and_ground_know_how_densely_both_together_cover(street, parameters, coverage, depth_mm):
+    """Against a count of the joined cloud: thick snow alone, thin snow among the discs of the ground."""
+    ground = with_surroundings(replace(street, antialiased=True))
+    snow = layer_at(ground, parameters, coverage, depth_mm)
+    joined = snowed_over(ground, snow)
+    assert len(joined.surroundings) == len(joined) == len(ground) - len(snow.buried) + len(snow.anchors)
+    counted = with_surroundings(joined).surroundings
+    ratio = joined.surroundings[-len(snow.anchors) :, 0] / counted[-len(snow.anchors) :, 0]
+    assert np.median(ratio) == pytest.approx(1, abs=0.15)
+    assert snowed_over(street, layer_at(street, parameters, coverage, depth_mm)).surroundings is None
