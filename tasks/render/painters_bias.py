@@ -6,8 +6,8 @@ share of a pixel at every distance, and slides under a car that drives. This mod
 can draw every disc as much nearer, down a road, as the order takes away.
 
 Discs of overlap kappa, their opacity times area by the area of the surface, lie as a random scatter: the mean share
-of light that passes all of them is exp(-kappa). Along the direction t in
-which the picture of the surface comes nearer, all in standard deviations of the disc, one at 0 is seen at t with
+of light that passes all of them is exp(-kappa). Along the direction t in which the picture of the surface comes
+nearer, all in standard deviations of the disc, one at 0 is seen at t with
 
     w(t) = phi(t) exp(-kappa Phi(r t)),
 

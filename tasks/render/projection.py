@@ -224,10 +224,8 @@ def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def
         a, b = (r00 * nx + r01 * ny + r02 * nz) / fx, (r10 * nx + r11 * ny + r12 * nz) / fy
         slant = a * (u - cx) + b * (v - cy) + (r20 * nx + r21 * ny + r22 * nz)
         # The covariance again, as a sum of squares: in a row, and from row to row along the slope.
-        within, across = (
-            _HALF / s[_RECORD + COLUMN_FALLOFF * BLOCK + l],
-            _HALF / s[_RECORD + ROW_FALLOFF * BLOCK + l],
-        )
+        within = _HALF / s[_RECORD + COLUMN_FALLOFF * BLOCK + l]
+        across = _HALF / s[_RECORD + ROW_FALLOFF * BLOCK + l]
         slope = s[_RECORD + SLOPE * BLOCK + l]
         down = a * slope + b
         along_y = across * down

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tasks.scene.gaussians import Gaussians
@@ -13,7 +14,7 @@ NEIGHBOURS = 24
 ALIKE, IN_PLANE = 0.8, 0.3
 """Neighbours of one surface: least cosine between the normals, and largest sine of the angle between the plane of
 the Gaussian and the line to its neighbour [1]."""
-MOST_OVERLAP = 100.0
+OPAQUE = 100.0
 """No overlap is counted larger: nothing is seen through so much [1]."""
 _AT_ONCE = 65536
 
@@ -23,8 +24,7 @@ def with_surroundings(gaussians: Gaussians) -> Gaussians:
 
     The overlap of a surface is its Gaussians' opacity times area, added up, per area. It is counted over the
     `NEIGHBOURS` next Gaussians, out to the last of them, as far as they belong to the same surface. A random scatter
-    has one less than that number within that radius, a regular grid just that number:
-    half of one is taken off.
+    has one less than that number within that radius, a regular grid just that number: half of one is taken off.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def with_surroundings(gaussians: Gaussians) -> Gaussians:
     if count < 1:
         alone = np.tile(np.array([0, 1], np.float32), (len(gaussians), 1))
         return replace(gaussians, surroundings=alone)
-    sizes = np.sort(gaussians.scales.astype(np.float64), axis=1)[:, 1:]
+    sizes = in_surface(gaussians.scales)
     area = 2 * np.pi * sizes[:, 0] * sizes[:, 1] * gaussians.opacities
     square = (sizes**2).sum(axis=1)
     tree = cKDTree(gaussians.means)
@@ -44,6 +44,16 @@ def with_surroundings(gaussians: Gaussians) -> Gaussians:
         distance, near = tree.query(gaussians.means[part], k=count + 1)
         _look_about(first, near, distance[:, -1], gaussians.means, gaussians.normals, area, square, out[part])
     return replace(gaussians, surroundings=out)
+
+
+def in_surface(scales: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The two standard deviations along the surface: all but the smallest, float64 [N, 2] [m].
+
+    Parameters
+    ----------
+    scales : [N, 3] as in `Gaussians` [m]
+    """
+    return np.sort(scales.astype(np.float64), axis=1)[:, 1:]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -66,5 +76,5 @@ def _look_about(first, near, radius, means, normals, area, square, out):  # type
         counted = (near.shape[1] - 1.5) / near.shape[1]
         disc = np.pi * radius[i] * radius[i]
         # Coincident points cover more than any number says.
-        out[i, 0] = min(counted * covered / disc, MOST_OVERLAP) if disc > 0 else MOST_OVERLAP
+        out[i, 0] = min(counted * covered / disc, OPAQUE) if disc > 0 else OPAQUE
         out[i, 1] = np.sqrt(spread / covered / square[own])

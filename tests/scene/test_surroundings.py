@@ -7,7 +7,7 @@ import pytest
 
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians, check_gaussians
-from tasks.scene.surroundings import MOST_OVERLAP, with_surroundings
+from tasks.scene.surroundings import OPAQUE, with_surroundings
 from tests.render.clouds import cloud
 
 SPACING, SIZE, OPACITY = 0.04, 0.03, 0.9
@@ -76,7 +76,7 @@ def test_one_gaussian_has_no_neighbours():
 def test_points_at_one_place_have_a_finite_overlap():
     heap = floor()
     heap = with_surroundings(replace(heap, means=np.zeros_like(heap.means)))
-    assert (heap.surroundings[:, 0] == MOST_OVERLAP).all()
+    assert (heap.surroundings[:, 0] == OPAQUE).all()
 
 
 def test_surroundings_without_antialiasing_are_refused():

@@ -14,6 +14,7 @@ from tasks.render.weather.shelter import open_share
 from tasks.render.weather.snow_field import SnowField, coverage_rank, local_depth_mm, tracks_at
 from tasks.render.weather.wheel_tracks import TrackParameters
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.surroundings import in_surface
 
 EDGE_WIDTHS = 1.4
 """Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
@@ -147,6 +148,8 @@ def snow_layer(
         colour = to_display_unclipped(colour)
     sh = np.zeros((len(index), *gaussians.sh.shape[1:]), dtype=np.float32)
     sh[:, 0] = (colour - 0.5) / C0
+    share = hidden_share(depth, p)
+    buried = (kept == 1) & (share >= BURIED)
     layer = replace(
         gaussians,
         means=(place + rise[:, None] * normal).astype(np.float32),
@@ -156,16 +159,8 @@ def snow_layer(
         sh=sh,
         normals=normal.astype(np.float32),
         class_id=gaussians.class_id[index],
-        surroundings=None,
+        surroundings=_surroundings(gaussians, index, scales, share, buried),
     )
-    share = hidden_share(depth, p)
-    buried = (kept == 1) & (share >= BURIED)
-    if gaussians.surroundings is not None:
-        # Where the ground is not buried its discs lie among those of the snow, and both cover as much as both.
-        about = gaussians.surroundings[index].astype(np.float64)
-        about[:, 0] *= share + ~buried
-        about[:, 1] *= _size(gaussians.scales[index]) / _size(scales)
-        layer = replace(layer, surroundings=about.astype(np.float32))
     return SnowLayer(gaussians=layer, anchors=index, share=share, buried=index[buried])
 
 
@@ -266,9 +261,19 @@ def _snow_colour(
     return shade[:, None] * (np.array(p.albedo) * np.asarray(white))
 
 
-def _size(scales: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Root of the two largest variances' sum, [A] [m]."""
-    return np.sqrt((np.sort(scales.astype(np.float64), axis=1)[:, 1:] ** 2).sum(axis=1))
+def _surroundings(
+    gaussians: Gaussians,
+    index: NDArray[np.int64],
+    scales: NDArray[np.float64],
+    share: NDArray[np.float64],
+    buried: NDArray[np.bool_],
+) -> NDArray[np.float32] | None:
+    """Of the layer, in these scales: where the ground is not buried, its discs lie among those of the snow."""
+    if gaussians.surroundings is None:
+        return None
+    before, now = (np.sqrt((in_surface(s) ** 2).sum(axis=1)) for s in (gaussians.scales[index], scales))
+    overlap, ratio = gaussians.surroundings[index].T
+    return np.column_stack((overlap * (share + ~buried), ratio * before / now)).astype(np.float32)
 
 
 def _lying(
