@@ -64,7 +64,7 @@ def means_nearer(
 def _lead(overlap: torch.Tensor, ratio: torch.Tensor, closeness: torch.Tensor) -> torch.Tensor:
     """`tasks.render.painters_bias.lead`."""
     i, j = overlap / (overlap + OVERLAP_SCALE) * INTERVALS, ratio / (ratio + 1) * INTERVALS
-    row, column = (place.long().clamp(0, INTERVALS - 1) for place in (i, j))
+    row, column = (place.long().clamp_max(INTERVALS - 1) for place in (i, j))
     terms = overlap.new_tensor(LEADS)
     down, across = i - row, j - column
     total = torch.zeros_like(overlap)

@@ -53,6 +53,31 @@ def test_neighbours_count_in_their_own_surface_only():
     assert both.surroundings[corner, 0].max() < 1.5 * OVERLAP
 
 
+def with_twin(ground: Gaussians, **changed: np.ndarray) -> Gaussians:
+    """The ground, and the same once more but for some arrays, half a cell aside."""
+    twin = replace(ground, means=ground.means + np.float32([SPACING / 2, SPACING / 2, 0]))
+    twin = replace(twin, **changed)
+    names = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
+    joined = {name: np.concatenate((getattr(ground, name), getattr(twin, name))) for name in names}
+    return with_surroundings(replace(ground, **joined))
+
+
+def test_a_surface_parallel_to_it_is_another():
+    ground = floor()
+    above = with_twin(ground, means=ground.means + np.float32([0, 0, SPACING]))
+    mixed = with_twin(ground)
+    here = inside(above)
+    assert above.surroundings[here, 0].mean() == pytest.approx(OVERLAP, rel=0.12)
+    assert mixed.surroundings[here, 0].mean() == pytest.approx(2 * OVERLAP, rel=0.12)
+
+
+def test_discs_that_stand_on_a_surface_are_not_of_it():
+    ground = floor()
+    upright = with_twin(ground, normals=ground.normals[:, [2, 1, 0]].copy())
+    lying = np.flatnonzero(inside(ground))
+    assert upright.surroundings[lying, 0].mean() == pytest.approx(OVERLAP, rel=0.12)
+
+
 def test_grit_among_larger_discs_knows_that_they_are_larger():
     ground = floor()
     scales = ground.scales.copy()
@@ -89,5 +114,9 @@ def test_surroundings_out_of_range_are_named():
     ground = with_surroundings(floor())
     with pytest.raises(InputError, match=r"surroundings must have shape \(1681, 2\)"):
         check_gaussians(replace(ground, surroundings=ground.surroundings[:5]))
-    with pytest.raises(InputError, match="surroundings must be an overlap of 0 or more and a positive size"):
-        check_gaussians(replace(ground, surroundings=-ground.surroundings))
+    for wrong in ([-1, 1], [1, -1], [1, 0]):
+        about = ground.surroundings * np.float32(wrong)
+        with pytest.raises(
+            InputError, match="surroundings must be an overlap of 0 or more and a positive size"
+        ):
+            check_gaussians(replace(ground, surroundings=about))

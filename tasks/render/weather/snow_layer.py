@@ -63,13 +63,13 @@ class SnowLayer:
     ----------
     gaussians : to append to the scene; they keep their anchors' class
     anchors : int64 [A] the road Gaussian under each [1]
-    share : float64 [A] share of it that is hidden [1]
+    cover : float64 [A] opacity times area of each by its anchor's [1]
     buried : int64 [B] road Gaussians that nobody sees any more [1]
     """
 
     gaussians: Gaussians
     anchors: NDArray[np.int64]
-    share: NDArray[np.float64]
+    cover: NDArray[np.float64]
     buried: NDArray[np.int64]
 
 
@@ -150,6 +150,8 @@ def snow_layer(
     sh[:, 0] = (colour - 0.5) / C0
     share = hidden_share(depth, p)
     buried = (kept == 1) & (share >= BURIED)
+    # Where the ground is not buried, its discs lie among those of the snow.
+    area = in_surface(scales).prod(axis=1) / in_surface(gaussians.scales[index]).prod(axis=1)
     layer = replace(
         gaussians,
         means=(place + rise[:, None] * normal).astype(np.float32),
@@ -159,9 +161,9 @@ def snow_layer(
         sh=sh,
         normals=normal.astype(np.float32),
         class_id=gaussians.class_id[index],
-        surroundings=_surroundings(gaussians, index, scales, share, buried),
+        surroundings=_surroundings(gaussians, index, area, share * area + ~buried),
     )
-    return SnowLayer(gaussians=layer, anchors=index, share=share, buried=index[buried])
+    return SnowLayer(gaussians=layer, anchors=index, cover=share * area, buried=index[buried])
 
 
 def snowed_over(gaussians: Gaussians, snow: SnowLayer) -> Gaussians:
@@ -179,7 +181,7 @@ def snowed_over(gaussians: Gaussians, snow: SnowLayer) -> Gaussians:
     """
     if gaussians.surroundings is not None:
         about = gaussians.surroundings.copy()
-        about[snow.anchors, 0] *= (1 + snow.share).astype(np.float32)
+        about[snow.anchors, 0] *= (1 + snow.cover).astype(np.float32)
         gaussians = replace(gaussians, surroundings=about)
     return appended(without(gaussians, snow.buried), snow.gaussians)
 
@@ -262,18 +264,13 @@ def _snow_colour(
 
 
 def _surroundings(
-    gaussians: Gaussians,
-    index: NDArray[np.int64],
-    scales: NDArray[np.float64],
-    share: NDArray[np.float64],
-    buried: NDArray[np.bool_],
+    gaussians: Gaussians, index: NDArray[np.int64], area: NDArray[np.float64], cover: NDArray[np.float64]
 ) -> NDArray[np.float32] | None:
-    """Of the layer, in these scales: where the ground is not buried, its discs lie among those of the snow."""
+    """Of Gaussians over these, so much of their area, on a surface so much more densely covered."""
     if gaussians.surroundings is None:
         return None
-    before, now = (np.sqrt((in_surface(s) ** 2).sum(axis=1)) for s in (gaussians.scales[index], scales))
     overlap, ratio = gaussians.surroundings[index].T
-    return np.column_stack((overlap * (share + ~buried), ratio * before / now)).astype(np.float32)
+    return np.column_stack((overlap * cover, ratio / np.sqrt(area))).astype(np.float32)
 
 
 def _lying(

@@ -234,6 +234,14 @@ def test_snow_and_ground_know_how_densely_both_together_cover(street, parameters
     joined = snowed_over(ground, snow)
     assert len(joined.surroundings) == len(joined) == len(ground) - len(snow.buried) + len(snow.anchors)
     counted = with_surroundings(joined).surroundings
-    ratio = joined.surroundings[-len(snow.anchors) :, 0] / counted[-len(snow.anchors) :, 0]
-    assert np.median(ratio) == pytest.approx(1, abs=0.15)
+    ratio = joined.surroundings / counted
+    layer = np.arange(len(joined)) >= len(joined) - len(snow.anchors)
+    assert np.median(ratio[layer, 0]) == pytest.approx(1, abs=0.15)
+    under = np.isin(np.delete(np.arange(len(ground)), snow.buried), snow.anchors)
+    if under.any():
+        assert np.median(ratio[: len(under)][under, 0]) == pytest.approx(1, abs=0.15)
+    narrow = layer.copy()
+    narrow[layer] = np.sort(snow.gaussians.scales, axis=1)[:, 2] < 0.7 * np.median(ground.scales.max(axis=1))
+    if narrow.any():
+        assert np.median(ratio[narrow, 1]) == pytest.approx(1, abs=0.25)
     assert snowed_over(street, layer_at(street, parameters, coverage, depth_mm)).surroundings is None
