@@ -1,0 +1,218 @@
+"""YAML and JSON text becomes plain values here and nowhere else: bounded, of one meaning, every fault told at once.
+
+What comes out holds text, finite numbers, booleans, nulls, lists, and tables whose keys are distinct text.
+"""
+
+import json
+import os
+import re
+import stat
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catalogs.sentences import brief, cap_problems, is_encodable, shorten
+from catalogs.yaml_text import DEEPEST, LARGEST_INTEGER, load_yaml
+from tasks.errors import InputError
+
+LARGEST_YAML = 8 * 2**20
+"""Bytes of a YAML document [1]: 20,000 scenarios written one by one take 2 MB."""
+LARGEST_JSON = 2**30
+"""Bytes of a JSON document [1]: the manifest of 10,000 clips takes 20 MB."""
+_NOT_STRUCTURE = bytes(set(range(256)) - set(b'"[]{}'))
+_STEPS = bytes.maketrans(b"[]{}", b"\x01\xff\x01\xff")
+_BACKSLASH_PAIR = re.compile(rb"\\.", re.DOTALL)
+_SURROGATE = re.compile(r"\\u[dD][89abAB]")
+
+
+def read_content(path: Path, kind: str, largest: int) -> bytes:
+    """The bytes of a regular file; anything else is refused without waiting for it.
+
+    Parameters
+    ----------
+    path : the file
+    kind : what it is called in the sentence
+    largest : bytes it may have [1]
+
+    Raises
+    ------
+    InputError
+        If it is missing, unreadable, too large or no regular file.
+    """
+    where = shorten(path)
+    try:
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise InputError(f"{where}: a {kind} must be a regular file; it is a folder, pipe or device")
+            content = file.read(largest + 1)
+    except FileNotFoundError:
+        raise InputError(f"{where}: a {kind} must exist; there is no such file") from None
+    except OSError as error:
+        raise InputError(f"{where}: a {kind} must be readable; {error.strerror}") from None
+    except InputError:
+        raise
+    except ValueError as error:  # a name with NUL, or with characters that no file name can have
+        raise InputError(f"{where}: a {kind} must have a proper file name; {shorten(error)}") from None
+    if len(content) > largest:
+        raise InputError(f"{where}: a {kind} must have at most {largest} bytes; it has more")
+    return content
+
+
+def read_yaml(path: Path, kind: str) -> dict[str, Any]:
+    """The table that a YAML file holds; the rules are those of `parse_yaml`.
+
+    Parameters
+    ----------
+    path : the file
+    kind : what it is called in the sentences
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or breaks a rule.
+    """
+    return parse_yaml(read_content(path, kind, LARGEST_YAML), path, kind)
+
+
+def parse_yaml(content: bytes, place: object, kind: str) -> dict[str, Any]:
+    """The table that YAML text holds.
+
+    Parameters
+    ----------
+    content : UTF-8
+    place : where it comes from, for the sentences
+    kind : what it is called in them
+
+    Raises
+    ------
+    InputError
+        One sentence for each fault: no UTF-8, no YAML, no table, too large, too deep, a key that stands twice or is
+        no text, a number that is not finite or too large, a tag beyond plain values.
+    """
+    value = parse_yaml_value(content, place, kind)
+    if not isinstance(value, dict):
+        raise InputError(
+            f"{shorten(place)}: a {kind} must be a table of keys and values; it is {brief(value)}"
+        )
+    return value
+
+
+def parse_yaml_value(content: bytes, place: object, kind: str) -> Any:
+    """The value that YAML text holds, be it a table, a list or a single value; the rules are those of `parse_yaml`.
+
+    Parameters
+    ----------
+    content : UTF-8
+    place : where it comes from, for the sentences
+    kind : what it is called in them
+
+    Raises
+    ------
+    InputError
+        One sentence for each fault.
+    """
+    start = f"{shorten(place)}: a {kind} must"
+    text = _decode(content, start, LARGEST_YAML)
+    return load_yaml(text, start)
+
+
+def read_json_document(path: Path, kind: str, *, large_integers: bool = False) -> Any:
+    """The value that a JSON file holds; the rules are those of `parse_json`.
+
+    Parameters
+    ----------
+    path : the file
+    kind : what it is called in the sentences
+    large_integers : let integers beyond 2^53 pass
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or breaks a rule.
+    """
+    content = read_content(path, kind, LARGEST_JSON)
+    return parse_json(content, path, kind, large_integers=large_integers)
+
+
+def parse_json(content: bytes, place: object, kind: str, *, large_integers: bool = False) -> Any:
+    """The value that JSON text holds.
+
+    Parameters
+    ----------
+    content : UTF-8
+    place : where it comes from, for the sentences
+    kind : what it is called in them
+    large_integers : let integers beyond 2^53 pass, for numbers that become floats, such as a logger's time in ns
+
+    Raises
+    ------
+    InputError
+        One sentence for each fault: no UTF-8, no JSON, too large, too deep, a key that stands twice, a number that
+        is not finite or too large, half of a surrogate pair.
+    """
+    start = f"{shorten(place)}: a {kind} must"
+    text = _decode(content, start, LARGEST_JSON)
+    if (depth := _measure_depth(content)) > DEEPEST:
+        raise InputError(f"{start} have at most {DEEPEST} tables and lists inside each other; it has {depth}")
+    problems: list[str] = []
+    most, longest, rule = (2**63, 20, "2^63") if large_integers else (LARGEST_INTEGER, 17, "2^53")
+
+    def build_table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        table = dict(pairs)
+        if len(table) != len(pairs):
+            problems.append(f"have distinct keys in a table; {_repeated([key for key, _ in pairs])} twice")
+        return table
+
+    def build_integer(digits: str) -> int:
+        number = int(digits) if len(digits) <= longest else 2 * most
+        if not -most <= number <= most:
+            problems.append(f"have integers of at most {rule}; one is {shorten(digits, 40)}")
+        return number
+
+    def build_float(digits: str) -> float:
+        number = float(digits)
+        if not isfinite(number):
+            problems.append(f"have finite numbers; one is {shorten(digits, 40)}")
+        return number
+
+    try:
+        value = json.loads(
+            text,
+            object_pairs_hook=build_table,
+            parse_int=build_integer,
+            parse_float=build_float,
+            parse_constant=build_float,
+        )
+    except ValueError as error:
+        raise InputError(f"{start} be valid JSON; {shorten(error)}") from None
+    if _SURROGATE.search(text) and not is_encodable(json.dumps(value, ensure_ascii=False)):
+        problems.append("have whole characters; one is half of a surrogate pair")
+    if problems:
+        raise InputError(cap_problems([f"{start} {problem}" for problem in problems]))
+    return value
+
+
+def _decode(content: bytes, start: str, largest: int) -> str:
+    if len(content) > largest:
+        raise InputError(f"{start} have at most {largest} bytes; it has {len(content)}")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{start} be UTF-8 text; line {line} is not: save it as UTF-8") from None
+
+
+def _measure_depth(content: bytes) -> int:
+    """Tables and lists inside each other in JSON text: the brackets outside strings, counted up and down."""
+    if b"\\" in content:
+        content = _BACKSLASH_PAIR.sub(b"", content)
+    brackets = b"".join(content.translate(None, _NOT_STRUCTURE).split(b'"')[::2])
+    steps = np.frombuffer(brackets.translate(_STEPS), np.int8)
+    return int(steps.cumsum(dtype=np.int64).max(initial=0))
+
+
+def _repeated(keys: list[str]) -> str:
+    twice = sorted({key for key in keys if keys.count(key) > 1})
+    return f"{', '.join(brief(key) for key in twice[:10])} {'stands' if len(twice) == 1 else 'stand'} there"

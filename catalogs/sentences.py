@@ -1,0 +1,100 @@
+"""Sentences about faulty input: values and lists cut to what a reader takes in, and pydantic's rules in words."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from reprlib import Repr
+from typing import Any
+
+from pydantic import ValidationError
+
+MOST_PROBLEMS = 20
+"""Problems told of one document [1]: more do not fit on a screen, and a mended start often mends the rest."""
+
+_SHORT = Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
+_SHORT.maxdict = _SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxset = 4
+_SHORT.maxlevel = 3
+
+
+def shorten(text: object, most: int = 200) -> str:
+    """The text on one line; where it is too long, its start and its end.
+
+    Parameters
+    ----------
+    text : what to show, such as a path or another library's message
+    most : characters to keep [1]
+    """
+    line = " ".join("".join(c if c.isprintable() else " " for c in str(text)[: 2 * most]).split())
+    whole = len(str(text)) <= 2 * most
+    if whole and len(line) <= most:
+        return line
+    tail = "".join(c if c.isprintable() else " " for c in str(text)[-most // 3 :])
+    return f"{line[: most - len(tail) - 3]}...{tail}"
+
+
+def brief(value: object, most: int = 60) -> str:
+    """A value as code shows it, cut to a few words.
+
+    Parameters
+    ----------
+    value : any value of a document
+    most : characters to keep [1]
+    """
+    return shorten(_SHORT.repr(value), most)
+
+
+def cap_problems(problems: Sequence[str], most: int = MOST_PROBLEMS) -> list[str]:
+    """The first problems, and how many more there are.
+
+    Parameters
+    ----------
+    problems : one sentence each
+    most : sentences to keep [1]
+    """
+    if len(problems) <= most:
+        return list(problems)
+    return [*problems[:most], f"... and {len(problems) - most} more problems"]
+
+
+def is_encodable(text: str) -> bool:
+    """Whether the text can be written as UTF-8: half of a surrogate pair cannot.
+
+    Parameters
+    ----------
+    text : any text
+    """
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def describe_rules(
+    error: ValidationError, place: object, known: Mapping[tuple[int | str, ...], Iterable[str]] | None = None
+) -> list[str]:
+    """Every rule that a document breaks, one sentence each.
+
+    Parameters
+    ----------
+    error : of the model that the document was held against
+    place : the document
+    known : keys that exist, by the place of their table; told where a key is unknown
+    """
+    where = shorten(place)
+    return [f"{where}: {_describe_rule(problem, known or {})}" for problem in error.errors(include_url=False)]
+
+
+def _describe_rule(problem: Any, known: Mapping[tuple[int | str, ...], Iterable[str]]) -> str:
+    place = shorten(".".join(str(part) for part in problem["loc"]) or "the whole document", 120)
+    match problem["type"]:
+        case "missing":
+            return f"{place} is missing: add it"
+        case "extra_forbidden":
+            there = known.get(problem["loc"][:-1])
+            names = f"; known here are {', '.join(there)}" if there else ""
+            return f"{place} is not a known key: remove it or correct its name{names}"
+        case "value_error":
+            return f"{place}: {shorten(problem['msg'].removeprefix('Value error, '), 1000)}"
+        case _:
+            rule = problem["msg"].replace("Input should be", "must be")
+            return f"{place}: {rule}; it is {brief(problem['input'])}"
