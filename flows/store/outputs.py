@@ -1,0 +1,250 @@
+"""Results in a folder of the user's: a command overwrites and deletes only files that it wrote there itself before.
+
+The folder's marker lists them by command. A name stands in it before the file is there, so that a killed command
+knows its files again. What a marker from elsewhere claims is still only a name inside the folder, and no link is
+followed.
+"""
+
+import errno
+import fcntl
+import json
+import os
+import re
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from flows.store.layout import write_atomically, write_json
+from tasks.errors import InputError
+
+MARKER = ".musync-written"
+FORMAT = "musync-written/1"
+MOST_BYTES = 64 * 2**20
+"""Size of the largest marker that is read [B]: half a million names."""
+SHOWN = 8
+NAME_BYTES = 220
+"""Longest name of a file [B]: file systems take 255, and a file that is being written has a longer name."""
+
+
+class Outputs:
+    """Files of one command in a folder; without a folder nothing is written.
+
+    Parameters
+    ----------
+    out : the folder, which need not exist; None writes nothing
+    command : as the user types it after ``musync``
+    names : of the files, relative to the folder, with ``/`` between its parts
+
+    Raises
+    ------
+    InputError
+        Listing every file in the way that the command did not write, every link, and a folder that cannot be used.
+    """
+
+    def __init__(self, out: str | Path | None, command: str, *names: str) -> None:
+        self.folder = None if out is None else Path(out)
+        self.command, self.names = command, names
+        self._claimed = self._alone = False
+        if self.folder is not None:
+            self._refuse_strangers(self.folder)
+
+    def write(self, name: str, content: str | bytes | memoryview) -> None:
+        """Write a file whole or not at all."""
+        if self.folder is not None:
+            write_atomically(self.path(name), content.encode() if isinstance(content, str) else content)
+
+    def write_json(self, name: str, value: Any) -> None:
+        """Write readable JSON; the same value gives the same bytes."""
+        if self.folder is not None:
+            write_json(self.path(name), value)
+
+    def path(self, name: str) -> Path:
+        """Where a file of this command lies; from now on the marker lists it."""
+        if self.folder is None or name not in self.names:
+            raise ValueError(f"{name} is none of the files that {self._title} has announced")
+        if not self._claimed:
+            self._refuse_strangers(self.folder)
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with self._locked(self.folder):
+                _write_marker(self.folder, read_marker(self.folder) | dict.fromkeys(self.names, self.command))
+            self._claimed = True
+        return self.folder / name
+
+    def remove_others(self, like: Callable[[str], object]) -> None:
+        """Delete what earlier calls of the command wrote and this one does not.
+
+        Parameters
+        ----------
+        like : whether a name has the form of those that may be deleted
+        """
+        if self.folder is None:
+            return
+        with self._locked(self.folder):
+            known = read_marker(self.folder)
+            mine = {name for name, command in known.items() if command == self.command}
+            gone = {name for name in mine - set(self.names) if like(name)}
+            for name in gone:
+                if _in_the_way(self.folder, name, known, self.command) is None:
+                    (self.folder / name).unlink(missing_ok=True)
+            _write_marker(self.folder, {name: command for name, command in known.items() if name not in gone})
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other calls from writing into the folder.
+
+        Raises
+        ------
+        InputError
+            If one is writing there now.
+        """
+        if self.folder is None:
+            yield
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with _held(self.folder, wait=False):
+            self._alone = True
+            try:
+                yield
+            finally:
+                self._alone = False
+
+    def _locked(self, folder: Path) -> AbstractContextManager[None]:
+        return nullcontext() if self._alone else _held(folder, wait=True)
+
+    def _refuse_strangers(self, folder: Path) -> None:
+        problems = [f"{folder}: {problem}" for problem in map(name_problem, self.names) if problem]
+        nearest = next(place for place in (folder, *folder.absolute().parents) if os.path.lexists(place))
+        if not nearest.is_dir():
+            problems.append(f"{nearest}: must be a folder; name another one for the files of {self._title}")
+        elif not os.access(nearest, os.W_OK | os.X_OK):
+            problems.append(f"{nearest}: must be a folder that can be written; name another one")
+        if problems:
+            raise InputError(problems)
+        if not folder.is_dir():
+            return
+        known = read_marker(folder)
+        found = (_in_the_way(folder, name, known, self.command) for name in self.names)
+        strangers = list(dict.fromkeys(problem for problem in found if problem is not None))
+        if strangers:
+            rest = [f"{folder}: and {len(strangers) - SHOWN} more"] if len(strangers) > SHOWN else []
+            raise InputError(strangers[:SHOWN] + rest)
+
+    @property
+    def _title(self) -> str:
+        return f"musync {self.command}"
+
+
+def name_problem(name: str) -> str | None:
+    """Why a name cannot be a file's inside the folder; None if it can."""
+    parts = PurePosixPath(name).parts
+    if not parts or name != "/".join(parts) or parts[0] == "/" or ".." in parts:
+        return f"{name!r} must be a name inside the folder, without '..' or a slash in front"
+    if re.search(r"[\x00-\x1f\x7f\ud800-\udfff]", name):
+        return f"{name!r} must be a file name without control characters"
+    if any(len(part.encode()) > NAME_BYTES for part in parts):
+        return f"{name[:40]!r}... must be at most {NAME_BYTES} bytes long; it has {len(name.encode())}"
+    return None
+
+
+def read_marker(folder: Path) -> dict[str, str]:
+    """Which command wrote which file of a folder; empty where no marker lies.
+
+    Raises
+    ------
+    InputError
+        If the marker is no file of ours.
+    """
+    path = folder / MARKER
+    try:
+        # a link is not followed, and a pipe not waited for
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise
+        raise _not_a_marker(path) from None
+    with open(descriptor, "rb") as stream:
+        facts = os.fstat(descriptor)
+        if not stat.S_ISREG(facts.st_mode) or facts.st_size > MOST_BYTES:
+            raise _not_a_marker(path)
+        content = stream.read(MOST_BYTES)
+    try:
+        value = json.loads(content)
+    except (ValueError, RecursionError):
+        raise _not_a_marker(path) from None
+    files = value.get("files") if isinstance(value, dict) and value.get("format") == FORMAT else None
+    if not isinstance(files, dict) or not all(
+        isinstance(command, str) and name_problem(name) is None for name, command in files.items()
+    ):
+        raise _not_a_marker(path)
+    return files
+
+
+def refuse_link(path: Path) -> None:
+    """Refuse to write to a file through a link, or to what is no file.
+
+    Raises
+    ------
+    InputError
+        If something else than a regular file lies there.
+    """
+    if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
+        raise InputError(f"{path}: must be a file and no link, folder or device; move it away")
+
+
+def _in_the_way(folder: Path, name: str, known: dict[str, str], command: str) -> str | None:
+    """What keeps a command from writing a file; None for a free name and for its own earlier file."""
+    *between, last = PurePosixPath(name).parts
+    place = folder
+    for part in between:
+        place = place / part
+        if not os.path.lexists(place):
+            return None
+        if place.is_symlink() or not place.is_dir():
+            return f"{place}: must be a folder and no link; move it away or name another folder"
+    place = place / last
+    if not os.path.lexists(place):
+        return None
+    if not stat.S_ISREG(place.lstat().st_mode):
+        return f"{place}: must be a file and no link or folder; move it away or name another folder"
+    if known.get(name) != command:
+        return (
+            f"{place} is not a file that musync {command} wrote, or an earlier version wrote it, which kept no list:"
+            " move it away or name another folder"
+        )
+    return None
+
+
+def _not_a_marker(path: Path) -> InputError:
+    return InputError(
+        f"{path}: must be muSync's list of the files that it wrote there ({FORMAT}); name another folder"
+    )
+
+
+def _write_marker(folder: Path, files: dict[str, str]) -> None:
+    value = {"format": FORMAT, "files": files}
+    text = json.dumps(value, indent=0, sort_keys=True, ensure_ascii=False)
+    write_atomically(folder / MARKER, (text + "\n").encode())
+
+
+@contextmanager
+def _held(folder: Path, *, wait: bool) -> Iterator[None]:
+    """Lock a folder itself, so that no lock file stays behind."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            raise InputError(
+                f"{folder}: another musync command is writing there; wait for it or name another folder"
+            ) from None
+        except OSError as error:
+            if error.errno not in {errno.EBADF, errno.EOPNOTSUPP, errno.ENOLCK}:
+                raise
+            # a network file system that locks no folders: commands that run one after another need no lock
+        yield
+    finally:
+        os.close(descriptor)
