@@ -1,0 +1,130 @@
+"""Signing a finished dataset, and what its signatures say."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from securesystemslib.signer import CryptoSigner
+
+from catalogs.documents import read_content
+from flows.store.address import publish, working
+from flows.store.layout import Layout, write_atomically
+from flows.store.lock import sole_writer
+from flows.store.sealed import read_manifest
+from manifests.canonical import sha256_of
+from manifests.manifest import manifest_damage
+from manifests.signing import (
+    ENVELOPE,
+    LARGEST_ENVELOPE,
+    add_signature,
+    load_signer,
+    load_verifier,
+    read_envelope,
+    signature_problems,
+)
+from tasks.errors import InputError
+
+LARGEST_KEY = 2**16
+"""Bytes of a key file [1]: an Ed25519 key takes 120."""
+SEAL_ALONE = "the seal shows damage, not forgery: a stranger who changes files can compute it again"
+
+
+def sign(dataset: str, *, key: str) -> dict[str, Any]:
+    """Sign a finished dataset's manifest, and with it every file that the manifest records.
+
+    The signature goes into ``manifest.dsse.json`` beside the manifest. Another key adds another signature; the same
+    key changes nothing. The files themselves are not looked at: `verify` does that, before and after.
+
+    Parameters
+    ----------
+    dataset : a sealed dataset
+    key : file with the Ed25519 private key: PEM, PKCS#8, without passphrase
+
+    Returns
+    -------
+    ``key_id`` of the key; ``manifest_sha256``, what it vouches for; ``signatures`` in the envelope; ``written``, False
+    where the key had signed already.
+
+    Raises
+    ------
+    InputError
+        If the key is no Ed25519 private key, the manifest is damaged, or the present envelope holds another statement.
+    """
+    signer = load_signer(read_content(Path(key), "private key", LARGEST_KEY), key)
+    with working(dataset, _signed_record) as layout:
+        read_manifest(layout)
+        with sole_writer(layout):
+            try:
+                return _signed(layout, signer)
+            finally:
+                shutil.rmtree(layout.staging)
+
+
+def _signed(layout: Layout, signer: CryptoSigner) -> dict[str, Any]:
+    content = layout.manifest.read_bytes()
+    if fault := manifest_damage(content):
+        raise InputError(f"{layout}/manifest.json: only a sound manifest can be signed; it is {fault}")
+    before = _envelope(layout)
+    envelope = add_signature(content, before, signer)
+    if envelope != before:
+        write_atomically(layout.root / ENVELOPE, envelope)
+        publish(layout, [layout.root / ENVELOPE])
+    return {
+        "key_id": signer.public_key.keyid,
+        "manifest_sha256": sha256_of([content]),
+        "signatures": len(read_envelope(envelope).signatures),
+        "written": envelope != before,
+    }
+
+
+def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
+    """What a dataset's signatures say.
+
+    Parameters
+    ----------
+    layout : a sealed dataset
+    key : file with an Ed25519 public key in PEM; None checks no signature
+
+    Returns
+    -------
+    ``signed``: True if the key's signature over this very manifest is valid, False if not, None if no key is given;
+    ``signature``: the same in a sentence.
+
+    Raises
+    ------
+    InputError
+        If the key is no Ed25519 public key.
+    """
+    if key is None:
+        return {"signed": None, "signature": _unchecked(layout)}
+    verifier = load_verifier(read_content(Path(key), "public key", LARGEST_KEY), key)
+    try:
+        problems = signature_problems(layout.manifest.read_bytes(), _envelope(layout), verifier)
+    except InputError as error:
+        problems = list(error.problems)
+    if problems:
+        return {"signed": False, "signature": "; ".join(problems)}
+    return {"signed": True, "signature": f"valid: key {verifier.keyid[:16]} has signed this manifest.json"}
+
+
+def _unchecked(layout: Layout) -> str:
+    try:
+        envelope = _envelope(layout)
+        if envelope is None:
+            return f"there is none, and {SEAL_ALONE}"
+        count = len(read_envelope(envelope).signatures)
+    except InputError as error:
+        return f"not checked, and not readable: {'; '.join(error.problems)}; {SEAL_ALONE}"
+    return f"{count} not checked: give the signer's public key with --key; {SEAL_ALONE}"
+
+
+def _envelope(layout: Layout) -> bytes | None:
+    path = layout.root / ENVELOPE
+    if not path.is_symlink() and not path.exists():
+        return None
+    return read_content(path, "signature envelope", LARGEST_ENVELOPE)
+
+
+def _signed_record(name: str) -> bool:
+    """What signing reads."""
+    return name in {"plan.json", "manifest.json", ENVELOPE}
