@@ -1,9 +1,12 @@
 """What code, on what libraries and processor, makes the data: recorded so that a difference can be named."""
 
 import importlib.metadata
+import os
 import platform
+import subprocess
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from manifests.canonical import sha256_of, sha256_of_file
 
@@ -13,6 +16,8 @@ RECORDED_LIBRARIES = (
     "numpy", "scipy", "numba", "llvmlite", "torch", "pyarrow", "pandas", "zarr", "numcodecs",
     "opencv-python-headless", "dask", "distributed", "prefect",
 )  # fmt: skip
+GIT_WAIT_S = 10
+"""Longest that git may take [s]; it takes hundredths of a second."""
 
 
 @lru_cache
@@ -36,6 +41,39 @@ def source_hash() -> str:
 def code_version() -> dict[str, str]:
     """The project's version and the hash of its source."""
     return {"version": importlib.metadata.version("musync"), "source_sha256": source_hash()}
+
+
+@lru_cache
+def git_commit(root: Path = SOURCE_ROOT) -> dict[str, Any] | None:
+    """The commit that the source is a checkout of, and whether its packages have changed since.
+
+    Asked of git without its hooks, monitors and locks, and not of a repository further up, to which an installed copy
+    of the source would be just another file.
+
+    Parameters
+    ----------
+    root : top folder of the checkout
+
+    Returns
+    -------
+    ``commit`` and ``changed``; None if there is no checkout, no commit or no git.
+    """
+    if not (root / ".git").exists():
+        return None
+    command = ["git", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null", "--no-optional-locks",
+               "status", "--porcelain=v2", "--branch", "--", *SOURCE_PACKAGES]  # fmt: skip
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    try:
+        said = subprocess.run(
+            command, cwd=root, env=variables, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+            timeout=GIT_WAIT_S, check=True,
+        ).stdout  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return None
+    lines = said.splitlines()
+    commit = next((line.split()[-1] for line in lines if line.startswith("# branch.oid ")), "(initial)")
+    changed = any(not line.startswith("#") for line in lines)
+    return None if commit == "(initial)" else {"commit": commit, "changed": changed}
 
 
 def library_versions() -> dict[str, str]:
