@@ -1,0 +1,282 @@
+"""Every parser of what a stranger may have written: sound documents, the loader, and the rules that it keeps."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.fuzzing import seals, sound
+from benchmarks.fuzzing.rules import (
+    CELLS_FINITE,
+    FINITE,
+    INF,
+    NAN,
+    UNITS,
+    Rule,
+    files_inside,
+    hashes_keep_their_form,
+    ids_keep_their_form,
+    limits,
+)
+from catalogs.bump_studies import load_bump_study
+from catalogs.buses import load_bus
+from catalogs.calibration import load_procedure
+from catalogs.cameras import load_camera
+from catalogs.campaigns import read_campaign
+from catalogs.channel_maps import load_channel_map
+from catalogs.drives import read_drives
+from catalogs.effects import load_effects
+from catalogs.effects.truths import load_sizes, load_truths
+from catalogs.gates import load_foreign_gates, load_gates
+from catalogs.grids import load_grid
+from catalogs.hazard_markings import load_marking
+from catalogs.learned_judges import load_judges
+from catalogs.protocols import load_protocol
+from catalogs.recordings import read_signals
+from catalogs.references import read_reference
+from catalogs.scenes.folder import read_scene
+from catalogs.scenes.gaussian_files import read_gaussians
+from catalogs.scenes.route_files import read_route
+from catalogs.scenes.stereo_folder import read_stereo_folder
+from catalogs.scenes.street import load_street_layout
+from catalogs.stop_studies import load_stop_study
+from catalogs.studies import load_sensitivity_study
+from catalogs.studies.closing import load_closing_study
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from catalogs.weather import load_weather
+from flows.auditing.verify import verify
+from flows.judging.foreign_sources import read_camera, read_claim, read_footage
+from flows.judging.physics import clip_columns, clip_facts, read_constants
+from flows.judging.trajectories import read_trajectory
+from flows.making.plan import read_plan
+from flows.making.scenes import scene_import
+from flows.making.seal import seal
+from flows.reading.describe import describe, validate
+from flows.reading.query import VIEWS, sql
+from flows.store.layout import Layout
+from flows.store.sealed import read_manifest
+from manifests.frozen_run import read_frozen
+from tasks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parser:
+    """One parser.
+
+    Parameters
+    ----------
+    name : of the parser
+    write : writes its sound documents
+    read : calls the real loader on a folder with one document
+    targets : names of the files that are mutated, as regular expressions
+    share : of all inputs, by weight [1]
+    rules : that mutations break knowingly
+    known_keys : places of mappings, as a regular expression, that take no unknown key; None where all are taken
+    reseal : makes seals fit again; None without seals
+    writes : the loader changes the document's folder
+    """
+
+    name: str
+    write: sound.Writer
+    read: Callable[[Path], object]
+    targets: tuple[str, ...] = (r".*",)
+    share: float = 1.0
+    rules: tuple[Rule, ...] = ()
+    known_keys: str | None = None
+    reseal: seals.Resealing | None = None
+    writes: bool = False
+
+    def mutates(self, file: str) -> bool:
+        """Whether a file of the document is mutated."""
+        return any(re.fullmatch(target, file) for target in self.targets)
+
+
+def entry(
+    name: str,
+    pattern: str,
+    load: Callable[[Path], object],
+    *,
+    share: float = 1.0,
+    reseal: seals.Resealing | None = None,
+) -> Parser:
+    """A parser of catalogue files: everything has a unit and nothing is unknown or infinite."""
+    return Parser(
+        name=name, write=sound.entries(pattern), read=lambda folder: load(folder / "entry.yaml"), share=share,
+        rules=(FINITE, UNITS), known_keys=".*", reseal=reseal,
+    )  # fmt: skip
+
+
+def read_dataset(folder: Path) -> None:
+    """What a reader does first: verify, describe, ask every view."""
+    result = verify(str(folder))
+    describe(str(folder))
+    for view in VIEWS:
+        sql(
+            str(folder),
+            f"SELECT * FROM {view} ORDER BY clip_id LIMIT 5" if view != "pairs" else "SELECT * FROM pairs",
+        )
+    if not result["verified"]:
+        raise InputError([f"{fault['path']} is {fault['damage']}" for fault in result["damaged"]])
+
+
+def read_tables(folder: Path) -> None:
+    """The tables of every clip as the auditors of its physics read them."""
+    for facts in clip_facts(folder):
+        clip_columns(folder, "ticks", facts)
+        clip_columns(folder, "frames", facts)
+
+
+def import_scene(folder: Path) -> None:
+    """A file of Gaussians along a route, to the folder that is not written."""
+    files = {path.name.partition(".")[0]: path for path in folder.iterdir()}
+    scene_import(str(files["cloud"]), str(files["route"]), str(folder / "scene"), camera_height=1.65)
+
+
+def uncached(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function without its cache, in which another document of the same place would be found."""
+    return getattr(function, "__wrapped__", function)
+
+
+NUMBERS_OF_A_GRID = (
+    limits("precipitation_mm_h", -1, 50_000, 1e308),
+    limits("initial_speed_km_h", -1, 5_000, 1e308),
+    limits("peak_pressure_mpa", -1, 300, 1e300),
+    limits("frames", -1, 0, 1, 2**31, 2**70),
+    limits("frame_rate_hz", -1, 0, 1e9),
+    limits("seed", -1, 2**53),
+)
+RECORDED_FILES = r"(clips\|\d+\|)?artifacts\|[^|]+"
+PLANNED = (
+    ids_keep_their_form(r"clips\|\d+\|clip_id|run_id"),
+    hashes_keep_their_form(r"inputs\|[^|]+|scene\|sha256"),
+    files_inside(r"inputs\|[^|]+", of_keys=True),
+    FINITE,
+)
+RECORDED = (
+    *PLANNED,
+    files_inside(RECORDED_FILES, of_keys=True),
+    hashes_keep_their_form(RECORDED_FILES),
+)
+
+PARSERS: tuple[Parser, ...] = (
+    Parser(
+        name="grid", write=sound.grids, read=lambda folder: load_grid(folder / "grid.yaml"), share=8,
+        rules=(FINITE, *NUMBERS_OF_A_GRID), known_keys=r"|base|latin_hypercube|(axes\|[^|]+|scenarios)\|[^|]+",
+    ),
+    Parser(
+        name="planned grid", write=sound.planned_grids, targets=("grid.yaml",), share=1,
+        read=lambda folder: validate(str(folder / "grid.yaml")), rules=(FINITE, *NUMBERS_OF_A_GRID),
+        known_keys=r"|base|axes\|[^|]+\|[^|]+",
+    ),
+    entry("vehicle", "vehicles/[bp]*.yaml", load_vehicle, share=4),
+    entry("frozen vehicle", "vehicles/m*.yaml", load_vehicle, share=1, reseal=seals.sealed_vehicle),
+    entry("surface", "surfaces/*.yaml", load_surface, share=3),
+    entry("camera", "cameras/*.yaml", load_camera, share=4),
+    entry("gates", "gates.yaml", load_gates, share=2),
+    entry("foreign gates", "foreign_gates.yaml", load_foreign_gates, share=2),
+    entry("hazard marking", "hazard_markings/*.yaml", load_marking, share=2),
+    entry("bus", "buses/*.yaml", load_bus, share=2),
+    entry("calibration procedure", "calibration/*.yaml", load_procedure, share=2),
+    entry("protocol", "protocols/*.yaml", load_protocol, share=2),
+    entry("stop study", "stop_studies/*.yaml", load_stop_study, share=2),
+    entry("bump study", "bump_studies/*.yaml", load_bump_study, share=2),
+    entry("sensitivity study", "studies/surface-sensitivity.yaml", load_sensitivity_study, share=1),
+    entry("closing study", "studies/closing.yaml", load_closing_study, share=2),
+    entry("street", "scenes/street.yaml", load_street_layout, share=2),
+    entry("effects library", "effects/library.yaml", load_effects, share=0.5),
+    entry("truths", "effects/truths.yaml", lambda path: (load_truths(path), load_sizes(path)), share=1),
+    entry("channel map", "channel_maps/*.yaml", load_channel_map, share=3),
+    Parser(
+        name="weather", write=sound.weather, read=load_weather, share=1, rules=(FINITE,), known_keys=".*",
+    ),
+    Parser(
+        name="learned judges", share=1, known_keys=".*", read=lambda folder: load_judges(folder / "judges.yaml"),
+        write=sound.texts({"judges.yaml": "clip: {checkpoint: a.pt, text_features: b.npy, source: c}\n"
+                                          "dover: {checkpoint: dover.pt, source: d}\n"}),
+        rules=(files_inside(r".*\|(checkpoint|text_features)"),),
+    ),
+    Parser(
+        name="manifest", write=sound.dataset, targets=(r"manifest\.json",), read=read_dataset, share=4,
+        rules=RECORDED, reseal=seals.sealed_json,
+    ),
+    Parser(
+        name="manifest alone", write=sound.dataset, targets=(r"manifest\.json",), share=4, rules=RECORDED,
+        read=lambda folder: read_manifest(Layout(folder)), reseal=seals.sealed_json,
+    ),
+    Parser(
+        name="telemetry", write=sound.dataset, targets=(r"telemetry/.*\.parquet",), read=read_dataset, share=1,
+        reseal=seals.sealed_dataset,
+    ),
+    Parser(
+        name="telemetry tables", write=sound.dataset, targets=(r"telemetry/.*\.parquet",), read=read_tables, share=1,
+    ),
+    Parser(
+        name="frozen inputs", write=sound.dataset, targets=(r"inputs/(vehicle|surface)\.yaml", r"plan\.json"), share=1,
+        read=read_constants,
+    ),
+    Parser(
+        name="plan", write=sound.dataset, targets=(r"plan\.json",), read=uncached(read_plan), share=5, rules=PLANNED,
+    ),
+    Parser(
+        name="receipt", write=sound.unfinished_dataset, targets=(r"\.staging/.*\.json",), share=1, writes=True,
+        read=lambda folder: seal(Layout(folder), uncached(read_plan)(folder)),
+        rules=(ids_keep_their_form("clip_id"), files_inside(r"artifacts\|[^|]+", of_keys=True), FINITE,
+               hashes_keep_their_form(r"artifacts\|[^|]+")),
+    ),
+    Parser(
+        name="frozen run", write=sound.frozen_runs, read=lambda folder: read_frozen(folder / "run.json"), share=4,
+        reseal=seals.sealed_json, rules=(FINITE,),
+    ),
+    Parser(
+        name="campaign", write=sound.campaigns, read=read_campaign, share=5,
+        rules=(FINITE, CELLS_FINITE, files_inside("run")),
+    ),
+    Parser(
+        name="drives", write=sound.campaigns, read=read_drives, share=3,
+        rules=(Rule(name="numbers are finite", where="sample_rate_hz", values=(NAN, INF)),
+               Rule(name="numbers are finite", where="precipitation_mm_h|snow_accumulation_h", numbers_only=True,
+                    values=("nan", "inf")), files_inside("run")),
+    ),
+    Parser(
+        name="recording", write=sound.recordings, targets=(r"log\..*",), share=4,
+        read=lambda folder: read_signals(next(folder.glob("log.*")), load_channel_map(folder / "map.yaml")[0]),
+    ),
+    Parser(
+        name="reference", write=sound.references, read=read_reference, share=4,
+        rules=(FINITE, files_inside(r"\d+\|case"), Rule(name="cases are names", where=r"\d+\|case", values=("*", "?"))),
+    ),
+    Parser(
+        name="Gaussians", write=sound.gaussian_files, share=8,
+        read=lambda folder: read_gaussians(next(folder.glob("cloud.*"))),
+    ),
+    Parser(name="scene import", write=sound.imports, read=import_scene, share=1, writes=True),
+    Parser(
+        name="scene folder", write=sound.scene_folders, read=read_scene, share=6, reseal=seals.sealed_scene,
+        rules=(FINITE, files_inside(r"sha256\|.*", of_keys=True), hashes_keep_their_form(r"sha256\|.*")),
+    ),
+    Parser(
+        name="route", write=sound.routes, share=6, rules=(FINITE, CELLS_FINITE),
+        read=lambda folder: read_route(next(folder.glob("route.*")), 1.65),
+    ),
+    Parser(name="stereo folder", write=sound.stereo_folders, read=read_stereo_folder, share=2, rules=(CELLS_FINITE,)),
+    Parser(
+        name="trajectory", write=sound.texts({"t.txt": sound.trajectory_text()}), share=2, rules=(CELLS_FINITE,),
+        read=lambda folder: read_trajectory(folder / "t.txt"),
+    ),
+    Parser(
+        name="video", write=sound.videos, read=lambda folder: read_footage(next(folder.glob("video.*"))), share=0.5,
+    ),
+    Parser(
+        name="claim", write=sound.claims, read=lambda folder: read_claim(folder / "claim.parquet"), share=3,
+        rules=(FINITE,),
+    ),
+    Parser(
+        name="video's camera", share=2, read=lambda folder: read_camera(folder / "camera.yaml"), rules=(FINITE,),
+        write=sound.texts({"camera.yaml": "width: 640\nheight: 360\nfocal_length: 500\n"},
+                          {"camera.yaml": "width: 640\nheight: 360\nfx: 500\nfy: 500\ncx: 320\ncy: 180\nk1: 0.1\n"
+                                          "height_above_road: {value: 1.4, unit: m, source: measured}\n"}),
+    ),
+)  # fmt: skip
+BY_NAME = {parser.name: parser for parser in PARSERS}
