@@ -60,23 +60,24 @@ def read_content(path: Path, kind: str, largest: int) -> bytes:
     return content
 
 
-def read_yaml(path: Path, kind: str) -> dict[str, Any]:
+def read_yaml(path: Path, kind: str, *, finite: bool = True) -> dict[str, Any]:
     """The table that a YAML file holds; the rules are those of `parse_yaml`.
 
     Parameters
     ----------
     path : the file
     kind : what it is called in the sentences
+    finite : refuse infinite numbers and NaN here; False for a reader that does so beside its other rules
 
     Raises
     ------
     InputError
         If it cannot be read or breaks a rule.
     """
-    return parse_yaml(read_content(path, kind, LARGEST_YAML), path, kind)
+    return parse_yaml(read_content(path, kind, LARGEST_YAML), path, kind, finite=finite)
 
 
-def parse_yaml(content: bytes, place: object, kind: str) -> dict[str, Any]:
+def parse_yaml(content: bytes, place: object, kind: str, *, finite: bool = True) -> dict[str, Any]:
     """The table that YAML text holds.
 
     Parameters
@@ -84,6 +85,7 @@ def parse_yaml(content: bytes, place: object, kind: str) -> dict[str, Any]:
     content : UTF-8
     place : where it comes from, for the sentences
     kind : what it is called in them
+    finite : refuse infinite numbers and NaN here; False for a reader that does so beside its other rules
 
     Raises
     ------
@@ -91,7 +93,7 @@ def parse_yaml(content: bytes, place: object, kind: str) -> dict[str, Any]:
         One sentence for each fault: no UTF-8, no YAML, no table, too large, too deep, a key that stands twice or is
         no text, a number that is not finite or too large, a tag beyond plain values.
     """
-    value = parse_yaml_value(content, place, kind)
+    value = parse_yaml_value(content, place, kind, finite=finite)
     if not isinstance(value, dict):
         raise InputError(
             f"{shorten(place)}: a {kind} must be a table of keys and values; it is {brief(value)}"
@@ -99,7 +101,7 @@ def parse_yaml(content: bytes, place: object, kind: str) -> dict[str, Any]:
     return value
 
 
-def parse_yaml_value(content: bytes, place: object, kind: str) -> Any:
+def parse_yaml_value(content: bytes, place: object, kind: str, *, finite: bool = True) -> Any:
     """The value that YAML text holds, be it a table, a list or a single value; the rules are those of `parse_yaml`.
 
     Parameters
@@ -107,6 +109,7 @@ def parse_yaml_value(content: bytes, place: object, kind: str) -> Any:
     content : UTF-8
     place : where it comes from, for the sentences
     kind : what it is called in them
+    finite : refuse infinite numbers and NaN here; False for a reader that does so beside its other rules
 
     Raises
     ------
@@ -115,7 +118,7 @@ def parse_yaml_value(content: bytes, place: object, kind: str) -> Any:
     """
     start = f"{shorten(place)}: a {kind} must"
     text = _decode(content, start, LARGEST_YAML)
-    return load_yaml(text, start)
+    return load_yaml(text, start, finite=finite)
 
 
 def read_json_document(path: Path, kind: str, *, large_integers: bool = False) -> Any:

@@ -1,19 +1,18 @@
 """Campaign folders read as drives: any channels, no split, for protocols that look at braking events."""
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-import yaml
+from pydantic import ValidationError
 
+from catalogs.campaign_files import LARGEST_RUN, CampaignHeader, parse_columns, parse_rows, read_header_bytes
+from catalogs.documents import parse_yaml, read_content
+from catalogs.sentences import cap_problems, describe_rules, shorten
 from tasks.errors import InputError
 from tasks.recordings.channels import CHANNELS_BY_NAME
 from tasks.recordings.events import Drive
-from tasks.surface.state import Weather, WeatherKind
+from tasks.surface.state import Weather
 
 NEEDED = ("brake_pressure", "speed", "pitch", "longitudinal_acceleration")
 WEATHER = ("weather", "precipitation_mm_h", "snow_accumulation_h")
@@ -48,12 +47,8 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
         Listing missing files, keys and channels.
     """
     folder = Path(folder)
-    missing = [name for name in ("campaign.yaml", "runs.csv") if not (folder / name).is_file()]
-    if missing:
-        raise InputError([f"a campaign folder needs {name}; {folder} has none" for name in missing])
-    header = _header(folder / "campaign.yaml")
-    rows = _rows(folder / "runs.csv")
-    interval = 1.0 / float(header["sample_rate_hz"])
+    header, rows = _checked(folder)
+    interval = 1.0 / header.sample_rate_hz
     problems: list[str] = []
     drives: list[Drive] = []
     for row in rows:
@@ -62,16 +57,9 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
             problems.append(f"{row['run']}: runs.csv names it, but {path.name} is not in runs/")
             continue
         try:
-            table = pq.read_table(path)
-            columns = {
-                name: np.asarray(table.column(name).to_numpy(), dtype=np.float64)
-                for name in table.column_names
-                if name in CHANNELS_BY_NAME
-            }
-        except (pa.ArrowInvalid, OSError, ValueError) as error:
-            problems.append(
-                f"{row['run']}: {path.name} must be a Parquet file of numbers; {str(error)[:100]}"
-            )
+            columns, _ = parse_columns(read_content(path, "run", LARGEST_RUN), path.name, CHANNELS_BY_NAME)
+        except InputError as error:
+            problems += [f"{row['run']}: {problem}" for problem in error.problems]
             continue
         problems += [f"{row['run']}: channel {name} is missing" for name in needed if name not in columns]
         problems += [
@@ -93,43 +81,28 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
             )
         )
     if problems:
-        raise InputError([f"{folder.name}: {problem}" for problem in problems])
-    return DriveCampaign(name=str(header["campaign"]), vehicle=str(header["vehicle"]), drives=tuple(drives))
+        raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
+    return DriveCampaign(name=header.campaign, vehicle=header.vehicle, drives=tuple(drives))
 
 
-def _header(path: Path) -> dict[str, Any]:
+def _checked(folder: Path) -> tuple[CampaignHeader, list[dict[str, str]]]:
+    """Header and runs, or the problems of both at once."""
+    header_bytes, table = read_header_bytes(folder)
+    problems: list[str] = []
+    checked, rows = None, []
+    path = folder / "campaign.yaml"
     try:
-        header = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} must be YAML; {' '.join(str(error).split())[:200]}") from None
-    if not isinstance(header, dict):
-        raise InputError(f"{path} must be a table of campaign, vehicle and sample_rate_hz")
-    absent = [key for key in ("campaign", "vehicle", "sample_rate_hz") if key not in header]
-    if absent:
-        raise InputError([f"{path} needs the key {key}" for key in absent])
-    rate = header["sample_rate_hz"]
-    if not isinstance(rate, int | float) or not rate > 0:
-        raise InputError(f"{path}: sample_rate_hz must be a number above 0; it is {rate}")
-    return header
-
-
-def _rows(path: Path) -> list[dict[str, str]]:
-    rows = list(csv.DictReader(path.read_text(encoding="utf-8-sig").splitlines()))
-    if not rows:
-        raise InputError(f"{path} must list at least one run; it lists none")
-    absent = [key for key in ("run", *WEATHER) if key not in rows[0]]
-    if absent:
-        raise InputError([f"{path} needs the column {key}" for key in absent])
-    problems = []
-    for row in rows:
-        if row["weather"] not in get_args(WeatherKind):
-            kinds = ", ".join(get_args(WeatherKind))
-            problems.append(f"{row['run']}: weather must be one of {kinds}; it is {row['weather']}")
-        for key in WEATHER[1:]:
-            try:
-                float(row[key])
-            except (TypeError, ValueError):
-                problems.append(f"{row['run']}: {key} must be a number; it is {row[key]}")
-    if problems:
-        raise InputError([f"{path}: {problem}" for problem in problems])
-    return rows
+        checked = CampaignHeader.model_validate(
+            parse_yaml(header_bytes, path, "campaign's header", finite=False)
+        )
+    except ValidationError as error:
+        problems += describe_rules(error, path)
+    except InputError as error:
+        problems += error.problems
+    try:
+        rows = parse_rows(table, ("run", *WEATHER), WEATHER[1:])
+    except InputError as error:
+        problems += [f"{shorten(folder)}: {problem}" for problem in error.problems]
+    if problems or checked is None:
+        raise InputError(cap_problems(problems))
+    return checked, rows

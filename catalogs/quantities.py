@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, TypeVar
 
-import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from catalogs.documents import read_yaml
+from catalogs.sentences import cap_problems, describe_rules
 from tasks.errors import InputError
 
 Number = Annotated[float, Field(strict=True)]
@@ -98,27 +99,8 @@ def read_entry(model: type[Entry], path: Path, kind: str) -> Entry:
     InputError
         One sentence per problem, all of them at once.
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: a {kind} must be readable YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: a {kind} must be a table of entries; it is {content!r:.60}")
+    content = read_yaml(path, kind, finite=False)
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise InputError([f"{path}: {_sentence(problem)}" for problem in error.errors()]) from None
-
-
-def _sentence(problem: Any) -> str:
-    place = ".".join(str(part) for part in problem["loc"]) or "the whole entry"
-    match problem["type"]:
-        case "missing":
-            return f"{place} is missing: add it"
-        case "extra_forbidden":
-            return f"{place} is not a known key: remove it or correct its name"
-        case "value_error":
-            return f"{place}: {problem['msg'].removeprefix('Value error, ')}"
-        case _:
-            rule = problem["msg"].replace("Input should be", "must be")
-            return f"{place}: {rule}; it is {problem['input']!r:.60}"
+        raise InputError(cap_problems(describe_rules(error, path))) from None

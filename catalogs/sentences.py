@@ -91,8 +91,8 @@ def _describe_rule(problem: Any, known: Mapping[tuple[int | str, ...], Iterable[
             return f"{place} is missing: add it"
         case "extra_forbidden":
             there = known.get(problem["loc"][:-1])
-            names = f"; known here are {', '.join(there)}" if there else ""
-            return f"{place} is not a known key: remove it or correct its name{names}"
+            names = f" (known here are {', '.join(there)})" if there else ""
+            return f"{place}: unknown key{names}: remove it or correct its name"
         case "value_error":
             return f"{place}: {shorten(problem['msg'].removeprefix('Value error, '), 1000)}"
         case _:

@@ -32,13 +32,14 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
     }
 
 
-def load_yaml(text: str, start: str) -> Any:
+def load_yaml(text: str, start: str, *, finite: bool) -> Any:
     """The value of a YAML text; None of an empty one.
 
     Parameters
     ----------
     text : the document
     start : of each sentence, up to "must"
+    finite : refuse infinite numbers and NaN
 
     Raises
     ------
@@ -52,7 +53,7 @@ def load_yaml(text: str, start: str) -> Any:
         node = loader.get_single_node()
         if node is None:
             return None
-        if problems := _node_problems(loader, node):
+        if problems := _node_problems(loader, node, finite):
             raise InputError(cap_problems([f"{start} {problem}" for problem in problems]))
         return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
@@ -101,7 +102,7 @@ def _check_shape(text: str, start: str) -> None:
             )
 
 
-def _node_problems(loader: Any, root: yaml.Node) -> list[str]:
+def _node_problems(loader: Any, root: yaml.Node, finite: bool) -> list[str]:
     """What is wrong with keys and values, in the order of the text."""
     found: list[tuple[int, str]] = []
     waiting, seen = [root], {id(root)}
@@ -113,7 +114,7 @@ def _node_problems(loader: Any, root: yaml.Node) -> list[str]:
             children = [value for _, value in node.value]
         elif isinstance(node, yaml.SequenceNode):
             children = node.value
-        problem = _value_problem(loader, node)
+        problem = _value_problem(loader, node, finite)
         if problem:
             found.append((node.start_mark.line, problem))
         for child in children:
@@ -137,7 +138,7 @@ def _key_problems(node: yaml.MappingNode) -> list[tuple[int, str]]:
     return found
 
 
-def _value_problem(loader: Any, node: yaml.Node) -> str | None:
+def _value_problem(loader: Any, node: yaml.Node, finite: bool) -> str | None:
     plain = _SCALAR_TAGS
     if isinstance(node, yaml.CollectionNode):
         plain = (_TAG + ("map" if isinstance(node, yaml.MappingNode) else "seq"),)
@@ -153,7 +154,7 @@ def _value_problem(loader: Any, node: yaml.Node) -> str | None:
         value = loader.construct_object(node)
     except (ValueError, KeyError, IndexError, OverflowError, yaml.YAMLError):
         return f"have values that keep to their tag; {brief(node.value)} is no {node.tag.removeprefix(_TAG)}"
-    if isinstance(value, float) and not isfinite(value):
+    if finite and isinstance(value, float) and not isfinite(value):
         return f"have finite numbers; one is {shorten(node.value, 40)}"
     if isinstance(value, int) and not -LARGEST_INTEGER <= value <= LARGEST_INTEGER:
         return f"have integers of at most 2^53; one is {shorten(node.value, 40)}"

@@ -44,25 +44,25 @@ def test_runs_come_with_their_drive_weather_and_known_channels(folder: Path) -> 
 @pytest.mark.parametrize(
     ("file", "content", "words"),
     [
-        ("campaign.yaml", "a: [", "must be YAML"),
+        ("campaign.yaml", "a: [", "must be valid YAML"),
         ("campaign.yaml", "- a", "must be a table"),
-        ("campaign.yaml", "{campaign: a, vehicle: b}", "needs the key sample_rate_hz"),
+        ("campaign.yaml", "{campaign: a, vehicle: b}", "sample_rate_hz is missing"),
         (
             "campaign.yaml",
             "{campaign: a, vehicle: b, sample_rate_hz: 0}",
-            "sample_rate_hz must be a number above 0",
+            "sample_rate_hz: must be greater than 0; it is 0",
         ),
         ("runs.csv", "run,weather\n", "must list at least one run"),
         ("runs.csv", "run,weather\na,dry\n", "needs the column precipitation_mm_h"),
         (
             "runs.csv",
             "run,weather,precipitation_mm_h,snow_accumulation_h\na,hail,x,0\n",
-            "weather must be one of",
+            "weather must be dry, rain or snow; it is 'hail'",
         ),
         (
             "runs.csv",
             "run,weather,precipitation_mm_h,snow_accumulation_h\na,dry,x,0\n",
-            "must be a number; it is x",
+            "must be a finite number; it is 'x'",
         ),
         ("runs/b.parquet", "text", "b: b.parquet must be a Parquet file"),
     ],

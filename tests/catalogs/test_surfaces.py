@@ -31,7 +31,7 @@ def test_dense_asphalt_holds_the_papers_values_and_bounds():
 
 
 def test_an_unknown_name_lists_what_exists():
-    with pytest.raises(InputError, match=r"surface ice: no such entry.*dense-asphalt"):
+    with pytest.raises(InputError, match=r"ice: no such surface.*dense-asphalt"):
         load_surface("ice")
 
 
@@ -55,7 +55,7 @@ def test_all_problems_of_a_file_are_listed_at_once(tmp_path):
         "snow_friction.value: must be a finite number; it is nan",
         "dry_friction: value must lie within its bounds 0.9 to 1; it is 0.82",
         "texture_depth_mm.source",
-        "grip is not a known key",
+        "grip: unknown key",
     ):
         assert expected in said
     assert all(str(path) in problem for problem in error.value.problems)

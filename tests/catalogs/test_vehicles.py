@@ -41,7 +41,7 @@ def test_a_vehicle_file_elsewhere_loads_like_the_shipped_one(tmp_path, entry):
 
 
 def test_an_unknown_name_lists_what_exists():
-    with pytest.raises(InputError, match=r"vehicle tractor: no such entry.*paper-reference"):
+    with pytest.raises(InputError, match=r"tractor: no such vehicle.*paper-reference"):
         load_vehicle("tractor")
 
 
@@ -65,7 +65,7 @@ def test_all_problems_of_a_file_are_listed_at_once(tmp_path, entry):
         "cg_height: unit must be m; it is mm",
         "pitch_inertia.value: must be a finite number; it is inf",
         "wheel_radius.value: must be a valid number; it is '0.32'",
-        "colour is not a known key",
+        "colour: unknown key",
         "gravity is missing",
         "brake_gain.source is missing",
         "families.rain: efficiency must have one value per surface_friction knot (4); it has 2",

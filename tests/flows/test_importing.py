@@ -240,7 +240,7 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
             {"runs": [{"name": "a", "file": "log.csv", "conditions": {"weather": "hail"}}]},
             "run a: conditions",
         ),
-        ({"colour": "red"}, "colour is not a known key"),
+        ({"colour": "red"}, "colour: unknown key"),
         ({"runs": [{"name": "../a", "file": "log.csv"}]}, "runs.0.name"),
     ],
 )

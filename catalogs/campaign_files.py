@@ -1,0 +1,187 @@
+"""The files of a campaign folder, each checked by itself: campaign.yaml, runs.csv, and a run's Parquet."""
+
+import csv
+import io
+import os
+from collections.abc import Collection, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from catalogs.documents import LARGEST_YAML, read_content
+from catalogs.names import name_problem
+from catalogs.quantities import Text
+from catalogs.sentences import brief, shorten
+from tasks.errors import InputError
+
+LARGEST_TABLE = 64 * 2**20
+"""Bytes of runs.csv [1]: a line of 200 bytes for each of 300,000 runs."""
+LARGEST_RUN = 2**31
+"""Bytes of a run's Parquet [1]."""
+MOST_SAMPLES = 20_000_000
+"""Samples of a run [1]: five hours at 1 kHz; a few bytes of Parquet can claim billions."""
+WEATHERS = ("dry", "rain", "snow")
+
+
+class CampaignHeader(BaseModel):
+    """What every reader needs of campaign.yaml; other keys are notes."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+
+    campaign: Text
+    vehicle: Text
+    sample_rate_hz: Annotated[float, Field(strict=True, gt=0, le=1_000_000)]
+
+
+def read_header_bytes(folder: Path) -> tuple[bytes, bytes]:
+    """The content of campaign.yaml and runs.csv.
+
+    Parameters
+    ----------
+    folder : of the campaign
+
+    Raises
+    ------
+    InputError
+        Naming each that is missing or cannot be read.
+    """
+    missing = [name for name in ("campaign.yaml", "runs.csv") if not os.path.isfile(folder / name)]
+    if missing:
+        raise InputError([f"a campaign folder needs {name}; {shorten(folder)} has none" for name in missing])
+    contents: list[bytes] = []
+    problems: list[str] = []
+    for name, largest in (("campaign.yaml", LARGEST_YAML), ("runs.csv", LARGEST_TABLE)):
+        try:
+            contents.append(read_content(folder / name, f"campaign folder's {name}", largest))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return contents[0], contents[1]
+
+
+def parse_rows(content: bytes, needed: Collection[str], numbers: Collection[str]) -> list[dict[str, str]]:
+    """The lines of runs.csv, each with its run, weather and numbers checked.
+
+    Parameters
+    ----------
+    content : CSV as UTF-8
+    needed : columns that there must be
+    numbers : those of them that hold finite numbers
+
+    Raises
+    ------
+    InputError
+        With one sentence per problem.
+    """
+    try:
+        reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""), strict=True)
+        names, rows = list(reader.fieldnames or ()), list(reader)
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"runs.csv must be UTF-8 text; line {line} is not: save it as UTF-8") from None
+    except csv.Error as error:
+        raise InputError(f"runs.csv must be CSV; {shorten(error)}") from None
+    problems = [f"runs.csv needs the column {name}" for name in needed if name not in names]
+    problems += [
+        f"runs.csv must have distinct columns; {brief(name)} stands there twice"
+        for name in dict.fromkeys(names)
+        if names.count(name) > 1
+    ]
+    if not rows:
+        problems.append("runs.csv must list at least one run; it lists none")
+    if problems:
+        raise InputError(problems)
+    seen: set[str] = set()
+    for number, row in enumerate(rows, start=1):
+        problems += _row_problems(row, numbers, f"runs.csv, run {number}", seen)
+    if problems:
+        raise InputError(problems)
+    return rows
+
+
+def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, seen: set[str]) -> list[str]:
+    if None in row or None in row.values():
+        return [f"{place}: must have as many fields as there are columns"]
+    problems = []
+    name = row["run"]
+    if problem := name_problem(name):
+        return [f"{place}: a run's name must {problem}"]
+    if name in seen:
+        problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
+    seen.add(name)
+    if row["weather"] not in WEATHERS:
+        problems.append(f"{name}: weather must be dry, rain or snow; it is {brief(row['weather'])}")
+    for key in numbers:
+        if not _is_number(row[key]):
+            problems.append(f"{name}: {key} must be a finite number; it is {brief(row[key])}")
+    return problems
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def parse_columns(
+    content: bytes, file: str, names: Collection[str]
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, str]]:
+    """Columns of a run's Parquet file, and the units that its metadata gives for them.
+
+    Parameters
+    ----------
+    content : the file
+    file : its name, for the sentences
+    names : columns to take where they are there
+
+    Raises
+    ------
+    InputError
+        With one sentence per problem: no Parquet, too many samples, columns that are no numbers or stand twice.
+    """
+    try:
+        with pq.ParquetFile(pa.BufferReader(content)) as parquet:
+            schema, count = parquet.schema_arrow, parquet.metadata.num_rows
+            found = [name for name in schema.names if name in names]
+            problems = _column_problems(schema, found, count, file)
+            if problems:
+                raise InputError(problems)
+            table = parquet.read(columns=found)
+            columns = {name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in found}
+            units = {name: _unit(schema.field(name)) for name in found}
+    except InputError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, TypeError, KeyError, OverflowError) as error:
+        raise InputError(f"{file} must be a Parquet file of numbers; {shorten(error)}") from None
+    return columns, {name: unit for name, unit in units.items() if unit is not None}
+
+
+def _column_problems(schema: pa.Schema, found: Sequence[str], count: int, file: str) -> list[str]:
+    problems = [
+        f"{file} must have distinct columns; {name} stands there twice"
+        for name in dict.fromkeys(found)
+        if found.count(name) > 1
+    ]
+    if problems:
+        return problems
+    problems = [
+        f"channel {name} must be of numbers; {file} has it as {shorten(schema.field(name).type, 60)}"
+        for name in found
+        if not (pa.types.is_integer(schema.field(name).type) or pa.types.is_floating(schema.field(name).type))
+    ]
+    if not 0 <= count <= MOST_SAMPLES:
+        problems.append(f"{file} must have at most {MOST_SAMPLES} samples; it has {count}")
+    return problems
+
+
+def _unit(field: pa.Field) -> str | None:
+    metadata = field.metadata or {}
+    return metadata[b"units"].decode("utf-8", "replace") if b"units" in metadata else None

@@ -1,0 +1,53 @@
+"""Names that users give to runs, grids and levels: they become file names, labels and text."""
+
+from typing import Annotated
+
+from pydantic import AfterValidator
+
+from catalogs.sentences import brief, is_encodable
+
+LONGEST_NAME = 100
+"""Characters of a name [1]: a label of several names still fits a file name of 255 bytes."""
+
+
+def name_problem(name: str) -> str | None:
+    """Why the text cannot be a name, as the rest of a sentence after "must"; None where it can.
+
+    Parameters
+    ----------
+    name : to become one file name, on any system
+    """
+    if not 0 < len(name) <= LONGEST_NAME:
+        return f"have 1 to {LONGEST_NAME} characters; it has {len(name)}"
+    if not name.isprintable() or not is_encodable(name) or name != name.strip():
+        return f"be printable characters without blanks at its ends; it is {brief(name)}"
+    if "/" in name or "\\" in name or name in (".", ".."):
+        return f"be no path; it is {brief(name)}"
+    return None
+
+
+def label_problem(label: str) -> str | None:
+    """As `name_problem`, for a label: names joined by slashes.
+
+    Parameters
+    ----------
+    label : such as of a level of an axis
+    """
+    problems = map(name_problem, label.split("/"))
+    return next((problem for problem in problems if problem), None)
+
+
+def _check_name(name: str) -> str:
+    if problem := name_problem(name):
+        raise ValueError(f"a name must {problem}")
+    return name
+
+
+def _check_label(label: str) -> str:
+    if problem := label_problem(label):
+        raise ValueError(f"a label must {problem}")
+    return label
+
+
+Name = Annotated[str, AfterValidator(_check_name)]
+Label = Annotated[str, AfterValidator(_check_label)]
