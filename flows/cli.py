@@ -5,8 +5,8 @@ import sys
 import typer
 
 from flows.commands import audits, datasets, judging, measured, scenes, studies
-from flows.commands.console import BROKEN, INPUT_WRONG
-from tasks.errors import InputError
+from flows.running.failures import INTERRUPTED, explain_end
+from flows.running.terminal import say
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
 for group in (datasets, audits, judging, studies, measured, scenes):
@@ -14,24 +14,25 @@ for group in (datasets, audits, judging, studies, measured, scenes):
 
 
 def main() -> None:
-    """Entry point: exit codes 0 done, 1 a check failed, 2 the input is wrong, 3 something broke."""
-    from flows.running.failures import ClipsFailed, disk_full_sentence
-
+    """Entry point: exit codes 0 done, 1 a check failed, 2 the input is wrong, 3 something broke, 130 interrupted."""
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # a terminal that knows ASCII only
     try:
-        app(standalone_mode=True)
-    except InputError as error:
-        for problem in error.problems:
-            print(f"musync: {problem}", file=sys.stderr)
-        sys.exit(INPUT_WRONG)
-    except ClipsFailed as error:
-        print(f"musync: {error}", file=sys.stderr)
-        sys.exit(BROKEN)
-    except OSError as error:
-        sentence = disk_full_sentence(error)
-        if sentence is None:
+        app()
+    except SystemExit as end:
+        if end.code != INTERRUPTED:
             raise
-        print(f"musync: {sentence}", file=sys.stderr)
-        sys.exit(INPUT_WRONG)
+        _end(KeyboardInterrupt())
+    except BaseException as error:
+        _end(error)
+
+
+def _end(error: BaseException) -> None:
+    code, sentences = explain_end(error, sys.argv[1:])
+    for sentence in sentences:
+        # a sentence of several lines is indented, so that no line of it looks like one of its own
+        say("musync: " + sentence.replace("\n", "\n  "), error=True)
+    sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ import shutil
 import sys
 from pathlib import Path
 
+from tasks.errors import InputError
+
 _IMPORT = re.compile(r"^\s*from (tasks[\w.]*) import", re.MULTILINE)
 
 KEPT = 4
@@ -22,7 +24,10 @@ def place_kernel_cache() -> None:
     """Point Numba at the folder of the present sources, unless the user has chosen one (NUMBA_CACHE_DIR)."""
     if "NUMBA_CACHE_DIR" in os.environ:
         return
-    folder = cache_root() / "kernels" / sources_hash()
+    try:
+        folder = cache_root() / "kernels" / sources_hash()
+    except InputError:  # without a home, Numba keeps kernels beside their sources
+        return
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     if "numba" in sys.modules:
         from numba.core import config
@@ -33,9 +38,21 @@ def place_kernel_cache() -> None:
 
 
 def cache_root() -> Path:
-    """Folder of what can be had again: MUSYNC_CACHE, or one in the user's cache."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return Path(os.environ.get("MUSYNC_CACHE", home / "musync"))
+    """Folder of what can be had again: MUSYNC_CACHE, or one in the user's cache.
+
+    Raises
+    ------
+    InputError
+        If neither is set and the user has no home folder.
+    """
+    if "MUSYNC_CACHE" in os.environ:
+        return Path(os.environ["MUSYNC_CACHE"])
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "musync"
+    except RuntimeError:
+        raise InputError(
+            "the user has no home folder for muSync's cache: set MUSYNC_CACHE to a folder that can be written"
+        ) from None
 
 
 def sources_hash(package: Path = Path(__file__).parent) -> str:

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
+from flows.running.failures import CHECK_FAILED
+from flows.running.terminal import open_console, say, visible
 from tasks.errors import InputError
-
-DONE, CHECK_FAILED, INPUT_WRONG, BROKEN = 0, 1, 2, 3
 
 DATASETS, WRITE_DATASETS = {"dataset", "a", "b"}, {"generate", "reproduce", "schedule"}
 """Arguments that may be addresses in an object store, and functions that may write to one."""
@@ -33,7 +33,11 @@ def call(name: str, prefect: bool, /, *args: Any, **kwargs: Any) -> Any:
     """Call a pipeline function, as a Prefect flow where one is asked for."""
     function = _function(name, prefect or "PREFECT_API_URL" in os.environ)
     _refuse_addresses(function, args, kwargs)
-    return function(*args, **kwargs)
+    try:
+        return function(*args, **kwargs)
+    except (EOFError, BrokenPipeError) as error:
+        # Typer takes these for the end of its own streams, and ends with the code of a failed check
+        raise RuntimeError(f"{type(error).__name__}: {error}") from error
 
 
 def _refuse_addresses(function: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> None:
@@ -109,23 +113,27 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
 
 
 def show(value: dict[str, Any], as_json: bool) -> None:
+    """Print a result: a line a value, a table where the value is a list of rows."""
     if as_json:
-        typer.echo(json.dumps(value, indent=1))
+        say(json.dumps(value, indent=1))
         return
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False, soft_wrap=True)
     for key, entry in value.items():
         if isinstance(entry, list) and entry and isinstance(entry[0], dict):
-            table = Table(title=key, title_justify="left")
-            for column in entry[0]:
-                table.add_column(column, overflow="fold")
-            for row in entry:
-                table.add_row(*(_text(row.get(column)) for column in entry[0]))
-            Console(highlight=False).print(table)
+            _show_table(key, entry)
         else:
-            console.print(f"{key}: {_text(entry)}")
+            say(f"{key}: {_text(entry)}")
+
+
+def _show_table(title: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    # its import takes longer than many a command
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for column in rows[0]:
+        table.add_column(visible(column), overflow="fold")
+    for row in rows:
+        table.add_row(*(_text(row.get(column)) for column in rows[0]))
+    open_console().print(table)
 
 
 def show_lines(result: dict[str, Any], as_json: bool, module: str) -> None:
@@ -135,7 +143,7 @@ def show_lines(result: dict[str, Any], as_json: bool, module: str) -> None:
         return
     from importlib import import_module
 
-    typer.echo(import_module(module).as_text(result), nl=False)
+    say(import_module(module).as_text(result).removesuffix("\n"))
 
 
 def exit_unless(good: bool) -> None:
@@ -148,4 +156,4 @@ def _text(value: Any) -> str:
         return f"{value:.5g}"
     if isinstance(value, list):
         return ", ".join(_text(item) for item in value)
-    return "-" if value is None else str(value)
+    return "-" if value is None else visible(str(value))

@@ -4,7 +4,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -14,27 +13,28 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from flows.running.terminal import open_console, say, visible
+
 Advance = Callable[[str], None]
 
 
 @contextmanager
 def progress_bar(title: str, total: int) -> Iterator[Advance]:
     """Yield a function that is told the name of each finished piece of work."""
-    console = Console(stderr=True)
     if not sys.stderr.isatty():
         done = 0
 
         def report(name: str) -> None:
             nonlocal done
             done += 1
-            console.print(f"{title} {done}/{total} {name}", highlight=False)
+            say(f"{title} {done}/{total} {visible(name)}", error=True)
 
         yield report
         return
     columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("elapsed"),
-        TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[last]}"),
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TextColumn("elapsed"),
+        TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[last]}", markup=False),
     )  # fmt: skip
-    with Progress(*columns, console=console) as bar:
+    with Progress(*columns, console=open_console(error=True)) as bar:
         task = bar.add_task(title, total=total, last="")
-        yield lambda name: bar.update(task, advance=1, last=name)
+        yield lambda name: bar.update(task, advance=1, last=visible(name))

@@ -1,0 +1,65 @@
+"""What a terminal is given: text of users and datasets as plain text, never as markup, emoji or control sequences."""
+
+import os
+import re
+import sys
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_UNPRINTABLE = re.compile(
+    "[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+"""Control characters, those that turn the direction of writing, line separators, and halves of characters."""
+
+
+def visible(text: str) -> str:
+    """One line of text whose control characters are written out: the escape character as ``\\x1b``."""
+    return _UNPRINTABLE.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def visible_lines(text: str) -> str:
+    """The same for text of several lines."""
+    return "\n".join(map(visible, text.split("\n")))
+
+
+def say(text: str, *, error: bool = False) -> None:
+    """Print lines for people; a reader that has gone (``| head -1``) is no failure.
+
+    Parameters
+    ----------
+    text : lines without the last line feed
+    error : whether they go to the standard error
+    """
+    stream = sys.stderr if error else sys.stdout
+    try:
+        stream.write(visible_lines(text) + "\n")
+        stream.flush()
+    except BrokenPipeError:
+        _silence(stream)
+
+
+def open_console(*, error: bool = False, **options: Any) -> "Console":
+    """A Rich console that takes text as it is; strings for it go through `visible` first.
+
+    Parameters
+    ----------
+    error : whether it writes to the standard error
+    options : further ones of ``rich.console.Console``
+    """
+    # its import takes longer than many a command
+    from rich.console import Console
+
+    class PlainConsole(Console):
+        def on_broken_pipe(self) -> None:
+            _silence(self.file)  # type: ignore[arg-type]
+
+    return PlainConsole(stderr=error, markup=False, emoji=False, highlight=False, **options)
+
+
+def _silence(stream: TextIO) -> None:
+    """Let a stream go nowhere, so that what is still to be printed disturbs nobody."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)

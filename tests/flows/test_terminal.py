@@ -1,0 +1,55 @@
+"""Text of users and datasets reaches the terminal as text."""
+
+import re
+
+import pytest
+
+from flows.commands.console import show
+from flows.running.progress import progress_bar
+from flows.running.terminal import open_console, visible, visible_lines
+
+HOSTILE = [
+    "[/red]", "[bold]x[/bold]", "a[b]c", ":smile:", "\x1b[2J\x1b]0;title\x07", "x\rforged", "\u202egnp.exe", "\x9b31m",
+    "\ud800", "$(reboot)", "{task.description}", "line\nverified: True",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("label", HOSTILE)
+def test_a_label_is_printed_as_it_is_with_its_control_characters_written_out(capsys, label):
+    show({"clips": [{"label": label}], "first": label, "all": [label]}, as_json=False)
+    printed = capsys.readouterr().out
+    assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202e\ud800]", printed)
+    lines = printed.splitlines()
+    assert f"first: {visible(label)}" in lines and f"all: {visible(label)}" in lines
+    assert "verified: True" not in lines
+    if visible(label) == label:
+        assert label in printed.split("first:")[0]
+
+
+@pytest.mark.parametrize("on_terminal", [False, True])
+@pytest.mark.parametrize("label", HOSTILE)
+def test_a_label_in_the_progress_is_text(capsys, monkeypatch, label, on_terminal):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: on_terminal, raising=False)
+    monkeypatch.setenv("COLUMNS", "200")
+    with progress_bar("clips", 1) as advance:
+        advance(label)
+    printed = capsys.readouterr().err
+    assert visible(label) in printed
+    assert "\x1b[2J" not in printed and "\x07" not in printed and "\u202e" not in printed
+
+
+def test_json_is_plain_ascii(capsys):
+    show({"label": "".join(HOSTILE)}, as_json=True)
+    assert capsys.readouterr().out.isascii()
+
+
+def test_only_the_line_feeds_of_several_lines_stay():
+    assert visible("a\n\x1b") == r"a\n\x1b"
+    assert visible_lines("a\n\x1b\tb") == "a\n" + r"\x1b\tb"
+    assert visible("Schnee, 雪, é") == "Schnee, 雪, é"
+
+
+def test_a_reader_that_leaves_ends_no_run(monkeypatch):
+    console = open_console()
+    monkeypatch.setattr("flows.running.terminal._silence", lambda stream: None)
+    console.on_broken_pipe()
