@@ -4,10 +4,9 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal
 
-import yaml
 from pydantic import TypeAdapter
 
-from catalogs.quantities import Scalar, checked
+from catalogs.quantities import Scalar, checked, read_entries
 
 PAPER_METRICS = Path(__file__).with_name("paper_metrics.yaml")
 
@@ -20,5 +19,5 @@ FILE = TypeAdapter(dict[str, dict[ClipSet, Annotated[Scalar, checked("1")]]])
 @cache
 def paper_values() -> dict[str, dict[ClipSet, float]]:
     """Value by metric and set of clips; a metric without a printed value is left out [1]."""
-    entries = FILE.validate_python(yaml.safe_load(PAPER_METRICS.read_text(encoding="utf-8")))
+    entries = read_entries(FILE, PAPER_METRICS, "table of printed figures")
     return {metric: {over: one.value for over, one in sets.items()} for metric, sets in entries.items()}

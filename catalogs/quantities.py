@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from catalogs.documents import read_yaml
+from catalogs.documents import LARGEST_YAML, parse_yaml, parse_yaml_value, read_content
 from catalogs.sentences import cap_problems, describe_rules
 from tasks.errors import InputError
 
@@ -43,6 +43,7 @@ class Table(CatalogueEntry):
 
 
 Entry = TypeVar("Entry", bound=CatalogueEntry)
+Form = TypeVar("Form")
 Value = TypeVar("Value", Scalar, Bounded, Table)
 
 
@@ -99,8 +100,46 @@ def read_entry(model: type[Entry], path: Path, kind: str) -> Entry:
     InputError
         One sentence per problem, all of them at once.
     """
-    content = read_yaml(path, kind, finite=False)
+    return parse_entry(model, read_content(path, kind, LARGEST_YAML), path, kind)
+
+
+def parse_entry(model: type[Entry], content: bytes, place: object, kind: str) -> Entry:
+    """Check the content of one YAML file.
+
+    Parameters
+    ----------
+    model : what it must hold
+    content : of the file
+    place, kind : where it comes from and what it is called in the sentences
+
+    Raises
+    ------
+    InputError
+        One sentence per problem, all of them at once.
+    """
+    return _checked(model.model_validate, parse_yaml(content, place, kind, finite=False), place)
+
+
+def read_entries(form: TypeAdapter[Form], path: Path, kind: str) -> Form:
+    """Read and check one YAML file that is a list, or a table of names that it chooses itself.
+
+    Parameters
+    ----------
+    form : what the file must hold
+    path : the file
+    kind : what it is called in the sentences
+
+    Raises
+    ------
+    InputError
+        One sentence per problem, all of them at once.
+    """
+    content = read_content(path, kind, LARGEST_YAML)
+    return _checked(form.validate_python, parse_yaml_value(content, path, kind, finite=False), path)
+
+
+def _checked(check: Callable[[Any], Form], content: object, place: object) -> Form:
     try:
-        return model.model_validate(content)
+        return check(content)
     except ValidationError as error:
-        raise InputError(cap_problems(describe_rules(error, path))) from None
+        raise InputError(cap_problems(describe_rules(error, place))) from None

@@ -12,7 +12,7 @@ from tasks.recordings.bus_drive import Bus, BusSignal, DriveStyle
 from tasks.recordings.channels import CHANNELS_BY_NAME, unit_factor
 
 FOLDER = Path(__file__).parent
-Positive = Annotated[float, Field(gt=0)]
+Positive = Annotated[float, Field(strict=True, gt=0)]
 Share = Annotated[Scalar, checked("1", minimum=0, maximum=1)]
 Ratio = Annotated[Scalar, checked("1", above=0)]
 Seconds = Annotated[Table, checked("s", above=0)]
@@ -56,7 +56,7 @@ class SignalEntry(CatalogueEntry):
     unit: Text
     rate_hz: Positive
     resolution: Positive
-    noise: Annotated[float, Field(ge=0)]
+    noise: Annotated[float, Field(strict=True, ge=0)]
 
     @field_validator("channel")
     @classmethod

@@ -35,7 +35,7 @@ class BoundsEntry(CatalogueEntry):
     upper: Number
     step: Number
     source: Text
-    smooth: Annotated[float, Field(gt=0)] | None = None
+    smooth: Annotated[float, Field(strict=True, gt=0)] | None = None
     start: Number | None = None
 
     @model_validator(mode="after")

@@ -13,7 +13,7 @@ from tasks.recordings.signals import ChannelRule, Gain
 
 FOLDER = Path(__file__).parent
 Part = Literal["train", "held_out"]
-Sigma = Annotated[float, Field(gt=0)]
+Sigma = Annotated[float, Field(strict=True, gt=0)]
 
 
 class GainEntry(CatalogueEntry):
@@ -83,12 +83,12 @@ class RunEntry(CatalogueEntry):
 class SegmentEntry(CatalogueEntry):
     """Cut every file into one run per brake application; every n-th of them is held out."""
 
-    above_mpa: Annotated[float, Field(gt=0)]
-    merge_gap_s: Annotated[float, Field(ge=0)]
-    minimum_s: Annotated[float, Field(ge=0)]
-    before_s: Annotated[float, Field(ge=0)]
-    after_s: Annotated[float, Field(ge=0)]
-    held_out_every: Annotated[int, Field(ge=2)]
+    above_mpa: Annotated[float, Field(strict=True, gt=0)]
+    merge_gap_s: Annotated[float, Field(strict=True, ge=0)]
+    minimum_s: Annotated[float, Field(strict=True, ge=0)]
+    before_s: Annotated[float, Field(strict=True, ge=0)]
+    after_s: Annotated[float, Field(strict=True, ge=0)]
+    held_out_every: Annotated[int, Field(strict=True, ge=2)]
 
 
 class RunTolerances(CatalogueEntry):
@@ -118,7 +118,7 @@ class CsvEntry(CatalogueEntry):
 
     separator: Text = ","
     decimal: Literal[".", ","] = "."
-    skip_rows: Annotated[int, Field(ge=0)] = 0
+    skip_rows: Annotated[int, Field(strict=True, ge=0)] = 0
 
 
 class ChannelMap(CatalogueEntry):
@@ -127,7 +127,7 @@ class ChannelMap(CatalogueEntry):
     campaign: Text
     vehicle: Text
     source: Text
-    sample_rate_hz: Annotated[float, Field(gt=0)]
+    sample_rate_hz: Annotated[float, Field(strict=True, gt=0)]
     time: TimeEntry | None = None
     csv: CsvEntry = CsvEntry()
     channels: dict[str, ChannelEntry]

@@ -1,14 +1,65 @@
 """The library of effects that a vehicle model may lack."""
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-import yaml
+from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 
-from tasks.errors import InputError
-from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect, EffectParameter
+from catalogs.quantities import CatalogueEntry, Number, Text, read_entries
+from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect, EffectClass, EffectParameter
 
 LIBRARY_FILE = Path(__file__).with_name("library.yaml")
+
+
+class ParameterEntry(CatalogueEntry):
+    """One number of an effect; the meanings stand at ``EffectParameter``."""
+
+    unit: Text
+    lower: Number
+    upper: Number
+    step: Number
+    start: Number
+
+    @model_validator(mode="after")
+    def _bounds_leave_room(self) -> "ParameterEntry":
+        if not (self.lower <= self.start <= self.upper and 0 < self.step < self.upper - self.lower):
+            raise ValueError(
+                "lower <= start <= upper must hold, and a step above 0 and below the distance of the bounds; they are"
+                f" {self.lower:g}, {self.start:g}, {self.upper:g} and {self.step:g}"
+            )
+        return self
+
+
+class EffectEntry(CatalogueEntry):
+    """One effect; the meanings stand at ``Effect``."""
+
+    name: Text
+    effect_class: EffectClass = Field(alias="class")
+    port: Text
+    variable: Text
+    enters: Text
+    source: Text
+    parameters: Annotated[dict[str, ParameterEntry], Field(min_length=1, max_length=2)]
+
+    @model_validator(mode="after")
+    def _ports_know_the_parameters(self) -> "EffectEntry":
+        unknown = [name for name in self.parameters if name not in PARAMETER_INDEX]
+        if unknown:
+            raise ValueError(
+                f"no port knows the parameter {', '.join(unknown)}; there are: {', '.join(PARAMETER_INDEX)}"
+            )
+        return self
+
+
+def _check_names(entries: list[EffectEntry]) -> list[EffectEntry]:
+    names = [entry.name for entry in entries]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"an effect must stand once; twice stand {', '.join(twice)}")
+    return entries
+
+
+LIBRARY = TypeAdapter(Annotated[list[EffectEntry], AfterValidator(_check_names)])
+"""What the file must hold."""
 
 
 def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
@@ -23,52 +74,19 @@ def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
     InputError
         With every rule the file breaks.
     """
-    with open(path, encoding="utf-8") as file:
-        entries = yaml.safe_load(file)
-    problems: list[str] = []
-    for entry in entries:
-        problems += _problems(entry)
-    names = [entry.get("name") for entry in entries]
-    problems += [
-        f"effect {name} stands twice in {path}" for name in sorted({n for n in names if names.count(n) > 1})
-    ]
-    if problems:
-        raise InputError(problems)
-    return tuple(_effect(entry) for entry in entries)
+    return tuple(_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
 
 
-def _problems(entry: dict[str, Any]) -> list[str]:
-    where = f"effect {entry.get('name', '?')}"
-    needed = ("name", "class", "port", "variable", "enters", "source", "parameters")
-    problems = [f"{where} needs the key {key}" for key in needed if key not in entry]
-    if problems:
-        return problems
-    if entry["class"] not in ("effect", "retune", "sensor"):
-        problems.append(f"{where}: class must be effect, retune or sensor; it is {entry['class']}")
-    if not 1 <= len(entry["parameters"]) <= 2:
-        problems.append(f"{where} must have one or two parameters; it has {len(entry['parameters'])}")
-    for name, p in entry["parameters"].items():
-        if name not in PARAMETER_INDEX:
-            problems.append(
-                f"{where}: no port knows the parameter {name}; there are: {', '.join(PARAMETER_INDEX)}"
-            )
-        elif not (p["lower"] <= p["start"] <= p["upper"] and 0 < p["step"] < p["upper"] - p["lower"]):
-            problems.append(f"{where}: {name} needs lower <= start <= upper and a step above 0; it has {p}")
-    return problems
-
-
-def _effect(entry: dict[str, Any]) -> Effect:
+def _effect(entry: EffectEntry) -> Effect:
     return Effect(
-        name=entry["name"],
-        effect_class=entry["class"],
-        port=entry["port"],
-        variable=entry["variable"],
-        enters=entry["enters"],
-        source=entry["source"],
+        name=entry.name,
+        effect_class=entry.effect_class,
+        port=entry.port,
+        variable=entry.variable,
+        enters=entry.enters,
+        source=entry.source,
         parameters=tuple(
-            EffectParameter(
-                name=name, unit=p["unit"], **{k: float(p[k]) for k in ("lower", "upper", "step", "start")}
-            )
-            for name, p in entry["parameters"].items()
+            EffectParameter(name=name, **parameter.model_dump())
+            for name, parameter in entry.parameters.items()
         ),
     )

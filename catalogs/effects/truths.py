@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
-import yaml
+from pydantic import Field, field_validator, model_validator
 
 from catalogs.effects import load_effects
-from tasks.errors import InputError
+from catalogs.quantities import CatalogueEntry, Number, read_entry
+from catalogs.sentences import brief
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.effects.slots import Slot
 
@@ -43,6 +44,56 @@ class Truth:
         return (self.slots[0].port, self.slots[0].variable) if self.slots else None
 
 
+class OutsideEntry(CatalogueEntry):
+    """A form outside the library: values of a port at equally spaced values of a variable."""
+
+    port: str
+    variable: str
+    at: Annotated[tuple[Number, ...], Field(min_length=2)]
+    value: tuple[Number, ...]
+    left_out: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> "OutsideEntry":
+        problems = []
+        if self.port not in PORTS or self.variable not in VARIABLES:
+            problems.append(
+                f"port must be of {', '.join(PORTS)} and variable of {', '.join(VARIABLES)}; they are"
+                f" {brief(self.port)} and {brief(self.variable)}"
+            )
+        steps = np.diff(self.at)
+        if not (steps > 0).all() or not np.allclose(steps, steps[0]):
+            problems.append(f"at must ascend in equal steps; it is {brief(self.at)}")
+        if len(self.value) != len(self.at):
+            problems.append(f"value must have one number for each of at; there are {len(self.value)}")
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+
+class TruthFile(CatalogueEntry):
+    """What the file must hold."""
+
+    library: dict[str, Annotated[dict[str, Number], Field(min_length=1)]]
+    outside: dict[str, OutsideEntry]
+    sizes: dict[str, Annotated[dict[str, tuple[Number, ...]], Field(min_length=1, max_length=1)]]
+
+    @field_validator("library", "sizes")
+    @classmethod
+    def _effects_exist(cls, named: dict[str, dict[str, object]]) -> dict[str, dict[str, object]]:
+        effects = {effect.name: {p.name for p in effect.parameters} for effect in load_effects()}
+        problems = []
+        for name, values in named.items():
+            if name not in effects:
+                problems.append(f"{name}: the library has no such effect; there are: {', '.join(effects)}")
+            elif not set(values) <= effects[name]:
+                known, given = ", ".join(sorted(effects[name])), ", ".join(values)
+                problems.append(f"{name}: parameters must be of {known}; they are {given}")
+        if problems:
+            raise ValueError("; ".join(problems))
+        return named
+
+
 def load_truths(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
     """Truths of a file, in its order.
 
@@ -55,36 +106,13 @@ def load_truths(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
     InputError
         With every rule the file breaks.
     """
-    content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    effects = {effect.name: {p.name for p in effect.parameters} for effect in load_effects()}
-    problems = []
-    for name, values in content["library"].items():
-        if name not in effects:
-            problems.append(f"truth {name}: the library has no such effect; there are: {', '.join(effects)}")
-        elif not set(values) <= effects[name]:
-            problems.append(
-                f"truth {name}: parameters must be of {', '.join(sorted(effects[name]))}; it has {', '.join(values)}"
-            )
-    for name, values in content["sizes"].items():
-        if name not in effects or len(values) != 1 or not set(values) <= effects[name]:
-            problems.append(
-                f"size {name}: needs an effect of the library and one of its parameters; it has {', '.join(values)}"
-            )
-    for name, form in content["outside"].items():
-        if form["port"] not in PORTS or form["variable"] not in VARIABLES:
-            problems.append(
-                f"truth {name}: port must be of {', '.join(PORTS)} and variable of {', '.join(VARIABLES)}; they are"
-                f" {form['port']} and {form['variable']}"
-            )
-    if problems:
-        raise InputError(problems)
+    file = read_entry(TruthFile, Path(path), "list of truths")
     library = [
-        Truth(name=name, values={k: float(v) for k, v in values.items()}, slots=(), left_out=())
-        for name, values in content["library"].items()
+        Truth(name=name, values=values, slots=(), left_out=()) for name, values in file.library.items()
     ]
     outside = [
-        Truth(name=name, values={}, slots=(_slot(form),), left_out=tuple(form.get("left_out", ())))
-        for name, form in content["outside"].items()
+        Truth(name=name, values={}, slots=(_slot(form),), left_out=form.left_out)
+        for name, form in file.outside.items()
     ]
     return (*library, *outside)
 
@@ -95,22 +123,26 @@ def load_sizes(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
     Parameters
     ----------
     path : YAML with ``sizes`` (effect to parameter to its values)
+
+    Raises
+    ------
+    InputError
+        With every rule the file breaks.
     """
-    content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    file = read_entry(TruthFile, Path(path), "list of truths")
     return tuple(
-        Truth(name=name, values={parameter: float(value)}, slots=(), left_out=())
-        for name, parameters in content["sizes"].items()
+        Truth(name=name, values={parameter: value}, slots=(), left_out=())
+        for name, parameters in file.sizes.items()
         for parameter, values in parameters.items()
         for value in values
     )
 
 
-def _slot(form: dict[str, Any]) -> Slot:
-    grid = np.array(form["at"], dtype=np.float64)
+def _slot(form: OutsideEntry) -> Slot:
     return Slot(
-        port=form["port"],
-        variable=form["variable"],
-        origin=float(grid[0]),
-        spacing=float(grid[1] - grid[0]),
-        values=np.array(form["value"], dtype=np.float64),
+        port=form.port,
+        variable=form.variable,
+        origin=form.at[0],
+        spacing=form.at[1] - form.at[0],
+        values=np.array(form.value, dtype=np.float64),
     )

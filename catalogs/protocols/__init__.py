@@ -23,7 +23,7 @@ class RuleEntry(CatalogueEntry):
     at_least: Number | None = None
     at_most: Number | None = None
     unit: Text
-    paper_fails: Annotated[int, Field(ge=0)] | None = None
+    paper_fails: Annotated[int, Field(strict=True, ge=0)] | None = None
     note: str = ""
 
     @model_validator(mode="after")

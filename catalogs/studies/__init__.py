@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import yaml
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, checked, read_entry
+from catalogs.grids.blocks import PartialScenario
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, checked, read_entries, read_entry
 from catalogs.scenario import Scenario
 from tasks.vehicle.sensitivity import PrintedFigure, StudyProtocol, WeatherStudy
 
@@ -44,7 +44,7 @@ class PrintedEntry(CatalogueEntry):
 
     figure: Text
     value: Number
-    digits: Annotated[int, Field(ge=0)]
+    digits: Annotated[int, Field(strict=True, ge=0)]
     unit: Text
 
 
@@ -55,6 +55,13 @@ class SensitivityEntry(CatalogueEntry):
     rain: WeatherStudyEntry
     snow: WeatherStudyEntry
     printed: tuple[PrintedEntry, ...]
+
+
+class ConditionEntry(PartialScenario):
+    """One condition of the paper's Appendix C as it stands in the file."""
+
+    name: Text
+    split: Text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,9 +109,14 @@ def load_sensitivity_study(path: Path = SENSITIVITY) -> tuple[StudyProtocol, tup
 
 def load_conditions() -> tuple[Condition, ...]:
     """The 19 development and 12 held-out conditions of the paper's Appendix C, in its order."""
-    rows = yaml.safe_load((FOLDER / "appendix-c.yaml").read_text(encoding="utf-8"))
+    rows = read_entries(TypeAdapter(list[ConditionEntry]), FOLDER / "appendix-c.yaml", "list of conditions")
     return tuple(
-        Condition(name=row.pop("name"), split=row.pop("split"), scenario=Scenario(**row)) for row in rows
+        Condition(
+            name=row.name,
+            split=row.split,
+            scenario=Scenario(**row.model_dump(exclude={"name", "split"}, exclude_none=True)),
+        )
+        for row in rows
     )
 
 

@@ -1,29 +1,29 @@
 """Harder campaigns for close-loop than one effect on a rich design: two effects at once, and too few manoeuvres."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from catalogs.documents import read_json_document
 from catalogs.effects.truths import Truth
-from catalogs.quantities import CatalogueEntry, read_entry
+from catalogs.quantities import CatalogueEntry, Number, read_entry
 from tasks.closure.drives import TRAINING, Drive
 
 FILE = Path(__file__).with_name("closing.yaml")
 ERROR_RATES = Path(__file__).with_name("closing_error_rates.json")
 """What `musync close-loop-benchmark` counted, without the campaigns one by one."""
 
-Positive = Annotated[float, Field(gt=0)]
+Positive = Annotated[float, Field(strict=True, gt=0)]
 
 
 class DriveEntry(CatalogueEntry):
     """One planned run; the meanings stand at ``Drive``."""
 
     weather: Literal["dry", "rain", "snow"] = "dry"
-    rate: Annotated[float, Field(ge=0)] = 0.0
+    rate: Annotated[float, Field(strict=True, ge=0)] = 0.0
     speed: Positive
-    peak: float
+    peak: Number
     duration: Positive
 
 
@@ -36,7 +36,7 @@ class ClosingStudy(CatalogueEntry):
     poor_design : the runs; the first `TRAINING` of them train
     """
 
-    partner_after: Annotated[int, Field(ge=1)]
+    partner_after: Annotated[int, Field(strict=True, ge=1)]
     poor_design: Annotated[tuple[DriveEntry, ...], Field(min_length=TRAINING + 3)]
 
     def drives(self) -> tuple[Drive, ...]:
@@ -72,5 +72,5 @@ def load_closing_study(path: str | Path = FILE) -> ClosingStudy:
 
 def load_error_rates() -> dict[str, Any]:
     """Counts of the benchmark that ships, with the hash of the engine that was judged."""
-    rates: dict[str, Any] = json.loads(ERROR_RATES.read_text(encoding="utf-8"))
+    rates: dict[str, Any] = read_json_document(ERROR_RATES, "table of error rates")
     return rates

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, parse_entry
 from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
 from tasks.vehicle.parameters import TyreFamily, Vehicle
@@ -167,5 +168,6 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
 
 
 def _read(source: Path) -> VehicleEntry:
-    check_seal(source)
-    return read_entry(VehicleEntry, source, "vehicle")
+    content = read_content(source, "vehicle", LARGEST_YAML)
+    check_seal(content, source)
+    return parse_entry(VehicleEntry, content, source, "vehicle")

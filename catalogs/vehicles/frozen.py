@@ -2,13 +2,13 @@
 
 import hashlib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
 from pydantic import Field
 
 from catalogs.quantities import CatalogueEntry, Number, Text
+from catalogs.sentences import shorten
 from tasks.errors import InputError
 
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -67,26 +67,28 @@ def frozen_text(entry: Mapping[str, Any], provenance: Mapping[str, Any], title: 
     return f"{body}{SEAL}{hashlib.sha256(body.encode()).hexdigest()}\n"
 
 
-def check_seal(source: Path) -> None:
+def check_seal(content: bytes, place: object) -> None:
     """Make sure that a frozen file still is what was frozen; a file without provenance has no seal to check.
 
     Parameters
     ----------
-    source : vehicle file
+    content : of a vehicle file
+    place : where it comes from, for the sentence
 
     Raises
     ------
     InputError
         If its content has another hash than its last line says.
     """
-    text = source.read_text(encoding="utf-8")
-    if "\nprovenance:" not in text:
+    content = content.replace(b"\r\n", b"\n")
+    if b"\nprovenance:" not in content:
         return
-    body, found, seal = text.rpartition(f"\n{SEAL}")
-    digest = hashlib.sha256(f"{body}\n".encode()).hexdigest()
-    if not found or seal.strip() != digest:
+    body, found, seal = content.rpartition(f"\n{SEAL}".encode())
+    digest = hashlib.sha256(body + b"\n").hexdigest()
+    stated = seal.decode("utf-8", "replace").strip() if found else ""
+    if stated != digest:
         raise InputError(
-            f"{source}: a frozen vehicle must be as it was frozen; its content has the hash {digest}, its last line"
-            f" says {seal.strip() or 'none'}: restore the file, or remove its provenance to make it a vehicle of"
-            " your own"
+            f"{shorten(place)}: a frozen vehicle must be as it was frozen; its content has the hash {digest}, its"
+            f" last line says {shorten(stated, 64) or 'none'}: restore the file, or remove its provenance to make it"
+            " a vehicle of your own"
         )

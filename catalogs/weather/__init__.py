@@ -6,8 +6,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, get_type_hints
 
-import yaml
-
+from catalogs.documents import read_yaml
+from catalogs.sentences import brief, cap_problems, shorten
 from tasks.errors import InputError
 from tasks.render.weather.parameters import WeatherParameters
 
@@ -34,30 +34,31 @@ def load_weather(folder: Path = FOLDER) -> WeatherParameters:
     documents: dict[str, Any] = {}
     for member in fields(WeatherParameters):
         path = folder / f"{member.name}.yaml"
+        if not path.is_file():
+            problems.append(f"{shorten(path)}: the weather catalogue needs this file; it is not there")
+            continue
         try:
-            documents[member.name] = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            problems.append(f"{path}: the weather catalogue needs this file; it is not there")
-        except yaml.YAMLError as error:
-            problems.append(f"{path}: must be YAML; {' '.join(str(error).split())}")
+            documents[member.name] = read_yaml(path, "weather catalogue's file", finite=False)
+        except InputError as error:
+            problems += error.problems
     values: dict[str, Any] = {
-        name: _typed(kind, documents[name], f"{folder / name}.yaml", problems)
+        name: _typed(kind, documents[name], f"{shorten(folder / name)}.yaml", problems)
         for name, kind in get_type_hints(WeatherParameters).items()
         if name in documents
     }
     if problems:
-        raise InputError(problems)
+        raise InputError(cap_problems(problems))
     return WeatherParameters(**values)
 
 
 def _typed(kind: Any, entries: object, place: str, problems: list[str]) -> Any:
     """Build a parameter class from a mapping of its fields; None, and a problem, where that fails."""
     if not isinstance(entries, Mapping):
-        problems.append(f"{place}: must map names to values; it holds {entries!r}")
+        problems.append(f"{place}: must map names to values; it holds {brief(entries)}")
         return None
     hints = get_type_hints(kind)
     for name in sorted(set(entries) - set(hints)):
-        problems.append(f"{place}: {name} is not a known value; known are {', '.join(hints)}")
+        problems.append(f"{place}: {shorten(name, 60)} is not a known value; known are {', '.join(hints)}")
     for name in sorted(set(hints) - set(entries)):
         problems.append(f"{place}: {name} is missing; give it value, unit and source")
     built: dict[str, Any] = {}
@@ -74,12 +75,12 @@ def _typed(kind: Any, entries: object, place: str, problems: list[str]) -> Any:
 def _leaf(hint: Any, entry: object, where: str, problems: list[str]) -> Any:
     """One value; a problem where it lacks unit or source, or is not of the field's type."""
     if not isinstance(entry, Mapping) or set(entry) != {"value", "unit", "source"}:
-        problems.append(f"{where} must have value, unit and source, and nothing else; it is {entry!r}")
+        problems.append(f"{where} must have value, unit and source, and nothing else; it is {brief(entry)}")
         return None
     value = entry["value"]
     if hint is str:
         if not isinstance(value, str):
-            problems.append(f"{where} must be a word; it is {value!r}")
+            problems.append(f"{where} must be a word; it is {brief(value)}")
         return value
     single = hint in (int, float)
     numbers = [value] if single else value if isinstance(value, list) else []
@@ -88,6 +89,6 @@ def _leaf(hint: Any, entry: object, where: str, problems: list[str]) -> Any:
         rule = (
             "a whole number" if hint is int else "a finite number" if single else "a list of finite numbers"
         )
-        problems.append(f"{where} must be {rule}; it is {value!r}")
+        problems.append(f"{where} must be {rule}; it is {brief(value)}")
         return None
     return hint(value) if single else tuple(float(n) for n in numbers)

@@ -77,7 +77,7 @@ def test_all_mistakes_are_told_at_once(copy):
         "air.yaml: wind_m_s must be a list of finite numbers; it is 3.0",
         "air.yaml: near: nearest_m must have value, unit and source",
         "air.yaml: haze_visual_range_m must be a finite number; it is inf",
-        "sky.yaml: must be YAML",
+        "sky.yaml: a weather catalogue's file must be valid YAML",
         "snowfall.yaml: the weather catalogue needs this file",
     ):
         assert part in text
