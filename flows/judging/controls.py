@@ -1,7 +1,6 @@
 """Negative controls: desynchronised copies of a dataset's claims, and which metric sees which."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from flows.making.driving import drive
 from flows.making.plan import Plan, read_plan
 from flows.running.orchestration import stage
 from flows.store.address import reading
-from flows.store.layout import write_atomically, write_json
+from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
 from tasks.eval.video_motion import path_error, weather_error
@@ -59,6 +58,7 @@ def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     InputError
         If the folder is no finished dataset, or holds fewer than two clips.
     """
+    results = Outputs(out, "controls", "controls.json", "controls.svg")
     root = reading(dataset).root
     facts = clip_facts(root)
     if len(facts) < 2:
@@ -67,10 +67,9 @@ def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     false = false_claims(clips, read_plan(root), catalogue_of(root))
     rows = list(score_controls(clips, false))
     result = {**summary(rows, untried(clips, false)), "rows": [*rows, *unread_rows()]}
-    if out is not None:
-        write_json(Path(out) / "controls.json", result)
-        if rows:
-            write_atomically(Path(out) / "controls.svg", as_svg(roc_figure(rows, CONTROLS)).encode())
+    results.write_json("controls.json", result)
+    if rows and out is not None:
+        results.write("controls.svg", as_svg(roc_figure(rows, CONTROLS)))
     return result
 
 

@@ -19,7 +19,8 @@ from flows.judging.road_edit_rows import road_edit_rows
 from flows.judging.trajectories import trajectory_files
 from flows.running.orchestration import stage
 from flows.store.address import reading
-from flows.store.layout import Layout, read_json, write_atomically, write_json
+from flows.store.layout import Layout, read_json
+from flows.store.outputs import Outputs
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
@@ -72,6 +73,7 @@ def evaluate(
     InputError
         If the folder is no finished dataset, or a trajectory or a checkpoint cannot be used.
     """
+    results = Outputs(out, "evaluate", "evaluation.json", "evaluation.parquet", "evaluation.html")
     root = reading(dataset).root
     judges = load_judges(learned)
     facts = clip_facts(root)
@@ -88,10 +90,9 @@ def evaluate(
     result = {
         "run_id": read_json(Layout(root).manifest)["run_id"], "codec": codec, "clips": len(clips), "rows": rows
     }  # fmt: skip
-    folder = Path(out)
-    write_json(folder / "evaluation.json", result)
-    write_parquet(pa.Table.from_pylist(rows, SCHEMA), folder / "evaluation.parquet")
-    write_atomically(folder / "evaluation.html", page(clips, rows, result["run_id"], codec).encode())
+    results.write_json("evaluation.json", result)
+    write_parquet(pa.Table.from_pylist(rows, SCHEMA), results.path("evaluation.parquet"))
+    results.write("evaluation.html", page(clips, rows, result["run_id"], codec))
     return result
 
 

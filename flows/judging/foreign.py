@@ -6,7 +6,7 @@ from typing import Any
 
 from catalogs.gates import load_foreign_gates
 from flows.judging.foreign_sources import read_camera, read_claim, read_footage
-from flows.store.layout import write_json
+from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.eval.foreign_video import claim_at, judge_motion
 from tasks.eval.video_motion import motion_retention
@@ -38,6 +38,7 @@ def judge(
     InputError
         Every file that cannot be read, in one sentence each.
     """
+    results = Outputs(out, "judge", "judgement.json")
     footage, told, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
     at = claim_at(told, footage.times)
     recovered = footage.motion(lens, at.rows, metric=metric)
@@ -57,8 +58,7 @@ def judge(
         **verdict,
         "not_run": [f"{name}: needs depth" for name in NEEDS_DEPTH] if is_video else [],
     }
-    if out is not None:
-        write_json(Path(out) / "judgement.json", result)
+    results.write_json("judgement.json", result)
     return result
 
 
@@ -87,6 +87,7 @@ def retention(
     InputError
         For every file that cannot be read, clips of different length, an event outside them, or a lost track.
     """
+    results = Outputs(out, "retention", "retention.json")
     names = (source, source_braking, edited, edited_braking)
     *clips, lens = _read_all(*((read_footage, name) for name in names), (read_camera, camera))
     counts = [len(clip.times) for clip in clips]
@@ -112,8 +113,7 @@ def retention(
         "clips": [clip.name for clip in clips],
         "method": [motion.method for motion in motions],
     }
-    if out is not None:
-        write_json(Path(out) / "retention.json", result)
+    results.write_json("retention.json", result)
     return result
 
 

@@ -9,7 +9,8 @@ import yaml
 
 from flows.running.orchestration import stage
 from flows.store.address import reading, telemetry
-from flows.store.layout import Layout, read_json, write_json
+from flows.store.layout import Layout, read_json
+from flows.store.outputs import Outputs
 from flows.store.telemetry import table_columns
 from tasks.conventions import FRAME_CHANNELS, TICK_CHANNELS
 from tasks.errors import InputError
@@ -31,6 +32,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     InputError
         If the folder is no finished dataset, a table lacks columns, or its mode's laws are not known here.
     """
+    results = Outputs(out, "audit-physics", "physics.json")
     root = reading(dataset, telemetry).root
     constants = read_constants(root)
     clips = clip_facts(root)
@@ -48,8 +50,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         "laws_checked": sum(row["laws"] for row in rows),
         "clips": rows,
     }
-    if out is not None:
-        write_json(Path(out) / "physics.json", result)
+    results.write_json("physics.json", result)
     return result
 
 

@@ -1,7 +1,6 @@
 """A bump study on a campaign: which road features its pitch rate gives away, and with which car."""
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from catalogs.bump_studies import load_bump_study
 from catalogs.drives import read_drives
 from catalogs.vehicles import load_vehicle
-from flows.store.layout import write_json
+from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.recordings.brake_dive import pitch_mode
 from tasks.recordings.road_bump import fit_feature, fit_feature_and_car, passage_of
@@ -40,6 +39,7 @@ def bump_study(
     InputError
         If the run or a channel is missing, or a window lies outside the run.
     """
+    results = Outputs(out, "bump-study", "bump_study.json")
     plan = load_bump_study(study)
     recorded = read_drives(campaign, needed=NEEDED)
     drive = next((drive for drive in recorded.drives if drive.name == plan.run), None)
@@ -69,8 +69,7 @@ def bump_study(
         ],
         "units": {"rate_rmse": "deg/s", "rate_rms": "deg/s", "peak_pitch": "deg", "feature": "m"},
     }
-    if out is not None:
-        write_json(Path(out) / "bump_study.json", result)
+    results.write_json("bump_study.json", result)
     return result
 
 

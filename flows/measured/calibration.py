@@ -13,7 +13,7 @@ from catalogs.calibration import load_procedure, procedure_source
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
 from catalogs.vehicles import load_vehicle, vehicle_source
 from catalogs.vehicles.frozen import frozen_text
-from flows.store.layout import write_atomically, write_json
+from flows.store.outputs import Outputs
 from flows.studies.vehicle_model import agreement_of
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
@@ -56,6 +56,7 @@ def calibrate(
     InputError
         Listing every problem of traces, vehicle or procedure.
     """
+    results = Outputs(out, "calibrate", f"{name}.yaml", "calibration.json")
     start = load_vehicle(vehicle)
     steps, interval = load_procedure(procedure)
     reference = read_reference(Path(traces), split=split)
@@ -66,9 +67,9 @@ def calibrate(
     ]
     fitted, records = run_stages(start, cases, steps)
     fitted = _rounded(fitted, steps)
-    target = Path(out) / f"{name}.yaml"
+    target = results.path(f"{name}.yaml")
     data = {case.case: sha256_of_file(trace_file(Path(traces), case.case)) for case, _ in reference}
-    write_atomically(target, _frozen(fitted, vehicle, procedure, steps, split, data).encode())
+    results.write(f"{name}.yaml", _frozen(fitted, vehicle, procedure, steps, split, data))
     frozen = load_vehicle(target)
     after = agreement_of(frozen, reference, steps.mode)
     result = {
@@ -86,7 +87,7 @@ def calibrate(
         "without": _without(frozen, reference, steps.mode),
         "identifiability": asdict(identifiability(frozen, cases, steps)),
     }
-    write_json(Path(out) / "calibration.json", result)
+    results.write_json("calibration.json", result)
     return result
 
 

@@ -14,7 +14,7 @@ from flows.measured.closing_ledger import record_reading
 from flows.measured.closing_report import report_html
 from flows.measured.closing_residuals import residual_rmse
 from flows.measured.grown_vehicle import grown_vehicle
-from flows.store.layout import write_atomically, write_json
+from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
 from tasks.closure.answer import ChannelError, NamedEffect, Parameter, Verdict
@@ -45,9 +45,9 @@ def close_loop(
     measured = read_campaign(Path(campaign))
     name = vehicle or measured.vehicle
     model, road = load_vehicle(name), load_surface(surface)
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / "split.json", split_of(measured))
+    grown = f"{Path(name).stem}-grown.yaml"
+    results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown)
+    results.write_json("split.json", split_of(measured))
     earlier = record_reading(measured, sha256_of_file(vehicle_source(name)))
     trace = attribute(measured, model, road, load_effects())
     result = verdict_json(trace.verdict)
@@ -63,14 +63,13 @@ def close_loop(
     text, missing = grown_vehicle(name, verdict, ranges)
     result["vehicle_file"] = None
     if text is not None:
-        path = folder / f"{Path(name).stem}-grown.yaml"
-        write_atomically(path, text.encode())
-        load_vehicle(path)
-        result["vehicle_file"] = str(path)
+        results.write(grown, text)
+        load_vehicle(results.path(grown))
+        result["vehicle_file"] = str(results.path(grown))
     result["not_carried_by_coupled_mode"] = missing
-    write_json(folder / "verdict.json", result)
-    write_atomically(folder / "report.html", report_html(trace, result, measured).encode())
-    result["report"] = str(folder / "report.html")
+    results.write_json("verdict.json", result)
+    results.write("report.html", report_html(trace, result, measured))
+    result["report"] = str(results.path("report.html"))
     return result
 
 

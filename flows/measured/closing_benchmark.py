@@ -1,10 +1,8 @@
 """The close-loop's own error rates: campaigns with a known truth, judged one by one, counted with exact intervals."""
 
-import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from catalogs.effects import load_effects
@@ -14,7 +12,8 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.measured.closing_benchmark_summary import pair_outcome, summary
 from flows.measured.closing_benchmark_tables import benchmark_tables
-from flows.store.layout import write_atomically, write_json
+from flows.store.journal import append_line, read_lines
+from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
 from tasks.closure.answer import Verdict
@@ -86,11 +85,9 @@ def close_loop_benchmark(
     minutes : no campaign is begun after so long
     vehicle : catalogue name or file
     """
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    log, engine = folder / LOG, engine_hash()
-    lines = log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
-    rows: list[dict[str, Any]] = [row for row in map(json.loads, lines) if row["engine"] == engine]
+    results = Outputs(out, "close-loop-benchmark", FILE, RATES, TABLES)
+    log, engine = results.path(FILE).with_name(LOG), engine_hash()
+    rows = [row for row in read_lines(log, {"engine", "truth", "seed"}) if row["engine"] == engine]
     done = {(row["truth"], row["seed"]) for row in rows}
     model, surface, effects = load_vehicle(vehicle), load_surface("dense-asphalt"), load_effects()
     started = time.monotonic()
@@ -127,12 +124,11 @@ def close_loop_benchmark(
             "engine": engine,
         }
         rows.append(row)
-        with log.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        append_line(log, row)
     result = summary(rows) | {"campaigns": rows, "engine_sha256": engine, "made_with": code_version()}
-    write_json(folder / FILE, result)
-    write_json(folder / RATES, {key: value for key, value in result.items() if key != "campaigns"})
-    write_atomically(folder / TABLES, benchmark_tables(result).encode())
+    results.write_json(FILE, result)
+    results.write_json(RATES, {key: value for key, value in result.items() if key != "campaigns"})
+    results.write(TABLES, benchmark_tables(result))
     return result
 
 

@@ -1,13 +1,13 @@
 """The ledger of held-out readings: whoever looks twice at runs that only judge says so."""
 
 import hashlib
-import json
 import os
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
+from flows.store.journal import append_line, read_lines
 from manifests.provenance import code_version
 from tasks.closure.campaign import Campaign, Run
 
@@ -29,11 +29,15 @@ def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
     Returns
     -------
     Number of readings before this one that had a held-out run of it among theirs.
+
+    Raises
+    ------
+    InputError
+        If the ledger is no such file.
     """
-    path = Path(os.environ.get("MUSYNC_LEDGER", LEDGER))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    known = [json.loads(line) for line in lines if line.strip()]
+    # a link that the user has named is theirs to follow; one that lies in the working folder is not
+    path = Path(os.environ["MUSYNC_LEDGER"]).resolve() if "MUSYNC_LEDGER" in os.environ else LEDGER
+    known = read_lines(path, {"content_sha256"})
     held_out = [data_hash(run) for run in campaign.held_out]
     entry = {
         "campaign": campaign.name,
@@ -44,8 +48,7 @@ def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
         "source_sha256": code_version()["source_sha256"],
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    with open(path, "a", encoding="utf-8") as file:
-        file.write(json.dumps(entry) + "\n")
+    append_line(path, entry)
     return sum(
         not set(held_out).isdisjoint(e.get("held_out_data_sha256", ()))
         or e["content_sha256"] == campaign.content_hash

@@ -4,14 +4,13 @@ import csv
 import io
 from dataclasses import asdict
 from math import isnan
-from pathlib import Path
 from typing import Any
 
 from catalogs.drives import read_drives
 from catalogs.protocols import load_protocol
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.store.layout import write_atomically, write_json
+from flows.store.outputs import Outputs
 from tasks.recordings.attrition import attrition_table
 from tasks.recordings.brake_dive import pitch_mode, with_model
 from tasks.recordings.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
@@ -51,6 +50,7 @@ def brake_protocol(
     InputError
         If the campaign lacks what the protocol needs.
     """
+    results = Outputs(out, "brake-protocol", "brake_protocol.json", "attrition.csv")
     rules = load_protocol(protocol)
     recorded = read_drives(campaign)
     base = load_vehicle(vehicle or recorded.vehicle)
@@ -79,13 +79,12 @@ def brake_protocol(
     }
     if not folds:
         result["note"] = "leaving a drive out needs events in at least two drives"
-    if out is not None:
-        write_json(Path(out) / "brake_protocol.json", result)
-        text = io.StringIO()
-        writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table)
-        write_atomically(Path(out) / "attrition.csv", text.getvalue().encode())
+    results.write_json("brake_protocol.json", result)
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(table)
+    results.write("attrition.csv", text.getvalue())
     return result
 
 

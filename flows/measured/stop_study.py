@@ -2,14 +2,13 @@
 
 from dataclasses import asdict
 from math import isnan
-from pathlib import Path
 from typing import Any
 
 from catalogs.drives import read_drives
 from catalogs.stop_studies import load_stop_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.store.layout import write_json
+from flows.store.outputs import Outputs
 from tasks.closure.campaign import CHANNELS
 from tasks.errors import InputError
 from tasks.recordings.events import Drive
@@ -46,6 +45,7 @@ def stop_study(
     InputError
         If a run or a channel is missing, or a run holds no stop.
     """
+    results = Outputs(out, "stop-study", "stop_study.json")
     plan = load_stop_study(study)
     recorded = read_drives(campaign)
     by_name = {drive.name: drive for drive in recorded.drives}
@@ -93,8 +93,7 @@ def stop_study(
         },
         "units": ERROR_UNITS,
     }  # fmt: skip
-    if out is not None:
-        write_json(Path(out) / "stop_study.json", result)
+    results.write_json("stop_study.json", result)
     return result
 
 

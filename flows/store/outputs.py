@@ -157,22 +157,13 @@ def read_marker(folder: Path) -> dict[str, str]:
         If the marker is no file of ours.
     """
     path = folder / MARKER
-    try:
-        # a link is not followed, and a pipe not waited for
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except FileNotFoundError:
+    if not os.path.lexists(path):
         return {}
-    except OSError as error:
-        if error.errno != errno.ELOOP:
-            raise
-        raise _not_a_marker(path) from None
-    with open(descriptor, "rb") as stream:
-        facts = os.fstat(descriptor)
-        if not stat.S_ISREG(facts.st_mode) or facts.st_size > MOST_BYTES:
-            raise _not_a_marker(path)
-        content = stream.read(MOST_BYTES)
+    facts = path.lstat()
+    if not stat.S_ISREG(facts.st_mode) or facts.st_size > MOST_BYTES:
+        raise _not_a_marker(path)
     try:
-        value = json.loads(content)
+        value = json.loads(path.read_bytes())
     except (ValueError, RecursionError):
         raise _not_a_marker(path) from None
     files = value.get("files") if isinstance(value, dict) and value.get("format") == FORMAT else None

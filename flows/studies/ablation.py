@@ -15,7 +15,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.drawing import as_svg
 from flows.making.driving import drive
-from flows.store.layout import write_atomically, write_json
+from flows.store.outputs import Outputs
 from flows.store.telemetry import write_parquet
 from flows.studies.ablation_figure import ablation_figure
 from tasks.errors import InputError
@@ -51,6 +51,7 @@ def ablation(
     InputError
         If the traces do not hold the condition that is compared.
     """
+    results = Outputs(out, "ablation", "ablation.json", "ablation.parquet", "ablation.svg")
     study, car, surface = load_ablation(), load_vehicle(vehicle), load_surface("dense-asphalt")
     provenance = vehicle_provenance(vehicle)
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
@@ -72,14 +73,11 @@ def ablation(
         "vehicle": vehicle, "mode": chosen, "pitch_condition": study.pitch.name,
         "stops": stops, "pitch": pitch, "reference": reference,
     }  # fmt: skip
-    folder = Path(out)
-    write_json(folder / "ablation.json", result)
-    write_parquet(
-        pa.table({"time": time} | {f"pitch_deg_{name.replace('-', '_')}": c for name, c in curves.items()}),
-        folder / "ablation.parquet",
-    )
+    results.write_json("ablation.json", result)
+    table = {"time": time} | {f"pitch_deg_{name.replace('-', '_')}": c for name, c in curves.items()}
+    write_parquet(pa.table(table), results.path("ablation.parquet"))
     figure = ablation_figure(stops, time, curves, {row["variant"]: row for row in pitch})
-    write_atomically(folder / "ablation.svg", as_svg(figure).encode())
+    results.write("ablation.svg", as_svg(figure))
     return result
 
 

@@ -10,7 +10,7 @@ from catalogs.references import ReferenceCase, Traces, read_reference
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
-from flows.store.layout import write_json
+from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.eval.state_agreement import CaseAgreement, aggregate, case_agreement
 from tasks.vehicle.parameters import Vehicle
@@ -22,12 +22,14 @@ BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipe
 
 def sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
+    results = Outputs(out, "sensitivity", "sensitivity.json")
     protocol, printed = load_sensitivity_study()
     vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     started = time.process_time()
     result = sensitivity_study(vehicle, surface, protocol)
     result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
-    return _written(result, out, "sensitivity.json")
+    results.write_json("sensitivity.json", result)
+    return result
 
 
 def agreement(
@@ -47,10 +49,12 @@ def agreement(
     InputError
         Listing every case whose trace or condition is missing.
     """
+    results = Outputs(out, "agreement", "agreement.json")
     model, provenance = load_vehicle(vehicle), vehicle_provenance(vehicle)
     chosen = mode or (provenance.mode if provenance else "paper")
     result = {"vehicle": vehicle, "mode": chosen} | agreement_of(model, read_reference(Path(traces)), chosen)
-    return _written(result, out, "agreement.json")
+    results.write_json("agreement.json", result)
+    return result
 
 
 def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], mode: Mode) -> dict[str, Any]:
@@ -91,18 +95,14 @@ def bench(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
     """
     if name is not None and name not in BENCHMARKS:
         raise InputError(f"bench {name}: no such benchmark; there are: {', '.join(BENCHMARKS)}")
+    results = Outputs(out, "bench", "bench.json")
     rows = [
         row
         for chosen in ([name] if name else BENCHMARKS)
         for row in import_module(f"benchmarks.{chosen}").rows()
     ]
-    return _written({"rows": rows}, out, "bench.json")
-
-
-def _written(result: dict[str, Any], out: str | None, name: str) -> dict[str, Any]:
-    if out is not None:
-        write_json(Path(out) / name, result)
-    return result
+    results.write_json("bench.json", {"rows": rows})
+    return {"rows": rows}
 
 
 def _plain(figures: dict[str, float]) -> dict[str, float | None]:
