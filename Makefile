@@ -1,15 +1,27 @@
 # Two commands for a newcomer: `make demo`, `make test`. Everything lives in .venv and datasets/.
 PYTHON ?= python3
 BIN := .venv/bin
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 READY := .venv/.ready
 DEMO ?= datasets/demo
 
-.PHONY: demo test check study study-schedule study-crash freeze bench clean
+.PHONY: demo test check study study-schedule study-crash study-fuzz study-faults freeze bench lock clean
 
-$(READY): pyproject.toml
+# Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
+# with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
+# list either. The last line installs these two, and muSync itself, with the setuptools of the list. A package without a
+# wheel for this platform is built from its source (whose hash is checked) with build tools that pip fetches unchecked.
+$(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(PIP) install --no-deps --require-hashes --requirement constraints.txt
+	$(PIP) install --no-build-isolation --editable '.[dev]'
 	touch $@
+
+# The newest versions that pyproject.toml allows: make lock LOCK=--upgrade
+lock: $(READY)
+	$(PIP) install 'uv>=0.13,<0.14'
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-package torch \
+		--extra dev --custom-compile-command 'make lock' --output-file constraints.txt $(LOCK) pyproject.toml
 
 demo: $(READY)
 	$(BIN)/musync generate demo --out $(DEMO)
@@ -32,6 +44,12 @@ study-schedule: $(READY)
 
 study-crash: $(READY)
 	$(BIN)/python -m benchmarks.crashes
+
+study-fuzz: $(READY)
+	$(BIN)/python -m benchmarks.fuzzing
+
+study-faults: $(READY)
+	$(BIN)/python -m benchmarks.store_faults
 
 freeze: $(READY)
 	$(BIN)/musync freeze
