@@ -36,11 +36,11 @@ def _describe(distribution: importlib.metadata.Distribution) -> Component | None
         facts = distribution.metadata
     except TypeError:  # Python 3.11 on a folder without METADATA, which a broken installation leaves
         return None
-    if not facts["Name"] or not facts["Version"]:
+    if "Name" not in facts or "Version" not in facts:
         return None
     name = re.sub(r"[-_.]+", "-", facts["Name"]).lower()
     address = PackageURL("pypi", name=name, version=facts["Version"])
-    licences = [LicenseExpression(facts["License-Expression"])] if facts["License-Expression"] else []
+    licences = [LicenseExpression(facts["License-Expression"])] if "License-Expression" in facts else []
     return Component(
         type=ComponentType.LIBRARY,
         name=name,
