@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import re
+import secrets
 import shutil
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.documents import parse_json
+from catalogs.scenes.array_files import open_regular, read_array
+from catalogs.sentences import brief
 from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians, check_gaussians
@@ -20,6 +25,27 @@ GAUSSIAN_ARRAYS = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals"
 OPTIONAL_ARRAYS = ("surroundings",)
 BLENDING_RULES = ("antialiased", "display_encoded")
 SCENE_ARRAYS = (*GAUSSIAN_ARRAYS, "station", "T_world_rig", "environment")
+SHAPES: dict[str, tuple[type[np.generic], tuple[int | None, ...]]] = {
+    "means": (np.float32, (None, 3)),
+    "quats_wxyz": (np.float32, (None, 4)),
+    "scales": (np.float32, (None, 3)),
+    "opacities": (np.float32, (None,)),
+    "sh": (np.float32, (None, None, 3)),
+    "normals": (np.float32, (None, 3)),
+    "class_id": (np.uint8, (None,)),
+    "surroundings": (np.float32, (None, 2)),
+    "station": (np.float64, (None,)),
+    "T_world_rig": (np.float64, (None, 4, 4)),
+    "environment": (np.float32, (None, None, 3)),
+}
+"""Type and shape of every array; None where any length goes."""
+LONGEST_FACTS = 2**20
+"""Bytes of scene.json [1]."""
+LONGEST_NAME = 255
+"""Characters of a scene's name [1]: that of its folder when it was made."""
+DIGEST = re.compile("[0-9a-f]{64}")
+FARTHEST_EDGE = 1000.0
+"""Greatest distance of a carriageway's edge from the route [m]."""
 ARRAY_FILES, OPTIONAL_FILES = (
     tuple(f"{name}.npy" for name in names) for names in (SCENE_ARRAYS, OPTIONAL_ARRAYS)
 )
@@ -40,8 +66,7 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
         If the folder holds other files.
     """
     must_be_new(folder)
-    partial = folder.with_name(folder.name + ".partial")
-    shutil.rmtree(partial, ignore_errors=True)
+    partial = folder.with_name(f"{folder.name}.{secrets.token_hex(4)}.partial")
     partial.mkdir(parents=True)
     try:
         for name, array in _arrays(scene).items():
@@ -82,22 +107,22 @@ def read_scene(folder: Path) -> Scene:
     InputError
         Naming every file at fault.
     """
-    content = _read_facts(folder)
-    problems = [
-        f"{folder / name}: must have the SHA-256 of scene.json;"
-        f" {'it is missing' if digest is None else 'its bytes differ'}"
-        for name, expected in sorted(content["sha256"].items())
-        if (digest := _file_hash(folder / name)) != expected
-    ]
+    content = read_facts(folder)
+    problems = array_damage(folder, content)
     if problems:
         raise InputError(problems)
-    try:
-        held = [*SCENE_ARRAYS, *(name for name in OPTIONAL_ARRAYS if f"{name}.npy" in content["sha256"])]
-        arrays = {name: np.load(folder / f"{name}.npy", allow_pickle=False) for name in held}
-    except (OSError, ValueError) as error:
-        raise InputError(f"{folder}: {error}") from None
+    arrays: dict[str, Any] = {}
+    for name in (*SCENE_ARRAYS, *(name for name in OPTIONAL_ARRAYS if f"{name}.npy" in content["sha256"])):
+        try:
+            arrays[name] = read_array(folder / f"{name}.npy", *SHAPES[name])
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    if not len(arrays["means"]):
+        raise InputError(f"{folder}: a scene must hold at least one Gaussian; it holds none")
     sky = arrays["environment"]
-    if sky.ndim != 3 or sky.shape[2] != 3 or not sky.size or not np.isfinite(sky).all():
+    if not sky.size or not np.isfinite(sky).all():
         raise InputError(
             f"{folder / 'environment.npy'}: must be a picture [H, W, 3] of finite numbers;"
             f" its shape is {sky.shape}"
@@ -118,9 +143,25 @@ def read_scene(folder: Path) -> Scene:
     )
 
 
+def array_damage(folder: Path, facts: dict[str, Any]) -> list[str]:
+    """The arrays of a scene folder that are not those of its scene.json, a sentence each.
+
+    Parameters
+    ----------
+    folder : of the scene
+    facts : its scene.json
+    """
+    return [
+        f"{folder / name}: must have the SHA-256 of scene.json;"
+        f" {'it is missing, or no regular file' if digest is None else 'its bytes differ'}"
+        for name, expected in sorted(facts["sha256"].items())
+        if (digest := _file_hash(folder / name)) != expected
+    ]
+
+
 def scene_hash(folder: Path) -> str:
     """SHA-256 over the hashes of the scene's arrays and the facts that change its picture."""
-    content = _read_facts(folder)
+    content = read_facts(folder)
     decisive = {
         key: content[key] for key in ("sha256", *BLENDING_RULES, "carriageway_left", "carriageway_right")
     }
@@ -140,26 +181,39 @@ def _arrays(scene: Scene) -> dict[str, NDArray[Any]]:
     }
 
 
-def _read_facts(folder: Path) -> dict[str, Any]:
+def read_facts(folder: Path) -> dict[str, Any]:
+    """What scene.json says, in its form.
+
+    Raises
+    ------
+    InputError
+        Listing every rule that it breaks.
+    """
     path = folder / "scene.json"
-    try:
-        content = json.loads(path.read_text())
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; is this a scene folder?") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: must be valid JSON; {error}") from None
+    if not path.exists():
+        raise InputError(f"{path}: no such file; is this a scene folder?")
+    with open_regular(path) as stream:
+        text = stream.read(LONGEST_FACTS + 1)
+    if len(text) > LONGEST_FACTS:
+        raise InputError(f"{path}: must have at most {LONGEST_FACTS} bytes; it has more")
+    content = parse_json(text, path, "scene.json")
     if not isinstance(content, dict) or content.get("format") != SCENE_FORMAT:
         found = content.get("format") if isinstance(content, dict) else content
-        raise InputError(f"{path}: the scene must be of format {SCENE_FORMAT}; it is {found!r}")
+        raise InputError(f"{path}: the scene must be of format {SCENE_FORMAT}; it is {brief(found)}")
     hashes = content.get("sha256")
     left, right = content.get("carriageway_left"), content.get("carriageway_right")
     rules = {
-        "name must be a text": isinstance(content.get("name"), str),
+        f"name must be printable text of at most {LONGEST_NAME} characters": (
+            isinstance(content.get("name"), str)
+            and content["name"].isprintable()
+            and len(content["name"]) <= LONGEST_NAME
+        ),
         f"{' and '.join(BLENDING_RULES)} must be true or false": all(
             isinstance(content.get(name), bool) for name in BLENDING_RULES
         ),
-        "carriageway_left and carriageway_right must be numbers [m], positive and negative": (
-            isinstance(left, int | float) and isinstance(right, int | float) and right < 0 < left
+        "carriageway_left and carriageway_right must be numbers [m], positive and negative, of at most"
+        f" {FARTHEST_EDGE:g} m": (
+            _is_number(left, FARTHEST_EDGE) and _is_number(right, FARTHEST_EDGE) and right < 0 < left  # type: ignore[operator]
         ),
         f"sun_direction_deg, where given, must be azimuth and elevation [deg], the latter {LOWEST_SUN_DEG:g} to 90": (
             _is_sun(content.get("sun_direction_deg"))
@@ -167,6 +221,8 @@ def _read_facts(folder: Path) -> dict[str, Any]:
         f"sha256 must name {', '.join(ARRAY_FILES)}, may name {', '.join(OPTIONAL_FILES)}, and nothing else": (
             isinstance(hashes, dict) and set(ARRAY_FILES) <= set(hashes) <= {*ARRAY_FILES, *OPTIONAL_FILES}
         ),
+        "sha256 must hold hashes of 64 hexadecimal digits": isinstance(hashes, dict)
+        and all(isinstance(digest, str) and DIGEST.fullmatch(digest) for digest in hashes.values()),
     }
     problems = [f"{path}: {rule}; it is not so" for rule, kept in rules.items() if not kept]
     if problems:
@@ -174,14 +230,20 @@ def _read_facts(folder: Path) -> dict[str, Any]:
     return content
 
 
+def _is_number(value: Any, most: float = 360.0) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= most
+
+
 def _is_sun(value: Any) -> bool:
     """Whether an entry of scene.json is a sound direction of the sun, or none."""
-    pair = isinstance(value, list) and len(value) == 2 and all(isinstance(v, int | float) for v in value)
+    pair = isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
     return value is None or (pair and not sun_problems((value[0], value[1])))
 
 
 def _file_hash(path: Path) -> str | None:
-    if not path.is_file():
+    """SHA-256 of a regular file; None where there is none. Links are not followed."""
+    try:
+        with open_regular(path) as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except InputError:
         return None
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

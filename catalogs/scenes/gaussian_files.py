@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from catalogs.scenes.ply_header import check_ply
+from catalogs.scenes.spz_header import check_spz
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians, check_gaussians
@@ -48,7 +49,8 @@ def read_gaussians(path: Path) -> Gaussians:
     n = len(data.means)
     if n == 0:
         raise InputError(f"{path}: must hold at least one Gaussian; it holds none")
-    norms = np.linalg.norm(data.quats, axis=1, keepdims=True)
+    # in double precision no float32 is too large or too small to be squared
+    norms = np.linalg.norm(data.quats.astype(np.float64), axis=1, keepdims=True)
     empty = norms == 0
     with np.errstate(invalid="ignore", over="ignore"):
         quats = np.where(empty, [1, 0, 0, 0], data.quats / np.where(empty, 1, norms)).astype(np.float32)
@@ -126,6 +128,7 @@ def _decoded(path: Path, form: str) -> Any:
             return gsply.plyread(path)
         if form == "spz":
             # GaussForge reads it too, but reports on standard output, where --json prints
+            check_spz(path)
             return gsply.read_spz(path)
         answer = gaussforge.GaussForge().convert(path.read_bytes(), form, "ply")
         if "error" in answer:

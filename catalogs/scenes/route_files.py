@@ -1,7 +1,6 @@
 """Routes from outside: CSV of road points, or camera poses as KITTI, TUM or nerfstudio write them."""
 
 import csv
-import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from catalogs.documents import parse_json, read_content
+from catalogs.sentences import shorten
 from tasks.errors import InputError
 from tasks.scene.route import Route, route_from_poses, route_from_positions
 
@@ -22,6 +23,10 @@ OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0])
 PRINTED_DIGITS = 1e-3
 """How far a rotation printed with few digits may be from an exact one [1]."""
 PROBLEMS_SHOWN = 10
+LARGEST_FILE = 2**26
+"""Bytes of a route's file [1]: KITTI's longest takes 1 MB."""
+UNITS_M = (1e-6, 1e6)
+"""Shortest and longest unit of a file [m]."""
 
 
 def read_route(
@@ -48,13 +53,14 @@ def read_route(
     InputError
         If the file is missing, unreadable, of another form, or no route; listing the lines at fault.
     """
-    if not path.is_file():
+    if not path.exists():
         raise InputError(f"{path}: no such file; give {FORMS}")
-    if not metres_per_unit > 0:
-        raise InputError(f"metres_per_unit must be positive; it is {metres_per_unit}")
+    low, high = UNITS_M
+    if not low <= metres_per_unit <= high:
+        raise InputError(f"metres_per_unit must be {low:g} to {high:g}; it is {metres_per_unit:g}")
     scaled = np.diag([metres_per_unit, metres_per_unit, metres_per_unit, 1.0])
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_content(path, "route", LARGEST_FILE).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: must be {FORMS}; it is not text") from None
     try:
@@ -73,7 +79,10 @@ def read_route(
 
 
 def _csv_route(text: str, metres_per_unit: float) -> Route:
-    rows = [[word.strip() for word in row] for row in csv.reader(text.splitlines())]
+    try:
+        rows = [[word.strip() for word in row] for row in csv.reader(text.splitlines())]
+    except csv.Error as error:
+        raise InputError(f"a route CSV must be a table of text; {error}") from None
     header = rows[0] if rows else []
     missing = [name for name in "xyz" if name not in header]
     if missing:
@@ -82,11 +91,10 @@ def _csv_route(text: str, metres_per_unit: float) -> Route:
     if 0 < len(attitude) < 4:
         raise InputError(f"a route CSV has all of qw, qx, qy, qz or none; it has {', '.join(attitude)}")
     names = [*"xyz", *attitude]
+    if twice := [name for name in names if header.count(name) > 1]:
+        raise InputError(f"a route CSV must have each column once; {', '.join(twice)} stand twice")
     lines = [(i, row) for i, row in enumerate(rows[1:], start=2) if any(row)]
-    picked = [
-        (i, [row[header.index(n)] for n in names] if len(row) == len(header) else row) for i, row in lines
-    ]
-    numbers = _numbers(picked, len(names))
+    numbers = _numbers(lines, [header.index(name) for name in names], len(header))
     positions = metres_per_unit * numbers[:, :3]
     if not attitude:
         return route_from_positions(positions)
@@ -105,7 +113,7 @@ def _camera_poses(text: str, suffix: str) -> NDArray[np.float64]:
     width = len(lines[0][1]) if lines else 0
     if width not in (8, 12):
         raise InputError(f"poses need 12 (KITTI) or 8 (TUM) numbers on every line; the first has {width}")
-    numbers = _numbers(lines, width)
+    numbers = _numbers(lines, range(width), width)
     if width == 8:
         # TUM writes time, position, and the quaternion's scalar last
         return _poses(numbers[:, 1:4], numbers[:, [7, 4, 5, 6]])
@@ -115,10 +123,7 @@ def _camera_poses(text: str, suffix: str) -> NDArray[np.float64]:
 
 
 def _nerfstudio(text: str) -> NDArray[np.float64]:
-    try:
-        content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(f"transforms.json must be valid JSON; {error}") from None
+    content = parse_json(text.encode(), "transforms.json", "route")
     frames = content.get("frames") if isinstance(content, dict) else None
     if not isinstance(frames, list) or not frames:
         raise InputError("transforms.json must have a list of frames, at least one; it has none")
@@ -128,8 +133,10 @@ def _nerfstudio(text: str) -> NDArray[np.float64]:
             pose = np.array(frame["transform_matrix"], dtype=np.float64)
         except (TypeError, KeyError, ValueError):
             pose = np.empty(0)
-        if pose.shape != (4, 4) or not np.isfinite(pose).all():
-            problems.append(f"frame {i} must have a transform_matrix of 4x4 finite numbers; it has not")
+        if pose.shape != (4, 4) or not np.isfinite(pose).all() or (pose[3] != (0, 0, 0, 1)).any():
+            problems.append(
+                f"frame {i} must have a transform_matrix of 4x4 finite numbers, the last row 0 0 0 1; it has not"
+            )
         poses.append(pose)
     if problems:
         raise InputError(problems)
@@ -141,22 +148,26 @@ def _nerfstudio(text: str) -> NDArray[np.float64]:
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
-    """Sorting key under which picture 2 comes before picture 10."""
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]
+    """Sorting key under which picture 2 comes before picture 10; a number of too many digits is read in parts."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d{1,18})", name)]
 
 
-def _numbers(lines: Sequence[tuple[int, list[str]]], width: int) -> NDArray[np.float64]:
-    """Finite numbers [M, width] of numbered lines of words; every line at fault is a problem."""
-    values = np.full((len(lines), width), np.nan)
+def _numbers(
+    lines: Sequence[tuple[int, list[str]]], columns: Sequence[int], width: int
+) -> NDArray[np.float64]:
+    """Finite numbers [M, columns] of numbered lines of ``width`` words; every line at fault is a problem."""
+    values = np.full((len(lines), len(columns)), np.nan)
+    count = f"{width} numbers" if len(columns) == width else f"{width} fields, {len(columns)} of them numbers"
     problems = []
     for row, (i, words) in enumerate(lines):
+        shown = shorten(" ".join(words), 60)
         try:
-            values[row] = [float(word) for word in words]
+            values[row] = [float(words[column]) for column in columns if len(words) == width]
         except ValueError:
-            problems.append(f"line {i} must hold {width} numbers; it holds {' '.join(words)[:60]!r}")
+            problems.append(f"line {i} must hold {count}; it holds {shown!r}")
             continue
         if not np.isfinite(values[row]).all():
-            problems.append(f"line {i} must hold finite numbers; it holds {' '.join(words)[:60]!r}")
+            problems.append(f"line {i} must hold finite numbers; it holds {shown!r}")
     if problems:
         raise InputError(problems)
     return values
@@ -164,7 +175,7 @@ def _numbers(lines: Sequence[tuple[int, list[str]]], width: int) -> NDArray[np.f
 
 def _poses(positions: NDArray[np.float64], quats_wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
     length = np.linalg.norm(quats_wxyz, axis=1)
-    if (np.abs(length - 1) > PRINTED_DIGITS).any():
+    if len(length) and np.abs(length - 1).max() > PRINTED_DIGITS:
         bad = int(np.abs(length - 1).argmax())
         raise InputError(f"pose {bad} must have a unit quaternion; its length is {length[bad]:g}")
     poses = np.tile(np.eye(4), (len(positions), 1, 1))
@@ -176,8 +187,9 @@ def _poses(positions: NDArray[np.float64], quats_wxyz: NDArray[np.float64]) -> N
 def _orthonormal(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Poses whose rotations, printed with few digits, are made exact."""
     R = poses[:, :3, :3]
-    off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
-    wrong = np.flatnonzero((off > PRINTED_DIGITS) | (np.linalg.det(R) < 0))
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    wrong = np.flatnonzero(~(off <= PRINTED_DIGITS) | (np.linalg.det(R) < 0))
     if len(wrong):
         raise InputError(
             f"a pose must be a right-handed rotation and a translation; {len(wrong)} of {len(poses)} are not,"

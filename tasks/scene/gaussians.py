@@ -7,6 +7,11 @@ from numpy.typing import NDArray
 
 from tasks.errors import InputError
 
+LARGEST = 1e18
+"""Greatest coordinate and standard deviation [m]: the square of a larger one is infinite in single precision."""
+UNIT_TOLERANCE = 1e-2
+"""How far a quaternion's or normal's length may be from 1 [1]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Gaussians:
@@ -83,7 +88,14 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
             )
     if not problems:
         for name, ok, rule in (
-            ("scales", (gaussians.scales > 0).all(axis=1), "positive"),
+            ("means", (np.abs(gaussians.means) <= LARGEST).all(axis=1), f"within {LARGEST:g} m"),
+            ("quats_wxyz", _is_unit(gaussians.quats_wxyz), "unit quaternions"),
+            ("normals", _is_unit(gaussians.normals), "unit vectors"),
+            (
+                "scales",
+                ((gaussians.scales > 0) & (gaussians.scales <= LARGEST)).all(axis=1),
+                f"positive, and at most {LARGEST:g} m",
+            ),
             ("opacities", (gaussians.opacities > 0) & (gaussians.opacities <= 1), "in (0, 1]"),
             ("surroundings", _is_surrounded(gaussians), "an overlap of 0 or more and a positive size"),
         ):
@@ -94,6 +106,11 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
                 )
     if problems:
         raise InputError(problems)
+
+
+def _is_unit(vectors: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Whether each of the vectors [N, D] is 1 long; a square beyond single precision is infinite, and is not."""
+    return np.abs(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)) - 1) <= UNIT_TOLERANCE
 
 
 def _is_surrounded(gaussians: Gaussians) -> NDArray[np.bool_]:

@@ -16,6 +16,12 @@ SAMPLING = 0.25
 """Step of the samples from which points find their foot on the route [m]."""
 
 
+LONGEST_ROUTE = 1e5
+"""Length of a route [m]: its samples take 50 MB, and no clip drives a hundredth of it."""
+FARTHEST = 1e8
+"""Greatest coordinate of a route [m]: more than ten times the radius of the Earth."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Route:
     """Rig poses on the road, sampled along the route.
@@ -47,6 +53,9 @@ class Route:
             )
         if not (np.isfinite(self.station).all() and np.isfinite(self.T_world_rig).all()):
             raise InputError("a route's stations and poses must be finite; some are not")
+        problems += _range_problems(self.T_world_rig[:, :3, 3])
+        if not self.station[-1] <= LONGEST_ROUTE:
+            problems.append(f"a route must be at most {LONGEST_ROUTE:g} m long; it is {self.station[-1]:g} m")
         steps = np.diff(self.station)
         if self.station[0] != 0 or (steps <= 0).any():
             problems.append(
@@ -54,12 +63,17 @@ class Route:
                 f" they start at {self.station[0]:g} and the smallest step is {steps.min():g} m"
             )
         R = self.T_world_rig[:, :3, :3]
-        off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+        # what is far beyond a rotation's numbers could not be multiplied
+        off = np.abs(R).max(axis=(1, 2)) - 1
+        if off.max() <= 1e-6:
+            off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
         if off.max() > 1e-6 or (np.linalg.det(R) < 0).any():
             problems.append(
                 f"a route's poses must be right-handed rotations; pose {int(off.argmax())} is off by"
                 f" {off.max():.1e}"
             )
+        if np.abs(self.T_world_rig[:, 3] - (0, 0, 0, 1)).max() > 1e-6:
+            problems.append("a route's poses must end in the row 0 0 0 1; some do not")
         if problems:
             raise InputError(problems)
 
@@ -176,6 +190,8 @@ def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01)
     InputError
         If fewer than two poses remain.
     """
+    if problems := _range_problems(T_world_rig[:, :3, 3]):
+        raise InputError(problems)
     poses = T_world_rig[_moving(T_world_rig[:, :3, 3], standstill)]
     steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     return Route(station=np.concatenate([[0.0], np.cumsum(steps)]), T_world_rig=poses)
@@ -194,8 +210,8 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
     InputError
         If fewer than two points remain, or the route stands upright somewhere.
     """
-    if not np.isfinite(positions).all():
-        raise InputError("a route's points must be finite; some are not")
+    if problems := _range_problems(positions):
+        raise InputError(problems)
     kept = positions[_moving(positions, standstill)]
     if len(kept) < 2:
         raise InputError(f"a route needs two points {standstill:g} m apart or more; it has {len(kept)}")
@@ -212,6 +228,16 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
     poses[:, :3, :3] = np.stack([forward, left, np.cross(forward, left)], axis=2)
     poses[:, :3, 3] = kept
     return Route(station=station, T_world_rig=poses)
+
+
+def _range_problems(positions: NDArray[np.float64]) -> list[str]:
+    if (np.abs(positions) <= FARTHEST).all():
+        return []
+    bad = int(np.flatnonzero(~(np.abs(positions) <= FARTHEST).all(axis=1))[0])
+    return [
+        f"a route's points must be finite numbers of at most {FARTHEST:g} m; point {bad} is"
+        f" {', '.join(f'{x:g}' for x in positions[bad])}"
+    ]
 
 
 def _moving(positions: NDArray[np.float64], standstill: float) -> list[int]:

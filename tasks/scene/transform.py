@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tasks.render.spherical_harmonics import sh_basis
-from tasks.scene.gaussians import Gaussians
+from tasks.scene.gaussians import Gaussians, check_gaussians
 
 BANDS = ((1, 4), (4, 9), (9, 16))
 """First and last coefficient of the bands 1, 2 and 3; band 0 does not turn."""
@@ -22,19 +22,29 @@ def moved(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussian
     ----------
     gaussians : in the source frame
     T_world_source : float64 [4, 4] source-to-world similarity: rotation, one scale, translation [m]
+
+    Raises
+    ------
+    InputError
+        If the cloud has values in that frame that no cloud may have.
     """
     scale = np.cbrt(np.linalg.det(T_world_source[:3, :3]))
     R = T_world_source[:3, :3] / scale
     turn = Rotation.from_matrix(R)
     quats = (turn * Rotation.from_quat(gaussians.quats_wxyz, scalar_first=True)).as_quat(scalar_first=True)
-    return replace(
+    with np.errstate(over="ignore", under="ignore"):
+        means = (gaussians.means @ T_world_source[:3, :3].T + T_world_source[:3, 3]).astype(np.float32)
+        scales = (scale * gaussians.scales).astype(np.float32)
+    turned = replace(
         gaussians,
-        means=(gaussians.means @ T_world_source[:3, :3].T + T_world_source[:3, 3]).astype(np.float32),
-        scales=(scale * gaussians.scales).astype(np.float32),
+        means=means,
+        scales=scales,
         quats_wxyz=quats.astype(np.float32),
         normals=(gaussians.normals @ R.T).astype(np.float32),
         sh=rotated_sh(gaussians.sh, R),
     )
+    check_gaussians(turned, "the cloud along the route")
+    return turned
 
 
 def rotated_sh(sh: NDArray[np.float32], rotation: NDArray[np.float64]) -> NDArray[np.float32]:

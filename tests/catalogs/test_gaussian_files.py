@@ -1,5 +1,8 @@
 """Gaussians trained elsewhere: .ply by its layout, packed forms by the .ply that they were made from."""
 
+import gzip
+import struct
+import tracemalloc
 from dataclasses import replace
 
 import gaussforge
@@ -9,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from catalogs.scenes.gaussian_files import read_gaussians, write_gaussians
 from tasks.errors import InputError
+from tasks.scene.transform import moved
 from tests.toy_street import toy_street
 
 SCENE = toy_street()
@@ -148,3 +152,85 @@ def test_reading_prints_nothing_where_json_is_printed(tmp_path, capfd):
     for name in ("a.ply", "b.spz", "b.splat"):
         read_gaussians(tmp_path / name)
     assert capfd.readouterr().out == ""
+
+
+def compressed(path):
+    """A compressed .ply of 50 Gaussians; its bytes."""
+    ply(path / "plain.ply")
+    packed = gaussforge.GaussForge().convert((path / "plain.ply").read_bytes(), "ply", "compressed.ply")
+    return bytes(packed["data"])
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        # 10,000 Gaussians in one chunk: the decoder would read bounds from beyond it
+        (lambda b: b.replace(b"vertex 50", b"vertex 300") + bytes(10_000), "must have 2 chunks"),
+        (lambda b: b.replace(b"element chunk 1", b"element chunk 0"), "must have 1 chunks"),
+        (lambda b: b.replace(b"min_x", b"mon_x"), "each chunk of a compressed .ply must have"),
+        (lambda b: b.replace(b"packed_scale", b"packed_scald"), "each vertex of a compressed .ply must have"),
+        (lambda b: b.replace(b"element vertex", b"element vertices"), "must have vertex elements"),
+        (lambda b: b.replace(b"element chunk 1", b"element chunk 1\nelement chunk 1"), "element chunk 1"),
+        (lambda b: b.replace(b"element chunk", b"comment end_header\nelement chunk"), "up to end_header"),
+        (lambda b: b[:-1], "truncated"),
+    ],
+)
+def test_a_compressed_ply_is_decoded_only_where_its_layout_is_the_decoder_s(tmp_path, change, sentence):
+    (tmp_path / "b.ply").write_bytes(change(compressed(tmp_path)))
+    with pytest.raises(InputError, match=sentence):
+        read_gaussians(tmp_path / "b.ply")
+
+
+def test_a_plain_ply_has_no_other_elements_and_no_property_twice(tmp_path):
+    ply(tmp_path / "a.ply")
+    whole = (tmp_path / "a.ply").read_bytes()
+    (tmp_path / "a.ply").write_bytes(
+        whole.replace(b"element vertex", b"element face 0\nproperty float a\nelement vertex")
+    )
+    with pytest.raises(InputError, match="the vertices must be the only element"):
+        read_gaussians(tmp_path / "a.ply")
+    (tmp_path / "a.ply").write_bytes(whole.replace(b"property float ny", b"property float nx"))
+    with pytest.raises(InputError, match="each property must stand once"):
+        read_gaussians(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize("value", [3e38, 1e-30])
+def test_quaternions_of_any_length_become_unit_ones(tmp_path, value):
+    ply(tmp_path / "a.ply")
+    rows = bytearray((tmp_path / "a.ply").read_bytes())
+    rows[-16:] = np.full(4, value, "<f4").tobytes()
+    (tmp_path / "a.ply").write_bytes(rows)
+    cloud = moved(read_gaussians(tmp_path / "a.ply"), np.eye(4))
+    np.testing.assert_allclose(np.linalg.norm(cloud.quats_wxyz, axis=1), 1, atol=1e-6)
+
+
+def spz(count, payload, version=2):
+    return gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", version, count, 0, 12, 0, 0) + payload)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (spz(10**9, b""), "1000000000 Gaussians in 19000000000 bytes"),
+        (spz(1, bytes(19 + 2**20)) + b"more", "more than extensions take"),
+        (spz(1, bytes(2**21)), "more than extensions take"),
+        (spz(2, bytes(19)), "38 bytes of Gaussians; 19 are there"),
+        (spz(1, bytes(19), version=9), "version 1 to 4"),
+        (b"NGSP\x04\x00\x00\x00" + b"\xff" * 24, "version 1 to 4 and degree 0 to 3"),
+        (b"NGSP", "cannot be unpacked"),
+        (b"\x1f\x8bxx", "cannot be unpacked"),
+    ],
+)
+def test_a_spz_unpacks_to_what_it_announces(tmp_path, content, sentence):
+    (tmp_path / "b.spz").write_bytes(content)
+    with pytest.raises(InputError, match=sentence):
+        read_gaussians(tmp_path / "b.spz")
+
+
+def test_a_spz_that_holds_more_than_it_announces_is_not_unpacked_whole(tmp_path):
+    (tmp_path / "b.spz").write_bytes(spz(1, bytes(2**26)))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="more than extensions take"):
+        read_gaussians(tmp_path / "b.spz")
+    assert tracemalloc.get_traced_memory()[1] < 2**24
+    tracemalloc.stop()

@@ -75,6 +75,19 @@ def test_a_csv_of_points_is_a_route_as_it_stands(tmp_path):
         ("r.json", '{"frames": [7]}', "frame 0"),
         ("r.json", '{"frames": [{"file_path": "a"}]}', "transform_matrix"),
         ("r.json", "{", "must be"),
+        ("r.json", '{"frames": [], "frames": []}', "distinct keys"),
+        ("r.json", "[" * 100_000, "inside each other"),
+        (
+            "r.json",
+            '{"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,0]]}]}',
+            "the last row 0 0 0 1",
+        ),
+        ("r.csv", "t,x,y,z\n0,0,0,0\n1,0,0\n", "line 3 must hold 4 fields, 3 of them numbers"),
+        ("r.csv", "x,x,y,z\n0,0,0,0\n", "each column once; x stand twice"),
+        ("r.csv", "x,y,z\n0,0,0\n1e7,0,0\n", "at most 100000 m long"),
+        ("r.csv", "x,y,z\n0,0,0\n1e300,0,0\n", "at most 1e.08 m; point 1 is 1e.300, 0, 0"),
+        ("r.csv", "x,y,z\n" + "1" * 200_000 + ",0,0\n", "field limit"),
+        ("r.txt", "1e200 0 0 0 0 1 0 0 0 0 1 0\n", "right-handed rotation"),
     ],
 )
 def test_a_faulty_route_file_is_one_sentence(tmp_path, name, content, sentence):
@@ -120,6 +133,24 @@ def test_frames_are_ordered_by_the_number_in_their_names(tmp_path):
         frame["transform_matrix"][2][3] = float(i)
     (tmp_path / "transforms.json").write_text(json.dumps({"frames": frames[5:] + frames[:5]}))
     assert read_route(tmp_path / "transforms.json", 1.5)[0].length == pytest.approx(11.0)
+
+
+def test_a_picture_s_number_may_have_any_digits(tmp_path):
+    frames = [
+        {"file_path": f"{'7' * 5_000}{i}.png", "transform_matrix": np.diag([1, -1, -1, 1.0]).tolist()}
+        for i in range(3)
+    ]
+    for i, frame in enumerate(frames):
+        frame["transform_matrix"][2][3] = float(i)
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": frames}))
+    assert read_route(tmp_path / "transforms.json", 1.5)[0].length == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("metres_per_unit", [0.0, -1.0, float("nan"), 1e-200, 1e200])
+def test_a_unit_that_no_reconstruction_has_is_refused(tmp_path, metres_per_unit):
+    write_kitti(tmp_path / "k.txt")
+    with pytest.raises(InputError, match=r"metres_per_unit must be 1e-06 to 1e.06"):
+        read_route(tmp_path / "k.txt", 1.5, metres_per_unit)
 
 
 def test_a_csv_with_quaternions_gives_the_rig_s_attitude(tmp_path):

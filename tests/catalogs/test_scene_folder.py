@@ -1,7 +1,9 @@
 """Scene folders: every array under its hash, every fault named."""
 
+import hashlib
 import json
 import shutil
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -84,6 +86,10 @@ def test_an_unknown_scene_lists_the_built_in_one():
         ("carriageway_left", -3, "carriageway_left"),
         ("carriageway_right", None, "carriageway_right"),
         ("sha256", {}, "sha256 must name means.npy"),
+        ("sha256", {"../means.npy": "0" * 64}, "sha256 must name means.npy"),
+        ("name", "\x1b[31m", "name must be printable"),
+        ("carriageway_left", float("inf"), "finite"),
+        ("carriageway_left", True, "carriageway_left"),
         ("sun_direction_deg", [120.0], "sun_direction_deg, where given"),
         ("sun_direction_deg", [120.0, 0.2], "sun_direction_deg, where given"),
     ],
@@ -104,3 +110,78 @@ def test_surroundings_are_kept_where_a_cloud_has_them_and_are_part_of_its_hash(t
     back = read_scene(tmp_path / "level").gaussians.surroundings
     np.testing.assert_array_equal(back, level.gaussians.surroundings)
     assert scene_hash(tmp_path / "plain") != scene_hash(tmp_path / "level")
+
+
+@pytest.mark.parametrize(
+    ("header", "sentence"),
+    [
+        (
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (1000000000000, 3), }",
+            "the 12000000000000 bytes",
+        ),
+        ("{'descr': '<f4', 'fortran_order': False, 'shape': (-1, 3), }", "bytes that its header announces"),
+        ("{'descr': '|O', 'fortran_order': False, 'shape': (2, 3), }", "must hold float32"),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), }", "must hold float32"),
+        ("{'descr': '<f4', 'fortran_order': False, 'shape': (3,), }", r"shape \[N, 3\]"),
+        ("(" * 600, "must be a .npy file"),
+        ("{'descr': '<f4'", "must be a .npy file"),
+    ],
+)
+def test_an_array_that_announces_what_it_does_not_hold_is_refused_before_memory_is_taken(
+    tmp_path, header, sentence
+):
+    write_scene(SCENE, tmp_path / "s", {})
+    text = header.encode().ljust(118 if len(header) < 118 else 630) + b"\n"
+    content = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + bytes(24)
+    (tmp_path / "s" / "means.npy").write_bytes(content)
+    reseal(tmp_path / "s")
+    tracemalloc.start()
+    with pytest.raises(InputError, match=sentence):
+        read_scene(tmp_path / "s")
+    assert tracemalloc.get_traced_memory()[1] < 2**25
+    tracemalloc.stop()
+
+
+def reseal(folder):
+    """Write the hashes of the arrays as they are: anybody can."""
+    facts = json.loads((folder / "scene.json").read_text())
+    facts["sha256"] = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.glob("*.npy")
+    }
+    (folder / "scene.json").write_text(json.dumps(facts))
+
+
+@pytest.mark.parametrize("name", ["scene.json", "means.npy"])
+def test_a_link_in_a_scene_folder_is_not_followed(tmp_path, name):
+    write_scene(SCENE, tmp_path / "s", {})
+    (tmp_path / "s" / name).rename(tmp_path / name)
+    (tmp_path / "s" / name).symlink_to(tmp_path / name)
+    with pytest.raises(InputError, match=name):
+        read_scene(tmp_path / "s")
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "rule"),
+    [
+        ("quats_wxyz", lambda a: 0 * a, "quats_wxyz must be unit quaternions"),
+        ("normals", lambda a: 3 * a, "normals must be unit vectors"),
+        ("means", lambda a: a + np.float32(3e38), "means must be within 1e.18 m"),
+        ("scales", lambda a: a + np.float32(3e38), "scales must be positive, and at most"),
+        ("means", lambda a: a[:0], "at least one Gaussian"),
+    ],
+)
+def test_a_value_that_no_street_has_is_refused_by_rule(tmp_path, name, change, rule):
+    write_scene(SCENE, tmp_path / "s", {})
+    path = tmp_path / "s" / f"{name}.npy"
+    np.save(path, change(np.load(path)))
+    reseal(tmp_path / "s")
+    with pytest.raises(InputError, match=rule):
+        read_scene(tmp_path / "s")
+
+
+def test_a_folder_that_only_looks_like_a_half_written_scene_stays(tmp_path):
+    mine = tmp_path / "s.partial" / "thesis.txt"
+    mine.parent.mkdir()
+    mine.touch()
+    write_scene(SCENE, tmp_path / "s", {})
+    assert mine.is_file() and sorted(path.name for path in tmp_path.iterdir()) == ["s", "s.partial"]
