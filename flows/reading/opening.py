@@ -1,19 +1,24 @@
 """A finished dataset for people who analyse it: the same tables in the library of their choice."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import duckdb
 import pyarrow as pa
 import pyarrow.dataset
 import pyarrow.parquet as pq
 
-from flows.reading.query import VIEWS, connect_sealed, schema
+from catalogs.sentences import shorten
+from flows.reading.connection import connect_sealed, quote_identifier
+from flows.reading.query import VIEWS, refused_query, schema
+from flows.reading.table_files import table_files
 from flows.store.address import frames_store, reading, telemetry
+from flows.store.frame_metadata import check_frames, read_local_metadata
 from flows.store.layout import Layout
+from flows.store.objects import Objects
 from flows.store.sealed import read_manifest
 from tasks.conventions import CHANNELS_BY_NAME
 from tasks.errors import InputError
@@ -25,6 +30,7 @@ if TYPE_CHECKING:  # each takes its time to import, and few people need all of t
     from flows.reading.windows import ClipWindows
 
 STORED = ("clips", "ticks", "frames", "pairs")
+_Answer = TypeVar("_Answer")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +42,13 @@ class Dataset:
     root : its folder
     manifest : its frozen manifest
     origin : its address in an object store; ``root`` then holds what has been read of it
+    allow_files : SQL may read and write files of this machine; else it reaches the dataset's tables alone
     """
 
     root: Path
-    manifest: dict[str, Any]
+    manifest: Mapping[str, Any]
     origin: str | None = None
+    allow_files: bool = False
 
     def __repr__(self) -> str:
         return f"Dataset({self.origin or str(self.root)!r}, {len(self.manifest['clips'])} clips)"
@@ -54,22 +62,36 @@ class Dataset:
             If there is no such table.
         """
         _known(table, STORED)
-        folder = Layout(self.root).telemetry
-        if table in {"clips", "pairs"}:
-            return pyarrow.dataset.dataset(folder / f"{table}.parquet")
-        partitioning = pyarrow.dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
-        first = next((folder / table).glob("*/*.parquet"))
-        labelled = pq.read_schema(first).append(pa.field("family", pa.string()))
-        return pyarrow.dataset.dataset(folder / table, schema=labelled, partitioning=partitioning)
+        paths = list(table_files(self._layout, self.manifest)[table].values())
+        try:
+            # without the metadata of the whole: libraries read settings for other libraries there
+            schema = pq.read_schema(paths[0]).remove_metadata()
+            if table in {"clips", "pairs"}:
+                return pyarrow.dataset.dataset(paths, schema=schema)
+            partitioning = pyarrow.dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
+            return pyarrow.dataset.dataset(
+                paths, schema=schema.append(pa.field("family", pa.string())), partitioning=partitioning
+            )
+        except (pa.ArrowException, OSError) as error:
+            raise self._unreadable(error) from None
 
     @cached_property
     def connection(self) -> duckdb.DuckDBPyConnection:
-        """A DuckDB connection with the views clips, ticks, frames, verdicts and pairs."""
-        return connect_sealed(Layout(self.root))
+        """A DuckDB connection with the views clips, ticks, frames, verdicts and pairs; it reaches nothing else."""
+        return connect_sealed(self._layout, self.manifest, allow_files=self.allow_files)
 
     def sql(self, query: str) -> duckdb.DuckDBPyRelation:
-        """A query over the views, as a relation that is evaluated when its rows are asked for."""
-        return self.connection.sql(query)
+        """A query over the views, as a relation that is evaluated when its rows are asked for.
+
+        Raises
+        ------
+        InputError
+            If it is no query that DuckDB takes, or asks for files and the dataset was not opened with ``allow_files``.
+        """
+        try:
+            return self.connection.sql(query)
+        except duckdb.Error as error:
+            raise refused_query(query, error, "musync.open(..., allow_files=True)") from None
 
     def pandas(self, table: str = "clips", columns: Sequence[str] | None = None) -> "pd.DataFrame":
         """A view as a pandas frame; what is not represented is NaN.
@@ -79,7 +101,7 @@ class Dataset:
         table : clips, ticks, frames, verdicts or pairs
         columns : those to read; None takes all
         """
-        return self._relation(table, columns).df()
+        return self._evaluated(table, columns, lambda relation: relation.df())
 
     def polars(self, table: str = "clips", columns: Sequence[str] | None = None) -> Any:
         """A view as a Polars frame; needs the package polars.
@@ -93,12 +115,31 @@ class Dataset:
             import polars as pl
         except ImportError:
             raise InputError("Polars is not installed: pip install 'musync[analysts]'") from None
-        return pl.from_arrow(self._relation(table, columns).to_arrow_table())
+        return self._evaluated(table, columns, lambda relation: pl.from_arrow(relation.to_arrow_table()))
 
-    def _relation(self, table: str, columns: Sequence[str] | None) -> duckdb.DuckDBPyRelation:
+    def _evaluated(
+        self,
+        table: str,
+        columns: Sequence[str] | None,
+        evaluate: Callable[[duckdb.DuckDBPyRelation], _Answer],
+    ) -> _Answer:
         _known(table, tuple(VIEWS))
-        chosen = "*" if columns is None else ", ".join(f'"{name}"' for name in columns)
-        return self.sql(f"SELECT {chosen} FROM {table}")
+        chosen = "*" if columns is None else ", ".join(map(quote_identifier, columns))
+        relation = self.sql(f"SELECT {chosen} FROM {table}")
+        try:
+            return evaluate(relation)
+        except (duckdb.Error, pa.ArrowException, ValueError, OverflowError) as error:
+            raise self._unreadable(error) from None
+
+    @property
+    def _layout(self) -> Layout:
+        return Layout(self.root, self.origin)
+
+    def _unreadable(self, error: Exception) -> InputError:
+        return InputError(
+            f"{self._layout}: its tables must be as muSync writes them; {shorten(error)}:"
+            " musync verify says whether they are damaged"
+        )
 
     @property
     def frames(self) -> "zarr.Group":
@@ -107,13 +148,12 @@ class Dataset:
         Raises
         ------
         InputError
-            If the dataset was made without frames.
+            If the dataset was made without frames, or their metadata are not those that muSync writes.
         """
-        if not self.manifest["grid"].get("pictures", True):
-            raise InputError(f"{self.origin or self.root}: the dataset was made without frames")
+        store = self._checked_frames()
         import zarr
 
-        return zarr.open_group(frames_store(Layout(self.root, self.origin)), mode="r")
+        return zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
 
     def xarray(self) -> Any:
         """The frames as a lazy xarray dataset, its clips by label and its frames with their time; needs xarray.
@@ -121,15 +161,20 @@ class Dataset:
         Raises
         ------
         InputError
-            If xarray is not installed.
+            If xarray is not installed, or as for `frames`.
         """
         try:
             import xarray
         except ImportError:
             raise InputError("xarray is not installed: pip install 'musync[analysts]'") from None
-        pixels = xarray.open_zarr(
-            frames_store(Layout(self.root, self.origin)), consolidated=False, chunks=None
-        )
+        try:
+            pixels = xarray.open_zarr(
+                self._checked_frames(), consolidated=False, zarr_format=3, chunks=None, decode_cf=False
+            )
+        except (ValueError, TypeError, KeyError) as error:
+            raise InputError(
+                f"{self._layout}/frames.zarr: {shorten(error)}: musync verify says whether it is damaged"
+            ) from None
         clips, time = self.manifest["clips"], CHANNELS_BY_NAME["t_ns"]
         seconds = [frame / self.manifest["grid"]["frame_rate_hz"] for frame in range(pixels.sizes["frame"])]
         return pixels.assign_coords(
@@ -170,16 +215,38 @@ class Dataset:
                 self.origin, lambda name: name.startswith(tuple(f"frames.zarr/{array}/" for array in arrays))
             )
         return windows_of(
-            self.root, self.manifest, window, stride or window, columns, arrays, clips, quarantined
+            self._layout, self.manifest, window, stride or window, columns, arrays, clips, quarantined
         )
+
+    def _checked_frames(self) -> Any:
+        """The Zarr store of the frames, once their metadata are found to be those that muSync writes."""
+        grid, layout = self.manifest["grid"], self._layout
+        if not grid.get("pictures", True):
+            raise InputError(f"{layout}: the dataset was made without frames")
+        if self.origin is None:
+            read = read_local_metadata(layout.frames)
+            members = [path.name for path in layout.frames.glob("*") if path.is_dir()]
+        else:
+            objects = Objects(f"{self.origin}/{layout.frames.name}")
+            read, members = objects.read, objects.folders()
+        check_frames(
+            read, members, f"{layout}/{layout.frames.name}", len(self.manifest["clips"]), grid["frames"]
+        )
+        return frames_store(layout)
 
     def schema(self) -> dict[str, Any]:
         """Columns of every view with unit, paper symbol, CF standard name and description."""
         return schema()
 
 
-def open(dataset: str | Path) -> Dataset:
+def open(dataset: str | Path, *, allow_files: bool = False) -> Dataset:
     """Open a finished dataset folder.
+
+    Parameters
+    ----------
+    dataset : folder, or address in an object store
+    allow_files : SQL may read and write files of this machine, and load extensions; else it reaches the dataset's
+        tables alone, whatever a query or a column's name says
 
     Raises
     ------
@@ -187,7 +254,9 @@ def open(dataset: str | Path) -> Dataset:
         If the folder is no sealed dataset.
     """
     layout = reading(dataset, telemetry)
-    return Dataset(root=layout.root, manifest=read_manifest(layout), origin=layout.origin)
+    return Dataset(
+        root=layout.root, manifest=read_manifest(layout), origin=layout.origin, allow_files=allow_files
+    )
 
 
 def _known(table: str, names: tuple[str, ...]) -> None:

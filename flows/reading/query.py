@@ -1,16 +1,17 @@
 """A dataset as five SQL views, and what its columns mean."""
 
 import math
-from pathlib import Path
-from typing import Any, Literal
+import re
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, Literal, TypeVar
 
 import duckdb
-import pyarrow.parquet as pq
 
-from flows.store.address import reading, telemetry
+from catalogs.sentences import shorten
+from flows.reading.connection import connect
 from flows.store.arrays import arrays_of
-from flows.store.layout import Layout
-from flows.store.sealed import read_manifest
 from tasks.conventions import (
     CHECK_CHANNELS,
     CLIP_CHANNELS,
@@ -36,59 +37,26 @@ VIEWS: dict[str, tuple[Channel, ...]] = {
 """The views and their columns; ``ticks`` and ``frames`` also have ``family``, by which their files lie."""
 
 
-def table_files(layout: Layout, table: str) -> str:
-    """Glob of the Parquet files of a stored table: clips, pairs, ticks or frames."""
-    if table in {"clips", "pairs"}:
-        return str(layout.telemetry / f"{table}.parquet")
-    return str(layout.telemetry / table / "*" / "*.parquet")
+MOST_VALUES = 20_000_000
+"""Of one answer [1]: as Python objects they take some 2 GB."""
+_FETCHED_AT_ONCE = 10_000
+_SECONDS_TO_END = 5.0
+_REACHED = re.compile(
+    r'Cannot access (?:file|directory) "(?P<place>.*)" - file system operations are disabled'
+    r"|the configuration has been locked|Loading external extensions is disabled"
+)
+_Result = TypeVar("_Result")
 
 
-def connect(dataset: str | Path) -> duckdb.DuckDBPyConnection:
-    """A DuckDB connection in memory with the views of a sealed dataset; what is not represented is NULL.
-
-    Raises
-    ------
-    InputError
-        If the folder is no sealed dataset.
-    """
-    layout = reading(dataset, telemetry)
-    read_manifest(layout)
-    return connect_sealed(layout)
-
-
-def connect_sealed(layout: Layout) -> duckdb.DuckDBPyConnection:
-    """`connect` to a dataset whose manifest has been read."""
-    connection = duckdb.connect()
-    for table in ("clips", "pairs", "ticks", "frames"):
-        files = table_files(layout, table).replace("'", "''")
-        connection.execute(
-            f"CREATE VIEW {table} AS SELECT {_columns(layout, table)}"
-            f" FROM read_parquet('{files}', hive_partitioning = {table in {'ticks', 'frames'}})"
-        )
-    checks = ", ".join(channel.name for channel in CHECK_CHANNELS)
-    connection.execute(f"CREATE VIEW verdicts AS SELECT clip_id, label, weather, {checks} FROM clips")
-    return connection
-
-
-def _columns(layout: Layout, table: str) -> str:
-    """All columns, with NaN as NULL: SQL's aggregates leave NULL out, and would return NaN for NaN."""
-    if table == "ticks":  # every tick has every number
-        return "*"
-    first = next(layout.root.glob(str(Path(table_files(layout, table)).relative_to(layout.root))), None)
-    if first is None:
-        raise InputError(f"{layout}: the files of {table} are missing: musync repair makes them again")
-    floats = [field.name for field in pq.read_schema(first) if str(field.type) == "double"]
-    nulls = ", ".join(f'nullif("{name}", \'nan\'::DOUBLE) AS "{name}"' for name in floats)
-    return f"* REPLACE ({nulls})"
-
-
-def sql(dataset: str, query: str) -> dict[str, Any]:
-    """Answer an SQL query over the views clips, ticks, frames, verdicts and pairs.
+def sql(dataset: str, query: str, *, allow_files: bool = False) -> dict[str, Any]:
+    """Answer an SQL query over the views clips, ticks, frames, verdicts and pairs; Ctrl-C ends it.
 
     Parameters
     ----------
     dataset : a sealed dataset folder
     query : DuckDB SQL, one statement
+    allow_files : the query may read and write files of this machine, and load extensions; else it reaches the views
+        alone
 
     Returns
     -------
@@ -97,18 +65,78 @@ def sql(dataset: str, query: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The folder is no sealed dataset, or the query is none that DuckDB answers.
+        The folder is no sealed dataset, the query is none that DuckDB answers, it asks for files without
+        ``allow_files``, or its answer is too large to be returned.
     """
-    with connect(dataset) as connection:
+    with connect(dataset, allow_files=allow_files) as connection:
         try:
-            answer = connection.execute(query)
-            names = [column[0] for column in answer.description or ()]
-            rows = answer.fetchall()
+            names, rows = run_interruptibly(connection, lambda: _answer(connection, query))
         except duckdb.Error as error:
-            raise InputError(
-                f"--- {query}: {str(error).strip()}\nviews are {', '.join(VIEWS)}; musync schema lists their columns"
-            ) from None
+            raise refused_query(query, error, "--allow-files") from None
     return {"columns": names, "rows": [dict(zip(names, map(_plain, row), strict=True)) for row in rows]}
+
+
+def _answer(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+    answer = connection.execute(query)
+    names = [column[0] for column in answer.description or ()]
+    rows: list[tuple[Any, ...]] = []
+    while some := answer.fetchmany(_FETCHED_AT_ONCE):
+        rows += some
+        if len(rows) * len(names) > MOST_VALUES:
+            raise InputError(
+                f"--- {shorten(query)}: the answer must have at most {MOST_VALUES:,} values (rows times columns); it"
+                " has more: add LIMIT, or take it in parts with musync.open(...).sql(...).to_arrow_reader()"
+            )
+    return names, rows
+
+
+def run_interruptibly(connection: duckdb.DuckDBPyConnection, work: Callable[[], _Result]) -> _Result:
+    """Do ``work`` with a connection so that Ctrl-C ends it: DuckDB by itself looks at signals only between results."""
+    outcome: Future[_Result] = Future()
+
+    def run() -> None:
+        try:
+            outcome.set_result(work())
+        except BaseException as error:  # handed over to the thread that waits
+            outcome.set_exception(error)
+
+    worker = threading.Thread(target=run, name="musync-sql", daemon=True)
+    worker.start()
+    try:
+        return outcome.result()
+    except KeyboardInterrupt:
+        connection.interrupt()
+        worker.join(_SECONDS_TO_END)
+        raise
+
+
+def refused_query(query: str, error: Exception, option: str) -> InputError:
+    """The sentence for a query that DuckDB refuses; where it reaches for more than the views, what would let it.
+
+    Parameters
+    ----------
+    query : as it was asked
+    error : DuckDB's
+    option : how the caller lets SQL use files
+    """
+    text = str(error).strip()
+    reached = _REACHED.search(text)
+    if reached is None:
+        return InputError(
+            f"--- {shorten(query)}: {_last_line(text)}\nviews are {', '.join(VIEWS)}; musync schema lists their columns"
+        )
+    asked = (
+        shorten(reached["place"]) if reached["place"] else "a change of DuckDB's settings, or an extension"
+    )
+    return InputError(
+        f"--- {shorten(query)}: this query asks for {asked}, and may read the dataset's views alone;"
+        f" {option} lets SQL read and write files of this machine"
+    )
+
+
+def _last_line(text: str) -> str:
+    """DuckDB's message; of an exception that a file raised, what it says and not where."""
+    return text.splitlines()[-1] if text.startswith("Traceback") else text
 
 
 def schema(of: Literal["views", "grid"] = "views") -> dict[str, Any]:

@@ -7,15 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import torch
 import zarr
 from torch.utils.data import Dataset, Sampler
 
+from catalogs.sentences import brief, shorten
+from flows.reading.table_files import table_files
 from flows.store.arrays import arrays_of
+from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
 from flows.store.layout import Layout
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
+
+_NUMERIC = {"double", "int64", "bool"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,7 +30,7 @@ class ClipWindows(Dataset[dict[str, Any]]):
 
     Parameters
     ----------
-    frames : the Zarr group's path
+    frames : folder of the Zarr group
     clips : index of each clip in the arrays
     telemetry : float32 [clips, frames, columns], in the units of the frame table
     columns : their names
@@ -57,19 +63,25 @@ class ClipWindows(Dataset[dict[str, Any]]):
             "start": span.start,
             "telemetry": self.telemetry[place, span],
         }
-        return sample | {
-            name: torch.from_numpy(np.asarray(self._array(name)[clip, span])) for name in self.arrays
-        }
+        return sample | {name: torch.from_numpy(self._pictures(name, clip, span)) for name in self.arrays}
 
     def __getstate__(self) -> dict[str, Any]:
         # each worker opens the arrays itself: an open store belongs to its process
         return self.__dict__ | {"_opened": {}}
 
+    def _pictures(self, name: str, clip: int, span: slice) -> np.ndarray:
+        try:
+            return np.asarray(self._array(name)[clip, span])
+        except (ValueError, RuntimeError, IndexError, OSError) as error:
+            raise InputError(
+                f"{self.frames / name}: clip {clip}: cannot be read; {shorten(error)}: musync repair makes it again"
+            ) from None
+
     def _array(self, name: str) -> zarr.Array:
         if name not in self._opened:
-            array = zarr.open_group(self.frames, mode="r")[name]
-            assert isinstance(array, zarr.Array)
-            self._opened[name] = array
+            # its metadata again: the dataset may be another since the windows were made, or on another machine
+            check_array(read_local_metadata(self.frames), name, self.frames)
+            self._opened[name] = zarr.open_array(self.frames / name, mode="r", zarr_format=3)
         return self._opened[name]
 
 
@@ -98,7 +110,7 @@ class SeededOrder(Sampler[int]):
 
 
 def windows_of(
-    root: Path,
+    layout: Layout,
     manifest: Mapping[str, Any],
     window: int,
     stride: int,
@@ -114,19 +126,15 @@ def windows_of(
     Raises
     ------
     InputError
-        Listing every argument that breaks a rule.
+        Listing every argument that breaks a rule; or files are not as muSync writes them.
     """
-    layout = Layout(root)
     frames = manifest["grid"]["frames"]
     rows = [
         row for row in manifest["clips"] if clips is None or row["label"] in clips or row["clip_id"] in clips
     ]
-    files = sorted((layout.telemetry / "frames").glob("*/*.parquet"))
-    known = {f.name for f in pq.read_schema(files[0]) if str(f.type) in {"double", "int64", "bool"}}
+    files = list(table_files(layout, manifest)["frames"].values())
     stored = {name for name in arrays_of(labels=True) if (layout.frames / name).is_dir()}
-    problems = [
-        f"column {name!r}: no such numeric column of the frame table" for name in columns if name not in known
-    ]
+    problems = _column_problems(files[0], columns)
     problems += [f"array {name!r}: the dataset has {', '.join(sorted(stored)) or 'no frames'}"
                  for name in arrays if name not in stored]  # fmt: skip
     if not 1 <= window <= frames:
@@ -142,7 +150,7 @@ def windows_of(
     )
     rows = [row for row in rows if row["label"] not in left_out]
     if not rows and not problems:
-        problems = [f"{root}: every clip is in quarantine; quarantined=True takes them all the same"]
+        problems = [f"{layout}: every clip is in quarantine; quarantined=True takes them all the same"]
     if problems:
         raise InputError(problems)
     if left_out:
@@ -151,12 +159,18 @@ def windows_of(
             f" ({', '.join(left_out)}); quarantined=True takes them too",
             stacklevel=3,
         )
+    if arrays:
+        check_frames(
+            read_local_metadata(layout.frames), arrays, layout.frames, len(manifest["clips"]), frames
+        )
     values: dict[str, np.ndarray] = {}
     for file in files:
-        table = pq.read_table(file, columns=["clip_id", *columns])
-        block = np.stack([table[name].to_numpy().astype(np.float32) for name in columns], axis=1)
-        ids = table["clip_id"].to_pylist()[::frames]
-        values |= dict(zip(ids, block.reshape(len(ids), frames, len(columns)), strict=True))
+        values |= _clip_values(file, columns, frames)
+    if absent := [row["label"] for row in rows if row["clip_id"] not in values]:
+        raise InputError(
+            f"{layout}/telemetry/frames: rows of {len(absent)} clips are missing ({brief(absent)}):"
+            " musync verify says which files are damaged"
+        )
     return ClipWindows(
         frames=layout.frames,
         clips=tuple(row["index"] for row in rows),
@@ -167,3 +181,48 @@ def windows_of(
         starts=tuple(range(0, frames - window + 1, stride)),
         left_out=left_out,
     )
+
+
+def _column_problems(file: Path, columns: Sequence[str]) -> list[str]:
+    try:
+        schema = pq.read_schema(file)
+    except (pa.ArrowException, OSError) as error:
+        return [
+            f"{file}: must be a Parquet file as muSync writes it; {shorten(error)}: musync repair makes it again"
+        ]
+    names = [field.name for field in schema if str(field.type) in _NUMERIC]
+    return [
+        f"column {name!r}: no such numeric column of the frame table"
+        for name in columns
+        if names.count(name) != 1
+    ]
+
+
+def _clip_values(file: Path, columns: Sequence[str], frames: int) -> dict[str, np.ndarray]:
+    """Columns of one file of the frame table, a block [frame, column] a clip.
+
+    Raises
+    ------
+    InputError
+        If it does not hold ``frames`` rows of each of its clips, one after the other, with these columns as numbers.
+    """
+    try:
+        table = pq.read_table(file, columns=["clip_id", *columns], partitioning=None)
+        numbers = [table[name].to_numpy().astype(np.float32) for name in columns]
+        ids = table["clip_id"].to_pylist()
+        if odd := [
+            field for field in table.schema if field.name in columns and str(field.type) not in _NUMERIC
+        ]:
+            raise TypeError(f"column {odd[0].name!r} is of type {odd[0].type}")
+    except (pa.ArrowException, KeyError, ValueError, TypeError, OSError) as error:
+        raise InputError(
+            f"{file}: must be a Parquet file as muSync writes it; {shorten(error)}: musync repair makes it again"
+        ) from None
+    named = ids[::frames]
+    if [name for name in named for _ in range(frames)] != ids or len(set(named)) != len(named):
+        raise InputError(
+            f"{file}: must hold {frames} rows of each clip, one clip after the other: musync verify says whether it is"
+            " damaged"
+        )
+    block = np.stack(numbers, axis=1) if numbers else np.empty((len(ids), 0), np.float32)
+    return dict(zip(named, block.reshape(len(named), frames, len(columns)), strict=True))

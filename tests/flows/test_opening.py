@@ -97,7 +97,7 @@ def test_the_python_of_the_analysts_page_runs_as_it_stands(data, toy_dataset):
     code = "\n".join(blocks).replace("datasets/demo", str(toy_dataset.root))
     code = code.replace("window=16, stride=8", "window=4, stride=4, quarantined=True")
     code = code.replace("[3, 40]", "[3, 5]").replace("rain-50/flat-braking", "snow-3/flat")
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=SOURCE_ROOT)
     assert done.returncode == 0, done.stderr
 

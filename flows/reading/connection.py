@@ -1,0 +1,105 @@
+"""DuckDB over a sealed dataset's tables: queries reach the recorded files, to read, and nothing else."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from catalogs.sentences import shorten
+from flows.reading.table_files import SCHEME, TableFiles, table_files
+from flows.store.address import reading, telemetry
+from flows.store.layout import Layout
+from flows.store.sealed import read_manifest
+from tasks.conventions import CHECK_CHANNELS
+from tasks.errors import InputError
+
+_SETTINGS: dict[str, str | bool | int | float | list[str]] = {
+    "autoinstall_known_extensions": False,
+    "autoload_known_extensions": False,
+    "python_enable_replacements": False,
+    "memory_limit": "50%",  # the answer, and other programs, need some too
+}
+_CLOSED: dict[str, str | bool | int | float | list[str]] = {
+    "temp_directory": "",
+    "allow_persistent_secrets": False,
+}
+"""Nothing is put aside on the disk: a query that needs more memory ends with an error and fills no disk."""
+
+
+def connect(dataset: str | Path, *, allow_files: bool = False) -> duckdb.DuckDBPyConnection:
+    """A DuckDB connection in memory with the views of a sealed dataset; what is not represented is NULL.
+
+    Parameters
+    ----------
+    dataset : a sealed dataset folder, or an address in an object store
+    allow_files : queries may read and write files of this machine, and load extensions, as DuckDB does by itself
+
+    Raises
+    ------
+    InputError
+        If the folder is no sealed dataset.
+    """
+    layout = reading(dataset, telemetry)
+    return connect_sealed(layout, read_manifest(layout), allow_files=allow_files)
+
+
+def connect_sealed(
+    layout: Layout, manifest: Mapping[str, Any], *, allow_files: bool = False
+) -> duckdb.DuckDBPyConnection:
+    """`connect` to a dataset whose manifest has been read.
+
+    Queries reach the recorded tables and nothing else: no file, network, extension or Python variable. They use at most
+    half of the machine's memory, and none of its disk: a query that needs more ends with an error.
+    """
+    tables = table_files(layout, manifest)
+    connection = duckdb.connect(config=_SETTINGS if allow_files else _SETTINGS | _CLOSED)
+    paths = {name: path for names in tables.values() for name, path in names.items()}
+    connection.register_filesystem(TableFiles(paths))
+    if not allow_files:
+        connection.execute(f"SET allowed_paths = {_literal(map(_address, paths))}")
+        connection.execute("SET enable_external_access = false")
+        connection.execute("SET lock_configuration = true")
+    try:
+        for table, names in tables.items():
+            connection.execute(
+                f"CREATE VIEW {table} AS SELECT {_columns(table, next(iter(names.values())))} FROM"
+                f" read_parquet({_literal(map(_address, names))},"
+                f" hive_partitioning = {table in {'ticks', 'frames'}})"
+            )
+        checks = ", ".join(channel.name for channel in CHECK_CHANNELS)
+        connection.execute(f"CREATE VIEW verdicts AS SELECT clip_id, label, weather, {checks} FROM clips")
+    except (duckdb.Error, pa.ArrowException, OSError) as error:
+        connection.close()
+        raise InputError(
+            f"{layout}: its tables must be Parquet files as muSync writes them; {shorten(error)}:"
+            " musync verify says whether they are damaged"
+        ) from None
+    return connection
+
+
+def _columns(table: str, first: Path) -> str:
+    """All columns, with NaN as NULL: SQL's aggregates leave NULL out, and would return NaN for NaN."""
+    if table == "ticks":  # every tick has every number
+        return "*"
+    floats = [field.name for field in pq.read_schema(first) if str(field.type) == "double"]
+    nulls = ", ".join(f"nullif({name}, 'nan'::DOUBLE) AS {name}" for name in map(quote_identifier, floats))
+    return f"* REPLACE ({nulls})" if nulls else "*"
+
+
+def quote_identifier(name: str) -> str:
+    """A column's or view's name as SQL takes it, whatever characters it has."""
+    escaped = name.replace('"', '""')
+    return f'"{escaped}"'
+
+
+def _address(name: str) -> str:
+    return f"{SCHEME}://{name}"
+
+
+def _literal(texts: Iterable[str]) -> str:
+    """A list of texts as SQL takes it."""
+    escaped = (text.replace("'", "''") for text in texts)
+    return "[" + ", ".join(f"'{text}'" for text in escaped) + "]"

@@ -1,0 +1,134 @@
+"""The recorded Parquet files of a dataset as a file system for DuckDB that reads them, and does nothing else.
+
+DuckDB's own list of allowed paths lets a query write to them (``COPY ... TO``, also inside ``WITH``). Here writing is
+refused where files are opened, whatever the query looks like; and a name is not a path: glob characters or quotes in a
+folder's name mean nothing to SQL.
+"""
+
+import io
+import os
+import re
+import threading
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
+
+from catalogs.sentences import brief
+from flows.store.layout import Layout
+from tasks.errors import InputError
+
+SCHEME = "musync"
+_WHOLE = re.compile(r"telemetry/(?P<table>clips|pairs)\.parquet")
+_PART = re.compile(r"telemetry/(?P<table>ticks|frames)/family=[a-z0-9_-]{1,64}/part-[0-9]{4,9}\.parquet")
+
+
+def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[str, Path]]:
+    """The recorded files of the tables clips, pairs, ticks and frames: name below ``telemetry`` to path.
+
+    Raises
+    ------
+    InputError
+        Listing the tables of which files are missing, and recorded files that lie where no table's do.
+    """
+    tables: dict[str, dict[str, Path]] = {"clips": {}, "pairs": {}, "ticks": {}, "frames": {}}
+    problems = []
+    for recorded in sorted(manifest["artifacts"]):
+        if not recorded.startswith("telemetry/"):
+            continue
+        named = _WHOLE.fullmatch(recorded) or _PART.fullmatch(recorded)
+        if named is None:
+            problems.append(f"{layout}/manifest.json: {brief(recorded)}: no place of a table's files")
+            continue
+        tables[named["table"]][recorded.removeprefix("telemetry/")] = layout.root / recorded
+    problems += [
+        f"{layout}: the files of {table} are missing: musync repair makes them again"
+        for table, files in tables.items()
+        if not files or not all(path.is_file() for path in files.values())
+    ]
+    if problems:
+        raise InputError(problems)
+    return tables
+
+
+class TableFiles(AbstractFileSystem):
+    """Files to read by name; no other name exists, and nothing can be written.
+
+    Parameters
+    ----------
+    files : name to path
+    """
+
+    protocol = SCHEME
+    cachable = False
+
+    def __init__(self, files: Mapping[str, Path]):
+        super().__init__()
+        self.files = dict(files)
+
+    def _open(self, path: str, mode: str = "rb", **_: Any) -> "_TableFile":
+        if mode != "rb":
+            raise PermissionError(f"{path}: a query does not write to a dataset")
+        return _TableFile(self._path(path))
+
+    def info(self, path: str, **_: Any) -> dict[str, Any]:
+        """Name, type and size [B]."""
+        return {
+            "name": self._strip_protocol(path),
+            "type": "file",
+            "size": self._path(path).stat().st_size,
+        }
+
+    def modified(self, path: str) -> datetime:
+        """When the file's content changed last."""
+        return datetime.fromtimestamp(self._path(path).stat().st_mtime, UTC)
+
+    def exists(self, path: str, **_: Any) -> bool:
+        """Whether there is a file of that name."""
+        return self._strip_protocol(path) in self.files
+
+    def glob(self, path: str, **_: Any) -> list[str]:
+        """The file of that name, whatever characters it has."""
+        return [self._strip_protocol(path)] if self.exists(path) else []
+
+    def _path(self, name: str) -> Path:
+        found = self.files.get(self._strip_protocol(name))
+        if found is None:
+            raise FileNotFoundError(f"{name}: no recorded file of a table")
+        return found
+
+
+class _TableFile(io.RawIOBase):
+    """A file that several threads read at once: each has a position of its own."""
+
+    def __init__(self, path: Path):
+        self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        self._size = os.fstat(self._descriptor).st_size
+        self._position = threading.local()
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return getattr(self._position, "value", 0)
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        start = {os.SEEK_SET: 0, os.SEEK_CUR: self.tell(), os.SEEK_END: self._size}[whence]
+        self._position.value = start + offset
+        return start + offset
+
+    def read(self, size: int = -1) -> bytes:
+        start = self.tell()
+        content = os.pread(self._descriptor, self._size - start if size < 0 else size, start)
+        self._position.value = start + len(content)
+        return content
+
+    def close(self) -> None:
+        if not self.closed:
+            os.close(self._descriptor)
+        super().close()
