@@ -48,7 +48,7 @@ def read_content(path: Path, kind: str, largest: int) -> bytes:
                 raise InputError(f"{where}: a {kind} must be a regular file; it is a folder, pipe or device")
             content = file.read(largest + 1)
     except FileNotFoundError:
-        raise InputError(f"{where}: a {kind} must exist; there is no such file") from None
+        raise InputError(f"{where}: no such file; a {kind} must exist") from None
     except OSError as error:
         raise InputError(f"{where}: a {kind} must be readable; {error.strerror}") from None
     except InputError:

@@ -1,7 +1,12 @@
 """One scenario: the weather q, the controls u and the road g that everything else follows from."""
 
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Collection
+from dataclasses import dataclass, fields
+from math import isfinite
 from typing import Any, Literal
+
+from catalogs.physical_limits import PhysicalLimits, limit_problem, load_physical_limits
+from catalogs.quantities import Scalar
 
 Weather = Literal["dry", "rain", "snow"]
 
@@ -43,39 +48,52 @@ class Scenario:
 
     def as_row(self) -> dict[str, Any]:
         """The fields in order, for a manifest, a table row or a content id."""
-        return asdict(self)
+        return dict(vars(self))
 
 
 SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario))
+NUMBERS = tuple(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"})
+NOT_NEGATIVE = (
+    "precipitation_mm_h", "snow_accumulation_h", "peak_pressure_mpa", "hazard_length_m", "ramp_s", "release_s",
+    "brake_onset_s", "brake_onset_m", "hold_s",
+)  # fmt: skip
+UNKNOWN_WEATHER = "unknown"
+"""Stands for a weather that could not be read, as NaN does for a number: no rule is held against either."""
 
 
-def scenario_problems(scenario: Scenario) -> list[str]:
-    """Every rule the scenario breaks by itself, each as one sentence; empty when it is sound."""
+def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list[str]:
+    """Every rule the scenario breaks by itself, each as one sentence; empty when it is sound.
+
+    Parameters
+    ----------
+    scenario : its controls
+    unknown : numbers that could not be read and are NaN
+    """
     s = scenario
-    problems = []
-    for name in (
-        "precipitation_mm_h",
-        "snow_accumulation_h",
-        "peak_pressure_mpa",
-        "hazard_length_m",
-        "ramp_s",
-        "release_s",
-    ):
-        if getattr(s, name) < 0:
-            problems.append(f"{name} must not be negative; it is {getattr(s, name):g}")
+    given = {name: value for name in NUMBERS if (value := getattr(s, name)) is not None}
+    problems = [
+        f"{name} must be a finite number; it is {value}"
+        for name, value in given.items()
+        if not isfinite(value) and name not in unknown
+    ]
+    problems += [
+        f"{name} must not be negative; it is {given[name]:g}"
+        for name in NOT_NEGATIVE
+        if name in given and given[name] < 0
+    ]
     if s.initial_speed_km_h <= 0:
         problems.append(f"initial_speed_km_h must be positive; it is {s.initial_speed_km_h:g}")
     if s.weather == "dry" and s.precipitation_mm_h > 0:
         problems.append(
             f"weather dry has no precipitation; precipitation_mm_h is {s.precipitation_mm_h:g}: name rain or snow"
         )
-    if s.weather != "dry" and s.precipitation_mm_h == 0:
+    if s.weather in ("rain", "snow") and s.precipitation_mm_h == 0:
         problems.append(f"weather {s.weather} needs precipitation_mm_h above 0; it is 0")
     if s.weather == "snow" and s.snow_accumulation_h == 0:
         problems.append(
             "weather snow needs an accumulation time; snow_accumulation_h is 0: give the hours of snowfall"
         )
-    if s.weather != "snow" and s.snow_accumulation_h > 0:
+    if s.weather in ("dry", "rain") and s.snow_accumulation_h > 0:
         problems.append(
             f"snow_accumulation_h belongs to snow; the weather is {s.weather} and it is {s.snow_accumulation_h:g}"
         )
@@ -83,13 +101,32 @@ def scenario_problems(scenario: Scenario) -> list[str]:
         problems.append(
             "braking (peak_pressure_mpa above 0) needs exactly one of brake_onset_s and brake_onset_m"
         )
-    for name in ("brake_onset_s", "brake_onset_m", "hold_s"):
-        value = getattr(s, name)
-        if value is not None and value < 0:
-            problems.append(f"{name} must not be negative; it is {value:g}")
-    if s.hazard_height_m != 0 and s.hazard_length_m == 0:
+    if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
-    return problems
+    limited = _limited(s, given, load_physical_limits())
+    return problems + [problem for one in limited if (problem := limit_problem(*one)) is not None]
+
+
+def _limited(s: Scenario, given: dict[str, float], limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
+    """Each number with its name and its limit."""
+    by_name = {
+        "snow_accumulation_h": limits.snow_accumulation,
+        "initial_speed_km_h": limits.initial_speed,
+        "peak_pressure_mpa": limits.peak_pressure,
+        **dict.fromkeys(("ramp_s", "hold_s", "release_s", "brake_onset_s"), limits.brake_time),
+        **dict.fromkeys(("brake_onset_m", "hazard_center_m"), limits.position),
+        "hazard_length_m": limits.hazard_length,
+    }
+    rate = limits.snow_rate if s.weather == "snow" else limits.rain_rate
+    limited = [
+        ("precipitation_mm_h", s.precipitation_mm_h, rate),
+        ("the size of hazard_height_m", abs(s.hazard_height_m), limits.hazard_height),
+    ]
+    limited += [(name, given[name], limit) for name, limit in by_name.items() if name in given]
+    if s.weather == "snow" and not any(limit_problem(*one) for one in limited):
+        fallen = s.precipitation_mm_h * s.snow_accumulation_h
+        limited.append(("precipitation_mm_h times snow_accumulation_h", fallen, limits.snow_water_equivalent))
+    return limited
 
 
 def route_problems(scenario: Scenario, route_length_m: float, scene: str) -> list[str]:

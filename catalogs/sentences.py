@@ -1,11 +1,13 @@
 """Sentences about faulty input: values and lists cut to what a reader takes in, and pydantic's rules in words."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from reprlib import Repr
 from typing import Any
 
 from pydantic import ValidationError
 
+Place = tuple[int | str, ...]
+"""Keys and numbers that lead to a value of a document."""
 MOST_PROBLEMS = 20
 """Problems told of one document [1]: more do not fit on a screen, and a mended start often mends the rest."""
 
@@ -70,7 +72,7 @@ def is_encodable(text: str) -> bool:
 
 
 def describe_rules(
-    error: ValidationError, place: object, known: Mapping[tuple[int | str, ...], Iterable[str]] | None = None
+    error: ValidationError, place: object, known: Callable[[Place], Iterable[str]] = lambda _: ()
 ) -> list[str]:
     """Every rule that a document breaks, one sentence each.
 
@@ -78,23 +80,27 @@ def describe_rules(
     ----------
     error : of the model that the document was held against
     place : the document
-    known : keys that exist, by the place of their table; told where a key is unknown
+    known : keys that exist in the table at a place; told where a key is unknown
     """
     where = shorten(place)
-    return [f"{where}: {_describe_rule(problem, known or {})}" for problem in error.errors(include_url=False)]
+    return [f"{where}: {_describe_rule(problem, known)}" for problem in error.errors(include_url=False)]
 
 
-def _describe_rule(problem: Any, known: Mapping[tuple[int | str, ...], Iterable[str]]) -> str:
-    place = shorten(".".join(str(part) for part in problem["loc"]) or "the whole document", 120)
+def _describe_rule(problem: Any, known: Callable[[Place], Iterable[str]]) -> str:
+    parts = [str(part) for part in problem["loc"] if part != "[key]"]
+    place = shorten(".".join(parts) or "the whole document", 120)
     match problem["type"]:
         case "missing":
             return f"{place} is missing: add it"
         case "extra_forbidden":
-            there = known.get(problem["loc"][:-1])
-            names = f" (known here are {', '.join(there)})" if there else ""
+            there = ", ".join(known(problem["loc"][:-1]))
+            names = f" (known here are {there})" if there else ""
             return f"{place}: unknown key{names}: remove it or correct its name"
         case "value_error":
-            return f"{place}: {shorten(problem['msg'].removeprefix('Value error, '), 1000)}"
+            rule = shorten(problem["msg"].removeprefix("Value error, "), 1000)
+            return f"{place}: {rule}" if parts else rule
+        case "dict_type" | "model_type" | "model_attributes_type":
+            return f"{place}: must be a table of keys and values; it is {brief(problem['input'])}"
         case _:
             rule = problem["msg"].replace("Input should be", "must be")
             return f"{place}: {rule}; it is {brief(problem['input'])}"

@@ -2,9 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import product
+from math import prod
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from catalogs.names import Label
+from catalogs.scenario import NUMBERS
+from catalogs.sentences import shorten
 
 Level = tuple[str, dict[str, Any]]
 
@@ -15,35 +20,52 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
+def _refuse_boolean(value: object) -> object:
+    if isinstance(value, bool):
+        raise ValueError(f"must be a number; it is {value}")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_refuse_boolean)]
+Whole = Annotated[int, BeforeValidator(_refuse_boolean)]
+
+
 class PartialScenario(Strict):
     """The scenario fields that one level of an axis sets; the rest keep their defaults."""
 
     weather: Literal["dry", "rain", "snow"] | None = None
-    precipitation_mm_h: float | None = None
-    snow_accumulation_h: float | None = None
-    initial_speed_km_h: float | None = None
-    peak_pressure_mpa: float | None = None
-    ramp_s: float | None = None
-    hold_s: float | None = None
-    release_s: float | None = None
-    brake_onset_s: float | None = None
-    brake_onset_m: float | None = None
+    precipitation_mm_h: Number | None = None
+    snow_accumulation_h: Number | None = None
+    initial_speed_km_h: Number | None = None
+    peak_pressure_mpa: Number | None = None
+    ramp_s: Number | None = None
+    hold_s: Number | None = None
+    release_s: Number | None = None
+    brake_onset_s: Number | None = None
+    brake_onset_m: Number | None = None
     hold_speed: bool | None = None
-    hazard_center_m: float | None = None
-    hazard_length_m: float | None = None
-    hazard_height_m: float | None = None
+    hazard_center_m: Number | None = None
+    hazard_length_m: Number | None = None
+    hazard_height_m: Number | None = None
 
 
-NUMBERS = tuple(name for name in PartialScenario.model_fields if name not in {"weather", "hold_speed"})
-Levels = Annotated[dict[str, PartialScenario], Field(min_length=1)]
+Levels = Annotated[dict[Label, PartialScenario], Field(min_length=1)]
+
+
+def _check_lengths(axes: dict[str, Levels]) -> dict[str, Levels]:
+    lengths = {name: len(levels) for name, levels in axes.items()}
+    if len(set(lengths.values())) > 1:
+        found = ", ".join(f"{name} has {count}" for name, count in lengths.items())
+        raise ValueError(f"its axes must have as many levels each; {shorten(found)}")
+    return axes
 
 
 class LatinHypercube(Strict):
     """Scenarios drawn so that each field takes one value from each of ``count`` equal strata of its range."""
 
-    count: int = Field(ge=1, le=1_000_000)
-    seed: int = Field(default=2025, ge=0, lt=2**53)
-    ranges: Annotated[dict[str, tuple[float, float]], Field(min_length=1)]
+    count: Whole = Field(ge=1, le=1_000_000)
+    seed: Whole = Field(default=2025, ge=0, lt=2**53)
+    ranges: Annotated[dict[str, tuple[Number, Number]], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _ranges_are_of_numbers(self) -> "LatinHypercube":
@@ -60,14 +82,15 @@ class Blocks(Strict):
     """What a grid multiplies; at least one block has to be there."""
 
     axes: Annotated[
-        dict[str, Levels], Field(description="Product: every level of each axis with every other.")
+        dict[Label, Levels], Field(description="Product: every level of each axis with every other.")
     ] = {}
     zip: Annotated[
-        dict[str, Levels],
+        dict[Label, Levels],
+        AfterValidator(_check_lengths),
         Field(description="Axes of equal length, taken in step: first with first, and so on."),
     ] = {}
     scenarios: Annotated[
-        dict[str, PartialScenario], Field(description="A list of scenarios, each with its name.")
+        dict[Label, PartialScenario], Field(description="A list of scenarios, each with its name.")
     ] = {}
     latin_hypercube: Annotated[
         LatinHypercube | None, Field(description="Scenarios drawn evenly from ranges of numbers.")
@@ -77,11 +100,21 @@ class Blocks(Strict):
     def _something_to_make(self) -> "Blocks":
         if not (self.axes or self.zip or self.scenarios or self.latin_hypercube):
             raise ValueError("a grid needs one of axes, zip, scenarios and latin_hypercube; there is none")
-        lengths = {name: len(levels) for name, levels in self.zip.items()}
-        if len(set(lengths.values())) > 1:
-            found = ", ".join(f"{name} has {count}" for name, count in lengths.items())
-            raise ValueError(f"zip: its axes must have as many levels each; {found}")
         return self
+
+
+def count_combinations(blocks: Blocks) -> int:
+    """How many combinations there are, without making any [1].
+
+    Parameters
+    ----------
+    blocks : to be multiplied
+    """
+    counts = [len(levels) for levels in blocks.axes.values()]
+    counts += [len(next(iter(blocks.zip.values())))] if blocks.zip else []
+    counts += [len(blocks.scenarios)] if blocks.scenarios else []
+    counts += [blocks.latin_hypercube.count] if blocks.latin_hypercube else []
+    return prod(counts)
 
 
 def combinations(blocks: Blocks) -> Iterator[list[Level]]:
@@ -104,7 +137,17 @@ def combinations(blocks: Blocks) -> Iterator[list[Level]]:
 
 
 def _levels(axis: Mapping[str, PartialScenario]) -> list[Level]:
-    return [(name, partial.model_dump(exclude_none=True)) for name, partial in axis.items()]
+    return [(name, fields_set_by(partial)) for name, partial in axis.items()]
+
+
+def fields_set_by(partial: PartialScenario) -> dict[str, Any]:
+    """The fields that a level sets, as they are.
+
+    Parameters
+    ----------
+    partial : the level
+    """
+    return {name: value for name, value in partial if value is not None}
 
 
 def _drawn(cube: LatinHypercube) -> list[Level]:

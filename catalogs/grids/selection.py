@@ -1,13 +1,12 @@
 """Conditions on scenarios: which combinations a grid leaves out, and to which split a clip belongs."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Annotated, Any
 
 from pydantic import Field, RootModel, model_validator
 
 from catalogs.calibrated_range import CALIBRATION_TAGS, calibration_tag, load_calibrated_range
-from catalogs.grids.blocks import Strict
+from catalogs.grids.blocks import Number, Strict
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
 
 CALIBRATION = "calibration"
@@ -17,8 +16,8 @@ Value = bool | str | float
 class Between(Strict):
     """A closed interval; an end that is left out is open."""
 
-    min: float | None = None
-    max: float | None = None
+    min: Number | None = None
+    max: Number | None = None
 
     @model_validator(mode="after")
     def _holds_something(self) -> "Between":
@@ -61,7 +60,7 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
 
 def facts_of(scenario: Scenario) -> dict[str, Any]:
     """What conditions are held against: the scenario's fields and its place in the calibrated range."""
-    return asdict(scenario) | {CALIBRATION: calibration_tag(scenario, load_calibrated_range())}
+    return scenario.as_row() | {CALIBRATION: calibration_tag(scenario, load_calibrated_range())}
 
 
 def split_of(facts: Mapping[str, Any], splits: Mapping[str, Condition]) -> str | None:

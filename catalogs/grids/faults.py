@@ -1,0 +1,129 @@
+"""Reading a faulty grid as far as it goes: what is wrong is told and left out, so that the rest is checked too."""
+
+from collections.abc import Iterable
+from copy import deepcopy
+from dataclasses import dataclass, field
+from math import nan
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from catalogs.grids.blocks import Levels, PartialScenario
+from catalogs.grids.form import GridFile
+from catalogs.scenario import NUMBERS, UNKNOWN_WEATHER
+from catalogs.sentences import Place, describe_rules
+
+BLOCKS = ("axes", "zip", "scenarios", "latin_hypercube")
+UNKNOWN: dict[str, Any] = {"weather": UNKNOWN_WEATHER, **dict.fromkeys(NUMBERS, nan)}
+"""What a level sets of which nothing can be read."""
+
+
+@dataclass(kw_only=True)
+class GridForm:
+    """What could be read of a grid.
+
+    Parameters
+    ----------
+    settings : the grid without its faults; None if nothing is left
+    problems : one sentence for each fault of form
+    is_expandable : False where a fault leaves open which scenarios there are
+    """
+
+    settings: GridFile | None
+    problems: list[str] = field(default_factory=list)
+    is_expandable: bool = True
+
+
+def read_form(content: dict[str, Any], path: Path) -> GridForm:
+    """The settings of a grid, and what is wrong with their form.
+
+    Parameters
+    ----------
+    content : of the file
+    path : the file, for the sentences
+    """
+    kept = deepcopy(content)
+    form = GridForm(settings=None)
+    unknown: dict[Place, set[str]] = {}
+    for _ in range(4):  # what is left out can bring a rule about the whole to light, and that another
+        try:
+            settings = GridFile.model_validate(kept)
+        except ValidationError as error:
+            form.problems += describe_rules(error, path, _known_keys)
+            for fault in error.errors(include_url=False):
+                if not _leave_out(kept, fault["loc"], fault["type"], unknown):
+                    form.is_expandable = False
+            if not form.is_expandable:
+                kept = {key: value for key, value in kept.items() if key not in (*BLOCKS, "base", "exclude")}
+                kept["scenarios"] = {"unknown": {}}
+        else:
+            form.settings = _mark_unknown(settings, unknown)
+            break
+    return form
+
+
+def _known_keys(place: Place) -> Iterable[str]:
+    return GridFile.model_fields if not place else PartialScenario.model_fields
+
+
+def _leave_out(kept: dict[str, Any], place: Place, kind: str, unknown: dict[Place, set[str]]) -> bool:
+    """Take out what is wrong; False where then it is open which scenarios there are.
+
+    A field of a level, or all of the level, is noted as unknown; a key that nobody knows is just dropped.
+    """
+    if not place:
+        return False
+    block = place[0]
+    depth = {"axes": 3, "zip": 3, "scenarios": 2, "base": 1}.get(str(block), 0)
+    if not depth or len(place) < depth:
+        kept.pop(str(block), None)
+        if block == "name":
+            kept["name"] = "unnamed"
+        if block == "frames":  # the rate's rule is about both
+            kept.pop("frame_rate_hz", None)
+        if block == "frame_rate_hz":
+            kept.pop("frames", None)
+        return block not in (*BLOCKS, "exclude")
+    if place[-1] == "[key]":
+        return False
+    table: Any = kept
+    for key in place[: depth - 1]:
+        table = table.get(key, {})
+    if place[depth - 1] not in table:  # left out with what was around it
+        return True
+    level = place[depth - 1]
+    if len(place) == depth:
+        table[level] = {}
+        unknown.setdefault(place, set()).update(UNKNOWN)
+        return block != "base"
+    name = str(place[depth])
+    table[level].pop(name, None)
+    if kind != "extra_forbidden":
+        unknown.setdefault(place[:depth], set()).add(name)
+    return True
+
+
+def _mark_unknown(settings: GridFile, unknown: dict[Place, set[str]]) -> GridFile:
+    """The settings with every field that could not be read as NaN, or as the unknown weather."""
+
+    def mark(partial: PartialScenario, place: Place) -> PartialScenario:
+        names = unknown.get(place, set()) & UNKNOWN.keys()
+        return partial.model_copy(update={name: UNKNOWN[name] for name in names})
+
+    def mark_axes(block: str, axes: dict[str, Levels]) -> dict[str, Levels]:
+        return {
+            axis: {name: mark(level, (block, axis, name)) for name, level in levels.items()}
+            for axis, levels in axes.items()
+        }
+
+    return settings.model_copy(
+        update={
+            "base": mark(settings.base, ("base",)),
+            "axes": mark_axes("axes", settings.axes),
+            "zip": mark_axes("zip", settings.zip),
+            "scenarios": {
+                name: mark(level, ("scenarios", name)) for name, level in settings.scenarios.items()
+            },
+        }
+    )

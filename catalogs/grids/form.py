@@ -1,0 +1,68 @@
+"""The form of a grid file, and the bounds of what one grid may ask for."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from catalogs.grids.blocks import Blocks, PartialScenario, Whole, count_combinations
+from catalogs.grids.blocks import Number as LaxNumber
+from catalogs.grids.selection import Condition
+from catalogs.names import Name
+from catalogs.physical_limits import limit_problem, load_physical_limits
+
+LIMITS = load_physical_limits()
+MOST_CLIPS = 100_000
+"""Clips of one grid [1]: a manifest takes 2 kB a clip and every command reads it whole, 200 MB of JSON here."""
+Reference = Annotated[str, Field(min_length=1, max_length=4096)]
+"""Name or file of an entry; 4096 characters are the longest path."""
+
+
+class GridFile(Blocks):
+    """A grid as written in YAML."""
+
+    name: Name
+    scene: Reference = "street"
+    vehicle: Reference = "paper-reference"
+    surface: Reference = "dense-asphalt"
+    camera: Reference = "dashcam-480x320"
+    hazard_marking: Reference | None = Field(
+        default=None, description="Paint on raised road features; without an entry they are left bare."
+    )
+    vehicle_mode: Literal["paper", "coupled"] = "paper"
+    frames: Whole = Field(default=81, ge=2, le=int(LIMITS.frames.value))
+    frame_rate_hz: LaxNumber = Field(default=10.0, gt=0, le=LIMITS.frame_rate.value, validate_default=True)
+    seed: Whole = Field(default=2025, ge=0, lt=2**53)
+    visual_seeds: Whole = Field(
+        default=1, ge=1, le=1000, description="Clips of each scenario, with visual seeds from seed upward."
+    )
+    composition: Literal["linear", "paper"] = Field(
+        default="linear",
+        description="linear adds up light; paper adds drops and flakes as 8-bit differences (Appendix A.4).",
+    )
+    labels: bool = False
+    pictures: bool = True
+    base: PartialScenario = PartialScenario()
+    exclude: list[Condition] = Field(
+        default=[], description="Combinations to leave out: those that keep any of these."
+    )
+    splits: dict[Name, Condition] = Field(
+        default={}, description="Name to condition; a clip belongs to the first that it keeps."
+    )
+
+    @field_validator("frame_rate_hz")
+    @classmethod
+    def _clips_are_short_enough(cls, rate: float, info: ValidationInfo) -> float:
+        frames = info.data.get("frames", 2)
+        if problem := limit_problem("(frames - 1) / frame_rate_hz", (frames - 1) / rate, LIMITS.duration):
+            raise ValueError(problem)
+        return rate
+
+    @model_validator(mode="after")
+    def _clips_are_few_enough(self) -> "GridFile":
+        count = count_combinations(self) * self.visual_seeds
+        if count > MOST_CLIPS:
+            raise ValueError(
+                f"a grid must ask for at most {MOST_CLIPS:,} clips; levels and visual_seeds multiply to {count:,}:"
+                " make several grids of it"
+            )
+        return self

@@ -1,0 +1,51 @@
+"""What no scenario and no clip may exceed."""
+
+from functools import cache
+from pathlib import Path
+from typing import Annotated
+
+from catalogs.quantities import CatalogueEntry, Scalar, checked, read_entry
+
+PHYSICAL_LIMITS = Path(__file__).with_name("physical_limits.yaml")
+
+Seconds = Annotated[Scalar, checked("s", above=0)]
+Metres = Annotated[Scalar, checked("m", above=0)]
+Rate = Annotated[Scalar, checked("mm h-1", above=0)]
+
+
+class PhysicalLimits(CatalogueEntry):
+    """The largest value of each quantity; ``position`` is along the route, ``brake_time`` any time of a brake."""
+
+    rain_rate: Rate
+    snow_rate: Rate
+    snow_accumulation: Annotated[Scalar, checked("h", above=0)]
+    snow_water_equivalent: Annotated[Scalar, checked("mm", above=0)]
+    initial_speed: Annotated[Scalar, checked("km h-1", above=0)]
+    peak_pressure: Annotated[Scalar, checked("MPa", above=0)]
+    brake_time: Seconds
+    position: Metres
+    hazard_length: Metres
+    hazard_height: Metres
+    duration: Seconds
+    frame_rate: Annotated[Scalar, checked("Hz", above=0)]
+    frames: Annotated[Scalar, checked("1", minimum=2)]
+
+
+@cache
+def load_physical_limits() -> PhysicalLimits:
+    """The limits of the catalogue."""
+    return read_entry(PhysicalLimits, PHYSICAL_LIMITS, "table of physical limits")
+
+
+def limit_problem(name: str, value: float, limit: Scalar) -> str | None:
+    """A sentence where a value exceeds its limit, else None.
+
+    Parameters
+    ----------
+    name : what the value is called where it was given
+    value : in the limit's unit
+    limit : of the catalogue
+    """
+    if not value > limit.value:
+        return None
+    return f"{name} must be at most {limit.value:g} {limit.unit} ({limit.source}); it is {value:g}"
