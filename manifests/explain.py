@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
-import yaml
-
+from catalogs.documents import parse_yaml_value
 from manifests.provenance import code_version, library_versions, processor
 
 VEHICLE, RENDER, JUDGING = "vehicle", "render", "judging"
@@ -157,4 +156,4 @@ def _rows(name: str, key: str, a: Any, b: Any) -> list[dict[str, Any]]:
 
 
 def _parsed(content: bytes | None) -> Any:
-    return ABSENT if content is None else yaml.safe_load(content)
+    return ABSENT if content is None else parse_yaml_value(content, "a recorded input", "catalogue entry")

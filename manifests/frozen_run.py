@@ -4,13 +4,14 @@ A dataset's manifest (`manifests.manifest`) seals what was made, file by file, a
 every input. A frozen run says what has to come out again; the code's state is recorded, and judged by the outcome.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from catalogs.documents import read_json_document
 from manifests.explain import REACHES, VEHICLE, shown, value_differences
 from manifests.manifest import seal_of
+from manifests.records import FrozenRun, check_record
 from tasks.errors import InputError
 
 FROZEN_FORMAT = "musync-frozen/1"
@@ -42,19 +43,16 @@ def frozen_source(name_or_path: str | Path) -> Path:
     return path
 
 
-def read_frozen(name_or_path: str | Path) -> dict[str, Any]:
+def read_frozen(name_or_path: str | Path) -> FrozenRun:
     """Read a frozen run.
 
     Raises
     ------
     InputError
-        If there is none, or it is of another format, or was changed by hand.
+        If there is none, or it is of another format, was changed by hand, or breaks a rule.
     """
     path = frozen_source(name_or_path)
-    try:
-        frozen: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: a frozen run must be valid JSON; {error}") from None
+    frozen = read_json_document(path, "frozen run")
     found = frozen.get("format") if isinstance(frozen, dict) else None
     if found != FROZEN_FORMAT:
         raise InputError(
@@ -63,7 +61,7 @@ def read_frozen(name_or_path: str | Path) -> dict[str, Any]:
         )
     if seal_of(frozen) != frozen.get("seal"):
         raise InputError(f"{path}: its seal does not match its content: it was changed after it was frozen")
-    return frozen
+    return check_record(FrozenRun, frozen, path)
 
 
 def sealed(run: Mapping[str, Any]) -> dict[str, Any]:

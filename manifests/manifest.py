@@ -1,23 +1,24 @@
 """The frozen manifest of a dataset: what was asked, what it was made with, and every hash."""
 
-import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rfc8785 import CanonicalizationError
 
+from catalogs.documents import parse_json
 from manifests.canonical import canonical_bytes, sha256_of, sha256_of_file
+from manifests.records import Manifest
 from tasks.errors import InputError
 
-MANIFEST_FORMAT = "musync-manifest/2"
+MANIFEST_FORMAT = "musync-manifest/3"
 
 
 def freeze(
     plan: Mapping[str, Any],
-    clips: list[Mapping[str, Any]],
+    clips: Sequence[Mapping[str, Any]],
     artifacts: Mapping[str, str],
-    processor: Mapping[str, str],
+    made_on: Mapping[str, Any],
 ) -> bytes:
     """The manifest's one byte string (RFC 8785).
 
@@ -26,14 +27,14 @@ def freeze(
     plan : the run's plan as JSON; its clips are replaced by ``clips``
     clips : one record a clip: id, scenario, seed, artifacts, content hashes, figures, verdict
     artifacts : relative path to SHA-256 of the files that several clips share
-    processor : on what the bytes were made; it decides nothing, and explains a difference
+    made_on : processor, git and environment: they decide nothing, and explain a difference
     """
     manifest = {
         **plan,
         "format": MANIFEST_FORMAT,
         "clips": list(clips),
         "artifacts": dict(artifacts),
-        "processor": dict(processor),
+        **made_on,
     }
     return canonical_bytes(manifest | {"seal": seal_of(manifest)})
 
@@ -56,8 +57,8 @@ def manifest_damage(content: bytes) -> str | None:
     content : the file's bytes
     """
     try:
-        manifest = json.loads(content)
-    except (ValueError, RecursionError):
+        manifest = parse_json(content, "manifest.json", "manifest")
+    except InputError:
         return "changed: it is no longer JSON"
     if not isinstance(manifest, dict) or "seal" not in manifest:
         return "changed: it carries no seal"
@@ -68,17 +69,7 @@ def manifest_damage(content: bytes) -> str | None:
     return None if sealed else "changed: its seal does not match its content"
 
 
-def check_format(manifest: Mapping[str, Any], place: object) -> None:
-    """Raise `InputError` if the manifest is of another format than this version reads."""
-    found = manifest.get("format")
-    if found != MANIFEST_FORMAT:
-        raise InputError(
-            f"{place}: the manifest must be of format {MANIFEST_FORMAT}; it is {found!r}:"
-            " read it with the version of muSync that wrote it"
-        )
-
-
-def recorded_files(manifest: Mapping[str, Any]) -> dict[str, tuple[str, str | None]]:
+def recorded_files(manifest: Manifest) -> dict[str, tuple[str, str | None]]:
     """Every recorded file: relative path to (SHA-256, clip id or None where several clips share it)."""
     files: dict[str, tuple[str, str | None]] = {
         path: (digest, None) for path, digest in manifest["artifacts"].items()
@@ -88,12 +79,14 @@ def recorded_files(manifest: Mapping[str, Any]) -> dict[str, tuple[str, str | No
     return files
 
 
-def damaged_files(root: Path, manifest: Mapping[str, Any]) -> list[dict[str, str | None]]:
-    """Files that are missing, or whose bytes are not those recorded; empty when all is well."""
+def damaged_files(root: Path, manifest: Manifest) -> list[dict[str, str | None]]:
+    """Files that are missing, lie behind a link, or whose bytes are not those recorded; empty when all is well."""
     damage: list[dict[str, str | None]] = []
     for path, (digest, clip_id) in sorted(recorded_files(manifest).items()):
         file = root / path
-        if not file.is_file():
+        if file.exists() and file.resolve() != root.resolve() / path:
+            damage.append({"path": path, "clip_id": clip_id, "damage": "behind a link"})
+        elif not file.is_file():
             damage.append({"path": path, "clip_id": clip_id, "damage": "missing"})
         elif sha256_of_file(file) != digest:
             damage.append({"path": path, "clip_id": clip_id, "damage": "changed"})

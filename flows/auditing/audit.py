@@ -2,8 +2,6 @@
 
 import math
 import os
-import shutil
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,14 +14,16 @@ from flows.running.runner import RunnerName
 from flows.store.address import everything, working
 from flows.store.arrays import arrays_of
 from flows.store.frames import read_clip
-from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically, write_json
-from flows.store.lock import sole_writer
-from flows.store.sealed import read_manifest
+from flows.store.layout import STAGED_TABLES, Layout, write_atomically
+from flows.store.outputs import Outputs
+from flows.store.sealed import read_manifest, read_receipt
+from flows.store.staging import scratch_dataset
 from flows.store.telemetry import read_columns
 from manifests.canonical import sha256_of
 from manifests.compare import first_pixel_difference, first_row_difference
 from manifests.explain import as_sentences, reasons
 from manifests.manifest import damaged_files
+from manifests.records import Manifest, Receipt
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 
@@ -61,6 +61,7 @@ def audit(
     """
     if not 0 <= share <= 1:
         raise InputError(f"--share must lie in 0 to 1; it is {share:g}")
+    results = Outputs(out, "audit", "audit.json", "audit.txt")
     changes: list[dict[str, Any]] = []
     mismatches: list[dict[str, Any]] = []
     not_remade: list[str] = []
@@ -86,9 +87,8 @@ def audit(
         "differences": as_sentences(changes),
         "not_remade": not_remade,
     }
-    if out is not None:
-        write_json(Path(out) / "audit.json", result)
-        write_atomically(Path(out) / "audit.txt", as_text(result).encode())
+    results.write_json("audit.json", result)
+    results.write("audit.txt", as_text(result))
     return result
 
 
@@ -128,7 +128,7 @@ def other_count() -> int:
     return len(os.sched_getaffinity(0)) - 1 or 2
 
 
-def chosen_clips(manifest: Mapping[str, Any], share: float) -> list[Mapping[str, Any]]:
+def chosen_clips(manifest: Manifest, share: float) -> list[Receipt]:
     """A share of the clips, drawn by hash: the same clips for the same dataset, spread over the grid."""
     count = math.ceil(share * len(manifest["clips"]))
     drawn = sorted(
@@ -139,8 +139,8 @@ def chosen_clips(manifest: Mapping[str, Any], share: float) -> list[Mapping[str,
 
 def remake_and_compare(
     layout: Layout,
-    manifest: Mapping[str, Any],
-    chosen: list[Mapping[str, Any]],
+    manifest: Manifest,
+    chosen: list[Receipt],
     runner: RunnerName,
     workers: int | None,
     scheduler: str | None,
@@ -148,15 +148,13 @@ def remake_and_compare(
     """Make the chosen clips again beside the dataset, in reverse order, and name what differs first."""
     if not chosen:
         return []
-    with tempfile.TemporaryDirectory(prefix=".audit-", dir=layout.root.parent) as folder:
-        remade = Layout(Path(folder))
-        shutil.copytree(layout.inputs, remade.inputs)
-        shutil.copy(layout.plan, remade.plan)
+    with scratch_dataset(layout) as remade:
+        for name in ("plan.json", *(f"inputs/{name}" for name in manifest["inputs"])):
+            write_atomically(remade.root / name, recorded_bytes(layout.root / name))
         plan = read_plan(remade.root)
         create_frame_arrays(remade, plan)
         indices = sorted((clip["index"] for clip in chosen), reverse=True)
-        with sole_writer(remade):  # what holds no lock is a left-over of a killed audit
-            fan_out(remade, plan, indices, runner, workers, scheduler)
+        fan_out(remade, plan, indices, runner, workers, scheduler)
         return [
             difference
             for clip in chosen
@@ -164,11 +162,22 @@ def remake_and_compare(
         ]
 
 
-def _first_difference(
-    layout: Layout, remade: Layout, plan: Plan, clip: Mapping[str, Any]
-) -> dict[str, Any] | None:
+def recorded_bytes(path: Path) -> bytes:
+    """The bytes of a small file of a dataset.
+
+    Raises
+    ------
+    InputError
+        If it is missing, or lies behind a link.
+    """
+    if path.resolve() != path or not path.is_file():
+        raise InputError(f"{path}: the manifest records this file; it is missing, or behind a link")
+    return path.read_bytes()
+
+
+def _first_difference(layout: Layout, remade: Layout, plan: Plan, clip: Receipt) -> dict[str, Any] | None:
     clip_id, index = clip["clip_id"], clip["index"]
-    new = read_json(remade.receipt(clip_id))["content"]
+    new = read_receipt(remade, clip_id)["content"]
     changed = [
         name
         for name in (*STAGED_TABLES, *arrays_of(plan.settings.labels))

@@ -12,6 +12,7 @@ from catalogs.scenes import load_scene
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import controls_of, hazard_of, weather_of
+from flows.making.places import find_scene
 from flows.making.plan import read_plan
 from flows.store.address import reading, telemetry
 from flows.store.layout import write_atomically, write_json
@@ -74,7 +75,7 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
         *surface_steps(weather_of(scenario), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row),
         *pitch_steps(vehicle, response, hazard, mode, row, ride.columns),
-        *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, _route(plan.settings.scene)),
+        *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, _route(plan.scene)),
     ]  # fmt: skip
     result = {
         "dataset": str(layout.root),
@@ -129,9 +130,9 @@ def _asked(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _route(scene: str) -> Route | None:
+def _route(scene: Mapping[str, str]) -> Route | None:
     """The scene's route; None where the scene has moved away, which leaves one step out."""
     try:
-        return load_scene(scene).route
+        return load_scene(find_scene(scene)).route
     except InputError:
         return None

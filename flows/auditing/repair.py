@@ -1,9 +1,8 @@
 """Making again what is broken or missing in a finished dataset, byte for byte, or saying why that cannot be."""
 
 import shutil
-import tempfile
 from collections.abc import Iterable, Mapping
-from pathlib import Path
+from pathlib import PurePosixPath
 from typing import Any
 
 import pyarrow.parquet as pq
@@ -16,18 +15,20 @@ from flows.making.seal import clips_table, pairs_table, preview_sheet, table_par
 from flows.running.orchestration import stage
 from flows.running.runner import RunnerName
 from flows.store.address import everything, publish, working
-from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically, write_json
+from flows.store.layout import STAGED_TABLES, Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
+from flows.store.outputs import Outputs
+from flows.store.sealed import read_manifest
+from flows.store.staging import remove_staging, scratch_dataset
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.explain import as_sentences, tool_differences, tools_here
 from manifests.manifest import recorded_files
+from manifests.records import Manifest
 from tasks.errors import InputError
 
 SUMMARIES = {"telemetry/clips.parquet": clips_table, "telemetry/pairs.parquet": pairs_table}
 """Tables that follow from the clips' records."""
-WHOLE_NUMBERS = {"index", "failed_frames"}
-"""Keys of a clip's record that are integers; canonical JSON writes a float 0.0 as 0 too."""
 
 
 def repair(
@@ -56,28 +57,29 @@ def repair(
     InputError
         The manifest itself is damaged, or inputs that clips follow from cannot be found any more.
     """
+    results = Outputs(out, "repair", "repair.json")
     with working(dataset, everything) as layout:
         result = _repaired(layout, runner, workers, scheduler)
-    if out is not None:
-        write_json(Path(out) / "repair.json", result)
+    results.write_json("repair.json", result)
     return result
 
 
 def _repaired(
     layout: Layout, runner: RunnerName, workers: int | None, scheduler: str | None
 ) -> dict[str, Any]:
-    found = stage(compare_files)(layout)
-    if any(row["path"] == "manifest.json" for row in found["damaged"]):
-        raise InputError(
-            f"{layout}/manifest.json: {found['damaged'][0]['damage']}, so nothing says what the other files should be:"
-            " put back a copy of the manifest, or generate the grid again into another folder"
-        )
-    manifest = read_json(layout.manifest)
-    paths = [row["path"] for row in found["damaged"] if row["damage"] != "not recorded"]
     with sole_writer(layout):
+        found = stage(compare_files)(layout)
+        if any(row["path"] == "manifest.json" for row in found["damaged"]):
+            raise InputError(
+                f"{layout}/manifest.json: {found['damaged'][0]['damage']}, so nothing says what the other files should"
+                " be: put back a copy of the manifest, or generate the grid again into another folder"
+            )
+        manifest = read_manifest(layout)
+        paths = [row["path"] for row in found["damaged"] if row["damage"] != "not recorded"]
+        _refuse_files_as_folders(layout, paths)
         restored = stage(restore)(layout, manifest, paths, runner, workers, scheduler) if paths else []
         publish(layout, [layout.root / path for path in restored])
-        shutil.rmtree(layout.staging)
+        remove_staging(layout)
     return {
         "repaired": stage(compare_files)(layout)["verified"],
         "damaged": found["damaged"],
@@ -87,9 +89,24 @@ def _repaired(
     }
 
 
+def _refuse_files_as_folders(layout: Layout, paths: Iterable[str]) -> None:
+    """Raise `InputError` where something else stands in the place of a folder, or a folder in that of a file."""
+    places = {place for path in paths for place in PurePosixPath(path).parents} - {PurePosixPath(".")}
+    wrong = [place for place in places if (layout.root / place).is_file()]
+    wrong += [PurePosixPath(path) for path in paths if (layout.root / path).is_dir()]
+    if wrong:
+        raise InputError(
+            [
+                f"{layout.root / place}: must not be a file where the dataset has a folder, nor a folder where it has a"
+                " file: move it away and repair again"
+                for place in sorted(wrong)
+            ]
+        )
+
+
 def restore(
     layout: Layout,
-    manifest: Mapping[str, Any],
+    manifest: Manifest,
     paths: list[str],
     runner: RunnerName,
     workers: int | None,
@@ -106,30 +123,26 @@ def restore(
                 write_atomically(layout.root / path, source.read_bytes())
                 restored.append(path)
 
-    with tempfile.TemporaryDirectory(prefix=".repair-", dir=layout.root.parent) as folder:
-        scratch = Layout(Path(folder))
-        with sole_writer(scratch):
-            plan = _prepare(layout, scratch, manifest)
-            move_in(scratch, [path for path in paths if (scratch.root / path).is_file()])
-            parts = {table: table_parts(plan, table) for table in STAGED_TABLES}
-            broken = [(t, path, ids) for t in parts for path, ids in parts[t].items() if path in wanted]
-            again = {clip_id for _, _, ids in broken for clip_id in ids}
-            again |= {
-                clip["clip_id"] for clip in manifest["clips"] if wanted.keys() & clip["artifacts"].keys()
-            }
-            indices = [clip.index for clip in plan.clips if clip.clip_id in again]
-            if indices:
-                fan_out(scratch, plan, indices, runner, workers, scheduler)
-            move_in(scratch, [path for clip in manifest["clips"] for path in clip["artifacts"]])
-            for table, path, ids in broken:
-                write_part(scratch, table, path, ids)
-            move_in(scratch, [path for _, path, _ in broken])
-            _remake_summaries(layout, scratch, plan, manifest, wanted)
-            move_in(scratch, [*SUMMARIES, "previews/contact_sheet.png"])
+    with scratch_dataset(layout) as scratch:
+        plan = _prepare(layout, scratch, manifest)
+        move_in(scratch, [path for path in paths if (scratch.root / path).is_file()])
+        parts = {table: table_parts(plan, table) for table in STAGED_TABLES}
+        broken = [(t, path, ids) for t in parts for path, ids in parts[t].items() if path in wanted]
+        again = {clip_id for _, _, ids in broken for clip_id in ids}
+        again |= {clip["clip_id"] for clip in manifest["clips"] if wanted.keys() & clip["artifacts"].keys()}
+        indices = [clip.index for clip in plan.clips if clip.clip_id in again]
+        if indices:
+            fan_out(scratch, plan, indices, runner, workers, scheduler)
+        move_in(scratch, [path for clip in manifest["clips"] for path in clip["artifacts"]])
+        for table, path, ids in broken:
+            write_part(scratch, table, path, ids)
+        move_in(scratch, [path for _, path, _ in broken])
+        _remake_summaries(layout, scratch, plan, manifest, wanted)
+        move_in(scratch, [*SUMMARIES, "previews/contact_sheet.png"])
     return sorted(restored)
 
 
-def _prepare(layout: Layout, scratch: Layout, manifest: Mapping[str, Any]) -> Plan:
+def _prepare(layout: Layout, scratch: Layout, manifest: Manifest) -> Plan:
     """Plan, inputs and empty arrays in the scratch folder, from the dataset, the manifest or the catalogue."""
     plan = plan_of(manifest)
     write_json(scratch.plan, plan.as_json())
@@ -152,16 +165,16 @@ def _prepare(layout: Layout, scratch: Layout, manifest: Mapping[str, Any]) -> Pl
     return read_plan(scratch.root)
 
 
-def plan_of(manifest: Mapping[str, Any]) -> Plan:
+def plan_of(manifest: Manifest) -> Plan:
     """The plan that a manifest was frozen from."""
-    return Plan.of({**manifest, "clips": [_as_written(clip) for clip in manifest["clips"]]})
+    return Plan.of(manifest, "manifest.json")
 
 
 def _remake_summaries(
-    layout: Layout, scratch: Layout, plan: Plan, manifest: Mapping[str, Any], wanted: Mapping[str, str]
+    layout: Layout, scratch: Layout, plan: Plan, manifest: Manifest, wanted: Mapping[str, str]
 ) -> None:
     """Tables of clips and the contact sheet, which follow from the manifest and the other files."""
-    receipts = [_as_written(clip) for clip in manifest["clips"]]
+    receipts = manifest["clips"]
     for path, table_of in SUMMARIES.items():
         write_parquet(table_of(receipts), scratch.root / path)
     if "previews/contact_sheet.png" in wanted:
@@ -172,12 +185,3 @@ def _remake_summaries(
         write_atomically(
             scratch.previews / "contact_sheet.png", preview_sheet(scratch, layout.frames, plan, receipts)
         )
-
-
-def _as_written(value: Any, key: str = "") -> Any:
-    """A clip's record with the floats that canonical JSON shortens to integers."""
-    if isinstance(value, dict):
-        return {name: _as_written(entry, name) for name, entry in value.items()}
-    if isinstance(value, int) and not isinstance(value, bool) and key not in WHOLE_NUMBERS:
-        return float(value)
-    return value

@@ -1,63 +1,81 @@
 """Are the files of a dataset those recorded, and what did killed runs leave behind? Hashes only, nothing is made."""
 
-import shutil
 from pathlib import Path
 from typing import Any
 
+from flows.auditing.signing import signature_findings
 from flows.running.orchestration import stage
 from flows.store.address import everything, stored_record, withdraw, working
-from flows.store.layout import Layout, clear_partial_files, write_json
+from flows.store.layout import Layout
+from flows.store.links import foreign_entries
 from flows.store.lock import sole_writer
+from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
+from flows.store.staging import (
+    abandoned_scratch,
+    partial_files,
+    remove_staged,
+    remove_staging,
+    staged_files,
+)
 from manifests.manifest import damaged_files, manifest_damage, recorded_files
+from manifests.signing import ENVELOPE
 from tasks.errors import InputError
 
-SCRATCH_PREFIXES = (".audit-", ".repair-")
-"""Folders beside a dataset in which clips are made again."""
 READ_AS_DATA = ("telemetry/", "frames.zarr/")
 """Where a file that nobody recorded would still be read as data."""
 
 
-def verify(dataset: str, *, out: str | None = None) -> dict[str, Any]:
-    """Compare every file of a dataset with its recorded hash, and the manifest with its own seal.
+def verify(dataset: str, *, key: str | None = None, out: str | None = None) -> dict[str, Any]:
+    """Compare every file of a dataset with its recorded hash, and the manifest with its seal and a signature.
 
     Parameters
     ----------
     dataset : a sealed dataset folder
+    key : file with the signer's Ed25519 public key in PEM; None checks no signature
     out : folder for ``verify.json``; None writes none
 
     Returns
     -------
-    ``verified``; ``files`` compared; ``damaged[]`` with ``path``, ``clip_id`` and ``damage``; ``unrecorded[]``,
+    ``verified``; ``signed`` and ``signature``, as of `signature_findings`; ``files`` compared;
+    ``damaged[]`` with ``path``, ``clip_id`` and ``damage``; ``unrecorded[]``,
     files in the folder that the manifest does not know: among the data they are damage, elsewhere they are not.
 
     Raises
     ------
     InputError
-        If the folder is no sealed dataset of this format.
+        If the folder is no sealed dataset of this format, or the key is none.
     """
+    results = Outputs(out, "verify", "verify.json")
     with working(dataset, everything) as layout:
-        result = stage(compare_files)(layout)
-    if out is not None:
-        write_json(Path(out) / "verify.json", result)
+        signature = signature_findings(layout, key)
+        result = stage(compare_files)(layout) | signature
+    result["verified"] = result["verified"] and result["signed"] is not False
+    results.write_json("verify.json", result)
     return result
 
 
 def compare_files(layout: Layout) -> dict[str, Any]:
     """What `verify` returns."""
-    fault = manifest_damage(layout.manifest.read_bytes()) if layout.manifest.is_file() else None
+    foreign = foreign_entries(layout.root)
+    damaged: list[dict[str, str | None]] = [
+        {"path": path, "clip_id": None, "damage": "a link, or no file"} for path in foreign
+    ]
+    is_there = layout.manifest.is_file() and not layout.manifest.is_symlink()
+    fault = manifest_damage(layout.manifest.read_bytes()) if is_there else None
     if fault is not None:
         # nothing that a changed manifest says of the other files can be relied on
-        damaged = [{"path": "manifest.json", "clip_id": None, "damage": fault}]
+        damaged.append({"path": "manifest.json", "clip_id": None, "damage": fault})
         return {"verified": False, "files": 1, "damaged": damaged, "unrecorded": []}
     manifest = read_manifest(layout)
     recorded = recorded_files(manifest)
     present = {layout.relative(path) for path in layout.root.rglob("*") if path.is_file()}
-    unrecorded = sorted(present - recorded.keys() - {"manifest.json"})
-    damaged = damaged_files(layout.root, manifest) + [
+    unrecorded = sorted(present - recorded.keys() - {"manifest.json", ENVELOPE})
+    damaged += [row for row in damaged_files(layout.root, manifest) if row["path"] not in foreign]
+    damaged += [
         {"path": path, "clip_id": None, "damage": "not recorded"}
         for path in unrecorded
-        if path.startswith(READ_AS_DATA)
+        if path.startswith(READ_AS_DATA) and path not in foreign
     ]
     return {
         "verified": not damaged,
@@ -68,9 +86,10 @@ def compare_files(layout: Layout) -> dict[str, Any]:
 
 
 def gc(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
-    """Remove what killed runs left: half-written files, a finished dataset's staging, scratch folders beside it.
+    """Remove what killed runs left: half-written files, scratch folders, and a finished dataset's staged files.
 
-    Committed clips of an unfinished dataset stay, and so does a scratch folder that a live run holds.
+    Committed clips of an unfinished dataset stay, and so does a scratch folder that a live run holds. Only what muSync
+    itself names so is removed, from the dataset's own folder.
 
     Parameters
     ----------
@@ -84,47 +103,32 @@ def gc(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the folder is no dataset, or another run is writing it.
+        If the folder is no dataset or holds links, or another run is writing it.
     """
     with working(dataset, stored_record) as layout:
         return _collect(layout, dry_run)
 
 
 def _collect(layout: Layout, dry_run: bool) -> dict[str, Any]:
-    if not layout.plan.is_file() and not layout.manifest.is_file():
-        raise InputError(f"{layout}: must be a muSync dataset; it has neither plan.json nor manifest.json")
+    finished = layout.manifest.is_file()
+    if not layout.plan.is_file() and not finished:
+        raise InputError(
+            f"{layout}: must be a muSync dataset; it has neither plan.json nor manifest.json: what a run began and did"
+            " not plan goes on with its musync generate command"
+        )
     with sole_writer(layout):
-        found = [path for path in layout.root.rglob("*.partial*") if layout.staging not in path.parents]
-        found += [path for path in layout.staging.glob("*") if _left_in_staging(layout, path)]
-        found += [path for path in layout.root.parent.iterdir() if _abandoned(path)]
+        found = {
+            *partial_files(layout),
+            *abandoned_scratch(layout),
+            *(staged_files(layout) if finished else ()),
+        }
         size = sum(_bytes(path) for path in found)
         if not dry_run:
-            clear_partial_files(layout)
-            withdraw(layout, [path for path in found if layout.staging in path.parents])
-            for path in found:
-                shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
-        if layout.manifest.is_file() and not (dry_run and found):
-            shutil.rmtree(layout.staging)
+            withdraw(layout, [path for path in found if path.is_file()])
+            remove_staged(found)
+        if finished:
+            remove_staging(layout)
     return {"removed": sorted(str(path) for path in found), "bytes": size, "dry_run": dry_run}
-
-
-def _left_in_staging(layout: Layout, path: Path) -> bool:
-    """In a finished dataset nothing is staged any more; in an unfinished one only half-written files are waste."""
-    return path.name != "lock" and (layout.manifest.is_file() or ".partial" in path.name)
-
-
-def _abandoned(path: Path) -> bool:
-    """Whether a scratch folder belongs to no live run; one without a lock is just being made, or no scratch."""
-    if not (path.is_dir() and path.name.startswith(SCRATCH_PREFIXES)):
-        return False
-    scratch = Layout(path)
-    if not (scratch.staging / "lock").is_file():
-        return False
-    try:
-        with sole_writer(scratch):
-            return True
-    except InputError:
-        return False
 
 
 def _bytes(path: Path) -> int:

@@ -12,9 +12,9 @@ from flows.judging.controls_figure import roc_figure
 from flows.judging.evaluation_rows import control_of
 from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
-from flows.making.clip import TICK_RATE_HZ, Catalogue, catalogue_of
+from flows.making.clip import Catalogue, catalogue_of
 from flows.making.driving import drive
-from flows.making.plan import Plan, read_plan
+from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
 from flows.running.orchestration import stage
 from flows.store.address import reading
 from flows.store.outputs import Outputs

@@ -26,7 +26,8 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
 from flows.making.driving import drive, hazard_of, ranges_of
-from flows.making.plan import ClipPlan, Plan, read_plan
+from flows.making.places import find_scene, remember_place
+from flows.making.plan import TICK_RATE_HZ, ClipPlan, Plan, read_plan
 from flows.store.address import here, publish
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_json
@@ -53,7 +54,6 @@ from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
 from tasks.vehicle.sensitivity import StudyProtocol
 
-TICK_RATE_HZ = 1000
 PIXEL_CENTRE = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
 """The renderer puts pixel centres at +0.5, OpenCV and the judges at whole numbers [px]."""
 
@@ -75,7 +75,7 @@ class Catalogue:
 @lru_cache(maxsize=2)
 def catalogue_of(root: Path) -> Catalogue:
     """Load a dataset's frozen inputs and its scene."""
-    return load_catalogue(Layout(root).inputs, read_plan(root).settings.scene)
+    return load_catalogue(Layout(root).inputs, find_scene(read_plan(root).scene))
 
 
 def load_catalogue(inputs: Path, scene: str) -> Catalogue:
@@ -92,12 +92,13 @@ def load_catalogue(inputs: Path, scene: str) -> Catalogue:
     )
 
 
-def make_clip(layout: Layout, index: int) -> dict[str, Any]:
-    """Make and commit clip ``index`` of a dataset; returns its receipt."""
+def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
+    """Make and commit clip ``index`` of a dataset whose scene lies at ``scene``; returns its receipt."""
     started = time.process_time(), time.perf_counter()
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
     layout = here(layout)
     plan = read_plan(layout.root)
+    remember_place(plan.scene["sha256"], scene)
     clip = plan.clips[index]
     catalogue = catalogue_of(layout.root)
 
@@ -147,10 +148,12 @@ def make_clip(layout: Layout, index: int) -> dict[str, Any]:
     return receipt | {"cost": cost}
 
 
-def warm_up(layout: Layout) -> None:
+def warm_up(layout: Layout, scene: str) -> None:
     """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
     root = here(layout).root
-    plan, catalogue = read_plan(root), catalogue_of(root)
+    plan = read_plan(root)
+    remember_place(plan.scene["sha256"], scene)
+    catalogue = catalogue_of(root)
     short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
     for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
         facts, ride = drive(

@@ -5,18 +5,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from catalogs.documents import parse_yaml
 from catalogs.grids import Grid, GridFile, expand_grid, grid_names, load_grid
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import drive
 from flows.making.generate import RunReport, generate
+from flows.making.places import find_scene
 from flows.making.plan import Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.running.runner import RunnerName
 from flows.store.layout import read_json, write_atomically
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, recorded_grid
 from flows.store.telemetry import columns_hash
 from manifests.explain import as_sentences, tool_differences, tools_here
 from manifests.frozen_run import (
@@ -29,6 +29,7 @@ from manifests.frozen_run import (
     sealed,
 )
 from manifests.provenance import processor
+from manifests.records import FrozenRun
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 
@@ -80,10 +81,10 @@ def freeze(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]
 def frozen_run(grid: Grid) -> dict[str, Any]:
     """The frozen run of a grid, with the telemetry that comes out here."""
     plan, inputs = _planned(grid)
-    ticks = ticks_of(plan)
+    ticks = ticks_of(plan, grid.settings)
     return sealed({
         "name": grid.settings.name,
-        "grid": grid.settings.model_dump(mode="json", exclude_defaults=True),
+        "grid": plan.settings.model_dump(mode="json", exclude_defaults=True),
         "parameters": _parameters(plan, inputs),
         "clips": [clip | {"ticks": ticks[clip["label"]]} for clip in _records(plan)],
         "scene": dict(plan.scene),
@@ -92,19 +93,20 @@ def frozen_run(grid: Grid) -> dict[str, Any]:
     })  # fmt: skip
 
 
-def problems_of(frozen: Mapping[str, Any]) -> list[str]:
+def problems_of(frozen: FrozenRun) -> list[str]:
     """Why a frozen run cannot be made again here, a sentence each; empty when it can.
 
     Every clip is driven and its telemetry compared: some milliseconds a clip, whatever its frames would cost.
     """
     try:
-        plan, inputs = _planned(_grid_of(frozen))
+        grid = _grid_of(frozen)
+        plan, inputs = _planned(grid)
     except InputError as error:
         return list(error.problems)
     found = differences(frozen, _parameters(plan, inputs), _records(plan))
     if found:
         return found
-    differing = differing_clips(frozen, ticks_of(plan))
+    differing = differing_clips(frozen, ticks_of(plan, grid.settings))
     if not differing:
         return []
     tools = "; ".join(as_sentences(tool_differences(frozen, tools_here()))) or "none that is recorded"
@@ -158,10 +160,16 @@ def reproduce(
     return report, differing_clips(frozen, made)
 
 
-def ticks_of(plan: Plan) -> dict[str, str]:
-    """Label to the hash of a clip's telemetry, of every clip of a plan; nothing is written."""
+def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
+    """Label to the hash of a clip's telemetry, of every clip of a plan; nothing is written.
+
+    Parameters
+    ----------
+    plan : the clips
+    asked : settings with the vehicle and the surface as they were asked for; the plan may record their names alone
+    """
     names = [channel.name for channel in TICK_CHANNELS]
-    vehicle, surface = load_vehicle(plan.settings.vehicle), load_surface(plan.settings.surface)
+    vehicle, surface = load_vehicle(asked.vehicle), load_surface(asked.surface)
     return {
         clip.label: columns_hash(
             drive(clip.scenario, vehicle, surface, plan.settings.vehicle_mode, plan.duration_s)[1].columns,
@@ -171,8 +179,10 @@ def ticks_of(plan: Plan) -> dict[str, str]:
     }
 
 
-def _grid_of(frozen: Mapping[str, Any]) -> Grid:
-    return expand_grid(GridFile.model_validate(frozen["grid"]), f"manifest {frozen['name']}")
+def _grid_of(frozen: FrozenRun) -> Grid:
+    place = f"manifest {frozen['name']}"
+    settings = recorded_grid(frozen["grid"], place)
+    return expand_grid(settings.model_copy(update={"scene": find_scene(frozen["scene"])}), place)
 
 
 def _planned(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
@@ -181,7 +191,7 @@ def _planned(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
 
 
 def _parameters(plan: Plan, inputs: Mapping[str, bytes]) -> dict[str, Any]:
-    parsed = {name: yaml.safe_load(content) for name, content in inputs.items()}
+    parsed = {name: parse_yaml(content, name, "catalogue entry") for name, content in inputs.items()}
     return parameters_that_matter(parsed, plan.settings.pictures)
 
 

@@ -1,23 +1,29 @@
 """A grid to a dataset: plan, make the missing clips, seal."""
 
+import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
 from catalogs.grids import Grid
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs
+from flows.making.places import find_scene
 from flows.making.plan import Plan, make_plan, plan_differences, read_plan
 from flows.making.seal import needed_to_seal, seal
 from flows.running.failures import ClipsFailed, disk_full_sentence
 from flows.running.orchestration import stage
 from flows.running.progress import progress_bar
 from flows.running.runner import RunnerName, open_executor, run_unordered
-from flows.store.address import bring, claim, publish, reading, resumable, working
+from flows.store.address import bring, claim, forget_begun, publish, reading, resumable, working
 from flows.store.frames import create_arrays
-from flows.store.layout import Layout, clear_partial_files, read_json, write_atomically, write_json
+from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
+from flows.store.sealed import read_manifest
+from flows.store.staging import BEGUN, abandoned_scratch, partial_files, remove_staged
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
+from tasks.render.backend import select_backend
 
 SHOWN = 8
 """Differences told when a folder holds another run."""
@@ -69,10 +75,13 @@ def generate(
     missing: list[int] = []
     cost: dict[str, dict[str, float]] = {}
     with working(out, resumable) as layout:
-        plan = stage(prepare)(grid, layout, backend, vehicle, pictures)
-        if not layout.manifest.is_file():
+        plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
+        _refuse_other_content(layout)
+        if layout.manifest.is_file():
+            _refuse_other_plan(layout, plan, inputs)
+        else:
             with sole_writer(layout):
-                clear_partial_files(layout)
+                stage(prepare)(layout, plan, inputs)
                 missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
                 cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
                 bring(layout, needed_to_seal(layout, plan))
@@ -86,7 +95,7 @@ def summary(name: str) -> bool:
 
 
 def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, float]]) -> RunReport:
-    clips = read_json(layout.manifest)["clips"]
+    clips = read_manifest(layout)["clips"]
     return RunReport(
         layout=layout,
         run_id=plan.run_id,
@@ -97,40 +106,64 @@ def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, flo
     )
 
 
-def prepare(
-    grid: str | Grid, layout: Layout, backend: str, vehicle: str | None = None, pictures: bool = True
-) -> Plan:
-    """Check and freeze the plan, and lay out the folder; resumes a folder that holds the same plan."""
-    from tasks.render.backend import select_backend
+def prepare(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
+    """Lay out the folder and freeze the plan in it; a folder that holds the same plan is left as it is.
 
-    plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
+    Parameters
+    ----------
+    layout : of the dataset, held for writing
+    plan, inputs : as of `flows.making.plan.make_plan`
+
+    Raises
+    ------
+    InputError
+        If the folder holds the plan of another run.
+    """
+    remove_staged([*partial_files(layout), *abandoned_scratch(layout)])
     if layout.plan.is_file():
-        existing = read_plan(layout.root)
-        if existing.run_id != plan.run_id:
-            theirs = frozen_inputs(layout, existing.inputs)
-            differences = plan_differences(existing.as_json(), plan.as_json(), theirs, inputs)
-            raise InputError(
-                [
-                    f"{layout}: holds the dataset of another run: {difference}"
-                    for difference in differences[:SHOWN]
-                ]
-                + [f"{layout}: give an empty folder, or go on there with what made it"]
-            )
-        return existing
-    if layout.root.exists() and (not layout.root.is_dir() or any(layout.root.iterdir())):
-        raise InputError(
-            f"{layout}: must be an empty or new folder, or a muSync dataset; it holds other files"
-        )
+        _refuse_other_plan(layout, plan, inputs)
+        return
+    # what lies there without a plan is what a run began that was stopped
+    forget_begun(layout)
+    for folder in (layout.inputs, layout.frames):
+        if folder.exists():
+            shutil.rmtree(folder)
+    write_atomically(layout.staging / BEGUN, b"")
     for name, content in inputs.items():
         write_atomically(layout.inputs / name, content)
     write_json(layout.inputs / "grid.json", plan.settings.model_dump(mode="json"))
     create_frame_arrays(layout, plan)
-    prepared = [path for path in layout.root.rglob("*") if path.is_file()]
+    prepared = [
+        path for folder in (layout.inputs, layout.frames) for path in folder.rglob("*") if path.is_file()
+    ]
     # last: where the plan exists, the folder is ready to be filled
     write_json(layout.plan, plan.as_json())
     publish(layout, prepared)
     claim(layout, layout.plan)
-    return plan
+
+
+def _refuse_other_content(layout: Layout) -> None:
+    """Raise `InputError` unless the folder is new, empty, a dataset, or one that a stopped run began."""
+    if layout.plan.is_file() or layout.manifest.is_file() or not layout.root.exists():
+        return
+    entries = {path.name for path in layout.root.iterdir()} if layout.root.is_dir() else {"a file"}
+    begun = (layout.staging / BEGUN).is_file()
+    if entries - {layout.staging.name} - ({layout.inputs.name, layout.frames.name} if begun else set()):
+        raise InputError(
+            f"{layout}: must be an empty or new folder, or a muSync dataset; it holds other files"
+        )
+
+
+def _refuse_other_plan(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
+    existing = read_plan(layout.root)
+    if existing.as_json() == plan.as_json():
+        return
+    theirs = frozen_inputs(layout, existing.inputs)
+    differences = plan_differences(existing.as_json(), plan.as_json(), theirs, inputs)
+    raise InputError(
+        [f"{layout}: holds the dataset of another run: {difference}" for difference in differences[:SHOWN]]
+        + [f"{layout}: give an empty folder, or go on there with what made it"]
+    )
 
 
 def create_frame_arrays(layout: Layout, plan: Plan) -> None:
@@ -173,11 +206,13 @@ def fan_out(
     cost: dict[str, dict[str, float]] = {}
     failures: dict[str, BaseException] = {}
     labels = {clip.index: clip.label for clip in plan.clips}
+    scene = find_scene(plan.scene)
+    jobs = [(layout, index, scene) for index in indices]
     with (
-        open_executor(runner, workers, scheduler, partial(warm_up, layout)) as executor,
+        open_executor(runner, workers, scheduler, partial(warm_up, layout, scene)) as executor,
         progress_bar("clips", len(indices)) as advance,
     ):
-        for (_, index), future in run_unordered(executor, make_clip, ((layout, index) for index in indices)):
+        for (_, index, _), future in run_unordered(executor, make_clip, jobs):
             error = future.exception()
             if error is None:
                 cost[labels[index]] = future.result()["cost"]

@@ -4,16 +4,18 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from catalogs.grids import GridFile
 from catalogs.scenes import scene_identity
+from flows.making.places import find_scene, noted_place
 from flows.making.plan import input_sources
-from flows.store.layout import Layout, read_json
+from flows.store.layout import Layout
+from flows.store.sealed import read_plan_record, recorded_grid
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.explain import input_differences, parameter_differences, tools_here
+from manifests.records import Manifest
 from tasks.errors import InputError
 
 
-def input_changes(layout: Layout, manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
+def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
     """Every input that is no longer the recorded one, down to the value where the recorded bytes are still known.
 
     Parameters
@@ -29,16 +31,16 @@ def input_changes(layout: Layout, manifest: Mapping[str, Any]) -> list[dict[str,
     InputError
         The dataset's plan is missing or no JSON, or its scene cannot be found.
     """
-    plan = read_json(layout.plan)
+    plan = read_plan_record(layout)
     present = frozen_inputs(layout, manifest["inputs"])
     here = {
         **manifest,
         **tools_here(),
         "grid": plan["grid"],
         "inputs": {name: sha256_of([content]) for name, content in present.items()},
-        "scene": {"sha256": scene_identity(plan["grid"]["scene"])},
+        "scene": {"sha256": scene_identity(find_scene(plan["scene"]))},
     }
-    sources = input_sources(GridFile.model_validate(manifest["grid"]))
+    sources = input_sources(recorded_grid(manifest["grid"], layout.manifest))
     recorded = {
         name: file.read_bytes()
         for name, digest in manifest["inputs"].items()
@@ -50,7 +52,7 @@ def input_changes(layout: Layout, manifest: Mapping[str, Any]) -> list[dict[str,
 def recorded_input(
     layout: Layout, sources: Mapping[str, Callable[[], Path]], name: str, digest: str
 ) -> Path | None:
-    """A file with the recorded bytes of an input, from the dataset or else from the catalogue; None if neither has it.
+    """A file with the recorded bytes of an input, from the dataset, the catalogue or where it lay; None if none has it.
 
     Parameters
     ----------
@@ -58,7 +60,7 @@ def recorded_input(
     sources : `flows.making.plan.input_sources` of its grid
     name, digest : of the input
     """
-    for find in (lambda: layout.inputs / name, sources.get(name)):
+    for find in (lambda: layout.inputs / name, sources.get(name), lambda: noted_place(digest)):
         try:
             file = find() if find is not None else None
         except InputError:

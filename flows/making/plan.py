@@ -16,15 +16,18 @@ from catalogs.studies import SENSITIVITY
 from catalogs.surfaces import surface_source
 from catalogs.vehicles import vehicle_provenance, vehicle_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
-from flows.store.layout import Layout, read_json
+from flows.making.memory import memory_problems
+from flows.making.places import remember_place
+from flows.store.layout import Layout
+from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
 from manifests.canonical import content_id, sha256_of
 from manifests.explain import input_differences, shown, value_differences
 from manifests.provenance import code_version, library_versions
+from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
 
-PLAN_FORMAT = "musync-plan/2"
-
+TICK_RATE_HZ = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class ClipPlan:
@@ -50,10 +53,10 @@ class Plan:
 
     run_id: str
     settings: GridFile
-    scene: Mapping[str, str]
+    scene: Mapping[str, Any]
     backend: str
     inputs: Mapping[str, str]
-    made_with: Mapping[str, Mapping[str, str]]
+    made_with: Mapping[str, Any]
     clips: tuple[ClipPlan, ...]
 
     @property
@@ -74,13 +77,13 @@ class Plan:
         }
 
     @classmethod
-    def of(cls, content: Mapping[str, Any]) -> "Plan":
-        """A plan from its JSON, or from a manifest's, whose clips say more."""
+    def of(cls, content: PlanRecord | Manifest, place: object) -> "Plan":
+        """A plan from its record, or from a manifest, whose clips say more; ``place`` is what messages call it."""
         asked = [field.name for field in fields(ClipPlan)]
-        clips = [{name: clip[name] for name in asked} for clip in content["clips"]]
+        clips: list[dict[str, Any]] = [{name: clip[name] for name in asked} for clip in content["clips"]]  # type: ignore[literal-required]
         return cls(
             run_id=content["run_id"],
-            settings=GridFile.model_validate(content["grid"]),
+            settings=recorded_grid(content["grid"], place),
             scene=content["scene"],
             backend=content["backend"],
             inputs=content["inputs"],
@@ -131,6 +134,8 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         problems += _route_problems(grid)
     if "camera.yaml" in inputs:
         problems += _composition_problems(settings)
+        ticks = int((settings.frames - 1) / settings.frame_rate_hz * TICK_RATE_HZ) + 1
+        problems += memory_problems(settings, load_camera(settings.camera), ticks)
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
     hashes = {name: sha256_of([content]) for name, content in inputs.items()}
@@ -151,12 +156,16 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
             f"{source}: two scenarios of a grid must differ; some of these are equal: {', '.join(sorted(repeated))}"
         )
     made_with = {"code": code_version(), "libraries": library_versions()}
+    recorded = recorded_settings(settings)
+    for name, lookup in input_sources(settings).items():
+        if getattr(settings, Path(name).stem, None) != getattr(recorded, Path(name).stem, None):
+            remember_place(hashes[name], lookup())
     run_id = content_id(
-        [asked, settings.model_dump(mode="json"), [clip.clip_id for clip in clips], made_with]
+        [asked, recorded.model_dump(mode="json"), [clip.clip_id for clip in clips], made_with]
     )
     plan = Plan(
         run_id=run_id,
-        settings=settings,
+        settings=recorded,
         scene=scene,
         backend=backend,
         inputs=hashes,
@@ -164,6 +173,27 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         clips=clips,
     )
     return plan, inputs
+
+
+def recorded_settings(settings: GridFile) -> GridFile:
+    """The settings as a dataset records them: with files by their name alone where their path is a private matter.
+
+    Parameters
+    ----------
+    settings : as asked for
+    """
+    references = {
+        name: recorded_reference(value)
+        for name in ("scene", "vehicle", "surface", "camera", "hazard_marking")
+        if (value := getattr(settings, name)) is not None
+    }
+    return settings.model_copy(update=references)
+
+
+def recorded_reference(reference: str) -> str:
+    """A catalogue name, or a path below the folder of the run, as it is; of any other path the last part."""
+    path = Path(reference)
+    return path.name if path.is_absolute() or path.parts[:1] == ("~",) or ".." in path.parts else reference
 
 
 def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
@@ -188,15 +218,10 @@ def read_plan(root: Path) -> Plan:
     Raises
     ------
     InputError
-        If there is none, or one of another format.
+        If there is none, or one of another format, or one that breaks a rule.
     """
-    content = read_json(Layout(root).plan)
-    if content.get("format") != PLAN_FORMAT:
-        raise InputError(
-            f"{Layout(root).plan}: the plan must be of format {PLAN_FORMAT}; it is {content.get('format')!r}:"
-            " read the dataset with the version that made it, or make it again"
-        )
-    return Plan.of(content)
+    place = Layout(root).plan
+    return Plan.of(read_plan_record(Layout(root)), place)
 
 
 def plan_differences(
@@ -230,7 +255,8 @@ def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str],
         except InputError as error:
             problems += error.problems
     try:
-        scene = {"name": settings.scene, "sha256": scene_identity(settings.scene)}
+        scene = {"name": recorded_reference(settings.scene), "sha256": scene_identity(settings.scene)}
+        remember_place(scene["sha256"], settings.scene)
     except InputError as error:
         problems += error.problems
     return inputs, scene, problems

@@ -14,7 +14,8 @@ from flows.making.driving import drive
 from flows.making.plan import ClipPlan, Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.store.frames import buffer_hash
-from flows.store.layout import write_atomically, write_json
+from flows.store.layout import write_atomically
+from flows.store.outputs import Outputs
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.render.backend import select_backend
@@ -64,6 +65,7 @@ def replay_audit(
     """
     if seeds < 2 or frames < 2:
         raise InputError(f"seeds and frames must be at least 2; they are {seeds} and {frames}")
+    results = Outputs(out, "replay-audit", "replay.json")
     checked, name = load_grid(grid), select_backend(backend).name
     runs: list[Replay] = []
     count = len(checked.scenarios)
@@ -74,7 +76,7 @@ def replay_audit(
             plan, inputs = freeze_grid(replace(checked, settings=settings), grid, name)
             for file, content in inputs.items():
                 write_atomically(Path(folder) / file, content)
-            catalogue = load_catalogue(Path(folder), plan.settings.scene)
+            catalogue = load_catalogue(Path(folder), checked.settings.scene)
             for clip in plan.clips:
                 runs.append(_run(clip, plan, catalogue, frames))
                 advance(f"{clip.label} seed {seed}")
@@ -98,9 +100,7 @@ def replay_audit(
         "largest_difference": differences,
         "problems": problems,
     }
-    if out is not None:
-        Path(out).mkdir(parents=True, exist_ok=True)
-        write_json(Path(out) / "replay.json", result)
+    results.write_json("replay.json", result)
     return result
 
 

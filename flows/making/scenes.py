@@ -1,9 +1,9 @@
 """Scenes made, imported and looked at."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from catalogs.scenes import load_scene, write_scene
@@ -11,10 +11,12 @@ from catalogs.scenes.folder import must_be_new
 from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.scenes.route_files import read_route
 from flows.store.layout import read_json
+from flows.store.outputs import Outputs
 from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
 from tasks.render.backend import select_backend
 from tasks.render.composition import compose, encode_8bit
+from tasks.render.contact_sheet import encode_png
 from tasks.render.environment import environment_view, plain_sky
 from tasks.scene.classify import classify_road
 from tasks.scene.scene import Scene, sun_problems
@@ -83,9 +85,6 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
     gbuffer = engine.rasterise(engine.prepare(loaded.gaussians), viewmat, intrinsics, width, height)
     sky = environment_view(loaded.environment, viewmat, intrinsics, width, height)
     picture = encode_8bit(compose(gbuffer, sky, loaded.gaussians.display_encoded))
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(folder / "rgb.png"), picture[..., ::-1])
     buffers: dict[str, Any] = {
         "depth": gbuffer.expected_depth,
         "surface_depth": gbuffer.depth,
@@ -93,9 +92,13 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
         "normal": gbuffer.normal,
         "class": gbuffer.class_id,
     }
+    results = Outputs(out, "render", "rgb.png", *(f"{name}.npy" for name in buffers))
+    results.write("rgb.png", encode_png(picture))
     for name, buffer in buffers.items():
-        np.save(folder / f"{name}.npy", buffer)
-    return {"picture": str(folder / "rgb.png"), "backend": engine.name, "width": width, "height": height}
+        content = BytesIO()
+        np.save(content, buffer)
+        results.write(f"{name}.npy", content.getvalue())
+    return {"picture": str(results.path("rgb.png")), "backend": engine.name, "width": width, "height": height}
 
 
 def _read_pose(pose: str) -> tuple[np.ndarray, np.ndarray, int, int]:

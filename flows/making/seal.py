@@ -1,6 +1,5 @@
 """Sealing: staged clips become the dataset's tables, preview and frozen manifest."""
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,15 @@ import pyarrow.parquet as pq
 from flows.making.plan import Plan
 from flows.store.address import publish, withdraw
 from flows.store.frames import read_clip
-from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically
+from flows.store.layout import STAGED_TABLES, Layout, write_atomically
+from flows.store.sealed import read_receipt
+from flows.store.staging import remove_staged, remove_staging, staged_files
 from flows.store.telemetry import labelled_table, read_columns, write_parquet
 from manifests.canonical import sha256_of_file
+from manifests.environment import environment_bom
 from manifests.manifest import freeze, is_quarantined
-from manifests.provenance import processor
+from manifests.provenance import git_commit, processor
+from manifests.records import Receipt
 from manifests.siblings import sibling_pairs
 from tasks.conventions import PAIR_CHANNELS
 from tasks.render.contact_sheet import contact_sheet, encode_png
@@ -28,7 +31,7 @@ PREVIEW_CLIPS = 24
 
 def seal(layout: Layout, plan: Plan) -> None:
     """Gather the staged tables, draw the contact sheet, and freeze the manifest last."""
-    receipts = [read_json(layout.receipt(clip.clip_id)) for clip in plan.clips]
+    receipts = [read_receipt(layout, clip.clip_id) for clip in plan.clips]
     tables = [
         write_part(layout, table, path, clip_ids)
         for table in STAGED_TABLES
@@ -52,10 +55,13 @@ def seal(layout: Layout, plan: Plan) -> None:
         *sorted(layout.frames.rglob("zarr.json")),
     ]
     artifacts = {layout.relative(path): sha256_of_file(path) for path in shared}
-    write_atomically(layout.manifest, freeze(plan.as_json(), receipts, artifacts, processor()))
+    made_on = {"processor": processor(), "git": git_commit(), "environment": environment_bom()}
+    write_atomically(layout.manifest, freeze(plan.as_json(), receipts, artifacts, made_on))
     publish(layout, made, last=layout.manifest)
-    withdraw(layout, [path for path in layout.staging.iterdir() if path.name != "lock"])
-    shutil.rmtree(layout.staging)
+    staged = staged_files(layout)
+    withdraw(layout, staged)
+    remove_staged(staged)
+    remove_staging(layout)
 
 
 def needed_to_seal(layout: Layout, plan: Plan) -> list[Path]:
@@ -90,7 +96,7 @@ def write_part(layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -
     return layout.root / path
 
 
-def clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
+def clips_table(receipts: Sequence[Receipt]) -> pa.Table:
     """One row a clip: controls, surface, outcome and verdict."""
     rows = [
         {name: r[name] for name in ("clip_id", "index", "label", "seed", "split", "calibration")}
@@ -108,7 +114,7 @@ def clips_table(receipts: list[dict[str, Any]]) -> pa.Table:
     return labelled_table(columns)
 
 
-def pairs_table(receipts: list[dict[str, Any]]) -> pa.Table:
+def pairs_table(receipts: Sequence[Receipt]) -> pa.Table:
     """One row a pair of clips that differ in exactly one control: what that control changes."""
     rows = sibling_pairs(receipts)
     kinds = {channel.name: float if channel.name.endswith("_change") else str for channel in PAIR_CHANNELS}
@@ -116,7 +122,7 @@ def pairs_table(receipts: list[dict[str, Any]]) -> pa.Table:
     return labelled_table(columns)
 
 
-def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: list[dict[str, Any]]) -> bytes:
+def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Sequence[Receipt]) -> bytes:
     """The contact sheet as PNG, from staged frame tables and the frames at ``pictures_at``."""
     frames = [frame for frame in PREVIEW_FRAMES if frame < plan.settings.frames]
     rows = []

@@ -4,8 +4,7 @@ from collections import Counter
 from typing import Any
 
 from catalogs.cameras import load_camera
-from flows.making.clip import TICK_RATE_HZ
-from flows.making.plan import make_plan
+from flows.making.plan import TICK_RATE_HZ, make_plan
 from flows.store.address import nothing, reading, stored_bytes
 from flows.store.sealed import read_manifest
 

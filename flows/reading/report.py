@@ -2,23 +2,25 @@
 
 import base64
 import json
-import shutil
+import re
 import zlib
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.making.clip import TICK_RATE_HZ
+from flows.making.plan import TICK_RATE_HZ
 from flows.making.seal import spread
 from flows.reading.film import write_film
 from flows.reading.previews import named_clips
 from flows.running.progress import progress_bar
 from flows.store.address import reading
 from flows.store.frames import read_clip
-from flows.store.layout import Layout, write_atomically
+from flows.store.layout import Layout
+from flows.store.outputs import Outputs, read_marker
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from manifests.siblings import sibling_pairs
@@ -27,6 +29,9 @@ from tasks.errors import InputError
 from tasks.render.traces import TRACES
 
 PAGE = Path(__file__).parent / "report_page"
+COMMAND = "report"
+OF_A_CLIP = re.compile(r"clips/\w+\.js|media/\w+\.mp4")
+"""Files that go when their clip does."""
 TRACED_CLIPS = 200
 """Larger datasets list every clip and bring the traces and films of so many, evenly spread, unless some are named."""
 DECIMALS = {"km/h": 1, "deg": 2, "kN": 2, "MPa": 2, "": 3}
@@ -55,16 +60,24 @@ def report(dataset: str, *, out: str | None = None, clips: list[str] | None = No
     """
     layout = reading(dataset)
     manifest = read_manifest(layout)
-    rows: list[dict[str, Any]] = manifest["clips"]
+    rows = manifest["clips"]
     brought = named_clips(rows, clips, dataset) if clips else spread(rows, TRACED_CLIPS)
     folder = _folder(layout, out)
     pictures = manifest["grid"].get("pictures", True)
-    made = _bring(layout, manifest, brought, folder, pictures)
     data = page_data(manifest, {row["clip_id"] for row in brought}, pictures)
-    write_atomically(folder / "data.js", f"const REPORT = {_script(data)};\n".encode())
-    for source in sorted(PAGE.iterdir()):
-        shutil.copyfile(source, folder / source.name)
-    (folder / "plotly.min.js").write_text(_plotly(), encoding="utf-8")
+    fixed = {source.name: source.read_bytes() for source in sorted(PAGE.iterdir())} | {
+        "plotly.min.js": _plotly().encode(),
+        "data.js": f"const REPORT = {_script(data)};\n".encode(),
+    }
+    of_clips = [
+        name for row in brought for name in (_traces_name(row), *([_film_name(row)] if pictures else []))
+    ]
+    page = Outputs(folder, COMMAND, *fixed, *of_clips)
+    with page.alone():
+        made = _bring(layout, manifest, brought, page, pictures)
+        for name, content in fixed.items():
+            page.write(name, content)
+        page.remove_others(OF_A_CLIP.fullmatch)
     return {
         "page": str(folder / "index.html"),
         "clips": len(rows),
@@ -104,7 +117,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
             {key: row[key] for key in kept}
             | {
                 "traced": row["clip_id"] in brought,
-                "film": f"media/{row['clip_id']}.mp4" if pictures and row["clip_id"] in brought else None,
+                "film": _film_name(row) if pictures and row["clip_id"] in brought else None,
             }
             for row in rows
         ],
@@ -128,50 +141,56 @@ def _bring(
     layout: Layout,
     manifest: Mapping[str, Any],
     brought: Sequence[Mapping[str, Any]],
-    folder: Path,
+    page: Outputs,
     pictures: bool,
 ) -> int:
     """Write the telemetry and make the missing films of some clips; how many films were made."""
     names = [channel.name for channel in TICK_CHANNELS]
-    wanted, made = set(), 0
+    made = 0
     with progress_bar("report", len(brought)) as advance:
         for row in brought:
             clip_id = row["clip_id"]
             ticks = read_columns(layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id)
-            content = f'clipArrived("{clip_id}", {_script(packed(ticks, names))});\n'
-            write_atomically(folder / "clips" / f"{clip_id}.js", content.encode())
-            wanted |= {f"{clip_id}.js", f"{clip_id}.mp4"}
-            film = folder / "media" / f"{clip_id}.mp4"
-            if pictures and not film.is_file():
-                film.parent.mkdir(exist_ok=True)
-                half = film.with_suffix(".half.mp4")
+            page.write(
+                _traces_name(row), f"clipArrived({_script(clip_id)}, {_script(packed(ticks, names))});\n"
+            )
+            if pictures and not page.path(_film_name(row)).is_file():
+                film = BytesIO()
                 write_film(
-                    half,
+                    film,
                     list(read_clip(layout.frames, row["index"], "rgb")),
                     manifest["grid"]["frame_rate_hz"],
                 )
-                half.replace(film)
+                page.write(_film_name(row), film.getvalue())
                 made += 1
             advance(row["label"])
-    for left_over in (*folder.glob("clips/*"), *folder.glob("media/*")):
-        if left_over.name not in wanted:
-            left_over.unlink()
     return made
+
+
+def _traces_name(row: Mapping[str, Any]) -> str:
+    return f"clips/{row['clip_id']}.js"
+
+
+def _film_name(row: Mapping[str, Any]) -> str:
+    return f"media/{row['clip_id']}.mp4"
 
 
 def _folder(layout: Layout, out: str | None) -> Path:
     if out is None and layout.origin is not None:
         raise InputError(f"{layout}: --out must name a folder for the page of a dataset in an object store")
-    folder = Path(out).resolve() if out else layout.root.with_name(f"{layout.root.name}-report")
+    beside = layout.root.with_name(f"{layout.root.name}-report")
+    if out is None and beside.is_symlink():
+        raise InputError(f"{beside}: is a link; name the page's folder with --out")
+    folder = Path(out).resolve() if out else beside
     if folder.is_relative_to(layout.root):
         raise InputError(
             f"--out {out}: must lie outside the dataset, whose files are all recorded; name another folder"
         )
-    if folder.exists() and (
-        not folder.is_dir() or (any(folder.iterdir()) and not (folder / "clips").is_dir())
-    ):
-        raise InputError(f"{folder}: must be new, empty or an earlier report; it holds other files")
-    folder.mkdir(parents=True, exist_ok=True)
+    if folder.is_dir() and any(folder.iterdir()) and COMMAND not in read_marker(folder).values():
+        raise InputError(
+            f"{folder}: must be new, empty or an earlier report; it holds other files, or a report of an earlier"
+            " version, which kept no list of its files: move it away or name another folder"
+        )
     return folder
 
 
@@ -200,7 +219,8 @@ def _manifest_facts(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _script(value: Any) -> str:
-    return json.dumps(value, separators=(",", ":"), allow_nan=False)
+    """A value as JavaScript: in ASCII, and without what could end a script element."""
+    return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def _plotly() -> str:

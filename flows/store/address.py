@@ -7,7 +7,6 @@ filled from the store alone; clips go to the store as they are made, the receipt
 
 import atexit
 import fcntl
-import json
 import shutil
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -16,17 +15,20 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
+from catalogs.documents import parse_json
 from flows.store.layout import Layout
 from flows.store.lease import LOCK
+from flows.store.links import refuse_foreign_entries
 from flows.store.objects import Objects, is_address
+from flows.store.sealed import check_manifest
 from manifests.canonical import sha256_of, sha256_of_file
-from manifests.manifest import check_format, recorded_files
+from manifests.manifest import recorded_files
 from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
 
 Wanted = Callable[[str], bool]
 SHOWN = 5
-PREPARED = ("inputs/", "frames.zarr/")
+PREPARED = ("inputs/", "frames.zarr/", ".staging/")
 """What is sent before a plan, and means nothing without it."""
 
 
@@ -63,7 +65,7 @@ def resumable(name: str) -> bool:
 
 
 def reading(address: str | Path, wanted: Wanted = everything) -> Layout:
-    """A finished dataset to read from.
+    """A finished dataset to read from, without links in it.
 
     Parameters
     ----------
@@ -73,17 +75,19 @@ def reading(address: str | Path, wanted: Wanted = everything) -> Layout:
     Raises
     ------
     InputError
-        The address holds no finished dataset, or files of it are missing or not the recorded ones.
+        The address holds no finished dataset, or files of it are missing or not the recorded ones, or it holds links.
     """
     if not is_address(address):
-        return Layout(Path(address).resolve())
+        layout = Layout(Path(address).resolve())
+        refuse_foreign_entries(layout.root, wanted)
+        return layout
     objects = Objects(str(address))
     content = objects.read("manifest.json")
     if content is None:
         raise InputError(_unfinished(objects))
     layout = Layout(_mirrors() / sha256_of([content])[:32], objects.address)
-    manifest = json.loads(content)
-    check_format(manifest, layout)
+    place = f"{layout}/manifest.json"
+    manifest = check_manifest(parse_json(content, place, "manifest"), place)
     recorded = {name: digest for name, (digest, _) in recorded_files(manifest).items() if wanted(name)}
     missing = {name for name in recorded if not (layout.root / name).is_file()}
     absent = objects.fetch(missing, layout.root)
@@ -184,6 +188,13 @@ def withdraw(layout: Layout, paths: Collection[Path]) -> None:
     """Remove files from the store."""
     if layout.origin is not None:
         Objects(layout.origin).remove([layout.relative(path) for path in paths])
+
+
+def forget_begun(layout: Layout) -> None:
+    """Remove from the store what a run sent that was stopped before its plan."""
+    if layout.origin is not None:
+        objects = Objects(layout.origin)
+        objects.remove([name for name in objects.sizes() if name != LOCK])
 
 
 def stored_bytes(layout: Layout) -> int:

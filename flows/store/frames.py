@@ -10,9 +10,13 @@ from typing import Any
 
 import numpy as np
 import zarr
+from zarr.abc.buffer import Buffer
+from zarr.buffer import default_buffer_prototype
 from zarr.codecs import BloscCodec, Crc32cCodec
+from zarr.storage import MemoryStore
 
 from flows.store.arrays import DIMENSION_SIZES, PixelArray, arrays_of
+from flows.store.layout import write_atomically
 from flows.store.telemetry import channel_labels
 from manifests.canonical import sha256_of
 
@@ -21,7 +25,8 @@ def create_arrays(
     path: Path, clips: int, frames: int, height: int, width: int, labels: bool, attributes: Mapping[str, Any]
 ) -> None:
     """Create the group and its arrays, once, before any clip is written."""
-    group = zarr.create_group(path, overwrite=False, attributes=dict(attributes))
+    metadata: dict[str, Buffer] = {}
+    group = zarr.create_group(MemoryStore(metadata), attributes=dict(attributes))
     for name, array in arrays_of(labels).items():
         dtype = array.dtype
         tail = (height, width, *(DIMENSION_SIZES[dimension] for dimension in array.dimensions))
@@ -39,13 +44,21 @@ def create_arrays(
             dimension_names=("clip", "frame", "y", "x", *array.dimensions),
             attributes=_labels(array),
         )
+    _write_files(path, metadata)
 
 
 def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> None:
-    """Write one clip's whole shard of every array; ``buffers`` maps array name to [frame, y, x(, channel)]."""
-    group = zarr.open_group(path, mode="r+")
+    """Write one clip's whole shard of every array; ``buffers`` maps array name to [frame, y, x(, channel)].
+
+    Zarr encodes in memory and `write_atomically` writes, so that a shard is whole and on the disk before the clip's
+    receipt is.
+    """
     for name, values in buffers.items():
-        _array(group, name)[index] = values
+        metadata = (path / name / "zarr.json").read_bytes()
+        files: dict[str, Buffer] = {"zarr.json": default_buffer_prototype().buffer.from_bytes(metadata)}
+        zarr.open_array(MemoryStore(files), mode="r+")[index] = values
+        del files["zarr.json"]
+        _write_files(path / name, files)
 
 
 def read_clip(path: Path, index: int, name: str) -> np.ndarray:
@@ -57,6 +70,11 @@ def buffer_hash(buffer: np.ndarray) -> str:
     """SHA-256 of the decoded pixels with their shape and type."""
     values = np.ascontiguousarray(buffer)
     return sha256_of([f"{values.dtype.str} {values.shape}\n".encode(), values.data.cast("B")])
+
+
+def _write_files(folder: Path, files: Mapping[str, Buffer]) -> None:
+    for name, content in files.items():
+        write_atomically(folder / name, content.to_bytes())
 
 
 def _labels(array: PixelArray) -> dict[str, Any]:

@@ -2,15 +2,16 @@
 
 import json
 import os
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from catalogs.documents import read_json_document
 from flows.store.arrays import arrays_of
-from tasks.errors import InputError
 
 STAGED_TABLES = ("ticks", "frames")
+PARTIAL = ".musync-partial"
+"""End of the name of a file that is being written."""
 
 
 @dataclass(frozen=True)
@@ -75,18 +76,27 @@ class Layout:
         return path.relative_to(self.root).as_posix()
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write beside the target, flush to the disk, then rename over it."""
+def write_atomically(path: Path, content: bytes | memoryview) -> None:
+    """Write beside the target, flush to the disk, then rename over it, so that the file is there whole or not at all.
+
+    The folder is flushed too: what was written before this file is on the disk when this file is.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    partial = path.with_name(f"{path.name}.{os.getpid()}{PARTIAL}")
+    partial.unlink(missing_ok=True)
     try:
-        with partial.open("wb") as stream:
+        with partial.open("xb") as stream:  # exclusive: a link that lies there is not followed
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -96,25 +106,11 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file.
+    """Read a JSON file of a dataset.
 
     Raises
     ------
     InputError
-        If it is missing or not JSON.
+        If it is missing, no regular file, or not JSON.
     """
-    try:
-        return json.loads(path.read_text())
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; is this a muSync dataset?") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: must be valid JSON; {error}") from None
-
-
-def clear_partial_files(layout: Layout) -> None:
-    """Remove what a killed writer left behind; committed files are never named like this."""
-    for path in layout.root.rglob("*.partial*"):
-        if path.is_dir():
-            shutil.rmtree(path)
-        else:
-            path.unlink(missing_ok=True)
+    return read_json_document(path, "file of a muSync dataset")

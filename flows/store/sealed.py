@@ -1,27 +1,106 @@
-"""Reading a finished dataset's manifest, without what it takes to make one."""
+"""Reading what a dataset records of itself: the one door for its plan, receipts and manifest."""
 
+from collections.abc import Mapping
 from typing import Any
 
+from pydantic import ValidationError
+
+from catalogs.grids import GridFile
+from catalogs.sentences import brief, cap_problems, describe_rules
+from flows.store.arrays import arrays_of
 from flows.store.layout import Layout, read_json
-from manifests.manifest import check_format
+from manifests.manifest import MANIFEST_FORMAT
+from manifests.records import Manifest, PlanRecord, Receipt, check_record
 from tasks.errors import InputError
 
+PLAN_FORMAT = "musync-plan/2"
 
-def read_manifest(layout: Layout) -> dict[str, Any]:
+
+def read_manifest(layout: Layout) -> Manifest:
     """The manifest of a sealed dataset.
 
     Raises
     ------
     InputError
-        If the run is unfinished, or the manifest is missing or of another format.
+        If the run is unfinished, or the manifest is missing, of another format, or breaks a rule.
     """
     if layout.plan.is_file() and not layout.manifest.is_file():
-        clips = read_json(layout.plan)["clips"]
+        clips = read_plan_record(layout)["clips"]
         done = sum(layout.receipt(clip["clip_id"]).is_file() for clip in clips)
         raise InputError(
             f"{layout}: the dataset must be finished; {done} of {len(clips)} clips are made:"
             " run its musync generate command again"
         )
-    manifest: dict[str, Any] = read_json(layout.manifest)
-    check_format(manifest, layout.manifest)
+    return check_manifest(read_json(layout.manifest), layout.manifest)
+
+
+def check_manifest(content: Any, place: object) -> Manifest:
+    """A parsed manifest, typed.
+
+    Parameters
+    ----------
+    content : parsed JSON
+    place : what messages call it
+
+    Raises
+    ------
+    InputError
+        If it is of another format, or breaks a rule.
+    """
+    manifest = check_record(Manifest, _of_format(content, MANIFEST_FORMAT, place), place)
+    recorded_grid(manifest["grid"], place)
     return manifest
+
+
+def read_plan_record(layout: Layout) -> PlanRecord:
+    """The plan of a dataset, finished or not.
+
+    Raises
+    ------
+    InputError
+        If it is missing, of another format, or breaks a rule.
+    """
+    return check_record(PlanRecord, _of_format(read_json(layout.plan), PLAN_FORMAT, layout.plan), layout.plan)
+
+
+def read_receipt(layout: Layout, clip_id: str) -> Receipt:
+    """The receipt of a clip that is made and not yet sealed.
+
+    Raises
+    ------
+    InputError
+        If it is missing, breaks a rule, or is that of another clip.
+    """
+    place = layout.receipt(clip_id)
+    receipt = check_record(Receipt, read_json(place), place)
+    arrays = arrays_of(labels=True).keys() & receipt["content"].keys()
+    shards = {layout.relative(layout.frame_shard(name, receipt["index"])) for name in arrays}
+    if receipt["clip_id"] != clip_id or receipt["artifacts"].keys() != shards:
+        raise InputError(
+            f"{place}: must be the receipt of clip {clip_id} and name its files; it is another: remove it"
+        )
+    return receipt
+
+
+def recorded_grid(content: Mapping[str, Any], place: object) -> GridFile:
+    """The settings that a plan or manifest records.
+
+    Raises
+    ------
+    InputError
+        Listing every key that breaks a rule.
+    """
+    try:
+        return GridFile.model_validate(content)
+    except ValidationError as error:
+        raise InputError(cap_problems(describe_rules(error, f"{place}: grid"))) from None
+
+
+def _of_format(content: Any, wanted: str, place: object) -> Any:
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != wanted:
+        raise InputError(
+            f"{place}: must be of format {wanted}; it is {brief(found)}:"
+            " read the dataset with the version of muSync that wrote it, or make it again"
+        )
+    return content

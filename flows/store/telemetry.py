@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from flows.store.layout import write_atomically
 from manifests.canonical import sha256_of
 from tasks.conventions import CHANNELS_BY_NAME, Channel
 
@@ -45,13 +46,12 @@ def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | No
 
 
 def write_parquet(table: pa.Table, path: Path) -> None:
-    """Write to a neighbour and rename, so that the file is whole or absent."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
+    """Write a table as Parquet; the file is there whole or not at all."""
+    buffer = pa.BufferOutputStream()
     floats = [field.name for field in table.schema if pa.types.is_floating(field.type)]
     pq.write_table(
         table,
-        partial,
+        buffer,
         compression="zstd",
         compression_level=3,
         row_group_size=ROW_GROUP_ROWS,
@@ -59,7 +59,7 @@ def write_parquet(table: pa.Table, path: Path) -> None:
         column_encoding=dict.fromkeys(floats, "BYTE_STREAM_SPLIT"),
         write_page_checksum=True,
     )
-    partial.replace(path)
+    write_atomically(path, memoryview(buffer.getvalue()))
 
 
 def read_columns(path: Path, clip_id: str | None = None) -> dict[str, np.ndarray]:

@@ -56,7 +56,7 @@ def test_a_changed_parameter_of_a_clip_is_named(copy):
         clip["scenario"]["initial_speed_km_h"] += 1
     copy.plan.write_text(json.dumps(plan))
     result = audited(copy)
-    assert "parameters dry/flat.initial_speed_km_h: 40 made it, 41.0 is here" in result["differences"]
+    assert "parameters dry/flat.initial_speed_km_h: 40.0 made it, 41.0 is here" in result["differences"]
     assert result["mismatches"][0]["why"] == ["parameters"]
 
 

@@ -175,7 +175,7 @@ def test_a_worker_that_does_not_see_the_folder_is_told(scheduler):
     with Client(scheduler) as client:
         client.wait_for_workers(1, timeout=30)
         with pytest.raises(InputError, match="must be visible on every worker under the same path"):
-            warm_cluster(client, partial(warm_up, Layout(Path("/nowhere/at/all"))), scheduler)
+            warm_cluster(client, partial(warm_up, Layout(Path("/nowhere/at/all")), "street"), scheduler)
 
 
 def test_a_cluster_without_workers_is_refused(tmp_path):

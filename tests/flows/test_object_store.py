@@ -16,6 +16,7 @@ from flows.auditing.repair import repair
 from flows.auditing.verify import gc, verify
 from flows.making.clip import make_clip
 from flows.making.generate import generate, prepare
+from flows.making.plan import make_plan
 from flows.reading.describe import describe
 from flows.reading.query import sql
 from flows.scheduled.failure_report import report_failure
@@ -36,9 +37,9 @@ def server(tmp_path_factory):
 
 
 @pytest.fixture
-def machine(server, tmp_path, monkeypatch):
-    """This process as a machine that knows the server and has read nothing yet."""
-    variables = environment(server, tmp_path / "cache")
+def machine(server, tmp_path, monkeypatch, toy_dataset):
+    """This process as a machine that knows the server and the shelf of scenes, and has read nothing yet."""
+    variables = environment(server, tmp_path / "cache") | {"MUSYNC_SCENES": str(toy_dataset.root.parent)}
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     return variables
@@ -142,8 +143,9 @@ def test_a_killed_run_goes_on_from_what_the_store_holds_on_another_machine(
 
 
 def test_workers_on_other_machines_share_no_folder_with_the_run(machine, grid, toy_dataset, monkeypatch):
-    def make_elsewhere(layout: Layout, index: int) -> dict:
-        return make_clip(Layout(Path("/a folder of the other machine/dataset"), layout.origin), index)
+    def make_elsewhere(layout: Layout, index: int, scene: str) -> dict:
+        elsewhere = Layout(Path("/a folder of the other machine/dataset"), layout.origin)
+        return make_clip(elsewhere, index, scene)
 
     monkeypatch.setattr(flows.making.generate, "make_clip", make_elsewhere)
     address = "s3://data/sets/apart"
@@ -154,7 +156,7 @@ def test_workers_on_other_machines_share_no_folder_with_the_run(machine, grid, t
 def test_a_second_run_on_another_machine_is_told_while_the_first_goes_on(server, machine, grid, tmp_path):
     address = "s3://data/sets/busy"
     with working(address, resumable) as layout:
-        prepare(grid, layout, "cpu")
+        prepare(layout, *make_plan(grid, "cpu"))
     with leased(Objects(address)):
         run = start(
             ["generate", grid, "--out", address, "--runner", "threads"], environment(server, tmp_path / "b")
@@ -190,7 +192,7 @@ def test_another_grid_does_not_go_into_the_same_dataset(stored, machine, grid, t
 
 def test_what_a_killed_run_left_in_the_store_is_collected(stored, machine):
     objects = Objects(stored)
-    objects.write(".staging/abc.json", b"{}")
+    objects.write(f".staging/{'0' * 16}.json", b"{}")
     assert len(gc(stored)["removed"]) == 1
     assert not [name for name in objects.sizes() if name.startswith(".staging/")]
 
@@ -204,7 +206,7 @@ def test_a_schedule_writes_dated_datasets_to_a_store_resumes_there_and_reports_t
     with pytest.raises(InputError, match="--out s3://nowhere/nightly: the bucket does not exist"):
         checked_parameters(grid, "0 3 * * *", "s3://nowhere/nightly", "threads", 1, None)
     with working(f"{root}/toy-20260301T030000Z", resumable) as layout:
-        prepare(grid, layout, "cpu")
+        prepare(layout, *make_plan(grid, "cpu"))
     run = scheduled_run(grid, root, at=at + timedelta(days=1), runner="threads", workers=1)
     assert (run["dataset"], run["made"]) == (f"{root}/toy-20260301T030000Z", 4)
     assert dataset_place(grid, root, "cpu", at + timedelta(days=2)) == f"{root}/toy-20260303T030000Z"

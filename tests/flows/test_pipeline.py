@@ -151,16 +151,16 @@ def test_a_clip_whose_pose_check_failed_is_kept_and_told_with_its_reasons(datase
     assert {row["label"] for row in rows if row["quarantined"]} == set(failed) and len(rows) == len(verdicts)
 
 
-def broken_on_two(layout: Layout, index: int) -> dict:
+def broken_on_two(layout: Layout, index: int, scene: str) -> dict:
     if index == 2:
         raise RuntimeError("lightning struck")
-    return make_clip(layout, index)
+    return make_clip(layout, index, scene)
 
 
-def full_on_two(layout: Layout, index: int) -> dict:
+def full_on_two(layout: Layout, index: int, scene: str) -> dict:
     if index == 2:
         raise OSError(28, "No space left on device")
-    return make_clip(layout, index)
+    return make_clip(layout, index, scene)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,6 @@ def test_a_second_writer_is_told(dataset, grid, tmp_path):
     from flows.store.lock import sole_writer
 
     layout = Layout(tmp_path / "data")
-    flows.making.generate.prepare(grid, layout, "cpu")
     with sole_writer(layout), pytest.raises(InputError, match="another run is writing"):
         generate(grid, str(layout.root), runner="threads")
 

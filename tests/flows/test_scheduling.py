@@ -41,10 +41,10 @@ def test_each_run_makes_its_own_dated_dataset_with_the_same_bytes(grid, tmp_path
     }
 
 
-def lightning_at_two(layout: Layout, index: int) -> dict:
+def lightning_at_two(layout: Layout, index: int, scene: str) -> dict:
     if index == 2:
         raise RuntimeError("lightning struck")
-    return make_clip(layout, index)
+    return make_clip(layout, index, scene)
 
 
 def test_an_unfinished_run_is_resumed_and_one_of_another_plan_left_alone(grid, tmp_path, monkeypatch):

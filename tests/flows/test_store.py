@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -5,7 +7,8 @@ import zarr
 
 from flows.store.arrays import ARRAYS, arrays_of
 from flows.store.frames import buffer_hash, create_arrays, read_clip, write_clip
-from flows.store.layout import Layout, clear_partial_files, write_atomically, write_json
+from flows.store.layout import PARTIAL, Layout, write_atomically, write_json
+from flows.store.staging import partial_files
 from flows.store.telemetry import columns_hash, labelled_table, read_columns, write_parquet
 from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS, SemanticClass
 from tasks.render.labels import MARK_BITS
@@ -166,12 +169,18 @@ def test_a_failed_write_leaves_the_old_file_and_no_partial_one(tmp_path, monkeyp
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_left_overs_of_a_killed_writer_are_cleared_and_nothing_else(layout):
+def test_left_overs_of_a_killed_writer_are_known_by_their_name_and_nothing_else_is(layout):
     write_clip(layout.frames, 0, buffers(1))
-    left_over = layout.frames / "rgb" / "c" / "1.partial"
-    left_over.mkdir(parents=True)
-    (left_over / "x").touch()
-    (layout.root / "manifest.json.77.partial").touch()
-    clear_partial_files(layout)
-    assert not list(layout.root.rglob("*.partial*"))
-    assert read_clip(layout.frames, 0, "rgb").any()
+    half = layout.root / f"manifest.json.77{PARTIAL}"
+    half.touch()
+    (layout.root / "thesis.partial.tex").touch()
+    assert partial_files(layout) == [half]
+
+
+def test_a_link_in_place_of_a_half_written_file_is_not_followed(tmp_path):
+    """A stranger who knows the name of the next half-written file cannot have another file overwritten."""
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+    (tmp_path / f"a.json.{os.getpid()}{PARTIAL}").symlink_to(victim)
+    write_json(tmp_path / "a.json", {})
+    assert victim.read_text() == "precious" and not (tmp_path / "a.json").is_symlink()

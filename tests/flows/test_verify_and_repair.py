@@ -8,7 +8,7 @@ import pytest
 
 from flows.auditing.repair import repair
 from flows.auditing.verify import gc, verify
-from flows.store.layout import Layout
+from flows.store.layout import PARTIAL, Layout
 from flows.store.lock import sole_writer
 from manifests.canonical import canonical_bytes
 from manifests.manifest import recorded_files
@@ -111,21 +111,32 @@ def test_bytes_that_come_out_otherwise_are_not_put_in_place(copy):
 
 
 def test_left_overs_of_killed_runs_go_and_nothing_else(toy_dataset, copy, tmp_path):
-    (copy.telemetry / "clips.parquet.partial").write_bytes(b"half")
-    copy.staging.mkdir()
-    (copy.staging / "0123.json").write_text("{}")
-    for name in (".audit-dead", ".audit-live"):
-        (tmp_path / name / ".staging").mkdir(parents=True)
-        (tmp_path / name / ".staging" / "lock").touch()
-    (tmp_path / ".audit-of-mine").mkdir()
-    with sole_writer(Layout(tmp_path / ".audit-live")):
+    (copy.telemetry / f"clips.parquet.77{PARTIAL}").write_bytes(b"half")
+    for name in ("dead", "live"):
+        (copy.staging / f"scratch-{name}" / ".staging").mkdir(parents=True)
+        (copy.staging / f"scratch-{name}" / ".staging" / "lock").touch()
+    (copy.staging / f"{'0' * 16}.json").write_text("{}")
+    mine = [
+        copy.staging / "notes.txt", copy.root / "thesis.partial.tex", tmp_path / ".audit-2025" / ".staging" / "lock"
+    ]  # fmt: skip
+    for path in mine:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    with sole_writer(Layout(copy.staging / "scratch-live")):
         named = gc(str(copy.root), dry_run=True)["removed"]
-        assert (copy.staging / "0123.json").exists()
+        assert (copy.staging / f"{'0' * 16}.json").exists()
         assert gc(str(copy.root))["removed"] == named
         assert len(named) == 3
-        assert (tmp_path / ".audit-live").exists()
-    assert (tmp_path / ".audit-of-mine").exists() and not (tmp_path / ".audit-dead").exists()
-    assert files_of(copy) == files_of(toy_dataset)
+        assert (copy.staging / "scratch-live").exists()
+    assert not (copy.staging / "scratch-dead").exists()
+    assert all(path.exists() for path in mine)
+
+
+def test_of_a_collected_dataset_no_staging_folder_stays(toy_dataset, copy):
+    copy.staging.mkdir()
+    (copy.staging / f"{'0' * 16}.ticks.parquet").touch()
+    assert len(gc(str(copy.root))["removed"]) == 1
+    assert files_of(copy) == files_of(toy_dataset) and not copy.staging.exists()
 
 
 def test_a_dataset_that_is_being_written_is_left_alone(copy):

@@ -1,0 +1,74 @@
+"""Where on this machine a user's own scenes and catalogue files lie: datasets record them by name and hash alone."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from catalogs.scenes import BUILT_IN, scene_identity
+from flows.store.layout import read_json, write_json
+from tasks.errors import InputError
+from tasks.kernel_cache import cache_root
+
+SHELVES = "MUSYNC_SCENES"
+"""Environment variable: folders that hold scenes, for datasets whose scene was never used on this machine."""
+
+
+def remember_place(sha256: str, place: str | Path) -> None:
+    """Note in the user's cache where something of a hash lies, for whoever makes or judges clips with it later.
+
+    Parameters
+    ----------
+    sha256 : of a file's bytes, or that identifies a scene
+    place : file or folder
+    """
+    note, absolute = _note(sha256), str(Path(place).resolve())
+    if not (note.is_file() and read_json(note) == absolute):
+        write_json(note, absolute)
+
+
+def noted_place(sha256: str) -> Path | None:
+    """Where something of a hash lay when it was last used; None if nothing is noted."""
+    note = _note(sha256)
+    return Path(str(read_json(note))) if note.is_file() else None
+
+
+def find_scene(scene: Mapping[str, Any]) -> str:
+    """The folder of a recorded scene on this machine, or its built-in name; its content may have changed since.
+
+    Parameters
+    ----------
+    scene : ``name`` and ``sha256``, of a plan or manifest
+
+    Raises
+    ------
+    InputError
+        If no place is known that holds it.
+    """
+    if scene["name"] in BUILT_IN:
+        return str(scene["name"])
+    shelves = [Path(folder) for folder in os.environ.get(SHELVES, "").split(os.pathsep) if folder]
+    places = [noted_place(scene["sha256"]), Path(scene["name"]), *(shelf / scene["name"] for shelf in shelves)]
+    found = {
+        str(place): content
+        for place in places
+        if place is not None and (content := _identity_at(place)) is not None
+    }
+    # a scene that was changed where it lies is better than none: audits compare it and say so
+    for place in sorted(found, key=lambda place: found[place] != scene["sha256"]):
+        return place
+    raise InputError(
+        f"scene {scene['name']}: no folder is known here that holds it (SHA-256 {scene['sha256'][:12]}...):"
+        f" set {SHELVES} to the folder in which it lies as {Path(scene['name']).name}"
+    )
+
+
+def _identity_at(place: Path) -> str | None:
+    try:
+        return scene_identity(str(place))
+    except (InputError, OSError):
+        return None
+
+
+def _note(sha256: str) -> Path:
+    return cache_root() / "places" / f"{sha256}.json"

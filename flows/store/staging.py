@@ -1,0 +1,99 @@
+"""The staging folder of a dataset: what muSync puts there, by the form of its name, and taking just that away again."""
+
+import errno
+import re
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from flows.store.layout import PARTIAL, STAGED_TABLES, Layout
+from flows.store.lock import sole_writer
+from manifests.canonical import ID_LENGTH
+from tasks.errors import InputError
+
+BEGUN = "begun"
+"""Written before anything else: until there is a plan, `inputs` and `frames.zarr` beside it are muSync's own."""
+_SCRATCH = re.compile(r"scratch-\w+")
+_STAGED = re.compile(
+    rf"{BEGUN}|[0-9a-f]{{{ID_LENGTH}}}\.(json|({'|'.join(STAGED_TABLES)})\.parquet)|.*\.\d+{re.escape(PARTIAL)}"
+)
+
+
+def staged_files(layout: Layout) -> list[Path]:
+    """Files in the staging folder that muSync wrote, but for the lock."""
+    return sorted(path for path in _entries(layout) if _STAGED.fullmatch(path.name) and path.is_file())
+
+
+def partial_files(layout: Layout) -> list[Path]:
+    """Files anywhere in the dataset that a killed run was writing; committed files never have such a name."""
+    return sorted(path for path in layout.root.rglob(f"*{PARTIAL}") if path.is_file())
+
+
+def abandoned_scratch(layout: Layout) -> list[Path]:
+    """Scratch folders of runs that are no more."""
+    return sorted(
+        path
+        for path in _entries(layout)
+        if _SCRATCH.fullmatch(path.name) and path.is_dir() and _is_abandoned(Layout(path))
+    )
+
+
+def remove_staged(paths: Iterable[Path]) -> None:
+    """Remove files and folders that the lists above name."""
+    for path in paths:
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def remove_staging(layout: Layout) -> None:
+    """Remove the lock and the folder of a finished dataset; what others put there keeps the folder."""
+    (layout.staging / "lock").unlink(missing_ok=True)
+    with suppress(OSError):
+        layout.staging.rmdir()
+
+
+@contextmanager
+def scratch_dataset(layout: Layout) -> Iterator[Layout]:
+    """A dataset of its own in which clips of another are made again; it goes with the run.
+
+    It lies in the dataset's staging folder, which workers reach as they reach the dataset, or, where nothing can be
+    written there, among the temporary files of this machine.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    """
+    try:
+        layout.staging.mkdir(exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix="scratch-", dir=layout.staging))
+    except OSError as error:
+        if error.errno not in {errno.EROFS, errno.EACCES, errno.EPERM}:
+            raise
+        folder = Path(tempfile.mkdtemp(prefix="musync-scratch-"))
+    scratch = Layout(folder)
+    try:
+        with sole_writer(scratch):  # what holds no lock is a left-over of a killed run
+            yield scratch
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        with suppress(OSError):
+            layout.staging.rmdir()
+
+
+def _is_abandoned(scratch: Layout) -> bool:
+    """Whether no live run holds a scratch folder; one without a lock is just being made."""
+    if not (scratch.staging / "lock").is_file():
+        return False
+    try:
+        with sole_writer(scratch):
+            return True
+    except InputError:
+        return False
+
+
+def _entries(layout: Layout) -> list[Path]:
+    return list(layout.staging.iterdir()) if layout.staging.is_dir() else []

@@ -1,0 +1,219 @@
+"""The forms of what is recorded: plans, receipts, manifests and frozen runs, checked once, where they are read.
+
+A dataset may come from a stranger. What passes here needs no second check: an id has the form of an id, and a recorded
+path is one of those that muSync writes, below the dataset's folder.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
+
+from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationError, with_config
+from typing_extensions import TypedDict
+
+from catalogs.scenario import Scenario
+from catalogs.sentences import brief, cap_problems, describe_rules
+from manifests.canonical import ID_LENGTH
+from tasks.errors import InputError
+from tasks.eval.motion_agreement import PoseVerdict
+
+LONGEST_TEXT = 1000
+"""Of labels, names and versions; longer ones are no names."""
+_NAME = r"[A-Za-z0-9_][A-Za-z0-9_.=-]{0,99}"
+
+Id = Annotated[str, Field(pattern=rf"^[0-9a-f]{{{ID_LENGTH}}}$")]
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+Seed = Annotated[str, Field(pattern=r"^[0-9]{1,20}$")]
+Text = Annotated[str, Field(max_length=LONGEST_TEXT, pattern=r"^\P{Cc}*$")]
+Index = Annotated[int, Field(ge=0, lt=2**31)]
+InputName = Annotated[str, Field(pattern=rf"^{_NAME}(/{_NAME}){{0,3}}$")]
+"""Of a catalogue file below ``inputs/``."""
+RecordedPath = Annotated[
+    str, Field(pattern=rf"^(plan\.json|(inputs|frames\.zarr|telemetry|previews)(/{_NAME}){{1,9}})$")
+]
+"""Relative path of a file that muSync writes into a dataset: no ``..``, nothing hidden, nothing absolute."""
+Figure = bool | float | Text | None
+
+
+def _refuse_way_out(name: str) -> str:
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts:
+        raise ValueError(f"must not lead out of the folder of the run; it is {brief(name)}")
+    return name
+
+
+LocalName = Annotated[Text, AfterValidator(_refuse_way_out)]
+
+STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+if TYPE_CHECKING:  # their keys follow from what they record
+    ScenarioRecord = dict[str, Any]
+    VerdictRecord = dict[str, Any]
+else:
+    ScenarioRecord = with_config(STRICT)(TypedDict("ScenarioRecord", get_type_hints(Scenario)))
+    _optional = {name: kind | None for name, kind in get_type_hints(PoseVerdict).items()}
+    VerdictRecord = with_config(STRICT)(TypedDict("VerdictRecord", {**_optional, "reasons": list[str]}))
+
+
+@with_config(STRICT)
+class SceneRecord(TypedDict):
+    """Which scene: its name, and the SHA-256 of its content."""
+
+    name: LocalName
+    sha256: Sha256
+
+
+@with_config(STRICT)
+class MadeWith(TypedDict):
+    """Version and hash of the code, and versions of the libraries."""
+
+    code: dict[Text, Text]
+    libraries: dict[Text, Text]
+
+
+@with_config(STRICT)
+class GitCommit(TypedDict):
+    """The commit of the source, and whether files of it were changed since."""
+
+    commit: Annotated[str, Field(pattern=r"^[0-9a-f]{40,64}$")]
+    changed: bool
+
+
+@with_config(STRICT)
+class ClipRecord(TypedDict):
+    """A planned clip."""
+
+    index: Index
+    clip_id: Id
+    label: Text
+    seed: Seed
+    scenario: ScenarioRecord
+    split: Text
+    calibration: Text
+
+
+@with_config(STRICT)
+class Receipt(ClipRecord):
+    """A clip that is made: its files, the hashes of its decoded content, and what came out."""
+
+    artifacts: dict[RecordedPath, Sha256]
+    content: dict[Text, Sha256]
+    figures: dict[Text, Figure]
+    verdict: VerdictRecord
+
+
+@with_config(STRICT)
+class PlanRecord(TypedDict):
+    """What ``plan.json`` holds."""
+
+    format: Text
+    run_id: Id
+    grid: dict[str, Any]
+    scene: SceneRecord
+    backend: Text
+    inputs: dict[InputName, Sha256]
+    made_with: MadeWith
+    clips: list[ClipRecord]
+
+
+@with_config(STRICT)
+class Manifest(TypedDict):
+    """What ``manifest.json`` holds; the form of ``grid`` is checked with the catalogue.
+
+    ``processor``, ``git`` and ``environment`` say on what, from which commit and beside which packages the bytes were
+    made: they decide nothing, and explain a difference.
+    """
+
+    format: Text
+    run_id: Id
+    grid: dict[str, Any]
+    scene: SceneRecord
+    backend: Text
+    inputs: dict[InputName, Sha256]
+    made_with: MadeWith
+    processor: dict[Text, Text]
+    git: "GitCommit | None"
+    environment: dict[str, Any]
+    clips: Annotated[list[Receipt], Field(min_length=1)]
+    artifacts: dict[RecordedPath, Sha256]
+    seal: Sha256
+
+
+@with_config(STRICT)
+class FrozenClip(TypedDict):
+    """A clip of a frozen run, with the hash of its telemetry."""
+
+    label: Text
+    seed: Seed
+    scenario: ScenarioRecord
+    split: Text
+    calibration: Text
+    ticks: Sha256
+
+
+@with_config(STRICT)
+class FrozenRun(TypedDict):
+    """What the file of a frozen run holds."""
+
+    format: Text
+    name: Text
+    grid: dict[str, Any]
+    parameters: dict[InputName, Any]
+    clips: Annotated[list[FrozenClip], Field(min_length=1)]
+    scene: SceneRecord
+    made_with: MadeWith
+    processor: dict[Text, Text]
+    seal: Sha256
+
+
+Record = TypeVar("Record", Receipt, PlanRecord, Manifest, FrozenRun)
+
+
+def check_record(form: type[Record], value: Any, place: object) -> Record:
+    """A value that was read, in its form; numbers that canonical JSON shortens are floats again.
+
+    Parameters
+    ----------
+    form : `Receipt`, `PlanRecord`, `Manifest` or `FrozenRun`
+    value : parsed JSON
+    place : what messages call it
+
+    Raises
+    ------
+    InputError
+        With what breaks the form, a sentence each.
+    """
+    try:
+        record: Record = _ADAPTERS[form].validate_python(value)
+    except ValidationError as error:
+        raise InputError(cap_problems(describe_rules(error, place))) from None
+    problems = _clip_problems(value.get("clips", []))
+    if problems:
+        raise InputError([f"{place}: {problem}" for problem in problems])
+    return record
+
+
+_ADAPTERS: dict[Any, TypeAdapter[Any]] = {
+    form: TypeAdapter(form) for form in (Receipt, PlanRecord, Manifest, FrozenRun)
+}
+
+
+def _clip_problems(clips: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Rules that bind the clips of one record together."""
+    rules = {
+        "every clip must have a label of its own; some have the same": _are_distinct(clips, "label"),
+        "every clip must have an id of its own; some have the same": _are_distinct(clips, "clip_id"),
+        "the clips must stand in the order of their index, from 0; they do not": all(
+            clip.get("index", place) == place for place, clip in enumerate(clips)
+        ),
+        "all clips must have the same figures; some have others": (
+            len({frozenset(clip.get("figures", ())) for clip in clips}) <= 1
+        ),
+    }
+    return [rule for rule, kept in rules.items() if not kept]
+
+
+def _are_distinct(clips: Sequence[Mapping[str, Any]], key: str) -> bool:
+    values = [clip[key] for clip in clips if key in clip]
+    return len(set(values)) == len(values)
