@@ -10,11 +10,13 @@ import os
 import re
 import shutil
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from tasks.errors import InputError
 
 _IMPORT = re.compile(r"^\s*from (tasks[\w.]*) import", re.MULTILINE)
+_STATE = re.compile("[0-9a-f]{16}")
 
 KEPT = 4
 """States of the sources whose kernels stay on disk."""
@@ -33,7 +35,7 @@ def place_kernel_cache() -> None:
         from numba.core import config
 
         config.CACHE_DIR = str(folder)
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         _forget_old(folder.parent)
 
 
@@ -77,8 +79,12 @@ def sources_hash(package: Path = Path(__file__).parent) -> str:
 
 
 def _forget_old(folder: Path) -> None:
-    """Remove all but the latest states; one that another process still writes to comes back by itself."""
-    if folder.is_dir():
-        states = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
-        for state in states[: -KEPT + 1]:
-            shutil.rmtree(state, ignore_errors=True)
+    """Remove all but the latest states; one that another process still writes to comes back by itself.
+
+    Only folders that are named as states are: what else lies there, and links, stay. A cache that cannot be read stays
+    as it is, and Numba keeps kernels beside their sources.
+    """
+    with suppress(OSError), os.scandir(folder) as entries:
+        states = [e for e in entries if _STATE.fullmatch(e.name) and e.is_dir(follow_symlinks=False)]
+        for state in sorted(states, key=lambda entry: entry.stat().st_mtime)[: -KEPT + 1]:
+            shutil.rmtree(state.path, ignore_errors=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from manifests.provenance import SOURCE_ROOT
-from tasks.kernel_cache import KEPT, sources_hash
+from tasks.kernel_cache import KEPT, _forget_old, sources_hash
 
 CALLED = """
 from numba import njit
@@ -41,9 +41,9 @@ def package(tmp_path) -> Path:
     return folder
 
 
-def result(package: Path) -> float:
+def result(package: Path, cache: str = "cache") -> float:
     env = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-    env |= {"MUSYNC_CACHE": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
+    env |= {"MUSYNC_CACHE": str(package.parent / cache), "PYTHONPATH": str(package.parent)}
     done = subprocess.run(
         [sys.executable, "-c", "from tasks.calling import twice; print(twice(3.0))"],
         cwd=package.parent,
@@ -75,3 +75,25 @@ def test_old_states_are_forgotten(package):
         (package / "level.py").write_text(f"LEVEL = {offset}.0\n")
         result(package)
     assert len(list((package.parent / "cache" / "kernels").iterdir())) == KEPT
+
+
+def test_only_states_are_forgotten_and_no_link_is_followed(tmp_path):
+    kernels, mine = tmp_path / "kernels", tmp_path / "mine"
+    mine.mkdir()
+    (mine / "thesis.txt").touch()
+    states = [f"{number:016x}" for number in range(KEPT + 2)]
+    for number, name in enumerate(["notes", *states]):
+        (kernels / name).mkdir(parents=True)
+        os.utime(kernels / name, (number, number))
+    (kernels / ("f" * 16)).symlink_to(mine)
+    (kernels / ("e" * 16)).symlink_to(tmp_path / "nowhere")
+    _forget_old(kernels)
+    kept = {path.name for path in kernels.iterdir()}
+    assert kept == {"notes", "f" * 16, "e" * 16, *states[-KEPT + 1 :]}
+    assert (mine / "thesis.txt").is_file()
+
+
+@pytest.mark.parametrize("place", ["x" * 5_000, "file/cache"])
+def test_an_unusable_cache_keeps_no_kernel_and_stops_none(package, place):
+    (package.parent / "file").touch()
+    assert result(package, place) == 8.0

@@ -1,40 +1,122 @@
-"""The built-in street, generated once and kept in the user's cache."""
+"""The built-in street, generated once, kept in the user's cache, and made anew where it was damaged."""
 
+import fcntl
 import hashlib
 import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import scipy
 
 import tasks.scene
-from catalogs.scenes.folder import write_scene
+from catalogs.scenes.folder import ARRAY_FILES, OPTIONAL_FILES, array_damage, read_facts, write_scene
 from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
+from tasks.scene.scene import Scene
+
+STREET = re.compile(r"street-\d+-[0-9a-f]{16}")
+HALF_MADE = re.compile(STREET.pattern + r"(\.\d+)?(\.[0-9a-f]{8})?\.partial|" + STREET.pattern + r"\.\d+")
+"""Names of what a killed process leaves behind: a folder that is being written."""
+MARKER = "musync-cache.sha256"
+"""Written last: the SHA-256 of scene.json, which in turn has those of the arrays."""
+WRITTEN = ("scene.json", *ARRAY_FILES, *OPTIONAL_FILES, MARKER)
+"""Files of a cached street; nothing else is ever deleted."""
 
 
 def cached_street(seed: int = 2025) -> Path:
-    """The folder of the street with this seed; made on first use, and again when its code changes.
+    """The folder of the street with this seed; made on first use, when its code changes, and when it is damaged.
 
     Parameters
     ----------
     seed : of every texture and object
+
+    Raises
+    ------
+    InputError
+        If the cache cannot be written, or holds in the street's place what is no street.
     """
     folder = cache_root() / f"street-{seed}-{_recipe_hash()}"
-    if not (folder / "scene.json").is_file():
-        from tasks.scene.street import build_street
-
-        own = folder.with_name(f"{folder.name}.{os.getpid()}")
-        write_scene(build_street(seed), own, {"source": "generated", "licence": "Apache-2.0"})
-        try:
-            own.rename(folder)
-        except OSError:
-            # another process was first, with the same bytes
-            if not (folder / "scene.json").is_file():
-                raise InputError(
-                    f"{folder}: the cache of generated scenes must be writable; it is not"
-                ) from None
+    try:
+        if not _is_whole(folder):
+            with _only_maker(folder.parent):
+                if not _is_whole(folder):
+                    _make(folder, seed)
+    except OSError as error:
+        raise InputError(
+            f"{folder.parent}: the cache of generated scenes must be a folder that can be written, with room for 60 MB;"
+            f" {error.strerror}: set MUSYNC_CACHE to one that is"
+        ) from None
     return folder
+
+
+def _make(folder: Path, seed: int) -> None:
+    """Write the street beside its place, then rename it; what killed makers left goes first."""
+    for path in sorted(folder.parent.iterdir()):
+        if HALF_MADE.fullmatch(path.name):
+            _forget(path)
+    if not _forget(folder):
+        raise InputError(
+            f"{folder}: must be the built-in street as muSync made it; it is damaged, and is or holds something else:"
+            " move it away, and the street is made anew"
+        )
+    own = folder.with_name(f"{folder.name}.{os.getpid()}")
+    try:
+        write_scene(_built(seed), own, {"source": "generated", "licence": "Apache-2.0"})
+        (own / MARKER).write_text(_facts_hash(own))
+        own.rename(folder)
+    finally:
+        _forget(own)
+
+
+def _built(seed: int) -> Scene:
+    from tasks.scene.street import build_street
+
+    return build_street(seed)
+
+
+def _is_whole(folder: Path) -> bool:
+    """Whether a cached street is there, byte for byte as it was made."""
+    if folder.is_symlink() or not (folder / MARKER).is_file():
+        return False
+    try:
+        sound = (folder / MARKER).read_bytes() == _facts_hash(folder).encode()
+        return sound and not array_damage(folder, read_facts(folder))
+    except (InputError, OSError):
+        return False
+
+
+def _facts_hash(folder: Path) -> str:
+    return hashlib.sha256((folder / "scene.json").read_bytes()).hexdigest()
+
+
+def _forget(folder: Path) -> bool:
+    """Remove a cached street, whole or not; False where anything but one is there, which is left as it is."""
+    if not os.path.lexists(folder):
+        return True
+    if folder.is_symlink() or not folder.is_dir():
+        return False
+    with os.scandir(folder) as entries:
+        if any(entry.name not in WRITTEN or entry.is_dir(follow_symlinks=False) for entry in entries):
+            return False
+    for name in WRITTEN:
+        (folder / name).unlink(missing_ok=True)
+    folder.rmdir()
+    return True
+
+
+@contextmanager
+def _only_maker(root: Path) -> Iterator[None]:
+    """Hold the cache for making a street; the lock goes with the process, however it ends."""
+    root.mkdir(parents=True, exist_ok=True)
+    lock = os.open(root / "street.lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
 
 
 def _recipe_hash() -> str:
