@@ -44,9 +44,14 @@ def read_content(path: Path, kind: str, largest: int) -> bytes:
     where = shorten(path)
     try:
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            state = os.fstat(file.fileno())
+            if not stat.S_ISREG(state.st_mode):
                 raise InputError(f"{where}: a {kind} must be a regular file; it is a folder, pipe or device")
-            content = file.read(largest + 1)
+            if state.st_size > largest:
+                raise InputError(
+                    f"{where}: a {kind} must have at most {largest} bytes; it has {state.st_size}"
+                )
+            return file.read(state.st_size)
     except FileNotFoundError:
         raise InputError(f"{where}: no such file; a {kind} must exist") from None
     except OSError as error:
@@ -55,9 +60,6 @@ def read_content(path: Path, kind: str, largest: int) -> bytes:
         raise
     except ValueError as error:  # a name with NUL, or with characters that no file name can have
         raise InputError(f"{where}: a {kind} must have a proper file name; {shorten(error)}") from None
-    if len(content) > largest:
-        raise InputError(f"{where}: a {kind} must have at most {largest} bytes; it has more")
-    return content
 
 
 def read_yaml(path: Path, kind: str, *, finite: bool = True) -> dict[str, Any]:
