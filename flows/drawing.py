@@ -1,9 +1,20 @@
-"""Figures as SVG: the same figure, the same bytes."""
+"""Figures and pages: SVG that is the same for the same figure, and text that is nothing but text."""
 
 from io import StringIO
 
 import matplotlib
 from matplotlib.figure import Figure
+
+NO_SCRIPTS = (
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline';"
+    " img-src data:; base-uri 'none'; form-action 'none'\">"
+)
+"""For the head of a page without scripts: none runs and nothing is fetched, even if a text got in unescaped."""
+
+
+def literal(text: str) -> str:
+    """Text of users and datasets for a figure, in which no dollar begins a formula."""
+    return text.replace("$", r"\$")
 
 
 def as_svg(figure: Figure) -> str:

@@ -6,6 +6,8 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
+from flows.drawing import literal
+
 COLUMNS = 4
 
 
@@ -28,7 +30,7 @@ def roc_figure(rows: Sequence[Mapping[str, Any]], meanings: Mapping[str, str]) -
             mine = [row for row in rows if (row["control"], row["metric"]) == (control, metric)]
             if mine:
                 best = max(mine, key=lambda row: row["auc"])
-                label = f"{metric} ({best['method']}, {best['auc']:.2f})"
+                label = literal(f"{metric} ({best['method']}, {best['auc']:.2f})")
                 axis.plot(
                     best["roc"]["false_alarms"],
                     best["roc"]["detections"],

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from flows.drawing import as_svg
+from flows.drawing import NO_SCRIPTS, as_svg, literal
 from flows.judging.judged_clip import JudgedClip, Row
 
 COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
@@ -83,7 +83,7 @@ def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: s
           f"{_table([row for row in rows if row['metric'] == name])}" for name in names),
     ]  # fmt: skip
     return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>muSync evaluation</title>'
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8">{NO_SCRIPTS}<title>muSync evaluation</title>'
         f"<style>{STYLE}</style></head><body>{''.join(parts)}</body></html>"
     )
 
@@ -150,8 +150,10 @@ def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
         claimed = np.rad2deg(clip.frames["pitch"] - clip.frames["pitch"][0])
         axis.plot(clip.times, claimed, color="black", lw=1.6, label="claimed")
         for method, motion in clip.motions.items():
-            axis.plot(clip.times, np.rad2deg(motion.pitch), color=COLOURS.get(method), lw=0.8, label=method)
-        axis.set_title(clip.facts["label"], fontsize=9)
+            axis.plot(
+                clip.times, np.rad2deg(motion.pitch), color=COLOURS.get(method), lw=0.8, label=literal(method)
+            )
+        axis.set_title(literal(clip.facts["label"]), fontsize=9)
         axis.tick_params(labelsize=7)
         low, high = axis.get_ylim()
         axis.set_ylim(min(low, -LEAST_SWING_DEG), max(high, LEAST_SWING_DEG))
@@ -188,7 +190,7 @@ def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
                 np.mean([r["value"] for r in mine if (r["window"], r["method"]) == (w, method)])
                 for w in windows
             ]
-            axis.plot(windows, means, "o-", color=COLOURS.get(method), ms=3, label=method)
+            axis.plot(windows, means, "o-", color=COLOURS.get(method), ms=3, label=literal(method))
         floors = [np.mean([r["floor"] for r in mine if r["window"] == w]) for w in windows]
         axis.plot(windows, floors, "--", color="black", label="perfect pose")
         axis.set_title(name, fontsize=9)

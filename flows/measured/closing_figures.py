@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from flows.drawing import literal
 from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.closure.evidence import RunEvidence
 from tasks.closure.forms import Leftover, curve, form_hypotheses, scan
@@ -45,7 +46,7 @@ def residual_force(trace: Trace) -> str:
         grown = state is trace.end and trace.end is not trace.start
         for run, colour in zip(state.evidence.train, colours, strict=True):
             x, force = _force_points(run.model, state, variable, grown)
-            axis.plot(x, force, ".", ms=2.5, color=colour, label=run.model.run.name)
+            axis.plot(x, force, ".", ms=2.5, color=colour, label=literal(run.model.run.name))
         axis.axhline(0.0, color="#888888", lw=0.8)
         axis.set_title(title)
         axis.set_xlabel(f"{variable} [{VARIABLE_UNITS[VARIABLES.index(variable)]}]")
@@ -185,7 +186,7 @@ def traces(trace: Trace) -> str:
             c = CHANNELS.index(channel)
             _trace(axes[row, column], time, run.model.measured[:, c], frozen[:, c], after[:, c])
             axes[row, column].set_ylabel(f"{channel.replace('_', ' ')}\n[{CHANNEL_UNITS[c]}]", fontsize=8)
-        axes[0, column].set_title(f"{title}: {run.model.run.name} ({run.model.run.weather})")
+        axes[0, column].set_title(literal(f"{title}: {run.model.run.name} ({run.model.run.weather})"))
         axes[-1, column].set_xlabel("time [s]")
     axes[0, 0].legend(fontsize=7)
     return picture(figure)

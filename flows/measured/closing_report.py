@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from flows.drawing import NO_SCRIPTS
 from flows.measured import closing_figures as figures
 from flows.measured.closing_error_rates import error_rates_html
 from flows.measured.closing_residuals import residuals_over_time
@@ -70,8 +71,8 @@ def report_html(trace: Trace, result: Mapping[str, Any], campaign: Campaign) -> 
         _section("Data and split, fixed before any fit", _data(result, campaign)),
     ]
     return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(campaign.name)}: close-loop'
-        f"</title><style>{STYLE}</style></head><body><h1>Campaign {escape(campaign.name)} against"
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8">{NO_SCRIPTS}<title>{escape(campaign.name)}:'
+        f" close-loop</title><style>{STYLE}</style></head><body><h1>Campaign {escape(campaign.name)} against"
         f" {escape(campaign.vehicle)}</h1>{''.join(parts)}</body></html>\n"
     )
 
@@ -100,7 +101,7 @@ def _text(value: Any) -> str:
 def _verdict(result: Mapping[str, Any]) -> str:
     kind = result["verdict"]
     effects = [
-        f"<li><b>{escape(e['name'])}</b> ({e['class']}, at {e['port']}): {_parameters(e)}</li>"
+        f"<li><b>{escape(e['name'])}</b> ({escape(e['class'])}, at {escape(e['port'])}): {_parameters(e)}</li>"
         for e in result["effects"]
     ]
     rivals = [
@@ -117,8 +118,8 @@ def _verdict(result: Mapping[str, Any]) -> str:
         for name in result["not_carried_by_coupled_mode"]
     ]
     return (
-        f'<p class="verdict"><b>{kind}</b>: {MEANING[kind]}</p><ul>{"".join(effects)}{"".join(rivals)}</ul>'
-        f"<ul>{''.join(notes)}</ul>"
+        f'<p class="verdict"><b>{escape(kind)}</b>: {escape(MEANING[kind])}</p>'
+        f"<ul>{''.join(effects)}{''.join(rivals)}</ul><ul>{''.join(notes)}</ul>"
     )
 
 
@@ -205,10 +206,10 @@ def _detectable(values: Mapping[str, float | None], effects: Sequence[Effect]) -
 
 def _data(result: Mapping[str, Any], campaign: Campaign) -> str:
     lines = [
-        f"campaign <code>{result['content_sha256']}</code>",
-        f"split <code>{result['split_sha256']}</code>",
-        f"library <code>{result['library_sha256']}</code>",
-        f"source <code>{result['made_with']['source_sha256']}</code>",
+        f"campaign <code>{escape(result['content_sha256'])}</code>",
+        f"split <code>{escape(result['split_sha256'])}</code>",
+        f"library <code>{escape(result['library_sha256'])}</code>",
+        f"source <code>{escape(result['made_with']['source_sha256'])}</code>",
         f"training runs: {escape(', '.join(run.name for run in campaign.train))}",
         f"held-out runs: {escape(', '.join(run.name for run in campaign.held_out))}",
         f"earlier readings of these held-out runs: {result['held_out_readings_before']}",

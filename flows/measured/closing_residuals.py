@@ -7,6 +7,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from flows.drawing import literal
 from flows.measured.closing_figures import picture
 from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.closure.evidence import RunEvidence
@@ -74,7 +75,9 @@ def residuals_over_time(trace: Trace) -> str:
         time = np.arange(run.model.samples) * run.model.run.interval
         for column, left in enumerate(both):
             for c in range(len(CHANNELS)):
-                axes[c, column].plot(time, left[:, c], lw=0.6, color=colour, label=run.model.run.name)
+                axes[c, column].plot(
+                    time, left[:, c], lw=0.6, color=colour, label=literal(run.model.run.name)
+                )
     for c, (channel, unit) in enumerate(zip(CHANNELS, CHANNEL_UNITS, strict=True)):
         axes[c, 0].set_ylabel(f"{channel.replace('_', ' ')}\n[{unit}]", fontsize=7)
         for axis in axes[c]:

@@ -1,7 +1,9 @@
 """Films of a dataset's clips, with the vehicle's traces below the picture."""
 
-from collections.abc import Sequence
-from pathlib import Path
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -12,10 +14,15 @@ from flows.reading.film import write_film
 from flows.running.progress import progress_bar
 from flows.store.address import reading
 from flows.store.frames import read_clip
-from flows.store.layout import Layout, read_json
+from flows.store.layout import Layout
+from flows.store.outputs import Outputs
+from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.traces import with_traces
+
+NAME_BYTES = 150
+"""Of a label that a film's name keeps [B]."""
 
 
 def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: bool = True) -> dict[str, Any]:
@@ -36,23 +43,54 @@ def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: b
     layout = reading(dataset)
     if not layout.manifest.is_file():
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
-    plan, rows = read_plan(layout.root), read_json(layout.manifest)["clips"]
+    plan, rows = read_plan(layout.root), read_manifest(layout)["clips"]
     if not plan.settings.pictures:
         raise InputError(f"{dataset}: must be a dataset with frames; it was made with --no-frames")
     chosen = named_clips(rows, clips, dataset) if clips else rows
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
+    names = film_names(rows)
+    results = Outputs(out, "preview", *(names[row["clip_id"]] for row in chosen))
     films = []
     with progress_bar("films", len(chosen)) as advance:
         for row in chosen:
-            film = folder / f"{row['label'].replace('/', '_')}.mp4"
+            film = BytesIO()
             write_film(film, _pictures(layout, row, traces), plan.settings.frame_rate_hz)
-            films.append(str(film))
+            name = names[row["clip_id"]]
+            results.write(name, film.getvalue())
+            films.append(str(results.path(name)))
             advance(row["label"])
     return {"films": films}
 
 
-def named_clips(rows: Sequence[dict[str, Any]], names: Sequence[str], dataset: str) -> list[dict[str, Any]]:
+def film_names(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """File name of each clip's film, by clip id: its label, made a file name; no two are the same.
+
+    Parameters
+    ----------
+    rows : all clips of a dataset, so that a name does not depend on which of them are filmed
+    """
+    stems = {row["clip_id"]: _file_stem(row["label"]) for row in rows}
+    counts = Counter(stem.casefold() for stem in stems.values())
+    # a label that ends like a name with an id gets one too: it could be the name of that id's clip
+    alone = {
+        stem
+        for stem in stems.values()
+        if counts[stem.casefold()] == 1 and stem.rpartition("-")[2] not in stems
+    }
+    return {
+        clip_id: f"{stem}.mp4" if stem in alone else f"{stem}-{clip_id}.mp4"
+        for clip_id, stem in stems.items()
+    }
+
+
+def _file_stem(label: str) -> str:
+    """A label without what a file name cannot hold or a shell would read."""
+    plain = re.sub(r"[^\w.,+=@ -]", "_", label).lstrip(".-") or "clip"
+    return plain.encode()[:NAME_BYTES].decode(errors="ignore")
+
+
+def named_clips(
+    rows: Sequence[Mapping[str, Any]], names: Sequence[str], dataset: str
+) -> list[Mapping[str, Any]]:
     """The clips of these labels or ids, in the dataset's order.
 
     Raises
@@ -68,7 +106,7 @@ def named_clips(rows: Sequence[dict[str, Any]], names: Sequence[str], dataset: s
     return [row for row in rows if row["label"] in names or row["clip_id"] in names]
 
 
-def _pictures(layout: Layout, row: dict[str, Any], traces: bool) -> list[NDArray[np.uint8]]:
+def _pictures(layout: Layout, row: Mapping[str, Any], traces: bool) -> list[NDArray[np.uint8]]:
     pictures = list(read_clip(layout.frames, row["index"], "rgb"))
     if not traces:
         return pictures

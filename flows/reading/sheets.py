@@ -1,7 +1,6 @@
 """Two sheets of stills: the same place in every weather; a road feature before, at and after contact, and its twin."""
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,9 @@ from numpy.typing import NDArray
 from flows.making.seal import PREVIEW_CLIPS, spread
 from flows.store.address import reading
 from flows.store.frames import read_clip
-from flows.store.layout import Layout, read_json, write_atomically
+from flows.store.layout import Layout
+from flows.store.outputs import Outputs
+from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.contact_sheet import encode_png, picture_sheet
@@ -36,10 +37,11 @@ def sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
     InputError
         The folder holds no finished dataset, or its grid has neither two weathers nor a road feature.
     """
+    results = Outputs(out, "sheets", "weather.png", "hazards.png")
     layout = reading(dataset)
     if not layout.manifest.is_file():
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
-    clips = read_json(layout.manifest)["clips"]
+    clips = read_manifest(layout)["clips"]
     weathers = [row for row in _by_everything_but_weather(clips) if len(row) > 1]
     hazards = spread([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
     drawn = {
@@ -54,22 +56,21 @@ def sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
     written = {}
     for name, rows in drawn.items():
         if rows:
-            path = Path(out) / f"{name}.png"
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, encode_png(picture_sheet(rows)))
-            written[name] = str(path)
+            file = f"{name}.png"
+            results.write(file, encode_png(picture_sheet(rows)))
+            written[name] = str(results.path(file))
     return written
 
 
-def _by_everything_but_weather(clips: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
-    groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+def _by_everything_but_weather(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
+    groups: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
     for clip in clips:
         rest = tuple(value for key, value in sorted(clip["scenario"].items()) if key not in WEATHER_FIELDS)
         groups.setdefault(rest, []).append(clip)
     return list(groups.values())
 
 
-def _contact(layout: Layout, clip: Mapping[str, Any], clips: list[dict[str, Any]]) -> list[Picture]:
+def _contact(layout: Layout, clip: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]) -> list[Picture]:
     """Before, at and after contact; beside them the place before contact on the flat twin, where there is one."""
     scenario = clip["scenario"]
     half, center = scenario["hazard_length_m"] / 2, scenario["hazard_center_m"]

@@ -13,10 +13,11 @@ import re
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from glob import escape
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from flows.store.layout import write_atomically, write_json
+from flows.store.layout import PARTIAL, write_atomically, write_json
 from tasks.errors import InputError
 
 MARKER = ".musync-written"
@@ -92,7 +93,7 @@ class Outputs:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Keep other calls from writing into the folder.
+        """Keep other calls from writing into the folder, and clear what killed ones left of the command's files.
 
         Raises
         ------
@@ -106,9 +107,18 @@ class Outputs:
         with _held(self.folder, wait=False):
             self._alone = True
             try:
+                self._clear_halves(self.folder)
                 yield
             finally:
                 self._alone = False
+
+    def _clear_halves(self, folder: Path) -> None:
+        for name, command in read_marker(folder).items():
+            if command == self.command and _no_folder_above(folder, name) is None:
+                place = folder / name
+                for half in place.parent.glob(f"{escape(place.name)}.*{PARTIAL}"):
+                    if stat.S_ISREG(half.lstat().st_mode):
+                        half.unlink()
 
     def _locked(self, folder: Path) -> AbstractContextManager[None]:
         return nullcontext() if self._alone else _held(folder, wait=True)
@@ -188,17 +198,9 @@ def refuse_link(path: Path) -> None:
 
 def _in_the_way(folder: Path, name: str, known: dict[str, str], command: str) -> str | None:
     """What keeps a command from writing a file; None for a free name and for its own earlier file."""
-    *between, last = PurePosixPath(name).parts
-    place = folder
-    for part in between:
-        place = place / part
-        if not os.path.lexists(place):
-            return None
-        if place.is_symlink() or not place.is_dir():
-            return f"{place}: must be a folder and no link; move it away or name another folder"
-    place = place / last
-    if not os.path.lexists(place):
-        return None
+    problem, place = _no_folder_above(folder, name), folder / name
+    if problem is not None or not os.path.lexists(place):
+        return problem
     if not stat.S_ISREG(place.lstat().st_mode):
         return f"{place}: must be a file and no link or folder; move it away or name another folder"
     if known.get(name) != command:
@@ -207,6 +209,17 @@ def _in_the_way(folder: Path, name: str, known: dict[str, str], command: str) ->
             " move it away or name another folder"
         )
     return None
+
+
+def _no_folder_above(folder: Path, name: str) -> str | None:
+    """The link or file that lies where a folder between must be; None if there is none."""
+    above = [
+        folder.joinpath(*PurePosixPath(name).parts[:k]) for k in range(1, len(PurePosixPath(name).parts))
+    ]
+    wrong = next(
+        (place for place in above if place.is_symlink() or (place.exists() and not place.is_dir())), None
+    )
+    return None if wrong is None else f"{wrong}: must be a folder and no link; move it away or name another folder"
 
 
 def _not_a_marker(path: Path) -> InputError:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from flows.store.journal import append_line, read_lines
+from flows.store.layout import PARTIAL
 from flows.store.outputs import MARKER, Outputs, name_problem, read_marker
 from tasks.errors import InputError
 
@@ -177,6 +178,18 @@ def test_only_earlier_files_of_the_command_and_of_the_form_go(tmp_path):
         "index.html", "clips/2.js", "clips/film.js", "clips/holiday.mp4", "notes.txt"
     }  # fmt: skip
     assert "clips/1.js" not in read_marker(tmp_path)
+
+
+def test_what_a_killed_command_left_half_written_goes_and_nothing_else(tmp_path):
+    write(tmp_path, "report", "index.html", "clips/1.js")
+    left = [f"index.html.17{PARTIAL}", f"clips/1.js.17{PARTIAL}"]
+    kept = [f"clips/mine.17{PARTIAL}", "clips/1.js.bak"]
+    for name in (*left, *kept):
+        (tmp_path / name).write_text("x")
+    (tmp_path / "clips" / f"1.js.18{PARTIAL}").symlink_to(tmp_path / "index.html")
+    with Outputs(tmp_path, "report", "index.html").alone():
+        pass
+    assert set(contents(tmp_path)) == {"index.html", "clips/1.js", f"clips/1.js.18{PARTIAL}", *kept}
 
 
 def test_two_that_must_be_alone_do_not_meet(tmp_path):

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from flows.reading.film import through_film, write_film
-from flows.reading.previews import preview
+from flows.reading.previews import film_names, preview
 from flows.store.frames import read_clip
 from flows.store.layout import read_json
+from flows.store.outputs import name_problem
 from tasks.errors import InputError
 from tasks.render.traces import STRIP_HEIGHT
 
@@ -38,6 +39,27 @@ def test_the_same_pictures_give_the_same_film(tmp_path):
     for name in ("a.mp4", "b.mp4"):
         write_film(tmp_path / name, pictures, 10.0)
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+
+
+def test_labels_that_differ_have_films_of_their_own_with_names_that_stay_in_the_folder():
+    labels = [
+        "a/b", "a_b", "A_b", "..", "../../x", ".hidden", "", "-rf", "x" * 300, "x" * 299 + "y", "é" * 200,
+        "a\x1bb", "$(id)", "a_b-0000000000000000", "snow-3/hump",
+    ]  # fmt: skip
+    rows = [{"clip_id": f"{k:016x}", "label": label} for k, label in enumerate(labels)]
+    names = film_names(rows)
+    assert len({name.casefold() for name in names.values()}) == len(labels)
+    assert all(name_problem(name) is None and "/" not in name for name in names.values())
+    assert not any(name.startswith((".", "-")) for name in names.values())
+    assert names[f"{labels.index('snow-3/hump'):016x}"] == "snow-3_hump.mp4"
+    assert names["0000000000000000"] == "a_b-0000000000000000.mp4"
+
+
+def test_a_film_of_one_s_own_is_not_overwritten(toy_dataset, tmp_path):
+    (tmp_path / "dry_flat.mp4").write_text("mine")
+    with pytest.raises(InputError, match=r"dry_flat\.mp4 is not a file that musync preview wrote"):
+        preview(str(toy_dataset.root), str(tmp_path))
+    assert [path.name for path in tmp_path.iterdir()] == ["dry_flat.mp4"]
 
 
 def test_clips_and_datasets_that_are_not_there_are_named(toy_dataset, tmp_path):

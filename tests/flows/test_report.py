@@ -187,6 +187,85 @@ def test_a_second_report_keeps_the_films(toy_dataset, page_folder):
     assert report(str(toy_dataset.root), out=str(page_folder))["films_made"] == 0
 
 
+def test_files_that_no_report_wrote_stay_and_those_of_clips_that_went_go(toy_dataset, tmp_path):
+    page = tmp_path / "page"
+    report(str(toy_dataset.root), out=str(page), clips=["dry/flat", "dry/hump"])
+    ours = {path.name for folder in ("clips", "media") for path in (page / folder).iterdir()}
+    for name in ("clips/holiday.mp4", "media/wedding.mp4", "letter.txt"):
+        (page / name).write_text("mine")
+    (page / "media" / f"{'0' * 16}.mp4").write_text("mine, with a name like a film's")
+    assert report(str(toy_dataset.root), out=str(page), clips=["dry/hump"])["films_made"] == 0
+    left = {path.name for folder in ("clips", "media") for path in (page / folder).iterdir()}
+    assert len(ours & left) == 2 and len(ours - left) == 2
+    assert left - ours == {"holiday.mp4", "wedding.mp4", f"{'0' * 16}.mp4"}
+    assert (page / "letter.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("theirs", ["clips/holiday.mp4", "index.html", ".musync-written"])
+def test_a_folder_that_only_looks_like_a_report_is_left_alone(toy_dataset, tmp_path, theirs):
+    (tmp_path / "clips").mkdir()
+    (tmp_path / theirs).write_text('{"format": "musync-written/1", "files": {"clips/holiday.mp4": "audit"}}')
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with pytest.raises(InputError, match="must be new, empty or an earlier report"):
+        report(str(toy_dataset.root), out=str(tmp_path))
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_a_page_is_not_written_through_links(toy_dataset, tmp_path):
+    victim, page = tmp_path / "victim", tmp_path / "page"
+    victim.mkdir()
+    report(str(toy_dataset.root), out=str(page), clips=["dry/hump"])
+    shutil.rmtree(page / "media")
+    (page / "media").symlink_to(victim)
+    (page / "data.js").unlink()
+    (page / "data.js").symlink_to(victim / "data.js")
+    with pytest.raises(InputError) as told:
+        report(str(toy_dataset.root), out=str(page))
+    assert len(told.value.problems) == 2
+    beside = tmp_path / "data"
+    beside.symlink_to(toy_dataset.root)
+    (toy_dataset.root.parent / f"{toy_dataset.root.name}-report").symlink_to(victim)
+    try:
+        with pytest.raises(InputError, match="is a link; name the page's folder"):
+            report(str(toy_dataset.root))
+    finally:
+        (toy_dataset.root.parent / f"{toy_dataset.root.name}-report").unlink()
+    assert list(victim.iterdir()) == []
+
+
+HOSTILE = [
+    '<img src=x onerror="window.owned=1">', "</script><script>window.owned=1</script>", "javascript:window.owned=1",
+    "=HYPERLINK(\"http://x\")${window.owned=1}`+'\u2028\u2029",
+]  # fmt: skip
+
+
+def test_labels_are_text_in_the_page_whatever_they_hold(browser, toy_dataset, tmp_path):
+    shutil.copytree(toy_dataset.root, tmp_path / "data")
+    path = tmp_path / "data" / "manifest.json"
+    manifest = json.loads(path.read_bytes())
+    for clip, label in zip(manifest["clips"], HOSTILE, strict=True):
+        clip["label"] = label
+        clip["verdict"]["reasons"] = [label]
+    manifest["grid"]["name"] = HOSTILE[0]
+    path.write_text(json.dumps(manifest))
+    report(str(tmp_path / "data"), out=str(tmp_path / "page"))
+    assert "</script>" not in (tmp_path / "page" / "data.js").read_text()
+    for page in opened(browser, tmp_path / "page"):
+        shown = page.locator("#clips tbody tr td:first-child").all_text_contents()
+        assert shown == HOSTILE
+        assert page.title().startswith(HOSTILE[0]) and page.locator("h1").text_content() == HOSTILE[0]
+        for row in range(4):
+            page.click(f"#clips tbody tr:nth-child({row + 1})")
+            page.wait_for_function(f"traces.shown[0]?.label === REPORT.clips[{row}].label")
+            assert page.locator("#label").text_content() == HOSTILE[row]
+        assert page.evaluate("window.owned") is None
+        assert page.locator("img").count() == 0 and page.locator("script").count() == 4 + 4
+        with page.expect_download() as download:
+            page.click("#csv")
+        first = next(csv.reader(download.value.path().read_text().splitlines()[1:2]))
+        assert first[1].startswith("'=HYPERLINK")
+
+
 def test_packed_columns_read_back_bit_for_bit():
     columns = {"x": np.array([0.1, -0.0, np.nan]), "on": np.array([True, False, True])}
     content = packed(columns, ["x", "on"])

@@ -21,7 +21,7 @@ const telemetryOf = (() => {
       known.set(clip.clip_id, new Promise((resolve, reject) => {
         waiting.set(clip.clip_id, resolve);
         const script = document.createElement("script");
-        script.src = `clips/${clip.clip_id}.js`;
+        script.src = `clips/${encodeURIComponent(clip.clip_id)}.js`;
         script.onerror = () => reject(new Error(`clips/${clip.clip_id}.js is missing: make the report again`));
         document.head.append(script);
       }).then(unpack));
@@ -47,7 +47,11 @@ async function unpack({ rows, columns, packed }) {
 
 /** A row a tick, as in the view ticks; numbers in the shortest form that reads back to the same double. */
 function asCsv(clip, columns) {
-  const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  const quoted = (text) => {
+    // a spreadsheet would take such a label for a formula
+    const inert = /^[=+\-@\t\r]/.test(text) ? `'${text}` : text;
+    return /[",\r\n]/.test(inert) ? `"${inert.replaceAll('"', '""')}"` : inert;
+  };
   const names = [...columns.keys()];
   const values = [...columns.values()];
   const identity = [clip.clip_id, clip.label, clip.scenario.weather].map(quoted).join(",");
