@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 from math import isnan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from flows.store.address import reading
 from flows.store.frames import read_clip
-from flows.store.layout import Layout, write_atomically, write_json
+from flows.store.layout import Layout
+from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from manifests.canonical import content_id
@@ -38,6 +38,7 @@ def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
     InputError
         If a folder is no sealed dataset, or its inputs are missing.
     """
+    results = Outputs(out, "diff", "diff.json", "diff.txt")
     old, new = reading(a), reading(b)
     before, after = read_manifest(old), read_manifest(new)
     why = input_differences(before, after, _inputs(old, before), _inputs(new, after))
@@ -60,9 +61,8 @@ def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
             "largest": _largest(rows),
         },
     }
-    if out is not None:
-        write_json(Path(out) / "diff.json", result)
-        write_atomically(Path(out) / "diff.txt", as_text(result).encode())
+    results.write_json("diff.json", result)
+    results.write("diff.txt", as_text(result))
     return result
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import asdict
 from math import isfinite
-from pathlib import Path
 from typing import Any
 
 from catalogs.cameras import load_camera
@@ -15,7 +14,7 @@ from flows.making.driving import controls_of, hazard_of, weather_of
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
 from flows.store.address import reading, telemetry
-from flows.store.layout import write_atomically, write_json
+from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
@@ -46,6 +45,7 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
     InputError
         The folder is no sealed dataset, or has no such clip or frame.
     """
+    results = Outputs(out, "explain", "explain.json", "explain.txt")
     layout = reading(dataset, telemetry)
     manifest, plan = read_manifest(layout), read_plan(layout.root)
     chosen = [c for c in plan.clips if clip in (c.clip_id, c.label)]
@@ -90,9 +90,8 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
         "steps": [asdict(step) | {"agrees": step.agrees} for step in steps],
         "agrees": all(step.agrees for step in steps),
     }
-    if out is not None:
-        write_json(Path(out) / "explain.json", result)
-        write_atomically(Path(out) / "explain.txt", as_text(result).encode())
+    results.write_json("explain.json", result)
+    results.write("explain.txt", as_text(result))
     return result
 
 

@@ -42,14 +42,27 @@ def audit(
 @app.command()
 def verify(
     dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    key: Annotated[
+        str | None, typer.Option(help="File with the signer's Ed25519 public key (PEM): check its signature.")
+    ] = None,
     out: Out = None,
     prefect: Prefect = False,
     as_json: Json = False,
 ) -> None:
-    """Verify every hash of a dataset and the seal of its manifest; make nothing."""
-    result = call("verify", prefect, dataset, out=out)
+    """Verify every hash of a dataset, the seal of its manifest and a signature; make nothing."""
+    result = call("verify", prefect, dataset, key=key, out=out)
     show(result, as_json)
     exit_unless(result["verified"])
+
+
+@app.command()
+def sign(
+    dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
+    key: Annotated[str, typer.Option(help="File with the Ed25519 private key: PEM, PKCS#8.")],
+    as_json: Json = False,
+) -> None:
+    """Sign a dataset's manifest, and with it every file that it records, with a private key."""
+    show(call("sign", False, dataset, key=key), as_json)
 
 
 @app.command()

@@ -74,6 +74,7 @@ def _function(name: str, as_flow: bool) -> Callable[..., Any]:
         "verify": "auditing.verify",
         "gc": "auditing.verify",
         "repair": "auditing.repair",
+        "sign": "auditing.signing",
         "sql": "reading.query",
         "schema": "reading.query",
         "explain": "auditing.explain",

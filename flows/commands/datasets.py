@@ -119,10 +119,18 @@ def describe(dataset: Annotated[str, typer.Argument()], as_json: Json = False) -
 def sql(
     dataset: Annotated[str, typer.Argument(help="A finished dataset folder.")],
     query: Annotated[str, typer.Argument(help="DuckDB SQL over clips, ticks, frames, verdicts and pairs.")],
+    allow_files: Annotated[
+        bool,
+        typer.Option(
+            "--allow-files",
+            help="Let the query read and write files of this machine and load extensions; else it reaches the"
+            " dataset alone.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Answer an SQL query over a dataset's views."""
-    result = call("sql", False, dataset, query)
+    result = call("sql", False, dataset, query, allow_files=allow_files)
     show(result if as_json else {"rows": result["rows"]}, as_json)
 
 

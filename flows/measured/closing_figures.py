@@ -13,7 +13,7 @@ from flows.drawing import literal
 from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.closure.evidence import RunEvidence
 from tasks.closure.forms import Leftover, curve, form_hypotheses, scan
-from tasks.closure.forward import CONSTANTS, N_STATES, RunModel, predict, roll
+from tasks.closure.forward import CONSTANTS, RunModel, predict, roll
 from tasks.closure.hypothesis import compose
 from tasks.closure.search import Found
 from tasks.closure.verdict import Trace
@@ -26,7 +26,6 @@ MEAN_OVER = 20
 """Samples averaged into one point of the residual force: its noise falls below what is looked for."""
 DISC_STATE = 13
 """Column of the front disc's temperature in a run's states."""
-assert DISC_STATE < N_STATES
 
 
 def picture(figure: Figure) -> str:

@@ -7,8 +7,9 @@ import urllib.request
 from datetime import UTC, datetime
 from pathlib import Path
 
-from flows.store.layout import write_atomically
+from flows.running.terminal import visible
 from flows.store.objects import Objects, is_address
+from flows.store.outputs import Outputs
 from tasks.errors import InputError
 
 NOTIFY_TIMEOUT_S = 60.0
@@ -29,7 +30,8 @@ def report_failure(grid: str, root: str, at: datetime, error: BaseException, not
     notify : shell-like command, which gets the report's path as its last argument, or an http(s) address, which
         gets JSON; a hook that fails is noted in the report
     """
-    path = (LOCAL if is_address(root) else Path(root)).resolve() / REPORTS / f"{stamp(at)}.txt"
+    name = f"{REPORTS}/{stamp(at)}.txt"
+    place = Outputs((LOCAL if is_address(root) else Path(root)).resolve(), "schedule", name)
     facts = {
         "what": "a scheduled muSync run failed",
         "grid": grid,
@@ -38,27 +40,30 @@ def report_failure(grid: str, root: str, at: datetime, error: BaseException, not
         "error": f"{type(error).__name__}: {error}",
         "next": "committed clips are kept; the next run of the schedule makes what is missing",
     }
-    text = "".join(f"{key}: {value}\n" for key, value in facts.items())
-    write_atomically(path, text.encode())
+    # what failed may say anything, but a line of its own it does not get
+    text = "".join(f"{key}: {visible(value)}\n" for key, value in facts.items())
+    place.write(name, text)
+    path = place.path(name)
     if notify is not None:
         try:
             _notify(notify, path, facts)
         except (OSError, subprocess.SubprocessError) as fault:
-            text += f"notification {notify} failed: {fault}\n"
-            write_atomically(path, text.encode())
+            text += visible(f"notification {notify} failed: {fault}") + "\n"
+            place.write(name, text)
     if is_address(root):
         try:
-            Objects(root).write(f"{REPORTS}/{path.name}", text.encode())
+            Objects(root).write(name, text.encode())
         except InputError as fault:  # the store may be what failed
-            write_atomically(path, f"{text}the report could not be sent: {fault}\n".encode())
+            place.write(name, text + visible(f"the report could not be sent: {fault}") + "\n")
     return path
 
 
 def _notify(notify: str, report: Path, facts: dict[str, str]) -> None:
     if is_webhook(notify):
         body = json.dumps(facts | {"report": str(report)}).encode()
-        request = urllib.request.Request(notify, body, {"Content-Type": "application/json"})
-        urllib.request.urlopen(request, timeout=NOTIFY_TIMEOUT_S).close()
+        # S310: is_webhook lets http and https alone through
+        request = urllib.request.Request(notify, body, {"Content-Type": "application/json"})  # noqa: S310
+        urllib.request.urlopen(request, timeout=NOTIFY_TIMEOUT_S).close()  # noqa: S310
     else:
         subprocess.run([*shlex.split(notify), str(report)], check=True, timeout=NOTIFY_TIMEOUT_S)
 

@@ -1,6 +1,5 @@
 """Datasets made again and again: a dated place a run, an unfinished one resumed, parameters checked beforehand."""
 
-import json
 import os
 import re
 import shlex
@@ -16,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, get_args
 
+from catalogs.documents import parse_json
 from flows.making.generate import generate
 from flows.making.plan import make_plan
 from flows.running.runner import RunnerName
@@ -57,7 +57,9 @@ def _begun_in_folder(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, s
     for folder in sorted(folders, reverse=True):
         layout = Layout(folder)
         if layout.plan.is_file() and not layout.manifest.is_file():
-            yield str(folder), read_json(layout.plan)["run_id"]
+            run_id = _run_id(layout.plan.read_bytes(), layout.plan)
+            if run_id is not None:
+                yield str(folder), run_id
 
 
 def _begun_in_store(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, str]]:
@@ -65,7 +67,19 @@ def _begun_in_store(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, st
         objects = Objects(f"{root}/{name}")
         plan = objects.read("plan.json")
         if plan is not None and objects.tag("manifest.json") is None:
-            yield objects.address, json.loads(plan)["run_id"]
+            run_id = _run_id(plan, objects.address)
+            if run_id is not None:
+                yield objects.address, run_id
+
+
+def _run_id(plan: bytes, place: object) -> str | None:
+    """Of a plan; None where it is damaged, so that there is nothing to go on with."""
+    try:
+        content = parse_json(plan, place, "plan")
+    except InputError:
+        return None
+    run_id = content.get("run_id") if isinstance(content, dict) else None
+    return run_id if isinstance(run_id, str) else None
 
 
 def scheduled_run(
@@ -148,7 +162,10 @@ def checked_parameters(
     if scheduler is not None and not re.fullmatch(r"(tcp|tls)://[^/]+:\d+", scheduler):
         problems.append(f"--scheduler must be like tcp://host:8786 or tls://host:8786; it is {scheduler!r}")
     if notify is not None and not is_webhook(notify):
-        words = shlex.split(notify)
+        try:
+            words = shlex.split(notify)
+        except ValueError:  # a quotation that does not end
+            words = []
         if not words or shutil.which(words[0]) is None:
             problems.append(f"--notify must be an http(s) address or a command that exists; it is {notify!r}")
     if problems:
@@ -252,7 +269,7 @@ def _wait_until_healthy(server: "subprocess.Popen[bytes]", address: str) -> None
                 f"the Prefect server ended with exit code {server.returncode} before it answered"
             )
         try:
-            urllib.request.urlopen(address, timeout=2).close()
+            urllib.request.urlopen(address, timeout=2).close()  # noqa: S310  (our own server on loopback)
             return
         except OSError:
             time.sleep(0.3)

@@ -11,7 +11,7 @@ import flows.making.generate
 from flows.making.clip import make_clip
 from flows.running.failures import ClipsFailed
 from flows.scheduled.failure_report import report_failure
-from flows.scheduled.scheduling import checked_parameters, scheduled_run
+from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -74,6 +74,40 @@ def test_a_failure_leaves_a_report_and_runs_the_command_with_it(tmp_path):
     assert (tmp_path / "told").read_text() == text + "two words\n"
 
 
+def test_nothing_that_failed_is_run_or_gets_a_line_of_its_own(tmp_path):
+    label = f"$(touch {tmp_path}/pwned) `touch {tmp_path}/pwned`; touch {tmp_path}/pwned\nnext: all is well\x1b[2J"
+    hook = f"sh -c 'cat \"$0\" > {tmp_path}/told'"
+    report = report_failure(label, str(tmp_path), AT, ClipsFailed(f"1 of 4 clips failed ({label})"), hook)
+    assert not (tmp_path / "pwned").exists()
+    lines = report.read_text().splitlines()
+    assert [line.partition(":")[0] for line in lines] == [
+        "what",
+        "grid",
+        "root",
+        "scheduled",
+        "error",
+        "next",
+    ]
+    assert r"\x1b[2J" in lines[4] and (tmp_path / "told").read_text() == report.read_text()
+
+
+def test_a_report_overwrites_no_file_of_another_s(tmp_path):
+    theirs = tmp_path / "reports" / "20260301T030000Z.txt"
+    theirs.parent.mkdir()
+    theirs.write_text("mine")
+    with pytest.raises(InputError, match="is not a file that musync schedule wrote"):
+        report_failure("demo", str(tmp_path), AT, ClipsFailed("no luck"), None)
+    assert theirs.read_text() == "mine"
+
+
+@pytest.mark.parametrize("plan", ["", "[]", '{"run_id": 1}', "{}"])
+def test_an_unfinished_dataset_with_a_damaged_plan_is_left_alone(grid, tmp_path, plan):
+    damaged = tmp_path / "root" / "toy-20260228T030000Z"
+    damaged.mkdir(parents=True)
+    (damaged / "plan.json").write_text(plan)
+    assert dataset_place(grid, str(tmp_path / "root"), "auto", AT).endswith("toy-20260301T030000Z")
+
+
 def test_a_failure_is_posted_to_a_webhook(tmp_path):
     told = []
 
@@ -109,6 +143,11 @@ def test_everything_wrong_with_a_schedule_is_told_when_it_is_made(tmp_path):
     for word in ("--every", "nowhere: no such grid", "--out", "--runner", "--scheduler cluster belongs to",
                  "--scheduler must be like tcp://host:8786", "--notify"):  # fmt: skip
         assert word in text
+
+
+def test_a_hook_with_an_open_quotation_is_told(grid, tmp_path):
+    with pytest.raises(InputError, match="--notify must be"):
+        checked_parameters(grid, "0 3 * * *", str(tmp_path), "threads", 1, "mail 'me")
 
 
 def test_parameters_name_files_in_full_so_that_runs_find_them_from_anywhere(grid, tmp_path, monkeypatch):
