@@ -90,7 +90,6 @@ def state_manifest(content: bytes) -> bytes:
     content : the manifest's bytes, which are a sound manifest
     """
     manifest = json.loads(content)
-    git = manifest.get("made_by", {}).get("git") or {}
     return canonical_bytes(
         {
             "_type": STATEMENT_TYPE,
@@ -100,7 +99,7 @@ def state_manifest(content: bytes) -> bytes:
                 "run_id": manifest["run_id"],
                 "format": manifest["format"],
                 "clips": len(manifest["clips"]),
-                "git_commit": git.get("commit"),
+                "git": manifest["git"],
             },
         }
     )

@@ -1,16 +1,16 @@
 """Signing a finished dataset, and what its signatures say."""
 
-import shutil
 from pathlib import Path
 from typing import Any
 
 from securesystemslib.signer import CryptoSigner
 
-from catalogs.documents import read_content
+from catalogs.documents import LARGEST_JSON, read_content
 from flows.store.address import publish, working
 from flows.store.layout import Layout, write_atomically
 from flows.store.lock import sole_writer
 from flows.store.sealed import read_manifest
+from flows.store.staging import remove_staging
 from manifests.canonical import sha256_of
 from manifests.manifest import manifest_damage
 from manifests.signing import (
@@ -55,16 +55,16 @@ def sign(dataset: str, *, key: str) -> dict[str, Any]:
         read_manifest(layout)
         with sole_writer(layout):
             try:
-                return _signed(layout, signer)
+                return _sign_manifest(layout, signer)
             finally:
-                shutil.rmtree(layout.staging)
+                remove_staging(layout)
 
 
-def _signed(layout: Layout, signer: CryptoSigner) -> dict[str, Any]:
+def _sign_manifest(layout: Layout, signer: CryptoSigner) -> dict[str, Any]:
     content = layout.manifest.read_bytes()
     if fault := manifest_damage(content):
         raise InputError(f"{layout}/manifest.json: only a sound manifest can be signed; it is {fault}")
-    before = _envelope(layout)
+    before = _load_envelope(layout)
     envelope = add_signature(content, before, signer)
     if envelope != before:
         write_atomically(layout.root / ENVELOPE, envelope)
@@ -96,10 +96,11 @@ def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
         If the key is no Ed25519 public key.
     """
     if key is None:
-        return {"signed": None, "signature": _unchecked(layout)}
+        return {"signed": None, "signature": _describe_unchecked(layout)}
     verifier = load_verifier(read_content(Path(key), "public key", LARGEST_KEY), key)
     try:
-        problems = signature_problems(layout.manifest.read_bytes(), _envelope(layout), verifier)
+        content = read_content(layout.manifest, "manifest", LARGEST_JSON)
+        problems = signature_problems(content, _load_envelope(layout), verifier)
     except InputError as error:
         problems = list(error.problems)
     if problems:
@@ -107,9 +108,9 @@ def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
     return {"signed": True, "signature": f"valid: key {verifier.keyid[:16]} has signed this manifest.json"}
 
 
-def _unchecked(layout: Layout) -> str:
+def _describe_unchecked(layout: Layout) -> str:
     try:
-        envelope = _envelope(layout)
+        envelope = _load_envelope(layout)
         if envelope is None:
             return f"there is none, and {SEAL_ALONE}"
         count = len(read_envelope(envelope).signatures)
@@ -118,7 +119,7 @@ def _unchecked(layout: Layout) -> str:
     return f"{count} not checked: give the signer's public key with --key; {SEAL_ALONE}"
 
 
-def _envelope(layout: Layout) -> bytes | None:
+def _load_envelope(layout: Layout) -> bytes | None:
     path = layout.root / ENVELOPE
     if not path.is_symlink() and not path.exists():
         return None

@@ -37,7 +37,7 @@ MANIFEST = canonical_bytes(
         "format": "musync-manifest/2",
         "run_id": "0123456789abcdef",
         "clips": [{}, {}],
-        "made_by": {"git": {"commit": COMMIT, "changed": False}},
+        "git": {"commit": COMMIT, "changed": False},
     }
 )
 OWNER, OTHER = (
@@ -113,7 +113,8 @@ def test_the_statement_is_one_of_in_toto_and_says_which_run():
         ("manifest.json", {"sha256": sha256_of([MANIFEST])})
     ]
     assert json.loads(state_manifest(MANIFEST))["predicate"] == {
-        "run_id": "0123456789abcdef", "format": "musync-manifest/2", "clips": 2, "git_commit": COMMIT,
+        "run_id": "0123456789abcdef", "format": "musync-manifest/2", "clips": 2,
+        "git": {"commit": COMMIT, "changed": False},
     }  # fmt: skip
 
 
