@@ -1,7 +1,8 @@
 """Logged signals from files: CSV, Parquet, MDF4 and bus JSON, each as its own samples on its own clock."""
 
-import json
-from collections.abc import Iterable
+import io
+import re
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
@@ -13,12 +14,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from catalogs.campaign_files import parse_columns
 from catalogs.channel_maps import ChannelMap
+from catalogs.documents import parse_json, read_content
+from catalogs.sentences import shorten
 from tasks.errors import InputError
 from tasks.recordings.channels import unit_factor
 from tasks.recordings.signals import Signal
 
 SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".json")
+LARGEST_FILE = 2**30
+"""Bytes of a recording [1]: a day of twenty channels at 100 Hz as text."""
 
 
 def recording_files(source: Path, channel_map: ChannelMap) -> tuple[Path, ...]:
@@ -71,22 +77,13 @@ def read_signals(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
         return _read_bus(path, names, channel_map.time.unit if channel_map.time else "s")
     if channel_map.time is None:
         raise InputError(f"{path}: a file without its own clock needs time: {{source: COLUMN}} in the map")
-    columns, units = _read_parquet(path) if suffix == ".parquet" else _read_csv(path, channel_map)
-    wanted = (channel_map.time.source, *names)
-    problems = _missing(path, wanted, columns)
-    arrays: dict[str, NDArray[np.float64]] = {}
-    for name in wanted:
-        if name in columns:
-            try:
-                arrays[name] = np.asarray(columns[name], dtype=np.float64)
-            except (TypeError, ValueError):
-                problems.append(f"{path.name}: signal {name} must be of numbers; it has text in it")
-    if problems:
-        raise InputError(problems)
+    wanted = tuple(dict.fromkeys((channel_map.time.source, *names)))
+    read = _read_parquet if suffix == ".parquet" else _read_csv
+    arrays, units = read(path, wanted, channel_map)
     time = arrays[channel_map.time.source] * unit_factor(channel_map.time.unit, "s")
     usable = np.isfinite(time)
     if channel_map.time.repeats == "keep_first":
-        usable &= np.concatenate(([True], np.diff(time) != 0.0))
+        usable &= np.concatenate(([True], np.diff(time) != 0.0))[: len(time)]
     signals = {}
     for name in names:
         # in tables of several rates a cell is empty where the signal has no sample: not a sample at all
@@ -95,56 +92,74 @@ def read_signals(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
     return signals
 
 
-def _read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowInvalid, OSError) as error:
-        raise InputError(f"{path}: must be a readable Parquet file; {_brief(error)}") from None
-    units = {
-        f.name: f.metadata[b"units"].decode() for f in table.schema if f.metadata and b"units" in f.metadata
-    }
-    return {name: table.column(name).to_numpy() for name in table.column_names}, units
+def _read_parquet(
+    path: Path, wanted: tuple[str, ...], _: ChannelMap
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, str]]:
+    content = read_content(path, "recording", LARGEST_FILE)
+    columns, units = parse_columns(content, path.name, wanted)
+    if problems := _missing(path, wanted, columns, pq.read_schema(pa.BufferReader(content)).names):
+        raise InputError(problems)
+    return columns, units
 
 
-def _read_csv(path: Path, channel_map: ChannelMap) -> tuple[dict[str, Any], dict[str, str]]:
+def _read_csv(
+    path: Path, wanted: tuple[str, ...], channel_map: ChannelMap
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, str]]:
     options = channel_map.csv
     try:
         frame = pd.read_csv(
-            path,
+            io.BytesIO(read_content(path, "recording", LARGEST_FILE)),
             sep=options.separator,
             decimal=options.decimal,
             skiprows=options.skip_rows,
             encoding="utf-8-sig",
         )
-    except ValueError as error:
-        raise InputError(f"{path}: must be a table of text; {_brief(error)}") from None
-    frame.columns = [str(name).strip() for name in frame.columns]
-    return {name: frame[name].to_numpy() for name in frame.columns}, {}
+    except InputError:
+        raise
+    except (ValueError, TypeError, OverflowError, re.error) as error:
+        raise InputError(f"{path}: must be a table of text; {shorten(error)}") from None
+    names = [str(name).strip() for name in frame.columns]
+    problems = _missing(path, wanted, names, names)
+    arrays: dict[str, NDArray[np.float64]] = {}
+    for name in wanted:
+        if names.count(name) > 1:
+            problems.append(
+                f"{path.name}: signal {name} must stand once; {names.count(name)} columns have its name"
+            )
+        elif name in names:
+            try:
+                arrays[name] = np.asarray(frame.iloc[:, names.index(name)], dtype=np.float64)
+            except (TypeError, ValueError):
+                problems.append(f"{path.name}: signal {name} must be of numbers; it has text in it")
+    if problems:
+        raise InputError(problems)
+    return arrays, {}
 
 
 def _read_bus(path: Path, names: tuple[str, ...], time_unit: str) -> dict[str, Signal]:
     """Signals as A2D2 stores its bus: per name a unit and [time, value] pairs."""
-    try:
-        content = json.loads(path.read_text())
-    except ValueError as error:
-        raise InputError(f"{path}: must be JSON; {_brief(error)}") from None
+    content = parse_json(
+        read_content(path, "recording", LARGEST_FILE), path, "recording", large_integers=True
+    )
     if not isinstance(content, dict):
         raise InputError(f"{path}: must be a table of signals, each with values of [time, value]")
-    problems = _missing(path, names, content)
+    problems = _missing(path, names, content, content)
     signals = {}
     for name in names:
         if name not in content:
             continue
         try:
-            pairs = np.asarray(content[name]["values"], dtype=np.float64).reshape(-1, 2)
-        except (KeyError, TypeError, ValueError):
-            problems.append(f"{path.name}: signal {name} must have values of [time, value]")
+            pairs = np.asarray(content[name]["values"], dtype=np.float64)
+            unit = content[name].get("unit") or ""
+        except (KeyError, TypeError, ValueError, OverflowError):
+            pairs, unit = np.empty(0), None
+        if (pairs.size and pairs.shape[1:] != (2,)) or not isinstance(unit, str):
+            problems.append(
+                f"{path.name}: signal {name} must have values of [time, value], and a unit as text"
+            )
             continue
-        signals[name] = Signal(
-            time=pairs[:, 0] * unit_factor(time_unit, "s"),
-            values=pairs[:, 1],
-            unit=content[name].get("unit") or "",
-        )
+        pairs = pairs.reshape(-1, 2)
+        signals[name] = Signal(time=pairs[:, 0] * unit_factor(time_unit, "s"), values=pairs[:, 1], unit=unit)
     if problems:
         raise InputError(problems)
     return signals
@@ -153,28 +168,33 @@ def _read_bus(path: Path, names: tuple[str, ...], time_unit: str) -> dict[str, S
 def _read_mdf(path: Path, names: tuple[str, ...]) -> dict[str, Signal]:
     asammdf = _asammdf()
     try:
-        recording = asammdf.MDF(path)
+        with asammdf.MDF(path) as recording:
+            return _mdf_signals(path, recording, names)
+    except InputError:
+        raise
     except Exception as error:  # whatever a damaged file makes the library raise
-        raise InputError(f"{path}: must be a readable MDF file; {_brief(error)}") from None
-    with recording:
-        problems = _missing(path, names, recording.channels_db)
-        signals = {}
-        for name in names:
-            places = recording.channels_db.get(name, ())
-            if len(places) > 1:
-                problems.append(
-                    f"{path.name}: signal {name} stands in {len(places)} groups; export the group that you mean"
-                )
-            elif places:
-                channel = recording.get(name, group=places[0][0], index=places[0][1])
-                if not np.issubdtype(channel.samples.dtype, np.number) or channel.samples.ndim != 1:
-                    problems.append(f"{path.name}: signal {name} must be of numbers, one a sample")
-                    continue
-                signals[name] = Signal(
-                    time=np.asarray(channel.timestamps, dtype=np.float64),
-                    values=np.asarray(channel.samples, dtype=np.float64),
-                    unit=channel.unit or "",
-                )
+        raise InputError(f"{path}: must be a readable MDF file; {shorten(error)}") from None
+
+
+def _mdf_signals(path: Path, recording: Any, names: tuple[str, ...]) -> dict[str, Signal]:
+    problems = _missing(path, names, recording.channels_db, recording.channels_db)
+    signals = {}
+    for name in names:
+        places = recording.channels_db.get(name, ())
+        if len(places) > 1:
+            problems.append(
+                f"{path.name}: signal {name} stands in {len(places)} groups; export the group that you mean"
+            )
+        elif places:
+            channel = recording.get(name, group=places[0][0], index=places[0][1])
+            if not np.issubdtype(channel.samples.dtype, np.number) or channel.samples.ndim != 1:
+                problems.append(f"{path.name}: signal {name} must be of numbers, one a sample")
+                continue
+            signals[name] = Signal(
+                time=np.asarray(channel.timestamps, dtype=np.float64),
+                values=np.asarray(channel.samples, dtype=np.float64),
+                unit=channel.unit or "",
+            )
     if problems:
         raise InputError(problems)
     return signals
@@ -191,15 +211,12 @@ def _asammdf() -> ModuleType:
     return module
 
 
-def _brief(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
-
-
-def _missing(path: Path, names: tuple[str, ...], there: Iterable[str]) -> list[str]:
-    known = [str(name) for name in there]
+def _missing(path: Path, names: tuple[str, ...], there: Collection[str], known: Iterable[str]) -> list[str]:
+    """A sentence for each name that is not there, with those of the file that come near."""
+    listed = [str(name) for name in known]
     problems = []
     for name in names:
-        if name not in known:
-            near = get_close_matches(name, known, n=3) or known[:12]
-            problems.append(f"{path.name}: signal {name} is missing; there are: {', '.join(near)}")
+        if name not in there:
+            near = get_close_matches(name, listed, n=3) or listed[:12]
+            problems.append(f"{path.name}: signal {name} is missing; there are: {shorten(', '.join(near))}")
     return problems

@@ -1,16 +1,18 @@
 """Reference traces: a folder with cases.json and one Parquet file a case."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from catalogs.campaign_files import parse_columns
+from catalogs.documents import LARGEST_YAML, parse_json, read_content
+from catalogs.names import Name
+from catalogs.physical_limits import limit_problem, load_physical_limits
+from catalogs.sentences import brief, cap_problems, describe_rules
 from tasks.errors import InputError
 from tasks.eval.state_agreement import REFERENCE_COLUMNS, CaseFacts
 from tasks.surface.road_profile import RoadHazard
@@ -19,6 +21,9 @@ from tasks.vehicle.rollout import Controls
 
 AFTER_STOP_S = 12.0
 """How long past the reference's end the model may still roll before it counts as not stopping [s]."""
+
+LARGEST_TRACE = 2**30
+"""Bytes of a trace's Parquet [1]."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Traces = dict[str, NDArray[np.float64]]
@@ -29,9 +34,9 @@ PRESSURE = "brake_pressure"
 class ReferenceCase(BaseModel):
     """The conditions of one reference trace, as cases.json has them; other keys are ignored."""
 
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(extra="ignore", frozen=True, strict=True)
 
-    case: str
+    case: Name
     split: str = "all"
     weather: Literal["dry", "rain", "snow"]
     surface_coefficient: Annotated[float, Field(gt=0, le=2)]
@@ -47,6 +52,24 @@ class ReferenceCase(BaseModel):
     hazard_height_m: Number = 0.0
     hazard_length_m: Number = 0.0
     stopping_distance_m: Number | None = None
+
+    @model_validator(mode="after")
+    def _keeps_physical_limits(self) -> "ReferenceCase":
+        limits = load_physical_limits()
+        bounded = {
+            "initial_speed_km_h": (self.initial_speed_km_h, limits.initial_speed),
+            "peak_pressure_mpa": (self.peak_pressure_mpa or 0.0, limits.peak_pressure),
+            "ramp_s": (self.ramp_s, limits.brake_time),
+            "brake_onset_s": (abs(self.brake_onset_s or 0.0), limits.brake_time),
+            "brake_onset_m": (abs(self.brake_onset_m or 0.0), limits.position),
+            "hazard_center_m": (abs(self.hazard_center_m), limits.position),
+            "hazard_length_m": (self.hazard_length_m, limits.hazard_length),
+            "hazard_height_m": (abs(self.hazard_height_m), limits.hazard_height),
+        }
+        found = [limit_problem(name, value, limit) for name, (value, limit) in bounded.items()]
+        if problems := [problem for problem in found if problem]:
+            raise ValueError("; ".join(problems))
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -110,37 +133,33 @@ def read_reference(folder: Path, split: str | None = None) -> list[tuple[Referen
         Listing every case whose condition or trace is missing or faulty, or the splits that exist.
     """
     path = folder / "cases.json"
-    try:
-        rows = json.loads(path.read_text())
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: no such file; a folder of traces holds cases.json and one Parquet a case"
-        ) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: must be valid JSON; {error}") from None
+    if not path.exists():
+        raise InputError(f"{path}: no such file; a folder of traces holds cases.json and one Parquet a case")
+    rows = parse_json(read_content(path, "list of cases", LARGEST_YAML), path, "list of cases")
     if not isinstance(rows, list) or not rows:
-        raise InputError(f"{path}: must be a list of at least one case; it is {str(rows)[:60]}")
+        raise InputError(f"{path}: must be a list of at least one case; it is {brief(rows)}")
     problems: list[str] = []
     cases = []
     splits: set[str] = set()
+    names: set[str] = set()
     for row in rows:
         try:
             case = ReferenceCase.model_validate(row)
+            if case.case in names:
+                problems.append(f"{path}: case {case.case} must stand once; it stands there again")
+            names.add(case.case)
             splits.add(case.split)
             if split in (None, case.split):
                 cases.append(_with_trace(folder, case))
         except ValidationError as error:
             name = row.get("case", "?") if isinstance(row, dict) else row
-            problems += [
-                f"{path}: case {name}: {'.'.join(map(str, e['loc']))}: {e['msg'].lower()}"
-                for e in error.errors()
-            ]
+            problems += describe_rules(error, f"{path}: case {brief(name)}")
         except InputError as error:
             problems += error.problems
     if not problems and not cases:
         problems.append(f"{path}: no case has the split {split}; there are: {', '.join(sorted(splits))}")
     if problems:
-        raise InputError(problems)
+        raise InputError(cap_problems(problems))
     return cases
 
 
@@ -152,7 +171,8 @@ def trace_file(folder: Path, case: str) -> Path:
     InputError
         If there is none.
     """
-    found = sorted([*folder.glob(f"{case}.parquet"), *folder.glob(f"*/{case}.parquet")])
+    places = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
+    found = [place / f"{case}.parquet" for place in places if (place / f"{case}.parquet").is_file()]
     if not found:
         raise InputError(f"{folder}: case {case} needs {case}.parquet here or one folder down; there is none")
     return found[0]
@@ -161,14 +181,13 @@ def trace_file(folder: Path, case: str) -> Path:
 def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Traces]:
     """A case and its columns; a brake onset that the conditions leave open is read from the trace's pressure."""
     path = trace_file(folder, case.case)
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowInvalid, OSError) as error:
-        raise InputError(f"{path}: a trace must be readable Parquet; {error}") from None
-    missing = [name for name in REFERENCE_COLUMNS if name not in table.column_names]
+    held, _ = parse_columns(
+        read_content(path, "trace", LARGEST_TRACE), str(path), (*REFERENCE_COLUMNS, PRESSURE)
+    )
+    missing = [name for name in REFERENCE_COLUMNS if name not in held]
     if missing:
         raise InputError(f"{path}: a trace needs the columns {', '.join(missing)}; they are missing")
-    columns = {name: table[name].to_numpy().astype(np.float64) for name in REFERENCE_COLUMNS}
+    columns = {name: held[name] for name in REFERENCE_COLUMNS}
     problems = [
         f"{path}: column {name} must hold numbers throughout; {int(np.sum(~np.isfinite(values)))} are not"
         for name, values in columns.items()
@@ -179,16 +198,15 @@ def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Trace
     if problems:
         raise InputError(problems)
     if case.peak_pressure_mpa and case.brake_onset_s is None and case.brake_onset_m is None:
-        case = case.model_copy(update={"brake_onset_s": _onset(path, case.case, table, columns["time"])})
+        case = case.model_copy(update={"brake_onset_s": _onset(path, case.case, held)})
     return case, columns
 
 
-def _onset(path: Path, case: str, table: pa.Table, time: NDArray[np.float64]) -> float:
-    pressure = table[PRESSURE].to_numpy() if PRESSURE in table.column_names else np.zeros(1)
-    braking = np.flatnonzero(pressure > 0)
+def _onset(path: Path, case: str, columns: Traces) -> float:
+    braking = np.flatnonzero(columns.get(PRESSURE, np.zeros(1)) > 0)
     if len(braking) == 0:
         raise InputError(
             f"{path}: case {case} brakes, but neither brake_onset_s nor brake_onset_m says when and no {PRESSURE}"
             " in the trace does: add one of them"
         )
-    return float(time[max(int(braking[0]) - 1, 0)])
+    return float(columns["time"][max(int(braking[0]) - 1, 0)])

@@ -47,7 +47,8 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
 from flows.auditing.verify import verify
-from flows.judging.foreign_sources import read_camera, read_claim, read_footage
+from flows.judging.claims import read_claim
+from flows.judging.foreign_sources import read_camera, read_footage
 from flows.judging.physics import clip_columns, clip_facts, read_constants
 from flows.judging.trajectories import read_trajectory
 from flows.making.plan import read_plan
@@ -100,11 +101,12 @@ def entry(
     *,
     share: float = 1.0,
     reseal: seals.Resealing | None = None,
+    rules: tuple[Rule, ...] = (),
 ) -> Parser:
     """A parser of catalogue files: everything has a unit and nothing is unknown or infinite."""
     return Parser(
         name=name, write=sound.entries(pattern), read=lambda folder: load(folder / "entry.yaml"), share=share,
-        rules=(FINITE, UNITS), known_keys=".*", reseal=reseal,
+        rules=(FINITE, UNITS, *rules), known_keys=".*", reseal=reseal,
     )  # fmt: skip
 
 
@@ -187,7 +189,9 @@ PARSERS: tuple[Parser, ...] = (
     entry("street", "scenes/street.yaml", load_street_layout, share=2),
     entry("effects library", "effects/library.yaml", load_effects, share=0.5),
     entry("truths", "effects/truths.yaml", lambda path: (load_truths(path), load_sizes(path)), share=1),
-    entry("channel map", "channel_maps/*.yaml", load_channel_map, share=3),
+    entry(
+        "channel map", "channel_maps/*.yaml", load_channel_map, share=3, rules=(files_inside(r"runs\|\d+\|file"),),
+    ),
     Parser(
         name="weather", write=sound.weather, read=load_weather, share=1, rules=(FINITE,), known_keys=".*",
     ),
@@ -195,7 +199,6 @@ PARSERS: tuple[Parser, ...] = (
         name="learned judges", share=1, known_keys=".*", read=lambda folder: load_judges(folder / "judges.yaml"),
         write=sound.texts({"judges.yaml": "clip: {checkpoint: a.pt, text_features: b.npy, source: c}\n"
                                           "dover: {checkpoint: dover.pt, source: d}\n"}),
-        rules=(files_inside(r".*\|(checkpoint|text_features)"),),
     ),
     Parser(
         name="manifest", write=sound.dataset, targets=(r"manifest\.json",), read=read_dataset, share=4,

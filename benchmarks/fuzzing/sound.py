@@ -4,8 +4,10 @@ import csv
 import io
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import cv2
 import gaussforge
@@ -17,13 +19,11 @@ import yaml
 import catalogs
 from catalogs.scenes.folder import write_scene
 from catalogs.scenes.gaussian_files import write_gaussians
-from flows.making.clip import make_clip
-from flows.making.generate import generate, prepare
-from flows.making.plan import read_plan
-from flows.store.layout import Layout
+from flows.making import generate as making
 from manifests.frozen_run import sealed
 from tasks.closure.campaign import CHANNELS
 from tasks.conventions import SemanticClass
+from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene
@@ -134,15 +134,13 @@ def scene_folders(folder: Path) -> None:
 
 def dataset(folder: Path) -> None:
     """A finished dataset without pictures."""
-    generate(str(_grid_beside(folder)), str(folder / "0"), runner="threads", workers=1)
+    making.generate(str(_grid_beside(folder)), str(folder / "0"), runner="threads", workers=1)
 
 
 def unfinished_dataset(folder: Path) -> None:
     """A dataset whose clips are made and not sealed."""
-    layout = Layout(folder / "0")
-    prepare(str(_grid_beside(folder)), layout, "cpu")
-    for clip in read_plan(layout.root).clips:
-        make_clip(layout, clip.index)
+    with patch.object(making, "seal", side_effect=InputError("stopped")), suppress(InputError):
+        making.generate(str(_grid_beside(folder)), str(folder / "0"), runner="threads", workers=1)
 
 
 def _grid_beside(folder: Path) -> Path:

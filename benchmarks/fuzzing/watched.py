@@ -1,6 +1,7 @@
 """Inputs read by processes that are watched: a hang, a crash or a process that grows is counted and ends nothing."""
 
 import contextlib
+import io
 import os
 import resource
 import shutil
@@ -99,7 +100,8 @@ def lay_out(files: dict[str, bytes], folder: Path) -> None:
 def prepare(parsers: Sequence[Parser], shelf: Path) -> None:
     """Write the sound documents of the parsers, a folder each, and see that their loaders take them."""
     for parser in parsers:
-        parser.write(shelf / parser.name)
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            parser.write(shelf / parser.name)
         for document in sorted((shelf / parser.name).iterdir()):
             with tempfile.TemporaryDirectory() as place:
                 copy = shutil.copytree(document, Path(place) / document.name)

@@ -1,16 +1,24 @@
 """A folder with a posed stereo sequence: calib.txt, poses.txt, image_l/*.png and image_r/*.png."""
 
+import struct
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.documents import read_content
+from catalogs.sentences import cap_problems, shorten
 from tasks.errors import InputError
 from tasks.scene.stereo.sequence import StereoSequence
 
 SMALLEST_SEQUENCE = 3
 """Two neighbours check a picture's depth; with fewer pictures nothing can be checked."""
+LARGEST_PICTURE, MOST_PIXELS = 2**28, 10**8
+"""Bytes and pixels of a picture [1]."""
+LARGEST_NUMBER = 1e8
+"""Greatest number of a pose [m] or of a projection matrix [px]."""
+PNG = b"\x89PNG\r\n\x1a\n"
 ROTATION_TOLERANCE = 1e-3
 """How far a pose's matrix may be from a rotation [1]."""
 
@@ -66,7 +74,7 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
         sizes = ", ".join(sorted(f"{w} x {h}" for h, w, _ in shapes))
         problems.append(f"{folder}: all pictures must have one size; there are {sizes}")
     if problems or calibration is None or poses is None:
-        raise InputError(problems)
+        raise InputError(cap_problems(problems))
 
     T = np.tile(np.eye(4), (len(poses), 1, 1))
     T[:, :3] = poses
@@ -85,8 +93,9 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
 def _rows(path: Path, problems: list[str]) -> NDArray[np.float64] | None:
     """3x4 matrices of a text file, one per row; None, and a problem, where there is none to be had."""
     try:
-        lines = [line for line in path.read_text().splitlines() if line.strip()]
-    except (OSError, UnicodeDecodeError):
+        content = read_content(path, "table of matrices", LARGEST_PICTURE).decode()
+        lines = [line for line in content.splitlines() if line.strip()]
+    except (InputError, UnicodeDecodeError):
         problems.append(f"{path}: must be a text file with twelve numbers per row; it cannot be read")
         return None
     rows = []
@@ -97,8 +106,10 @@ def _rows(path: Path, problems: list[str]) -> NDArray[np.float64] | None:
             values = [float(word) for word in words]
         except ValueError:
             values = []
-        if len(values) != 12 or not np.isfinite(values).all():
-            problems.append(f"{path}: every row must be twelve finite numbers; row {number} is {line[:60]!r}")
+        if len(values) != 12 or not (np.abs(values) <= LARGEST_NUMBER).all():
+            problems.append(
+                f"{path}: every row must be twelve finite numbers; row {number} is {shorten(line, 60)!r}"
+            )
         else:
             rows.append(np.reshape(values, (3, 4)))
     if not lines:
@@ -144,9 +155,32 @@ def _pictures(folder: Path, problems: list[str]) -> dict[str, NDArray[np.uint8]]
         problems.append(f"{folder}: must hold .png pictures; there are none")
     pictures = {}
     for path in names:
-        picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
-        if picture is None:
-            problems.append(f"{path}: must be a picture; it cannot be decoded")
-        else:
-            pictures[path.name] = np.ascontiguousarray(picture[..., ::-1])
+        picture = _picture(path, problems)
+        if picture is not None:
+            pictures[path.name] = picture
     return pictures
+
+
+def _picture(path: Path, problems: list[str]) -> NDArray[np.uint8] | None:
+    """An RGB picture [H, W, 3]; None, and a problem, where there is none, or one of no camera's size."""
+    try:
+        content = read_content(path, "picture", LARGEST_PICTURE)
+    except InputError as error:
+        problems += error.problems
+        return None
+    # a PNG says its size before a byte of it is decoded
+    width, height = struct.unpack(">II", content[16:24]) if content[12:16] == b"IHDR" else (0, 0)
+    if not (content.startswith(PNG) and 0 < width * height <= MOST_PIXELS):
+        problems.append(
+            f"{path}: must be a PNG of 1 to {MOST_PIXELS} pixels; it cannot be decoded: it is no PNG, or of"
+            f" {width} x {height} pixels"
+        )
+        return None
+    try:
+        picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:
+        picture = None
+    if picture is None:
+        problems.append(f"{path}: must be a picture; it cannot be decoded")
+        return None
+    return np.ascontiguousarray(picture[..., ::-1], np.uint8)

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.gates import load_foreign_gates
-from flows.judging.foreign_sources import read_camera, read_claim, read_footage
+from flows.judging.claims import read_claim
+from flows.judging.foreign_sources import read_camera, read_footage
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.eval.foreign_video import claim_at, judge_motion

@@ -1,4 +1,4 @@
-"""What a judge of foreign videos is given: footage, the claim and the camera, from files it did not make."""
+"""What a judge of foreign videos is given: footage and its camera, from files it did not make."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,14 +6,12 @@ from typing import Any
 
 import cv2
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-import yaml
 from numpy.typing import NDArray
 
+from catalogs.documents import read_yaml
+from catalogs.sentences import brief
 from flows.judging.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim
 from tasks.eval.motion import RecoveredMotion
 from tasks.eval.outside_trajectory import motion_from_trajectory
 from tasks.eval.pose_essential import recover_motion_essential
@@ -22,6 +20,8 @@ from tasks.eval.undistort import COEFFICIENTS, undistorted
 MOST_FRAMES, LEAST_FRAMES = 3000, 5
 MOST_PIXELS = 960 * 540
 """Size that frames are judged at; larger ones are reduced by area, so that the longest video fills 5 GB."""
+LARGEST_CAMERA = 1e6
+"""Greatest number of a camera's file [px, m or 1]."""
 CHUNK = 64
 """Frames that are undistorted at once."""
 LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -181,50 +181,6 @@ def _judged_size(width: int, height: int) -> tuple[int, int]:
     return int(scale * width), int(scale * height)
 
 
-def read_claim(path: Path) -> VideoClaim:
-    """Claimed pitch and station over time.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or lacks or repeats what is needed.
-    """
-    try:
-        table = pq.read_table(path, partitioning=None)
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: the claim must be a Parquet file; {str(error).splitlines()[0]}") from None
-    names = set(table.column_names)
-    problems = []
-    if not names & {"t_ns", "time"}:
-        problems.append(f"{path}: the claim lacks a column t_ns or time; it has {', '.join(sorted(names))}.")
-    if "pitch" not in names:
-        problems.append(f"{path}: the claim lacks the column pitch [rad].")
-    if not names & {"station", "speed"}:
-        problems.append(f"{path}: the claim lacks a column station [m] or speed [m/s].")
-    if "clip_id" in names and len(table["clip_id"].unique()) > 1:
-        problems.append(
-            f"{path}: the claim holds {len(table['clip_id'].unique())} clips; give one clip's rows."
-        )
-    if problems:
-        raise InputError(problems)
-
-    def column(name: str) -> NDArray[np.float64]:
-        return np.asarray(table[name].to_numpy(), np.float64)
-
-    time = column("t_ns") * 1e-9 if "t_ns" in names else column("time")
-    if len(time) < 2 or not (np.diff(time) > 0).all():
-        raise InputError(f"{path}: the claim's time must rise from row to row, over two rows at least.")
-    if "station" in names:
-        station = column("station")
-    else:
-        speed = column("speed")
-        station = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
-    told = VideoClaim(time=time - time[0], pitch=column("pitch"), station=station)
-    if not (np.isfinite(told.pitch).all() and np.isfinite(told.station).all()):
-        raise InputError(f"{path}: the claim's pitch and station must be finite throughout.")
-    return told
-
-
 def read_camera(path: Path) -> ForeignCamera:
     """The camera of a video from YAML: focal_length or fx, fy, cx, cy; width and height; mount and distortion.
 
@@ -233,31 +189,26 @@ def read_camera(path: Path) -> ForeignCamera:
     InputError
         If the file cannot be read or lacks a number.
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(
-            f"{path}: the camera must be readable YAML; {' '.join(str(error).split())}"
-        ) from None
-    if not isinstance(content, dict):
-        raise InputError(
-            f"{path}: the camera must be a table of width, height and focal_length or fx, fy, cx, cy."
-        )
+    content = read_yaml(path, "camera")
     numbers: dict[str, Any] = {k: v.get("value") if isinstance(v, dict) else v for k, v in content.items()}
-    if "focal_length" in numbers and {"width", "height"} <= numbers.keys():
+    if "focal_length" in numbers and _is_number(numbers.get("width")) and _is_number(numbers.get("height")):
         f = numbers["focal_length"]
-        half = {k: v / 2 - 0.5 if isinstance(v, (int, float)) else v for k, v in numbers.items()}
-        numbers = {"fx": f, "fy": f, "cx": half["width"], "cy": half["height"]} | numbers
+        centre = {"cx": numbers["width"] / 2 - 0.5, "cy": numbers["height"] / 2 - 0.5}
+        numbers = {"fx": f, "fy": f} | centre | numbers
     wrong = [
-        f"{path}: the camera's {key} must be a number above 0; it is {numbers.get(key)}."
-        for key in ("width", "height", "fx", "fy", "cx", "cy")
-        if not isinstance(numbers.get(key), (int, float)) or not numbers[key] > 0
+        f"{path}: the camera's {key} must be a number of {least} to {LARGEST_CAMERA:g};"
+        f" it is {brief(numbers.get(key))}."
+        for key, least in (("width", 1), ("height", 1), ("fx", 1e-3), ("fy", 1e-3), ("cx", 0.0), ("cy", 0.0))
+        if not _is_number(numbers.get(key), least)
     ]
     bends = {key: numbers.get(key) or 0.0 for key in COEFFICIENTS}
+    places = {
+        key: numbers.get(key) or 0.0 for key in ("behind_front_axle", "left_of_centre", "height_above_road")
+    }
     wrong += [
-        f"{path}: the camera's {key} must be a finite number; it is {value}."
-        for key, value in bends.items()
-        if not isinstance(value, (int, float)) or not np.isfinite(value)
+        f"{path}: the camera's {key} must be a number within +-{LARGEST_CAMERA:g}; it is {brief(value)}."
+        for key, value in (bends | places).items()
+        if not _is_number(value, -LARGEST_CAMERA)
     ]
     if wrong:
         raise InputError(wrong)
@@ -265,12 +216,16 @@ def read_camera(path: Path) -> ForeignCamera:
         [[numbers["fx"], 0, numbers["cx"]], [0, numbers["fy"], numbers["cy"]], [0, 0, 1]], np.float64
     )
     mount = LEVEL.copy()
-    mount[:3, 3] = [-float(numbers.get("behind_front_axle") or 0), float(numbers.get("left_of_centre") or 0),
-                    float(numbers.get("height_above_road") or 0)]  # fmt: skip
+    mount[:3, 3] = -places["behind_front_axle"], places["left_of_centre"], places["height_above_road"]
     distortion = np.array(list(bends.values()), np.float64) if any(bends.values()) else None
     return ForeignCamera(
         K=K, width=int(numbers["width"]), height=int(numbers["height"]), mount=mount, distortion=distortion
     )
+
+
+def _is_number(value: Any, least: float = 0.0) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and bool(least <= value <= LARGEST_CAMERA)
 
 
 def intrinsics_at(camera: ForeignCamera, width: int, height: int) -> NDArray[np.float64]:

@@ -6,10 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from catalogs.documents import read_content
+from catalogs.sentences import cap_problems, shorten
 from tasks.errors import InputError
 
 SUFFIXES = (".txt", ".tum")
 """Of files that are read as trajectories."""
+LARGEST_FILE = 2**28
+"""Bytes of a trajectory [1]: a day of poses at 30 Hz."""
+FARTHEST = 1e8
+"""Greatest coordinate [unit of the file]: more than ten times the radius of the Earth in metres."""
 COLUMNS = "time tx ty tz qx qy qz qw"
 
 
@@ -22,9 +28,9 @@ def read_trajectory(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64
         If the file cannot be read, a line has not eight numbers, times do not rise or a rotation is none.
     """
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: the trajectory must be a readable text file; {error}") from None
+        lines = read_content(path, "trajectory", LARGEST_FILE).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: a trajectory must be a text file in UTF-8; it is not") from None
     rows, problems = [], []
     for number, line in enumerate(lines, start=1):
         words = line.replace(",", " ").split("#")[0].split()
@@ -34,8 +40,11 @@ def read_trajectory(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64
             values = [float(word) for word in words]
         except ValueError:
             values = []
-        if len(values) != 8 or not np.isfinite(values).all():
-            problems.append(f"{path}: line {number} must hold eight numbers, {COLUMNS}; it is {line[:60]!r}")
+        if len(values) != 8 or not np.isfinite(values).all() or np.abs(values[1:4]).max() > FARTHEST:
+            problems.append(
+                f"{path}: line {number} must hold eight numbers, {COLUMNS}, lengths up to"
+                f" {FARTHEST:g}; it is {shorten(line, 60)!r}"
+            )
         elif abs(np.linalg.norm(values[4:]) - 1.0) > 0.01:
             problems.append(f"{path}: line {number}: the quaternion's length must be 1; give qx qy qz qw")
         else:
@@ -46,7 +55,7 @@ def read_trajectory(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64
     if not problems and not (np.diff(table[:, 0]) > 0).all():
         problems.append(f"{path}: the times must rise from line to line")
     if problems:
-        raise InputError(problems)
+        raise InputError(cap_problems(problems))
     poses = np.tile(np.eye(4), (len(table), 1, 1))
     poses[:, :3, :3] = Rotation.from_quat(table[:, 4:]).as_matrix()
     poses[:, :3, 3] = table[:, 1:4]

@@ -101,7 +101,7 @@ def with_nan(values):
         (lambda f: spoil(f, slip_rr=None), "needs the columns slip_rr"),
         (lambda f: spoil(f, pitch=with_nan), "pitch must hold numbers throughout; 1 are not"),
         (lambda f: spoil(f, time=lambda t: t[::-1].copy()), "time must hold at least two ascending times"),
-        (lambda f: (f / "development" / "wet.parquet").write_text("no"), "must be readable Parquet"),
+        (lambda f: (f / "development" / "wet.parquet").write_text("no"), "must be a Parquet file of numbers"),
         (lambda f: (f / "cases.json").write_text("{}"), "must be a list of at least one case"),
         (lambda f: (f / "cases.json").unlink(), "no such file"),
     ],

@@ -273,9 +273,9 @@ def test_the_measured_sets_come_in_through_their_maps(tmp_path: Path, outside_da
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("log.parquet", "must be a readable Parquet file"),
+        ("log.parquet", "must be a Parquet file of numbers"),
         ("log.mf4", "must be a readable MDF file"),
-        ("log.json", "must be JSON"),
+        ("log.json", "must be valid JSON"),
         ("log.xlsx", "measurements must be of .csv"),
     ],
 )
