@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from catalogs.channel_maps import HIGHEST_RATE
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.names import name_problem
 from catalogs.quantities import Text
@@ -36,7 +37,7 @@ class CampaignHeader(BaseModel):
 
     campaign: Text
     vehicle: Text
-    sample_rate_hz: Annotated[float, Field(strict=True, gt=0, le=1_000_000)]
+    sample_rate_hz: Annotated[float, Field(strict=True, gt=0, le=HIGHEST_RATE)]
 
 
 def read_header_bytes(folder: Path) -> tuple[bytes, bytes]:

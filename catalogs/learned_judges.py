@@ -8,6 +8,8 @@
 `text_features` is float [3, D]: the mean features of the paper's prompts (Appendix D) for dry, rain and snow.
 """
 
+import os
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.quantities import CatalogueEntry, Text, read_entry
+from catalogs.sentences import shorten
 from tasks.errors import InputError
 
 JUDGES = ("clip", "dover", "fast_vqa", "lpips")
@@ -90,27 +93,35 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
 
 
 def _load(path: Path, entry: Checkpoint) -> LoadedJudge:
-    import torch
+    try:
+        import torch
+    except ImportError:
+        raise InputError("a learned judge needs the package torch: install it") from None
 
     needed = [entry.checkpoint, *([entry.text_features] if isinstance(entry, ClipCheckpoint) else [])]
     for name in needed:
-        if not (path.parent / name).is_file():
+        if not os.path.isfile(path.parent / name):
             return _missing(f"not run: checkpoint missing: {name}")
     try:
         network = torch.jit.load(path.parent / entry.checkpoint, map_location="cpu").eval()
-    except (RuntimeError, ValueError) as error:
+    except (RuntimeError, ValueError, OSError, EOFError) as error:
         raise InputError(
-            f"{entry.checkpoint} must be a TorchScript module; {str(error).splitlines()[0]}"
+            f"{shorten(entry.checkpoint)} must be a TorchScript module; {shorten(error)}"
         ) from None
     features = None
     if isinstance(entry, ClipCheckpoint):
         try:
             features = np.load(path.parent / entry.text_features, allow_pickle=False)
-        except ValueError as error:
-            raise InputError(f"{entry.text_features} must be a NumPy array; {error}") from None
+        except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+            raise InputError(
+                f"{shorten(entry.text_features)} must be a NumPy array; {shorten(error)}"
+            ) from None
+        if not isinstance(features, np.ndarray) or not np.issubdtype(features.dtype, np.floating):
+            raise InputError(f"{shorten(entry.text_features)} must be one array of floats; it is not")
         if features.ndim != 2 or len(features) != 3 or not np.isfinite(features).all():
             raise InputError(
-                f"{entry.text_features} must hold finite features [3, D] of dry, rain and snow; it is {features.shape}"
+                f"{shorten(entry.text_features)} must hold finite features [3, D] of dry, rain and snow; it is"
+                f" {features.shape}"
             )
     return LoadedJudge(network=network, text_features=features, note=entry.source)
 

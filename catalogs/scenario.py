@@ -103,11 +103,21 @@ def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list
         )
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
-    limited = _limited(s, given, load_physical_limits())
-    return problems + [problem for one in limited if (problem := limit_problem(*one)) is not None]
+    return problems + limit_problems(s)
 
 
-def _limited(s: Scenario, given: dict[str, float], limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
+def limit_problems(scenario: Scenario) -> list[str]:
+    """Every physical limit that the scenario exceeds, each as one sentence.
+
+    Parameters
+    ----------
+    scenario : its controls
+    """
+    limited = _limited(scenario, load_physical_limits())
+    return [problem for one in limited if (problem := limit_problem(*one)) is not None]
+
+
+def _limited(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
     """Each number with its name and its limit."""
     by_name = {
         "snow_accumulation_h": limits.snow_accumulation,
@@ -122,7 +132,9 @@ def _limited(s: Scenario, given: dict[str, float], limits: PhysicalLimits) -> li
         ("precipitation_mm_h", s.precipitation_mm_h, rate),
         ("the size of hazard_height_m", abs(s.hazard_height_m), limits.hazard_height),
     ]
-    limited += [(name, given[name], limit) for name, limit in by_name.items() if name in given]
+    limited += [
+        (name, value, limit) for name, limit in by_name.items() if (value := getattr(s, name)) is not None
+    ]
     if s.weather == "snow" and not any(limit_problem(*one) for one in limited):
         fallen = s.precipitation_mm_h * s.snow_accumulation_h
         limited.append(("precipitation_mm_h times snow_accumulation_h", fallen, limits.snow_water_equivalent))

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, Text, checked, read_entry
@@ -64,6 +64,11 @@ class SignalEntry(CatalogueEntry):
         if channel not in CHANNELS_BY_NAME:
             raise ValueError(f"no such channel; there are: {', '.join(CHANNELS_BY_NAME)}; it is {channel}")
         return channel
+
+    @model_validator(mode="after")
+    def _unit_is_of_the_channel(self) -> "SignalEntry":
+        unit_factor(self.unit, CHANNELS_BY_NAME[self.channel].unit)
+        return self
 
 
 class BusEntry(CatalogueEntry):

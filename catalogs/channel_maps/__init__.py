@@ -1,18 +1,26 @@
 """Channel maps: how a logger's signals become the channels and runs of a campaign."""
 
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
 
+from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Number, Text, read_entry
+from catalogs.names import LONGEST_NAME
+from catalogs.quantities import CatalogueEntry, Number, Text
+from catalogs.sentences import brief, cap_problems, describe_rules, shorten
 from tasks.errors import InputError
 from tasks.recordings.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
 from tasks.recordings.signals import ChannelRule, Gain
 
 FOLDER = Path(__file__).parent
+HIGHEST_RATE = 1_000_000.0
+"""Of a campaign [Hz]: a thousand times what a vehicle's bus gives."""
 Part = Literal["train", "held_out"]
+Kept = TypeVar("Kept")
+Entry = TypeVar("Entry", bound=CatalogueEntry)
 Sigma = Annotated[float, Field(strict=True, gt=0)]
 
 
@@ -55,6 +63,13 @@ class TimeEntry(CatalogueEntry):
     unit: Text = "s"
     repeats: Literal["refuse", "keep_first"] = "refuse"
 
+    @field_validator("unit")
+    @classmethod
+    def _is_of_time(cls, unit: str) -> str:
+        if UNITS.get(unit, ("", 0.0))[0] != "time":
+            raise ValueError(f"time unit must be one of s, ms, us, ns; it is {unit}")
+        return unit
+
 
 class Conditions(CatalogueEntry):
     """What the logger does not know of a run; the columns of runs.csv."""
@@ -69,15 +84,28 @@ class Conditions(CatalogueEntry):
     hazard_height_m: Number = 0.0
 
 
+def _check_inside(file: str) -> str:
+    path = PurePosixPath(file)
+    if path.is_absolute() or ".." in path.parts or not path.name or not file.isprintable():
+        raise ValueError(f"must be a file in the folder of the measurements; it is {brief(file)}")
+    return file
+
+
 class RunEntry(CatalogueEntry):
     """One run: a stretch of one file in the logger's time, with what differs from the common conditions."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
-    file: Text
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=LONGEST_NAME)]
+    file: Annotated[Text, AfterValidator(_check_inside)]
     from_s: Number | None = None
     to_s: Number | None = None
     part: Part = "train"
     conditions: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("conditions")
+    @classmethod
+    def _are_conditions(cls, conditions: dict[str, Any]) -> dict[str, Any]:
+        Conditions.model_validate(conditions)
+        return conditions
 
 
 class SegmentEntry(CatalogueEntry):
@@ -127,11 +155,11 @@ class ChannelMap(CatalogueEntry):
     campaign: Text
     vehicle: Text
     source: Text
-    sample_rate_hz: Annotated[float, Field(strict=True, gt=0)]
+    sample_rate_hz: Annotated[float, Field(strict=True, gt=0, le=HIGHEST_RATE)]
     time: TimeEntry | None = None
     csv: CsvEntry = CsvEntry()
     channels: dict[str, ChannelEntry]
-    not_measured: tuple[str, ...] = ()
+    not_measured: Annotated[tuple[str, ...], Field(validate_default=True)] = ()
     conditions: Conditions = Conditions()
     runs: tuple[RunEntry, ...] = ()
     segment: SegmentEntry | None = None
@@ -147,38 +175,73 @@ class ChannelMap(CatalogueEntry):
         """The common conditions with the run's own laid over them."""
         return Conditions.model_validate(self.conditions.model_dump() | run.conditions)
 
-    @model_validator(mode="after")
-    def _keeps_its_rules(self) -> "ChannelMap":
-        problems = []
-        for name in (*self.channels, *self.not_measured):
-            if name not in CHANNELS_BY_NAME:
-                problems.append(f"channel {name}: no such channel; there are: {', '.join(CHANNELS_BY_NAME)}")
-        for name, entry in self.channels.items():
+    @field_validator("channels")
+    @classmethod
+    def _channels_exist_in_their_unit(cls, channels: dict[str, ChannelEntry]) -> dict[str, ChannelEntry]:
+        problems = _unknown_channels(channels)
+        for name, entry in channels.items():
             if name in CHANNELS_BY_NAME:
                 try:
                     _ = entry.rule(name).factor
                 except InputError as error:
                     problems += [f"channel {name}: {problem}" for problem in error.problems]
-        for channel in MAIN_CHANNELS:
-            if (channel.name in self.channels) == (channel.name in self.not_measured):
-                problems.append(
-                    f"channel {channel.name} must stand either in channels or in not_measured: the map must say"
-                    " where it is or that there is none"
-                )
-        if self.time is not None and UNITS.get(self.time.unit, ("", 0.0))[0] != "time":
-            problems.append(f"time unit must be one of s, ms, us, ns; it is {self.time.unit}")
-        if self.runs and self.segment is not None:
-            problems.append("a map has either runs or segment; this one has both")
-        names = [run.name for run in self.runs]
-        problems += [f"run {name} stands twice" for name in sorted({n for n in names if names.count(n) > 1})]
-        for run in self.runs:
-            try:
-                self.conditions_of(run)
-            except ValueError as error:
-                problems.append(f"run {run.name}: conditions: {' '.join(str(error).split())[:200]}")
-        if problems:
-            raise ValueError("; ".join(problems))
-        return self
+        return _refused(channels, problems)
+
+    @field_validator("not_measured")
+    @classmethod
+    def _every_main_channel_has_its_place(
+        cls, names: tuple[str, ...], info: ValidationInfo
+    ) -> tuple[str, ...]:
+        problems = _unknown_channels(names)
+        if "channels" in info.data:
+            problems += [
+                f"channel {channel.name} must stand either in channels or in not_measured: the map must say where it"
+                " is or that there is none"
+                for channel in MAIN_CHANNELS
+                if (channel.name in info.data["channels"]) == (channel.name in names)
+            ]
+        return _refused(names, problems)
+
+    @field_validator("runs")
+    @classmethod
+    def _runs_stand_once(cls, runs: tuple[RunEntry, ...]) -> tuple[RunEntry, ...]:
+        names = [run.name for run in runs]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        return _refused(runs, [f"run {name} stands twice" for name in twice])
+
+    @field_validator("segment")
+    @classmethod
+    def _is_in_place_of_runs(cls, segment: SegmentEntry | None, info: ValidationInfo) -> SegmentEntry | None:
+        both = segment is not None and bool(info.data.get("runs"))
+        return _refused(segment, ["a map has either runs or segment; this one has both"] if both else [])
+
+
+class FaultyMap(InputError):
+    """A channel map that breaks rules.
+
+    Parameters
+    ----------
+    problems : one sentence each
+    readable : what it says of signals, so that these can be looked up in the recordings all the same; None if nothing
+    """
+
+    def __init__(self, problems: list[str], readable: ChannelMap | None):
+        super().__init__(problems)
+        self.readable = readable
+
+
+def _unknown_channels(names: Iterable[str]) -> list[str]:
+    return [
+        f"channel {shorten(name, 60)}: no such channel; there are: {', '.join(CHANNELS_BY_NAME)}"
+        for name in names
+        if name not in CHANNELS_BY_NAME
+    ]
+
+
+def _refused(value: Kept, problems: list[str]) -> Kept:
+    if problems:
+        raise ValueError("; ".join(problems))
+    return value
 
 
 def load_channel_map(name_or_path: str | Path) -> tuple[ChannelMap, Path]:
@@ -187,7 +250,36 @@ def load_channel_map(name_or_path: str | Path) -> tuple[ChannelMap, Path]:
     Raises
     ------
     InputError
-        Listing every problem of the file, or the maps that exist.
+        If there is no such map, or it is no YAML; the sentence lists the maps that exist.
+    FaultyMap
+        Listing every problem of the file.
     """
     path = find_entry(FOLDER, name_or_path, "channel map")
-    return read_entry(ChannelMap, path, "channel map"), path
+    content = read_yaml(path, "channel map", finite=False)
+    try:
+        return ChannelMap.model_validate(content), path
+    except ValidationError as error:
+        raise FaultyMap(cap_problems(describe_rules(error, path)), _readable_part(content)) from None
+
+
+def _readable_part(content: dict[str, Any]) -> ChannelMap | None:
+    """The signals, the clock, the runs and the form of text files, where they can be read by themselves."""
+    named = content.get("channels")
+    channels = {
+        name: entry
+        for name, given in (named if isinstance(named, dict) else {}).items()
+        if (entry := _part(ChannelEntry, given)) is not None
+    }
+    time, csv = _part(TimeEntry, content.get("time")), _part(CsvEntry, content.get("csv", {}))
+    listed = content.get("runs", [])
+    runs = [_part(RunEntry, given) for given in listed] if isinstance(listed, list) else [None]
+    if not channels or csv is None or None in runs or (time is None and "time" in content):
+        return None
+    return ChannelMap.model_construct(channels=channels, time=time, csv=csv, runs=tuple(runs))
+
+
+def _part(model: type[Entry], content: object) -> Entry | None:
+    try:
+        return model.model_validate(content)
+    except ValidationError:
+        return None

@@ -1,6 +1,7 @@
 """Known truths that close-loop is tried on: library effects at sizes that matter, and forms outside any library."""
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated
 
@@ -71,6 +72,11 @@ class OutsideEntry(CatalogueEntry):
         return self
 
 
+@cache
+def _library_names() -> dict[str, set[str]]:
+    return {effect.name: {p.name for p in effect.parameters} for effect in load_effects()}
+
+
 class TruthFile(CatalogueEntry):
     """What the file must hold."""
 
@@ -81,7 +87,7 @@ class TruthFile(CatalogueEntry):
     @field_validator("library", "sizes")
     @classmethod
     def _effects_exist(cls, named: dict[str, dict[str, object]]) -> dict[str, dict[str, object]]:
-        effects = {effect.name: {p.name for p in effect.parameters} for effect in load_effects()}
+        effects = _library_names()
         problems = []
         for name, values in named.items():
             if name not in effects:

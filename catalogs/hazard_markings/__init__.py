@@ -3,13 +3,22 @@
 from pathlib import Path
 from typing import Annotated
 
+from pydantic import AfterValidator
+
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
 from tasks.render.road_paint import HazardMarking
 
 FOLDER = Path(__file__).parent
 
-Reflectance = Annotated[Table, checked("1", minimum=0, maximum=1)]
+
+def _check_colour(table: Table) -> Table:
+    if len(table.value) != 3:
+        raise ValueError(f"must be red, green and blue; it has {len(table.value)} values")
+    return table
+
+
+Reflectance = Annotated[Table, checked("1", minimum=0, maximum=1), AfterValidator(_check_colour)]
 
 
 class MarkingEntry(CatalogueEntry):

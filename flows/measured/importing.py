@@ -11,8 +11,11 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
-from catalogs.channel_maps import ChannelMap, Conditions, SegmentEntry, load_channel_map
+from catalogs.campaign_files import MOST_SAMPLES
+from catalogs.channel_maps import ChannelMap, Conditions, FaultyMap, SegmentEntry, load_channel_map
+from catalogs.names import name_problem
 from catalogs.recordings import read_signals, recording_files
+from catalogs.sentences import shorten
 from flows.store.layout import write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
@@ -58,9 +61,14 @@ def import_measurements(source: str, *, map: str, out: str) -> dict[str, Any]:
         raise InputError(
             f"{folder}: a campaign is made in a new or empty folder; this one holds other things"
         )
-    channel_map, map_file = load_channel_map(map)
+    try:
+        channel_map, map_file = load_channel_map(map)
+    except FaultyMap as faults:
+        raise InputError([*faults.problems, *_signal_problems(Path(source), faults.readable)]) from None
     recordings = _read_all(recording_files(Path(source), channel_map), channel_map)
     planned = planned_runs(channel_map, recordings)
+    if problems := _plan_problems(planned, recordings, channel_map.sample_rate_hz):
+        raise InputError(problems)
     made = [
         (
             run,
@@ -179,6 +187,42 @@ def run_table(columns: dict[str, np.ndarray], rate: float) -> pa.Table:
     ]
     arrays = [pa.array(np.arange(count) / rate)] + [pa.array(values) for values in columns.values()]
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+
+
+def _plan_problems(
+    planned: list[PlannedRun], recordings: dict[Path, dict[str, Signal]], rate: float
+) -> list[str]:
+    """Runs whose name is no file name or not their own, and runs of more samples than a campaign may hold."""
+    names = [run.name for run in planned]
+    problems = [
+        f"run {shorten(name)} stands twice: rename a file, or list the map's runs"
+        for name in sorted({name for name in names if names.count(name) > 1})
+    ]
+    for run in planned:
+        if problem := name_problem(run.name):
+            problems.append(f"{shorten(run.file)}: a run takes the file's name, which must {problem}")
+        shared = [
+            np.clip(signal.time[[0, -1]], run.start, run.end)
+            for signal in recordings[run.file].values()
+            if len(signal.time)
+        ]
+        count = min((float(end - start) for start, end in shared), default=0.0) * rate
+        if count > MOST_SAMPLES:
+            problems.append(
+                f"run {shorten(run.name)} must have at most {MOST_SAMPLES} samples; at {rate:g} Hz it has {count:.3g}"
+            )
+    return problems
+
+
+def _signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
+    """What is wrong with the signals that a faulty map names, as far as it can be read."""
+    if channel_map is None:
+        return []
+    try:
+        _read_all(recording_files(source, channel_map), channel_map)
+    except InputError as error:
+        return list(error.problems)
+    return []
 
 
 def _read_all(files: tuple[Path, ...], channel_map: ChannelMap) -> dict[Path, dict[str, Signal]]:

@@ -238,7 +238,7 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
         ({"runs": [{"name": "a", "file": "gone.csv"}]}, "gone.csv: the map's runs name it"),
         (
             {"runs": [{"name": "a", "file": "log.csv", "conditions": {"weather": "hail"}}]},
-            "run a: conditions",
+            "runs.0.conditions.weather: must be",
         ),
         ({"colour": "red"}, "colour: unknown key"),
         ({"runs": [{"name": "../a", "file": "log.csv"}]}, "runs.0.name"),
