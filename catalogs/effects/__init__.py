@@ -1,20 +1,25 @@
 """The library of effects that a vehicle model may lack."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 
 from catalogs.quantities import CatalogueEntry, Number, Text, read_entries
 from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect, EffectClass, EffectParameter
 
+Unit = Literal[
+    "1", "1/(100 K)", "1/(100 kJ)", "1/MPa", "MPa", "N", "N m", "N m s/rad", "N m s^2/m^2", "N s^2/m^2", "N/m",
+    "N/m^3", "N/mm", "kg m^2", "m", "m/s", "m^2", "rad", "s", "s/m",
+]  # fmt: skip
+"""Units that the ports take."""
 LIBRARY_FILE = Path(__file__).with_name("library.yaml")
 
 
 class ParameterEntry(CatalogueEntry):
     """One number of an effect; the meanings stand at ``EffectParameter``."""
 
-    unit: Text
+    unit: Unit
     lower: Number
     upper: Number
     step: Number

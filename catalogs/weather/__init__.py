@@ -12,6 +12,8 @@ from tasks.errors import InputError
 from tasks.render.weather.parameters import WeatherParameters
 
 FOLDER = Path(__file__).parent
+MOST_STEPS = 100
+"""Size classes, or octaves of noise [1]: five times what ships; each one costs time in every frame."""
 
 
 def load_weather(folder: Path = FOLDER) -> WeatherParameters:
@@ -84,11 +86,21 @@ def _leaf(hint: Any, entry: object, where: str, problems: list[str]) -> Any:
         return value
     single = hint in (int, float)
     numbers = [value] if single else value if isinstance(value, list) else []
-    sound = [type(n) is int or (hint is not int and type(n) is float and isfinite(n)) for n in numbers]
+    sound = [_is_sound(n, hint is int) for n in numbers]
     if not (sound and all(sound)):
         rule = (
-            "a whole number" if hint is int else "a finite number" if single else "a list of finite numbers"
+            f"a whole number from 1 to {MOST_STEPS}"
+            if hint is int
+            else "a finite number"
+            if single
+            else "a list of finite numbers"
         )
         problems.append(f"{where} must be {rule}; it is {brief(value)}")
         return None
     return hint(value) if single else tuple(float(n) for n in numbers)
+
+
+def _is_sound(number: object, is_count: bool) -> bool:
+    if is_count:
+        return type(number) is int and 1 <= number <= MOST_STEPS
+    return type(number) in (int, float) and isfinite(number)  # type: ignore[arg-type]

@@ -71,7 +71,7 @@ def test_all_mistakes_are_told_at_once(copy):
     text = "\n".join(caught.value.problems)
     for part in (
         "rain.yaml: slope must be a finite number; it is 'steep'",
-        "rain.yaml: classes must be a whole number; it is 2.5",
+        "rain.yaml: classes must be a whole number from 1 to 100; it is 2.5",
         "rain.yaml: colour is not a known value; known are kind, intercept",
         "rain.yaml: flutter_m is missing",
         "air.yaml: wind_m_s must be a list of finite numbers; it is 3.0",

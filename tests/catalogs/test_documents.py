@@ -1,0 +1,178 @@
+"""The door for YAML and JSON: what passes is plain and bounded, what does not is refused with a sentence in time."""
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from catalogs import documents
+from catalogs.documents import parse_json, parse_yaml, parse_yaml_value, read_json_document, read_yaml
+from catalogs.yaml_text import DEEPEST, LARGEST_INTEGER
+from tasks.errors import InputError
+
+CATALOGS = Path(documents.__file__).parent
+
+
+def problems_of(parse, content: bytes) -> tuple[str, ...]:
+    with pytest.raises(InputError) as caught:
+        parse(content, "here", "note")
+    assert all(problem.startswith("here: a note must ") for problem in caught.value.problems)
+    return caught.value.problems
+
+
+def nested_aliases(levels: int) -> bytes:
+    lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lines += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]" for k in range(1, levels)]
+    return "\n".join(lines).encode()
+
+
+@pytest.mark.parametrize("path", sorted(CATALOGS.rglob("*.yaml")), ids=lambda path: path.stem)
+def test_what_ships_is_read_as_yamls_own_loader_reads_it(path):
+    assert parse_yaml_value(path.read_bytes(), path, "file") == yaml.safe_load(path.read_text())
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"a: \xff", "be UTF-8 text; line 1 is not"),
+        ("a: 1".encode("utf-16"), "be UTF-8 text"),
+        (b"a: [", "be valid YAML; line 2: while parsing a flow node"),
+        (b"a: \x00", "be valid YAML"),
+        (b"a: 1\n---\nb: 1", "single document"),
+        (b"", "be a table of keys and values; it is None"),
+        (b"[1, 2]", "be a table of keys and values; it is [1, 2]"),
+        (b"a: 1\na: 2", "have distinct keys in a table; 'a' stands there twice (line 2)"),
+        (b"1: a", "have text as keys; one is 1: put it in quotes (line 1)"),
+        (b"null: a", "have text as keys; one is null"),
+        (b"on: a", "have text as keys; one is on"),
+        (b"? [1]\n: a", "have text as keys; one is a table or list"),
+        (b"? {b: 1}\n: a", "have text as keys; one is a table or list"),
+        (b"a: !!python/object/apply:os.system [ls]", "hold plain values; one has the tag"),
+        (b"a: !!set {b, c}", "hold plain values; one has the tag"),
+        (b"a: !!timestamp 2024-13-45", "hold plain values; one has the tag"),
+        (b"a: !!bool maybe", "have values that keep to their tag; 'maybe' is no bool"),
+        (b"a: 0x_", "'0x_' is no int"),
+        (b"a: !!int ''", "'' is no int"),
+        (b"a: .nan", "have finite numbers; one is .nan (line 1)"),
+        (b"a: -.inf", "have finite numbers"),
+        (b"a: 1.0e+999", "have finite numbers"),
+        (b"a: 9007199254740993", "have integers of at most 2^53"),
+        (b"a: " + b"1" * 5000, "have numbers of at most 400 characters; one has 5000"),
+        (b"a: " + b"1:" * 200_000 + b"1", "have numbers of at most 400 characters"),
+        (b"a: &a [*a]", "not hold itself; line 1"),
+        (b"a: &a {b: *a}", "not hold itself"),
+        (b"a: *b", "undefined alias"),
+        (nested_aliases(9), "with its aliases written out"),
+        (b"[" * 100_000, f"have at most {DEEPEST} tables and lists inside each other"),
+        (b"{a: " * 100_000, f"have at most {DEEPEST} tables"),
+        (b"- " * 100_000, f"have at most {DEEPEST} tables"),
+        (b"? " * 100_000, f"have at most {DEEPEST} tables"),
+        (b"[" + b"1," * 600_000 + b"1]", "have at most 500000 keys and values"),
+        (b"#" * (documents.LARGEST_YAML + 1), "have at most 8388608 bytes; it has 8388609"),
+    ],
+)
+def test_faulty_yaml_is_one_sentence_in_time(content, words):
+    begun = time.process_time()
+    (problem,) = problems_of(parse_yaml, content)
+    assert words in problem
+    assert len(problem) < 300 and problem.isprintable()
+    assert time.process_time() - begun < 5
+
+
+def test_all_faults_of_yaml_are_told_at_once_with_their_lines():
+    problems = problems_of(parse_yaml, b"a: 1\na: 2\nb: {c: 1, c: 2, 3: 4}\nd: .inf\ne: !!omap []\n")
+    assert [problem.rpartition(" (line ")[2] for problem in problems] == ["2)", "3)", "3)", "4)", "5)"]
+
+
+def test_many_faults_are_counted_not_listed():
+    with pytest.raises(InputError) as caught:
+        parse_yaml("\n".join(f"{number}: a" for number in range(100)).encode(), "here", "note")
+    assert len(caught.value.problems) == 21
+    assert caught.value.problems[-1] == "... and 80 more problems"
+
+
+def test_anchors_and_merges_in_their_usual_use_and_dates_as_text_are_fine():
+    text = b"a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\nc: [*a, *a]\nday: 2024-05-01\nodd: 2024-13-45\n"
+    assert parse_yaml(text, "here", "note") == {
+        "a": {"x": 1, "y": 2}, "b": {"x": 1, "y": 3}, "c": [{"x": 1, "y": 2}] * 2,
+        "day": "2024-05-01", "odd": "2024-13-45",
+    }  # fmt: skip
+
+
+def test_a_reader_that_refuses_nan_itself_gets_it():
+    value = parse_yaml(b"a: .nan", "here", "note", finite=False)["a"]
+    assert value != value
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b'"\xff"', "be UTF-8 text"),
+        (b"[1,]", "be valid JSON"),
+        (b"", "be valid JSON"),
+        (b"[" * 100_000, f"have at most {DEEPEST} tables and lists inside each other; it has 100000"),
+        (b'{"a":' * 100_000, f"have at most {DEEPEST} tables"),
+        (b'["\\\\", ' + b"[" * 100, f"have at most {DEEPEST} tables"),
+        (b'{"a": 1, "b": {"c": 1, "c": 2}}', "have distinct keys in a table; 'c' stands there twice"),
+        (b"[NaN]", "have finite numbers; one is NaN"),
+        (b"[-Infinity]", "have finite numbers"),
+        (b"[1e999]", "have finite numbers"),
+        (b"[9007199254740993]", "have integers of at most 2^53"),
+        (b"[" + b"9" * 10_000 + b"]", "have integers of at most 2^53"),
+        (b'["\\ud800"]', "half of a surrogate pair"),
+    ],
+)
+def test_faulty_json_is_one_sentence(content, words):
+    (problem,) = problems_of(parse_json, content)
+    assert words in problem and len(problem) < 300
+
+
+def test_all_faults_of_json_are_told_at_once():
+    assert (
+        len(problems_of(parse_json, b'{"a": NaN, "a": 1e999, "b": 1e20, "c": [12345678901234567890]}')) == 4
+    )
+
+
+def test_sound_json_is_what_jsons_own_reader_gives():
+    text = '{"a": [1, 2.5, -3e2, "x]}[{\\"", null, true], "b": {"\\ud83d\\ude97": 9007199254740992}}'
+    assert parse_json(text.encode(), "here", "note") == json.loads(text)
+
+
+def test_a_loggers_nanoseconds_pass_where_they_become_floats():
+    assert parse_json(b"[1700000000000000000]", "here", "log", large_integers=True) == [17 * 10**17]
+    with pytest.raises(InputError, match=r"2\^63"):
+        parse_json(b"[99999999999999999999]", "here", "log", large_integers=True)
+    assert LARGEST_INTEGER < 17 * 10**17
+
+
+@pytest.mark.parametrize("read", [read_yaml, read_json_document])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("missing", "no such file"),
+        ("folder", "a note must be"),
+        ("pipe", "must be a regular file"),
+        ("a" * 100_000, "File name too long"),
+        ("a\x00b", "must have a proper file name"),
+        ("a\ud800", "a note must"),
+        ("looped", "must be readable"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_one_short_sentence(tmp_path, read, name, words):
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "looped").symlink_to(tmp_path / "looped")
+    with pytest.raises(InputError, match=words) as caught:
+        read(tmp_path / name, "note")
+    (problem,) = caught.value.problems
+    assert len(problem) < 400
+
+
+def test_a_file_is_not_read_further_than_it_may_be_long(tmp_path, monkeypatch):
+    monkeypatch.setattr(documents, "LARGEST_YAML", 10)
+    (tmp_path / "large.yaml").write_text("a: 12345678")
+    with pytest.raises(InputError, match="at most 10 bytes; it has 11"):
+        read_yaml(tmp_path / "large.yaml", "note")

@@ -1,0 +1,44 @@
+"""A catalogue entry is found by its name or by a file, and a name never leads out of the catalogue."""
+
+import pytest
+
+from catalogs.entries import find_entry
+from catalogs.vehicles import FOLDER, load_vehicle
+from tasks.errors import InputError
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "a" * 100_000,
+        "a" * 100_000 + ".yaml",
+        "a\x00b",
+        "a\x00b.yaml",
+        "",
+        ".",
+        "..",
+        "../vehicles/paper-reference",
+        "./paper-reference",
+        "/etc/passwd",
+        "paper-reference\n",
+        "\ud800",
+        "\ud800.yaml",
+    ],
+)
+def test_a_name_that_is_none_is_one_short_sentence_with_those_that_exist(name):
+    with pytest.raises(InputError, match=r"no such vehicle; .*paper-reference") as caught:
+        load_vehicle(name)
+    assert len(str(caught.value)) < 500
+
+
+def test_a_folder_or_pipe_that_ends_like_a_file_is_no_entry(tmp_path):
+    (tmp_path / "folder.yaml").mkdir()
+    with pytest.raises(InputError, match="no such thing"):
+        find_entry(tmp_path, tmp_path / "folder.yaml", "thing")
+
+
+def test_a_name_is_looked_up_and_a_file_is_taken_as_it_is(tmp_path):
+    file = tmp_path / "my car.yaml"
+    file.write_text("{}")
+    assert find_entry(FOLDER, file, "vehicle") == file
+    assert find_entry(FOLDER, "bmw-m8", "vehicle") == FOLDER / "bmw-m8.yaml"
