@@ -9,12 +9,12 @@ from typing import Any
 from catalogs.cameras import camera_source, load_camera
 from catalogs.gates import GATES
 from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
-from catalogs.hazard_markings import marking_source
+from catalogs.hazard_markings import load_marking, marking_source
 from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
-from catalogs.surfaces import surface_source
-from catalogs.vehicles import vehicle_provenance, vehicle_source
+from catalogs.surfaces import load_surface, surface_source
+from catalogs.vehicles import load_vehicle, vehicle_provenance, vehicle_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.making.memory import memory_problems
 from flows.making.places import remember_place
@@ -28,6 +28,14 @@ from tasks.errors import InputError
 from tasks.render.sensor import Sensor
 
 TICK_RATE_HZ = 1000
+LOADERS: Mapping[str, Callable[[Path], Any]] = {
+    "vehicle.yaml": load_vehicle,
+    "surface.yaml": load_surface,
+    "camera.yaml": load_camera,
+    "hazard_marking.yaml": load_marking,
+}
+"""What checks the entries that a user may bring."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ClipPlan:
@@ -132,10 +140,7 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
     inputs, scene, problems = _read_entries(settings)
     if scene:
         problems += _route_problems(grid)
-    if "camera.yaml" in inputs:
-        problems += _composition_problems(settings)
-        ticks = int((settings.frames - 1) / settings.frame_rate_hz * TICK_RATE_HZ) + 1
-        problems += memory_problems(settings, load_camera(settings.camera), ticks)
+    problems += _camera_problems(settings)
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
     hashes = {name: sha256_of([content]) for name, content in inputs.items()}
@@ -251,7 +256,9 @@ def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str],
     problems: list[str] = []
     for name, lookup in input_sources(settings).items():
         try:
-            inputs[name] = lookup().read_bytes()
+            source = lookup()
+            LOADERS.get(name, Path.stat)(source)
+            inputs[name] = source.read_bytes()
         except InputError as error:
             problems += error.problems
     try:
@@ -290,13 +297,20 @@ def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
         )
 
 
-def _composition_problems(settings: GridFile) -> list[str]:
-    camera = load_camera(settings.camera)
-    if settings.composition == "linear" or (camera.plain and camera.sensor == Sensor()):
+def _camera_problems(settings: GridFile) -> list[str]:
+    """What of a grid its camera cannot do, or this machine not with it; a camera at fault is told elsewhere."""
+    try:
+        camera = load_camera(settings.camera)
+    except InputError:
         return []
+    ticks = int((settings.frames - 1) / settings.frame_rate_hz * TICK_RATE_HZ) + 1
+    problems = memory_problems(settings, camera, ticks)
+    if settings.composition == "linear" or (camera.plain and camera.sensor == Sensor()):
+        return problems
     return [
+        *problems,
         f"composition: paper is one of finished 8-bit pictures; {camera.name} has a lens, a shutter or a sensor that"
-        " needs linear light: take a plain camera or composition: linear"
+        " needs linear light: take a plain camera or composition: linear",
     ]
 
 

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from threading import Event, Thread
 from typing import Any
 
+from catalogs.documents import parse_json
 from flows.store.objects import Objects
 from tasks.errors import InputError
 
@@ -59,7 +60,7 @@ def _keep(objects: Objects, held: list[str], ended: Event) -> None:
 def _taken_over(objects: Objects) -> str:
     """The tag of the lock, once its owner is known to be dead."""
     seen, content = objects.tag(LOCK), objects.read(LOCK)
-    owner: dict[str, Any] = json.loads(content) if content else {"host": "", "pid": 0}
+    owner = _owner_of(content)
     busy = InputError(
         f"{objects.address}: another run is writing this dataset (on {owner['host']}, process {owner['pid']});"
         " wait for it or give another address"
@@ -75,6 +76,19 @@ def _taken_over(objects: Objects) -> str:
     return tag
 
 
+def _owner_of(content: bytes | None) -> dict[str, Any]:
+    """Host and process that a lock names; of a lock that names none, an unknown owner."""
+    unknown = {"host": "an unknown machine", "pid": 0}
+    try:
+        owner = parse_json(content or b"{}", LOCK, "lock")
+    except InputError:
+        return unknown
+    known = (
+        isinstance(owner, dict) and isinstance(owner.get("host"), str) and isinstance(owner.get("pid"), int)
+    )
+    return owner if known else unknown
+
+
 def _claim() -> bytes:
     claim = {"host": platform.node(), "pid": os.getpid(), "renewal": uuid.uuid4().hex}
     return json.dumps(claim, sort_keys=True).encode()
@@ -84,9 +98,9 @@ def _died_here(owner: Mapping[str, Any]) -> bool:
     if owner["host"] != platform.node():
         return False
     try:
-        os.kill(int(owner["pid"]), 0)
+        os.kill(owner["pid"], 0)
     except ProcessLookupError:
         return True
-    except PermissionError:
+    except (PermissionError, OverflowError):
         pass
     return False
