@@ -64,6 +64,8 @@ def test_runs_come_with_their_drive_weather_and_known_channels(folder: Path) -> 
             "run,weather,precipitation_mm_h,snow_accumulation_h\na,dry,x,0\n",
             "must be a finite number; it is 'x'",
         ),
+        ("runs.csv", "run,weather,precipitation_mm_h,snow_accumulation_h\n../a,dry,0,0\n", "must be no path"),
+        ("campaign.yaml", "{campaign: 3, vehicle: b, sample_rate_hz: 1}", "campaign: must be a valid string"),
         ("runs/b.parquet", "text", "b: b.parquet must be a Parquet file"),
     ],
 )

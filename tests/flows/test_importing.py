@@ -26,6 +26,12 @@ def write_map(folder: Path, **changes: object) -> str:
     return str(folder / "map.yaml")
 
 
+def map_beside(folder: Path) -> str:
+    """The map in a folder of its own, where it is no recording."""
+    (folder / "map").mkdir()
+    return write_map(folder / "map")
+
+
 def write_csv(path: Path, columns: Columns) -> str:
     pd.DataFrame(columns).to_csv(path, index=False)
     return str(path)
@@ -246,6 +252,40 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
 )
 def test_a_faulty_map_is_named_by_its_key(tmp_path: Path, changes: dict[str, object], words: str) -> None:
     assert words in problems_of(tmp_path, logged(braking_columns()), **changes)
+
+
+@pytest.mark.parametrize("file", ["../log.csv", "/etc/passwd", "..", "a\x00b", ""])
+def test_a_run_stays_in_the_folder_of_the_measurements(tmp_path: Path, file: str) -> None:
+    text = problems_of(tmp_path, logged(braking_columns()), runs=[{"name": "a", "file": file}])
+    assert "runs.0.file: must be a file in the folder" in text or "runs.0.file: String should have" in text
+
+
+def test_missing_tolerances_hide_neither_a_wrong_unit_nor_a_missing_signal(tmp_path: Path) -> None:
+    content = yaml.safe_load(MAP)
+    del content["tolerances_1sigma"]
+    content["channels"]["speed"] |= {"unit": "bar"}
+    content["channels"]["pitch"] |= {"source": "nick"}
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
+    source = write_csv(tmp_path / "log.csv", logged(braking_columns()))
+    with pytest.raises(InputError) as caught:
+        import_measurements(source, map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign"))
+    text = str(caught.value)
+    assert "tolerances_1sigma is missing" in text
+    assert "channel speed: unit bar is of pressure" in text
+    assert "signal nick is missing" in text
+
+
+def test_files_that_give_runs_of_one_name_are_told(tmp_path: Path) -> None:
+    write_csv(tmp_path / "log.csv", logged(braking_columns()))
+    pd.DataFrame(logged(braking_columns())).to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(InputError, match="run log stands twice"):
+        import_measurements(str(tmp_path), map=map_beside(tmp_path), out=str(tmp_path / "campaign"))
+
+
+def test_a_clock_that_would_fill_the_memory_is_refused(tmp_path: Path) -> None:
+    log = logged(braking_columns())
+    log["t_ms"] = log["t_ms"] * 1e12
+    assert "run log must have at most 20000000 samples; at" in problems_of(tmp_path, log)
 
 
 def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
