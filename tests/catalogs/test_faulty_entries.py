@@ -1,0 +1,145 @@
+"""Every kind of catalogue entry: what ships is read, and each rule of its own names the value that breaks it."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from catalogs.buses import load_bus
+from catalogs.channel_maps import load_channel_map
+from catalogs.effects import load_effects
+from catalogs.effects.truths import load_sizes, load_truths
+from catalogs.hazard_markings import load_marking
+from catalogs.learned_judges import load_judges
+from catalogs.stop_studies import load_stop_study
+from catalogs.vehicles import load_vehicle
+from catalogs.weather import FOLDER as WEATHER
+from catalogs.weather import load_weather
+from tasks.errors import InputError
+
+CATALOGS = WEATHER.parent
+Change = Callable[[Any], None]
+
+
+@pytest.mark.parametrize(
+    ("file", "load", "change", "words"),
+    [
+        ("effects/library.yaml", load_effects, lambda c: c[7].update(parameters=3), "7.parameters: must be a table"),
+        ("effects/library.yaml", load_effects, lambda c: c[7].pop("name"), "7.name is missing"),
+        ("effects/library.yaml", load_effects, lambda c: c.append(c[0]), "an effect must stand once; twice stand"),
+        (
+            "effects/library.yaml",
+            load_effects,
+            lambda c: c[0]["parameters"]["drag_area"].update(unit="furlong"),
+            "0.parameters.drag_area.unit: must be",
+        ),
+        (
+            "effects/library.yaml",
+            load_effects,
+            lambda c: c[0]["parameters"]["drag_area"].update(step=9.0),
+            "0.parameters.drag_area: lower <= start <= upper must hold",
+        ),
+        ("effects/library.yaml", load_effects, lambda c: c.insert(0, None), "0: must be a table"),
+        ("effects/truths.yaml", load_truths, lambda c: c.pop("outside"), "outside is missing"),
+        ("effects/truths.yaml", load_truths, lambda c: c["library"].update(magic={"a": 1}), "magic: the library"),
+        ("effects/truths.yaml", load_sizes, lambda c: c["sizes"].update(idle_creep=[1]), "sizes.idle_creep: must be"),
+        (
+            "effects/truths.yaml",
+            load_truths,
+            lambda c: c["outside"]["strut_step"].update(at=[0, 1]),
+            "outside.strut_step: value must have one number for each of at",
+        ),
+        (
+            "effects/truths.yaml",
+            load_truths,
+            lambda c: c["outside"]["strut_step"].update(at=[0, 0, 1, 2, 4]),
+            "outside.strut_step: at must ascend in equal steps",
+        ),
+        (
+            "hazard_markings/zebra-yellow-black.yaml",
+            load_marking,
+            lambda c: c["paint"].update(value=[0.5, 0.5]),
+            "paint: must be red, green and blue; it has 2 values",
+        ),
+        (
+            "buses/a2d2-like.yaml",
+            load_bus,
+            lambda c: c["signals"][1].update(unit="bar"),
+            "signals.1: unit bar is of pressure, m/s of speed",
+        ),
+        ("buses/a2d2-like.yaml", load_bus, lambda c: c["signals"][1].update(rate_hz=True), "1.rate_hz: must"),
+        (
+            "stop_studies/bmw-m8.yaml",
+            load_stop_study,
+            lambda c: c["rungs"][2]["fixed"]["drag_area"].update(unit="furlong"),
+            "rungs.2.fixed: unit of drag_area must be m^2; it is furlong",
+        ),
+        ("channel_maps/bmw-m8.yaml", load_channel_map, lambda c: c.update(sample_rate_hz=1e300), "rate_hz: must be"),
+        ("vehicles/multibody-grown.yaml", load_vehicle, lambda c: c["wheel_radius"].update(value=9), "frozen"),
+    ],
+)  # fmt: skip
+def test_a_broken_rule_is_named_with_its_place(
+    tmp_path: Path, file: str, load: Callable[[Path], object], change: Change, words: str
+) -> None:
+    content = yaml.safe_load((CATALOGS / file).read_text())
+    change(content)
+    path = tmp_path / "entry.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    with pytest.raises(InputError) as caught:
+        load(path)
+    assert words in str(caught.value)
+    assert all(str(path) in problem for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize("content", [b"\xff", b"[" * 100_000, b"a: {b: 1, b: 2}", b""])
+@pytest.mark.parametrize(
+    "load", [load_effects, load_truths, load_sizes, load_vehicle, load_channel_map, load_judges]
+)
+def test_what_is_no_document_is_one_sentence(
+    tmp_path: Path, load: Callable[[Path], object], content: bytes
+) -> None:
+    path = tmp_path / "entry.yaml"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        load(path)
+    assert len(caught.value.problems) == 1 and len(str(caught.value)) < 500
+
+
+def test_a_frozen_vehicle_keeps_its_seal_with_the_line_ends_of_another_system(tmp_path: Path) -> None:
+    path = tmp_path / "multibody-grown.yaml"
+    path.write_bytes((CATALOGS / "vehicles" / path.name).read_bytes().replace(b"\n", b"\r\n"))
+    assert load_vehicle(path) == load_vehicle("multibody-grown")
+
+
+@pytest.mark.parametrize("count", [0, -1, 101, 2**50])
+def test_the_weather_of_a_stranger_asks_for_no_more_size_classes_than_a_frame_can_bear(
+    tmp_path: Path, count: int
+) -> None:
+    for path in WEATHER.glob("*.yaml"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    rain = yaml.safe_load((tmp_path / "rain.yaml").read_text())
+    rain["classes"]["value"] = count
+    (tmp_path / "rain.yaml").write_text(yaml.safe_dump(rain))
+    with pytest.raises(InputError, match=f"classes must be a whole number from 1 to 100; it is {count}"):
+        load_weather(tmp_path)
+
+
+@pytest.mark.parametrize("form", ["text", "table", "archive", "empty"])
+def test_features_that_are_no_array_of_floats_are_refused(tmp_path: Path, form: str) -> None:
+    torch = pytest.importorskip("torch")
+    torch.jit.script(torch.nn.Identity()).save(str(tmp_path / "clip.pt"))
+    features = tmp_path / "features.npy"
+    if form == "archive":
+        with open(features, "wb") as file:
+            np.savez(file, a=np.zeros(3))
+    elif form == "empty":
+        features.touch()
+    else:
+        np.save(features, np.array(["a", "b", "c"]) if form == "text" else np.zeros((3, 2), dtype=np.int64))
+    path = tmp_path / "judges.yaml"
+    path.write_text("clip: {checkpoint: clip.pt, text_features: features.npy, source: own}")
+    with pytest.raises(InputError, match=r"features\.npy must be"):
+        load_judges(path)
