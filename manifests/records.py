@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationError, with_config
 from typing_extensions import TypedDict
 
-from catalogs.scenario import Scenario
+from catalogs.scenario import SCENARIO_FIELDS, Scenario
 from catalogs.sentences import brief, cap_problems, describe_rules
 from manifests.canonical import ID_LENGTH
+from tasks.conventions import CLIP_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseVerdict
 
@@ -32,7 +33,6 @@ RecordedPath = Annotated[
     str, Field(pattern=rf"^(plan\.json|(inputs|frames\.zarr|telemetry|previews)(/{_NAME}){{1,9}})$")
 ]
 """Relative path of a file that muSync writes into a dataset: no ``..``, nothing hidden, nothing absolute."""
-Figure = bool | float | Text | None
 
 
 def _refuse_way_out(name: str) -> str:
@@ -49,9 +49,14 @@ STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 if TYPE_CHECKING:  # their keys follow from what they record
     ScenarioRecord = dict[str, Any]
+    FiguresRecord = dict[str, Any]
     VerdictRecord = dict[str, Any]
 else:
     ScenarioRecord = with_config(STRICT)(TypedDict("ScenarioRecord", get_type_hints(Scenario)))
+    _figures = {c.name: float | None for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
+    FiguresRecord = with_config(STRICT)(
+        TypedDict("FiguresRecord", {**_figures, "calibration_extrapolated": bool})
+    )
     _optional = {name: kind | None for name, kind in get_type_hints(PoseVerdict).items()}
     VerdictRecord = with_config(STRICT)(TypedDict("VerdictRecord", {**_optional, "reasons": list[str]}))
 
@@ -99,7 +104,7 @@ class Receipt(ClipRecord):
 
     artifacts: dict[RecordedPath, Sha256]
     content: dict[Text, Sha256]
-    figures: dict[Text, Figure]
+    figures: FiguresRecord
     verdict: VerdictRecord
 
 
@@ -206,9 +211,6 @@ def _clip_problems(clips: Sequence[Mapping[str, Any]]) -> list[str]:
         "every clip must have an id of its own; some have the same": _are_distinct(clips, "clip_id"),
         "the clips must stand in the order of their index, from 0; they do not": all(
             clip.get("index", place) == place for place, clip in enumerate(clips)
-        ),
-        "all clips must have the same figures; some have others": (
-            len({frozenset(clip.get("figures", ())) for clip in clips}) <= 1
         ),
     }
     return [rule for rule, kept in rules.items() if not kept]

@@ -1,4 +1,4 @@
-"""A grid whose clips cost next to nothing, so that what is studied is the store: the motion once, pictures drawn at random."""
+"""A grid whose clips cost next to nothing, so that the store is what is studied: motion once, pictures at random."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

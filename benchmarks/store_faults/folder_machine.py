@@ -85,7 +85,7 @@ class FolderMachine(RuleBasedStateMachine):
         undisturbed()
 
     def teardown(self) -> None:
-        """After all the faults, one undisturbed run and one undisturbed repair give the bytes of the undisturbed run."""
+        """After all the faults, an undisturbed repair and run give the bytes of the undisturbed run."""
         try:
             if self.damaged:
                 self._repair()

@@ -1,4 +1,4 @@
-"""The same on a dataset in an object store: requests that are refused, unanswered or never sent, dead owners, jumping clocks."""
+"""The same in an object store: requests that are refused, unanswered or never sent, dead owners, jumping clocks."""
 
 import shutil
 import tempfile

@@ -1,4 +1,4 @@
-"""Some tens of the sequences of ``make study-faults``: what holds of a store whose disk or requests fail at any step."""
+"""Some tens of the sequences of ``make study-faults``: what holds while disk or requests fail at any step."""
 
 from benchmarks.store_faults.study import study_faults
 

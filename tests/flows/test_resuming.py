@@ -1,0 +1,130 @@
+"""A run that stops anywhere goes on with the same command, before its plan too; what is another's is left alone."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+import flows.making.generate
+from flows.auditing.verify import gc
+from flows.making.generate import generate
+from flows.making.plan import make_plan
+from flows.store.layout import Layout
+from flows.store.lock import sole_writer
+from tasks.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def grid(toy_dataset) -> str:
+    return str(toy_dataset.root.parent / "grid.yaml")
+
+
+def make(grid: str, folder: Path) -> Layout:
+    return generate(grid, str(folder), runner="threads", workers=1, pictures=False).layout
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole(grid, tmp_path_factory) -> dict[str, bytes]:
+    return files_of(make(grid, tmp_path_factory.mktemp("whole") / "data").root)
+
+
+@pytest.mark.parametrize("writes", [0, 1, 2, 8, 15])
+def test_a_disk_that_is_full_before_there_is_a_plan_can_be_freed_and_the_run_goes_on(
+    grid, whole, tmp_path, monkeypatch, writes
+):
+    folder, left = tmp_path / "data", [writes]
+    real = os.fsync
+
+    def flush(descriptor: int) -> None:
+        if left[0] == 0:
+            raise OSError(28, "No space left on device")
+        left[0] -= 1
+        real(descriptor)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    with pytest.raises(OSError, match="No space"):
+        make(grid, folder)
+    monkeypatch.undo()
+    assert folder.is_dir() and not (folder / "plan.json").exists()
+    make(grid, folder)
+    assert files_of(folder) == whole
+
+
+def test_a_run_that_was_begun_can_be_begun_anew_with_another_grid(grid, tmp_path, monkeypatch):
+    """Before there is a plan nothing binds the folder to a grid."""
+    other = tmp_path / "other.yaml"
+    other.write_text(Path(grid).read_text().replace("frames: 11", "frames: 5"))
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(flows.making.generate, "create_frame_arrays", stop)
+    with pytest.raises(KeyboardInterrupt):
+        make(grid, tmp_path / "data")
+    monkeypatch.undo()
+    assert make(str(other), tmp_path / "data").manifest.is_file()
+
+
+@pytest.mark.parametrize("name", ["inputs", "frames.zarr", "notes.txt"])
+def test_a_folder_with_a_name_of_ours_but_without_our_mark_is_left_alone(grid, tmp_path, name):
+    (tmp_path / "data" / name).mkdir(parents=True)
+    (tmp_path / "data" / name / "precious.txt").write_text("mine")
+    with pytest.raises(InputError, match="it holds other files"):
+        make(grid, tmp_path / "data")
+    assert files_of(tmp_path / "data") == {f"{name}/precious.txt": b"mine"}
+
+
+def test_what_a_run_began_without_a_plan_is_no_dataset_to_collect_in(tmp_path):
+    (tmp_path / "data" / ".staging").mkdir(parents=True)
+    (tmp_path / "data" / ".staging" / "begun").touch()
+    with pytest.raises(InputError, match="goes on with its musync generate"):
+        gc(str(tmp_path / "data"))
+
+
+def test_a_lock_that_is_a_link_or_another_name_of_a_file_is_refused_and_the_file_keeps_its_bytes(tmp_path):
+    victim = tmp_path / "id_rsa"
+    victim.write_text("secret")
+    for kind in ("symlink_to", "hardlink_to"):
+        layout = Layout(tmp_path / kind)
+        layout.staging.mkdir(parents=True)
+        getattr(layout.staging / "lock", kind)(victim)
+        with pytest.raises(InputError, match="remove it"), sole_writer(layout):
+            pass
+        assert victim.read_text() == "secret"
+
+
+def test_no_file_of_a_dataset_says_where_somebodys_files_lie(toy_dataset):
+    """The grid names its scene and its camera by absolute paths."""
+    folder = str(toy_dataset.root.parent).encode()
+    assert folder in (toy_dataset.root.parent / "grid.yaml").read_bytes()
+    assert [name for name, content in files_of(toy_dataset.root).items() if folder in content] == []
+
+
+def test_a_clip_that_cannot_fit_into_memory_is_refused_before_anything_is_made(grid, tmp_path):
+    big = tmp_path / "big.yaml"
+    big.write_text(
+        Path(grid)
+        .read_text()
+        .replace("frames: 11", "frames: 40000\nlabels: true")
+        .replace("frame_rate_hz: 10", "frame_rate_hz: 100")
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("flows.making.memory.memory_here", lambda: 8 * 10**9)
+        with pytest.raises(
+            InputError, match=r"40000 frames need about 18\.1 GB, and this machine has 8\.0 GB"
+        ):
+            make_plan(str(big), "cpu")
+
+
+def test_faults_of_a_grids_own_catalogue_entries_are_told_with_those_of_the_grid(grid, tmp_path):
+    (tmp_path / "car.yaml").write_text("mass: {value: heavy}\n")
+    faulty = tmp_path / "faulty.yaml"
+    faulty.write_text(Path(grid).read_text() + f"vehicle: {tmp_path / 'car.yaml'}\nsurface: ice-rink\n")
+    with pytest.raises(InputError) as raised:
+        make_plan(str(faulty), "cpu")
+    told = str(raised.value)
+    assert "car.yaml: sprung_mass is missing" in told and "ice-rink: no such surface" in told
