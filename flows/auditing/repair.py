@@ -67,6 +67,8 @@ def repair(
 def _repaired(
     layout: Layout, runner: RunnerName, workers: int | None, scheduler: str | None
 ) -> dict[str, Any]:
+    if not layout.manifest.is_file():
+        read_manifest(layout)  # says what is missing, before anything is written there
     with sole_writer(layout):
         found = stage(compare_files)(layout)
         if any(row["path"] == "manifest.json" for row in found["damaged"]):

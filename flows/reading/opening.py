@@ -141,7 +141,7 @@ class Dataset:
             " musync verify says whether they are damaged"
         )
 
-    @property
+    @cached_property
     def frames(self) -> "zarr.Group":
         """The frames as lazy Zarr arrays ``[clip, frame, y, x(, channel)]``; ``index`` of a clip is its first axis.
 
@@ -210,10 +210,9 @@ class Dataset:
         """
         from flows.reading.windows import windows_of
 
-        if self.origin is not None:  # workers read the files of these arrays often
-            reading(
-                self.origin, lambda name: name.startswith(tuple(f"frames.zarr/{array}/" for array in arrays))
-            )
+        folders = tuple(f"frames.zarr/{array}/" for array in arrays)
+        # workers read the files of these arrays often: they have to be here, and no links
+        reading(self.origin or self.root, lambda name: name.startswith(folders))
         return windows_of(
             self._layout, self.manifest, window, stride or window, columns, arrays, clips, quarantined
         )
@@ -224,6 +223,7 @@ class Dataset:
         if not grid.get("pictures", True):
             raise InputError(f"{layout}: the dataset was made without frames")
         if self.origin is None:
+            reading(self.root, lambda name: name.startswith("frames.zarr/"))
             read = read_local_metadata(layout.frames)
             members = [path.name for path in layout.frames.glob("*") if path.is_dir()]
         else:

@@ -15,10 +15,13 @@ from zarr.buffer import default_buffer_prototype
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.storage import MemoryStore
 
+from catalogs.sentences import shorten
 from flows.store.arrays import DIMENSION_SIZES, PixelArray, arrays_of
+from flows.store.frame_metadata import check_array, read_local_metadata
 from flows.store.layout import write_atomically
 from flows.store.telemetry import channel_labels
 from manifests.canonical import sha256_of
+from tasks.errors import InputError
 
 
 def create_arrays(
@@ -54,6 +57,7 @@ def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> Non
     receipt is.
     """
     for name, values in buffers.items():
+        check_array(read_local_metadata(path), name, path)
         metadata = (path / name / "zarr.json").read_bytes()
         files: dict[str, Buffer] = {"zarr.json": default_buffer_prototype().buffer.from_bytes(metadata)}
         zarr.open_array(MemoryStore(files), mode="r+")[index] = values
@@ -62,8 +66,22 @@ def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> Non
 
 
 def read_clip(path: Path, index: int, name: str) -> np.ndarray:
-    """One clip's frames of one array, decoded and checksum-verified."""
-    return np.asarray(_array(zarr.open_group(path, mode="r"), name)[index])
+    """One clip's frames of one array, decoded and checksum-verified.
+
+    Raises
+    ------
+    InputError
+        If the metadata are not those that muSync writes, there is no such clip, or its pictures are damaged.
+    """
+    shape = check_array(read_local_metadata(path), name, path)
+    if not 0 <= index < shape[0]:
+        raise InputError(f"{path}/{name}: has {shape[0]} clips; there is no clip {index}")
+    try:
+        return np.asarray(zarr.open_array(path / name, mode="r", zarr_format=3)[index])
+    except (ValueError, RuntimeError, OSError) as error:
+        raise InputError(
+            f"{path}/{name}: clip {index} must be readable; {shorten(error)}: musync repair makes it again"
+        ) from None
 
 
 def buffer_hash(buffer: np.ndarray) -> str:
@@ -87,9 +105,3 @@ def _labels(array: PixelArray) -> dict[str, Any]:
 
         labels |= {"flag_masks": list(MARK_BITS.values()), "flag_meanings": " ".join(MARK_BITS)}
     return labels
-
-
-def _array(group: zarr.Group, name: str) -> zarr.Array:
-    array = group[name]
-    assert isinstance(array, zarr.Array)
-    return array

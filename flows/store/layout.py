@@ -4,6 +4,7 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from threading import get_native_id
 from typing import Any
 
 from catalogs.documents import read_json_document
@@ -82,7 +83,7 @@ def write_atomically(path: Path, content: bytes | memoryview) -> None:
     Folders are flushed too: what was written before this file is on the disk when this file is.
     """
     _make_folder(path.parent)
-    partial = path.with_name(f"{path.name}.{os.getpid()}{PARTIAL}")
+    partial = path.with_name(f"{path.name}.{os.getpid()}-{get_native_id()}{PARTIAL}")
     partial.unlink(missing_ok=True)
     try:
         with partial.open("xb") as stream:  # exclusive: a link that lies there is not followed

@@ -17,7 +17,7 @@ BEGUN = "begun"
 """Written before anything else: until there is a plan, `inputs` and `frames.zarr` beside it are muSync's own."""
 _SCRATCH = re.compile(r"scratch-\w+")
 _STAGED = re.compile(
-    rf"{BEGUN}|[0-9a-f]{{{ID_LENGTH}}}\.(json|({'|'.join(STAGED_TABLES)})\.parquet)|.*\.\d+{re.escape(PARTIAL)}"
+    rf"{BEGUN}|[0-9a-f]{{{ID_LENGTH}}}\.(json|({'|'.join(STAGED_TABLES)})\.parquet)|.*{re.escape(PARTIAL)}"
 )
 
 

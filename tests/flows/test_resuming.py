@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import flows.making.generate
+from flows.auditing.repair import repair
 from flows.auditing.verify import gc
 from flows.making.generate import generate
 from flows.making.plan import make_plan
@@ -83,6 +84,15 @@ def test_what_a_run_began_without_a_plan_is_no_dataset_to_collect_in(tmp_path):
     (tmp_path / "data" / ".staging" / "begun").touch()
     with pytest.raises(InputError, match="goes on with its musync generate"):
         gc(str(tmp_path / "data"))
+
+
+@pytest.mark.parametrize("command", [gc, repair])
+def test_a_folder_that_is_no_dataset_is_not_touched_nor_made(tmp_path, command):
+    (tmp_path / "mine").mkdir()
+    for name in ("nowhere", "mine"):
+        with pytest.raises(InputError):
+            command(str(tmp_path / name))
+    assert list(tmp_path.rglob("*")) == [tmp_path / "mine"]
 
 
 def test_a_lock_that_is_a_link_or_another_name_of_a_file_is_refused_and_the_file_keeps_its_bytes(tmp_path):

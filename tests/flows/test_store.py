@@ -1,4 +1,5 @@
 import os
+from threading import get_native_id
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -181,6 +182,6 @@ def test_a_link_in_place_of_a_half_written_file_is_not_followed(tmp_path):
     """A stranger who knows the name of the next half-written file cannot have another file overwritten."""
     victim = tmp_path / "victim"
     victim.write_text("precious")
-    (tmp_path / f"a.json.{os.getpid()}{PARTIAL}").symlink_to(victim)
+    (tmp_path / f"a.json.{os.getpid()}-{get_native_id()}{PARTIAL}").symlink_to(victim)
     write_json(tmp_path / "a.json", {})
     assert victim.read_text() == "precious" and not (tmp_path / "a.json").is_symlink()

@@ -60,7 +60,7 @@ def test_a_recorded_path_is_one_that_muSync_writes(manifest, path):
 @pytest.mark.parametrize(
     "clip_id",
     [
-        "/tmp/x",
+        "/x",
         "../x",
         "0123456789abcdeF",
         "0123456789abcde",
