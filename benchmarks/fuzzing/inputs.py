@@ -19,7 +19,7 @@ KNOWINGLY = 0.35
 """Share of inputs that break a rule knowingly, where there is one to break."""
 RESEALED = 0.8
 """Share of inputs whose seals are made again."""
-TWICE, WHOLE = "no key stands twice", "a file is whole"
+TWICE, WHOLE, SEALED = "no key stands twice", "a file is whole", "seals fit"
 LOST_BY_SEALING = (TWICE, WHOLE)
 """Rules that a JSON document keeps again once it was read and written."""
 WHOLE_FILES = (".json", ".parquet", ".npy", ".ply", ".spz", ".png")
@@ -84,6 +84,8 @@ def make_input(documents: Documents, seed: int, number: int) -> Input:
     knowing = _break_knowingly(rng, documents, document, file) if rng.random() < KNOWINGLY else None
     content, what, rule = knowing or (*_change(rng, documents, document, file), None)
     changed: Files = {file: content}
+    if rule is None and content != files[file] and re.fullmatch(parser.sealed or "", file):
+        rule = SEALED
     if parser.reseal is not None and not (
         knowing and file.endswith(".json") and knowing[2] in LOST_BY_SEALING
     ):
@@ -93,6 +95,7 @@ def make_input(documents: Documents, seed: int, number: int) -> Input:
             whole = None
         if whole is not None:
             changed = {name: data for name, data in whole.items() if files.get(name) != data}
+            rule = knowing[2] if knowing else None
     return Input(document=document, changed=changed, what=f"{document}/{file}: {what}", broken=rule)
 
 

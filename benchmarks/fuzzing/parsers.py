@@ -76,6 +76,7 @@ class Parser:
     rules : that mutations break knowingly
     known_keys : places of mappings, as a regular expression, that take no unknown key; None where all are taken
     reseal : makes seals fit again; None without seals
+    sealed : names, as a regular expression, of files that must be refused when they changed and the seals did not
     writes : the loader changes the document's folder
     """
 
@@ -87,6 +88,7 @@ class Parser:
     rules: tuple[Rule, ...] = ()
     known_keys: str | None = None
     reseal: seals.Resealing | None = None
+    sealed: str | None = None
     writes: bool = False
 
     def mutates(self, file: str) -> bool:
@@ -201,7 +203,8 @@ PARSERS: tuple[Parser, ...] = (
                                           "dover: {checkpoint: dover.pt, source: d}\n"}),
     ),
     Parser(
-        name="manifest", write=sound.dataset, targets=(r"manifest\.json",), read=read_dataset, share=4,
+        name="manifest", write=sound.dataset, targets=(r"manifest\.json",), read=read_dataset, share=2,
+        sealed=r".*",
         rules=RECORDED, reseal=seals.sealed_json,
     ),
     Parser(
@@ -210,6 +213,7 @@ PARSERS: tuple[Parser, ...] = (
     ),
     Parser(
         name="telemetry", write=sound.dataset, targets=(r"telemetry/.*\.parquet",), read=read_dataset, share=1,
+        sealed=r".*",
         reseal=seals.sealed_dataset,
     ),
     Parser(
@@ -257,6 +261,7 @@ PARSERS: tuple[Parser, ...] = (
     Parser(name="scene import", write=sound.imports, read=import_scene, share=1, writes=True),
     Parser(
         name="scene folder", write=sound.scene_folders, read=read_scene, share=6, reseal=seals.sealed_scene,
+        sealed=r".*\.npy",
         rules=(FINITE, files_inside(r"sha256\|.*", of_keys=True), hashes_keep_their_form(r"sha256\|.*")),
     ),
     Parser(

@@ -90,6 +90,17 @@ def _read(parser: Parser, folder: Path, broken: str | None) -> tuple[Outcome, st
     return ("silent", f"accepted although {broken}") if broken else ("accepted", "")
 
 
+def _place(error: BaseException) -> str:
+    """File and line of the project from which an exception comes."""
+    root = Path(__file__).parents[2]
+    own = [
+        f"{Path(frame.filename).relative_to(root)}:{frame.lineno}"
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename.startswith(f"{root}/") and "/.venv/" not in frame.filename
+    ]
+    return own[-1] if own else "elsewhere"
+
+
 def lay_out(files: dict[str, bytes], folder: Path) -> None:
     """Write a document's files below a folder."""
     for name, content in files.items():
