@@ -56,6 +56,7 @@ def oserror(number: int, path: str | None = "data/x.json") -> OSError:
         (oserror(errno.ENOTDIR), "is a file where a folder is needed"),
         (oserror(errno.EISDIR), "is a folder where a file is needed"),
         (oserror(errno.ELOOP), "lead in a circle"),
+        (RuntimeError("Symlink loop from 'data/x'"), "Symlink loop from 'data/x': is a link where none may be, or"),
         (oserror(errno.EMFILE, None), "too many files are open"),
         (oserror(errno.ENOENT), "data/x.json: there is no such file"),
         (oserror(errno.EEXIST), "something else lies there"),
