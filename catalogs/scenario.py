@@ -70,19 +70,12 @@ def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list
     unknown : numbers that could not be read and are NaN
     """
     s = scenario
-    given = {name: value for name in NUMBERS if (value := getattr(s, name)) is not None}
     problems = [
         f"{name} must be a finite number; it is {value}"
-        for name, value in given.items()
-        if not isfinite(value) and name not in unknown
+        for name in NUMBERS
+        if (value := getattr(s, name)) is not None and not isfinite(value) and name not in unknown
     ]
-    problems += [
-        f"{name} must not be negative; it is {given[name]:g}"
-        for name in NOT_NEGATIVE
-        if name in given and given[name] < 0
-    ]
-    if s.initial_speed_km_h <= 0:
-        problems.append(f"initial_speed_km_h must be positive; it is {s.initial_speed_km_h:g}")
+    problems += range_problems(s)
     if s.weather == "dry" and s.precipitation_mm_h > 0:
         problems.append(
             f"weather dry has no precipitation; precipitation_mm_h is {s.precipitation_mm_h:g}: name rain or snow"
@@ -103,18 +96,22 @@ def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list
         )
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
-    return problems + limit_problems(s)
+    return problems
 
 
-def limit_problems(scenario: Scenario) -> list[str]:
-    """Every physical limit that the scenario exceeds, each as one sentence.
+def range_problems(scenario: Scenario) -> list[str]:
+    """Every number of the scenario that no scenario may have, whatever the others are, each as one sentence.
 
     Parameters
     ----------
     scenario : its controls
     """
+    given = {name: value for name in NOT_NEGATIVE if (value := getattr(scenario, name)) is not None}
+    problems = [f"{name} must not be negative; it is {value:g}" for name, value in given.items() if value < 0]
+    if scenario.initial_speed_km_h <= 0:
+        problems.append(f"initial_speed_km_h must be positive; it is {scenario.initial_speed_km_h:g}")
     limited = _limited(scenario, load_physical_limits())
-    return [problem for one in limited if (problem := limit_problem(*one)) is not None]
+    return problems + [problem for one in limited if (problem := limit_problem(*one)) is not None]
 
 
 def _limited(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:

@@ -1,15 +1,19 @@
 """Calibration procedures: stages, bounds and scales, as YAML."""
 
+from functools import cache
 from math import inf, radians
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, checked, read_entry
+from catalogs.vehicles import vehicle_units
 from tasks.calibration.residual import Phase, Response, Yardstick
+from tasks.calibration.scalars import KNOT_GROUPS
 from tasks.calibration.staged import Bounds, Procedure, Stage
+from tasks.vehicle.effects.numbers import EFFECT_UNITS
 
 FOLDER = Path(__file__).parent
 
@@ -58,6 +62,13 @@ class StageEntry(CatalogueEntry):
     phase: Phase
 
 
+@cache
+def _group_units() -> dict[str, str]:
+    """Unit of each group, as vehicle files write it."""
+    knots = {group: "s" if group.endswith("_s") else "1" for group in KNOT_GROUPS}
+    return {**vehicle_units(), **knots, **EFFECT_UNITS}
+
+
 class ProcedureEntry(CatalogueEntry):
     """A whole procedure; the meanings stand at ``Procedure``."""
 
@@ -73,6 +84,19 @@ class ProcedureEntry(CatalogueEntry):
     scales: ScalesEntry
     bounds: dict[Text, BoundsEntry]
     stages: tuple[StageEntry, ...]
+
+    @field_validator("bounds")
+    @classmethod
+    def _units_are_those_of_the_groups(cls, bounds: dict[str, BoundsEntry]) -> dict[str, BoundsEntry]:
+        units = _group_units()
+        problems = [
+            f"unit of {group} must be {units[group]}; it is {entry.unit}"
+            for group, entry in bounds.items()
+            if entry.unit != units.get(group, entry.unit)
+        ]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return bounds
 
     @model_validator(mode="after")
     def _every_group_has_bounds(self) -> "ProcedureEntry":

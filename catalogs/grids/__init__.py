@@ -10,7 +10,7 @@ from catalogs.grids.blocks import combinations, fields_set_by
 from catalogs.grids.faults import read_form
 from catalogs.grids.form import GridFile
 from catalogs.grids.selection import CALIBRATION, facts_of, split_of
-from catalogs.scenario import UNKNOWN_WEATHER, Scenario, limit_problems, scenario_problems
+from catalogs.scenario import UNKNOWN_WEATHER, Scenario, range_problems, scenario_problems
 from catalogs.sentences import cap_problems, shorten
 from tasks.errors import InputError
 
@@ -86,7 +86,7 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
     """The product of the blocks, later ones over earlier ones over ``base``, less what is excluded, each checked."""
     base = fields_set_by(settings.base)
     # a value that every level overrides is judged all the same: it stands in the file
-    problems: dict[str, list[str]] = {problem: ["base"] for problem in limit_problems(Scenario(**base))}
+    problems: dict[str, list[str]] = {problem: ["base"] for problem in range_problems(Scenario(**base))}
     scenarios, tags, left_out = [], [], 0
     labels: set[str] = set()
     for combination in combinations(settings):

@@ -1,5 +1,6 @@
 """Vehicles: mechanical values, tyre families and frozen calibration."""
 
+from functools import cache
 from itertools import pairwise
 from math import radians
 from pathlib import Path
@@ -136,6 +137,13 @@ def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
         As ``load_vehicle``.
     """
     return _read(vehicle_source(name_or_path)).provenance
+
+
+@cache
+def vehicle_units() -> dict[str, str]:
+    """Unit of each number of a vehicle file."""
+    entry = _read(FOLDER / "paper-reference.yaml")
+    return {name: quantity.unit for name, quantity in entry if isinstance(quantity, Scalar)}
 
 
 def load_vehicle(name_or_path: str | Path) -> Vehicle:

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from catalogs.buses import load_bus
+from catalogs.calibration import load_procedure
 from catalogs.channel_maps import load_channel_map
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_sizes, load_truths
@@ -57,6 +58,12 @@ Change = Callable[[Any], None]
             load_truths,
             lambda c: c["outside"]["strut_step"].update(at=[0, 0, 1, 2, 4]),
             "outside.strut_step: at must ascend in equal steps",
+        ),
+        (
+            "calibration/coupled-grown.yaml",
+            load_procedure,
+            lambda c: c["bounds"]["static_pitch"].update(unit="rad"),
+            "bounds: unit of static_pitch must be deg; it is rad",
         ),
         (
             "hazard_markings/zebra-yellow-black.yaml",

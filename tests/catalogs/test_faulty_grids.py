@@ -73,6 +73,10 @@ def problems_of(tmp_path: Path, body: str) -> list[str]:
             "{name: t, base: {peak_pressure_mpa: 23}, scenarios: {a: {peak_pressure_mpa: 0}}}",
             ["scenario base: peak_pressure_mpa must be at most 20 MPa"],
         ),
+        (
+            "{name: t, base: {precipitation_mm_h: -1}, scenarios: {a: {precipitation_mm_h: 0}}}",
+            ["scenario base: precipitation_mm_h must not be negative; it is -1"],
+        ),
     ],
 )  # fmt: skip
 def test_each_fault_is_told_and_none_is_made_up(tmp_path, body, starts):
