@@ -1,5 +1,6 @@
 """The ``musync`` command: reads arguments, calls one function, prints what it returned."""
 
+import os
 import sys
 
 import typer
@@ -8,6 +9,9 @@ from flows.commands import audits, datasets, judging, measured, scenes, studies
 from flows.running.failures import INTERRUPTED, explain_end
 from flows.running.terminal import say
 
+QUIET = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "ERROR"}
+"""OpenCV writes names and tags of a video to the terminal as they are; what is wrong with it, we say."""
+
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
 for group in (datasets, audits, judging, studies, measured, scenes):
     app.add_typer(group.app)
@@ -15,6 +19,8 @@ for group in (datasets, audits, judging, studies, measured, scenes):
 
 def main() -> None:
     """Entry point: exit codes 0 done, 1 a check failed, 2 the input is wrong, 3 something broke, 130 interrupted."""
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # a terminal that knows ASCII only
     try:
