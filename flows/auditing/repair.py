@@ -19,7 +19,7 @@ from flows.store.layout import STAGED_TABLES, Layout, write_atomically, write_js
 from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
-from flows.store.staging import remove_staging, scratch_dataset
+from flows.store.staging import left_overs, remove_staged, remove_staging, scratch_dataset
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.explain import as_sentences, tool_differences, tools_here
@@ -70,6 +70,7 @@ def _repaired(
     if not layout.manifest.is_file():
         read_manifest(layout)  # says what is missing, before anything is written there
     with sole_writer(layout):
+        remove_staged(left_overs(layout))
         found = stage(compare_files)(layout)
         if any(row["path"] == "manifest.json" for row in found["damaged"]):
             raise InputError(

@@ -34,6 +34,7 @@ from flows.store.layout import STAGED_TABLES, Layout, write_json
 from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
+from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
 from tasks.eval.pose_pnp import recover_motion_pnp
 from tasks.eval.undistort import undistorted
@@ -113,12 +114,16 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
         rig_at = rig_of(ride, frames, catalogue)
         buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed), rig_at)
         frames |= judge(buffers, frames, facts["film_depth_mm"], catalogue)
-        write_clip(layout.frames, index, buffers)
     else:
         frames |= nothing_to_judge(len(frames["frame"]))
     verdict = frames.pop("verdict")
 
+    if layout.manifest.is_file():
+        # the driver died, another run took over, and has ended: there is nothing to commit any more
+        raise InputError(f"{layout}: the dataset is finished; clip {clip.label} was made by another run")
     identity = {"clip_id": clip.clip_id, "label": clip.label, "weather": clip.scenario.weather}
+    if plan.settings.pictures:
+        write_clip(layout.frames, index, buffers)
     write_parquet(labelled_table(ride.columns, identity), layout.staged(clip.clip_id, "ticks"))
     write_parquet(labelled_table(frames, identity | facts), layout.staged(clip.clip_id, "frames"))
     shards = {name: layout.frame_shard(name, index) for name in buffers}

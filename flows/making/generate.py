@@ -20,7 +20,7 @@ from flows.store.frames import create_arrays
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
 from flows.store.sealed import read_manifest
-from flows.store.staging import BEGUN, abandoned_scratch, partial_files, remove_staged
+from flows.store.staging import BEGUN, left_overs, remove_staged
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 from tasks.render.backend import select_backend
@@ -119,7 +119,7 @@ def prepare(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
     InputError
         If the folder holds the plan of another run.
     """
-    remove_staged([*partial_files(layout), *abandoned_scratch(layout)])
+    remove_staged(left_overs(layout))
     if layout.plan.is_file():
         _refuse_other_plan(layout, plan, inputs)
         return

@@ -40,8 +40,14 @@ def abandoned_scratch(layout: Layout) -> list[Path]:
     )
 
 
+def left_overs(layout: Layout) -> set[Path]:
+    """What killed runs left: half-written files, their scratch folders, and in a finished dataset all that is staged."""
+    staged = staged_files(layout) if layout.manifest.is_file() else []
+    return {*partial_files(layout), *abandoned_scratch(layout), *staged}
+
+
 def remove_staged(paths: Iterable[Path]) -> None:
-    """Remove files and folders that the lists above name."""
+    """Remove files and folders of the lists above."""
     for path in paths:
         if path.is_dir():
             shutil.rmtree(path)

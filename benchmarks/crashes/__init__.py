@@ -1,0 +1,1 @@
+"""Runs that are killed, files that rot, disks that are full: what the bytes are afterwards."""

@@ -1,0 +1,31 @@
+"""``python -m benchmarks.crashes [--kills 200] [--flips 500] [--disks 20]``: count what survives, fail if not all does."""
+
+import argparse
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.crashes.full_disk import full_disk_study
+from benchmarks.crashes.kills import GRID, kill_study
+from benchmarks.crashes.rot import flip_study
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    for name, count in (("kills", 200), ("flips", 500), ("disks", 20), ("seed", 9)):
+        parser.add_argument(f"--{name}", type=int, default=count)
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        place = Path(scratch)
+        (place / "grid.yaml").write_text(GRID)
+        killed = kill_study(place / "grid.yaml", place, asked.kills, asked.seed)
+        flipped = flip_study(place / "whole", asked.flips)
+        filled = full_disk_study(place / "grid.yaml", place, place / "whole", asked.disks)
+    print(json.dumps({"killed": killed, "flipped": flipped, "filled": filled}))
+    good = (
+        killed["equal"] == killed["runs_finished"] > 0
+        and killed["half_clips"] == 0
+        and flipped["named"] == flipped["flips"]
+        and filled["told"] == filled["equal"] == filled["disks"]
+    )
+    sys.exit(0 if good else 1)
