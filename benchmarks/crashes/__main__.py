@@ -1,4 +1,4 @@
-"""``python -m benchmarks.crashes [--kills 200] [--flips 500] [--disks 20]``: count what survives, fail if not all does."""
+"""``python -m benchmarks.crashes [--kills 200] [--flips 500] [--disks 20]``: count what survives."""
 
 import argparse
 import json

@@ -111,11 +111,7 @@ def _collect(layout: Layout, dry_run: bool) -> dict[str, Any]:
             " not plan goes on with its musync generate command"
         )
     with sole_writer(layout):
-        found = {
-            *partial_files(layout),
-            *abandoned_scratch(layout),
-            *(staged_files(layout) if finished else ()),
-        }
+        found = left_overs(layout)
         size = sum(_bytes(path) for path in found)
         if not dry_run:
             withdraw(layout, [path for path in found if path.is_file()])

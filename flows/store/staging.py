@@ -41,7 +41,7 @@ def abandoned_scratch(layout: Layout) -> list[Path]:
 
 
 def left_overs(layout: Layout) -> set[Path]:
-    """What killed runs left: half-written files, their scratch folders, and in a finished dataset all that is staged."""
+    """What killed runs left: half-written files, scratch folders, and in a finished dataset all that is staged."""
     staged = staged_files(layout) if layout.manifest.is_file() else []
     return {*partial_files(layout), *abandoned_scratch(layout), *staged}
 
