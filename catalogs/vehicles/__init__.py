@@ -13,6 +13,7 @@ from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, parse_entry
 from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
+from tasks.vehicle.effects.numbers import EFFECT_UNITS
 from tasks.vehicle.parameters import TyreFamily, Vehicle
 
 FOLDER = Path(__file__).parent
@@ -106,10 +107,24 @@ class VehicleEntry(CatalogueEntry):
 
     @model_validator(mode="after")
     def _effects_keep_their_rules(self) -> "VehicleEntry":
-        problems = effect_problems(self.effects, self.provenance.bounds if self.provenance else {})
+        bounds = self.provenance.bounds if self.provenance else {}
+        problems = effect_problems(self.effects, bounds)
+        units = self._units_inside()
+        problems += [
+            f"provenance.bounds: unit of {group} must be {units[group]}; it is {limits.unit}"
+            for group, limits in bounds.items()
+            if limits.unit != units.get(group, limits.unit)
+        ]
         if problems:
             raise ValueError("; ".join(problems))
         return self
+
+    def _units_inside(self) -> dict[str, str]:
+        """Unit of each group that a calibration may move; angles are in radians there."""
+        fields = {name: quantity.unit for name, quantity in self if isinstance(quantity, Scalar)}
+        knots = {name: getattr(self.families.dry, name).unit for name in KNOT_TABLES}
+        inside = {name: "rad" if unit == "deg" else unit for name, unit in fields.items()}
+        return {**inside, **knots, **EFFECT_UNITS}
 
 
 def vehicle_names() -> tuple[str, ...]:

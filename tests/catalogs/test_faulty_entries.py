@@ -17,6 +17,7 @@ from catalogs.hazard_markings import load_marking
 from catalogs.learned_judges import load_judges
 from catalogs.stop_studies import load_stop_study
 from catalogs.vehicles import load_vehicle
+from catalogs.vehicles.frozen import frozen_text
 from catalogs.weather import FOLDER as WEATHER
 from catalogs.weather import load_weather
 from tasks.errors import InputError
@@ -113,6 +114,16 @@ def test_what_is_no_document_is_one_sentence(
     with pytest.raises(InputError) as caught:
         load(path)
     assert len(caught.value.problems) == 1 and len(str(caught.value)) < 500
+
+
+def test_the_bounds_of_a_frozen_vehicle_are_in_the_unit_of_what_they_bound(tmp_path: Path) -> None:
+    content = yaml.safe_load((CATALOGS / "vehicles" / "multibody-grown.yaml").read_text())
+    content["provenance"]["bounds"]["cg_height"]["unit"] = "furlong"
+    del content["provenance"]["sha256"]
+    path = tmp_path / "resealed.yaml"
+    path.write_text(frozen_text(content, content.pop("provenance"), "resealed"))
+    with pytest.raises(InputError, match=r"provenance\.bounds: unit of cg_height must be m; it is furlong"):
+        load_vehicle(path)
 
 
 def test_a_frozen_vehicle_keeps_its_seal_with_the_line_ends_of_another_system(tmp_path: Path) -> None:
