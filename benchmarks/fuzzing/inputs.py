@@ -22,6 +22,8 @@ RESEALED = 0.8
 TWICE, WHOLE, SEALED = "no key stands twice", "a file is whole", "seals fit"
 LOST_BY_SEALING = (TWICE, WHOLE)
 """Rules that a JSON document keeps again once it was read and written."""
+TREES = (".yaml", ".json", ".musync-written")
+"""Forms that are read as trees."""
 WHOLE_FILES = (".json", ".parquet", ".npy", ".ply", ".spz", ".png")
 """Forms of which no beginning is whole."""
 
@@ -69,7 +71,7 @@ class Documents:
         """A YAML or JSON file as plain values."""
         key = document, file
         if key not in self._trees:
-            load = json.loads if file.endswith(".json") else yaml.safe_load
+            load = yaml.safe_load if file.endswith(".yaml") else json.loads
             self._trees[key] = load(self.files[document][file])
         return self._trees[key]
 
@@ -87,7 +89,7 @@ def make_input(documents: Documents, seed: int, number: int) -> Input:
     if rule is None and content != files[file] and re.fullmatch(parser.sealed or "", file):
         rule = SEALED
     if parser.reseal is not None and not (
-        knowing and file.endswith(".json") and knowing[2] in LOST_BY_SEALING
+        knowing and not file.endswith(".yaml") and knowing[2] in LOST_BY_SEALING
     ):
         try:
             whole = parser.reseal(files | changed, file) if rng.random() < RESEALED else None
@@ -105,7 +107,7 @@ def _break_knowingly(
     """Content that breaks a rule, how, and which; None where the file is under no rule."""
     parser, content = documents.parser, documents.files[document][file]
     rules = list(parser.rules)
-    if file.endswith((".yaml", ".json")):
+    if file.endswith(TREES):
         yaml_form = file.endswith(".yaml")
         tree = documents.tree(document, file)
 
@@ -152,7 +154,7 @@ def _change(rng: Random, documents: Documents, document: str, file: str) -> tupl
     content = documents.files[document][file]
     if rng.random() < 0.1:
         return payloads.odd_bytes(rng, content), "bytes changed"
-    if file.endswith((".yaml", ".json")):
+    if file.endswith(TREES):
         if rng.random() < 0.25:
             return payloads.odd_text(rng, content.decode()), "text changed"
         yaml_form, tree = file.endswith(".yaml"), documents.tree(document, file)

@@ -46,6 +46,7 @@ from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
+from flows.auditing.signing import signature_findings
 from flows.auditing.verify import verify
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
@@ -57,6 +58,7 @@ from flows.making.seal import seal
 from flows.reading.describe import describe, validate
 from flows.reading.query import VIEWS, sql
 from flows.store.layout import Layout
+from flows.store.outputs import read_marker
 from flows.store.sealed import read_manifest
 from manifests.frozen_run import read_frozen
 from tasks.errors import InputError
@@ -130,6 +132,13 @@ def read_tables(folder: Path) -> None:
     for facts in clip_facts(folder):
         clip_columns(folder, "ticks", facts)
         clip_columns(folder, "frames", facts)
+
+
+def read_signature(folder: Path) -> None:
+    """A signed dataset's signature, held against the signer's key."""
+    found = signature_findings(Layout(folder), str(folder / "public.pem"))
+    if not found["signed"]:
+        raise InputError(found["signature"])
 
 
 def import_scene(folder: Path) -> None:
@@ -212,7 +221,7 @@ PARSERS: tuple[Parser, ...] = (
         read=lambda folder: read_manifest(Layout(folder)), reseal=seals.sealed_json,
     ),
     Parser(
-        name="telemetry", write=sound.dataset, targets=(r"telemetry/.*\.parquet",), read=read_dataset, share=1,
+        name="telemetry", write=sound.dataset, targets=(r"telemetry/.*\.parquet",), read=read_dataset, share=0.5,
         sealed=r".*",
         reseal=seals.sealed_dataset,
     ),
@@ -235,6 +244,20 @@ PARSERS: tuple[Parser, ...] = (
     Parser(
         name="frozen run", write=sound.frozen_runs, read=lambda folder: read_frozen(folder / "run.json"), share=4,
         reseal=seals.sealed_json, rules=(FINITE,),
+    ),
+    Parser(
+        name="signature", write=sound.signed_dataset, read=read_signature, share=3, known_keys=None,
+        targets=(r"manifest\.dsse\.json", r"public\.pem"),
+    ),
+    Parser(
+        name="signed manifest", write=sound.signed_dataset, read=read_signature, share=2, sealed=r".*",
+        targets=(r"manifest\.json",),
+    ),
+    Parser(
+        name="marker of outputs", share=2, read=lambda folder: read_marker(folder), targets=(r"\.musync-written",),
+        rules=(files_inside(r"files\|[^|]+", of_keys=True),),
+        write=sound.texts({".musync-written": '{"files": {"a.csv": "sheets", "b/c.png": "report"},'
+                                              ' "format": "musync-written/1"}'}),
     ),
     Parser(
         name="campaign", write=sound.campaigns, read=read_campaign, share=5,

@@ -15,10 +15,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat, PublicFormat
 
 import catalogs
 from catalogs.scenes.folder import write_scene
 from catalogs.scenes.gaussian_files import write_gaussians
+from flows.auditing.signing import sign
 from flows.making import generate as making
 from manifests.frozen_run import sealed
 from tasks.closure.campaign import CHANNELS
@@ -135,6 +138,17 @@ def scene_folders(folder: Path) -> None:
 def dataset(folder: Path) -> None:
     """A finished dataset without pictures."""
     making.generate(str(_grid_beside(folder)), str(folder / "0"), runner="threads", workers=1)
+
+
+def signed_dataset(folder: Path) -> None:
+    """A finished dataset with a signature, and the key that made it."""
+    dataset(folder)
+    key = Ed25519PrivateKey.from_private_bytes(bytes(range(32)))
+    private = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    public = key.public_key().public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
+    _put(folder.parent / "key.pem", private)
+    sign(str(folder / "0"), key=str(folder.parent / "key.pem"))
+    _put(folder / "0" / "public.pem", public)
 
 
 def unfinished_dataset(folder: Path) -> None:

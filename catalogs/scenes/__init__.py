@@ -1,10 +1,12 @@
 """Scenes by name or folder: the built-in street, and what was imported or reconstructed."""
 
+import os
 from functools import lru_cache
 from pathlib import Path
 
 from catalogs.scenes.folder import read_scene, scene_hash, write_scene
 from catalogs.scenes.street_cache import cached_street
+from catalogs.sentences import shorten
 from tasks.errors import InputError
 from tasks.scene.scene import Scene
 
@@ -22,9 +24,10 @@ def scene_folder(name_or_folder: str | Path) -> Path:
     if str(name_or_folder) in BUILT_IN:
         return cached_street()
     folder = Path(name_or_folder)
-    if not (folder / "scene.json").is_file():
+    # unlike Path.is_file this takes a name that no file can have for one that is not there
+    if not os.path.isfile(folder / "scene.json"):
         raise InputError(
-            f"scene {name_or_folder}: no such scene; give a scene folder or one of: {', '.join(BUILT_IN)}"
+            f"scene {shorten(name_or_folder)}: no such scene; give a scene folder or one of: {', '.join(BUILT_IN)}"
         )
     return folder
 

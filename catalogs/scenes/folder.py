@@ -94,7 +94,9 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
 
 
 def must_be_new(folder: Path) -> None:
-    """Raise `InputError` if the folder holds anything."""
+    """Raise `InputError` if the folder holds anything, or is none of its own."""
+    if folder.is_symlink():
+        raise InputError(f"{folder}: must be a new or empty folder; it is a link: give the folder itself")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: must be a new or empty folder; it holds other files")
 

@@ -1,5 +1,6 @@
 """What a judge of foreign videos is given: footage and its camera, from files it did not make."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,11 @@ MOST_PIXELS = 960 * 540
 """Size that frames are judged at; larger ones are reduced by area, so that the longest video fills 5 GB."""
 LARGEST_CAMERA = 1e6
 """Greatest number of a camera's file [px, m or 1]."""
+NO_PLAYLISTS = (
+    "protocol_whitelist;file|format_whitelist;"
+    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpeg,mpegts,mpegvideo,h264,hevc,ivf,asf,flv,ogg,yuv4mpegpipe,gif,apng"
+)
+"""What FFmpeg may open: containers of frames. A playlist's text would send it to other files, and to the network."""
 CHUNK = 64
 """Frames that are undistorted at once."""
 LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -134,6 +140,7 @@ def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64], tupl
         raise InputError(f"{path}: no such file; give a video.")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a video.")
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = NO_PLAYLISTS
     stream = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     rate = stream.get(cv2.CAP_PROP_FPS)
     announced = int(stream.get(cv2.CAP_PROP_FRAME_COUNT))

@@ -47,6 +47,14 @@ def test_a_scene_is_not_written_over_other_files(tmp_path):
         write_scene(SCENE, tmp_path, {})
 
 
+def test_a_scene_is_not_written_through_a_link(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "s").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="it is a link"):
+        write_scene(SCENE, tmp_path / "s", {})
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
 def test_the_hash_follows_the_content_and_not_the_place(tmp_path):
     write_scene(SCENE, tmp_path / "a", {})
     shutil.copytree(tmp_path / "a", tmp_path / "b")
@@ -72,9 +80,11 @@ def test_a_nan_in_a_gaussian_is_refused_with_its_number(tmp_path):
         read_scene(tmp_path / "s")
 
 
-def test_an_unknown_scene_lists_the_built_in_one():
-    with pytest.raises(InputError, match="street"):
-        load_scene("nowhere")
+@pytest.mark.parametrize("name", ["nowhere", "x" * 100_000, "a\0b"])
+def test_an_unknown_scene_lists_the_built_in_one(name):
+    with pytest.raises(InputError, match="street") as caught:
+        load_scene(name)
+    assert len(str(caught.value)) < 400
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import pytest
 from benchmarks.synthetic_street import Clip, drive_clip
 from catalogs.gates import load_foreign_gates
 from flows.judging import foreign_sources
+from flows.judging.claims import read_claim
 from flows.judging.foreign import judge, retention
 from flows.judging.foreign_sources import (
     LEVEL,
@@ -219,3 +220,52 @@ def test_retention_sees_what_an_editor_kept_and_what_it_lost(tmp_path: Path) -> 
     assert part["motion_retention"] < 0.7 and (tmp_path / "out" / "retention.json").is_file()
     with pytest.raises(InputError, match="event must lie within"):
         retention(source, braking, kept, edited_braking, camera=str(tmp_path / "K.yaml"), event=(16, 80))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["ffconcat version 1.0\nfile {}\n", "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{}\n#EXT-X-ENDLIST\n"],
+)
+def test_a_playlist_opens_no_other_file(tmp_path: Path, street: Clip, text: str) -> None:
+    encode(tmp_path / "other.avi", street.frames, 16.0, "MJPG")
+    for name in ("list.mp4", "list.m3u8"):
+        (tmp_path / name).write_text(text.format("other.avi"))
+        with pytest.raises(InputError, match="no frame can be read"):
+            read_video(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("{width: .inf, height: 2, focal_length: 3}", "finite"),
+        ("{width: 1.0e+300, height: 2, focal_length: 3}", "width must be a number of 1 to 1e.06"),
+        ("{width: 0.5, height: 2, focal_length: 3}", "width must be a number of 1"),
+        ("{width: true, height: 2, focal_length: 3}", "width must be a number of 1"),
+        (
+            "{width: 4, height: 2, focal_length: 3, height_above_road: high}",
+            "height_above_road must be a number",
+        ),
+        ("{width: 4, width: 5, height: 2, focal_length: 3}", "distinct keys"),
+    ],
+)
+def test_a_camera_holds_what_a_camera_can_have(tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / "K.yaml").write_text(content)
+    with pytest.raises(InputError, match=words):
+        read_camera(tmp_path / "K.yaml")
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ({"pitch": ["x", "y"]}, "pitch must be of numbers"),
+        ({"pitch": [0.0, 1e9]}, r"pitch must be within 3\.142 rad"),
+        ({"station": [0.0, float("inf")]}, "finite number of at most"),
+        ({"time": [0.0, float("nan")]}, "time must rise"),
+        ({"clip_id": ["a", "b"]}, "holds 2 clips"),
+    ],
+)
+def test_a_claim_holds_what_a_drive_can_have(tmp_path: Path, columns: dict, words: str) -> None:
+    sound = {"time": [0.0, 1.0], "pitch": [0.0, 0.1], "station": [0.0, 2.0]}
+    pq.write_table(pa.table(sound | columns), tmp_path / "claim.parquet")
+    with pytest.raises(InputError, match=words):
+        read_claim(tmp_path / "claim.parquet")
