@@ -11,7 +11,7 @@ from flows.store.links import foreign_entries
 from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
-from flows.store.staging import remove_staged, remove_staging
+from flows.store.staging import left_overs, remove_staged, remove_staging
 from manifests.manifest import damaged_files, manifest_damage, recorded_files
 from manifests.signing import ENVELOPE
 from tasks.errors import InputError
