@@ -52,7 +52,7 @@ def read_form(content: dict[str, Any], path: Path) -> GridForm:
         except ValidationError as error:
             form.problems += describe_rules(error, path, _known_keys)
             for fault in error.errors(include_url=False):
-                if not _leave_out(kept, fault["loc"], fault["type"], unknown):
+                if not _leave_out(kept, fault["loc"], unknown):
                     form.is_expandable = False
             if not form.is_expandable:
                 kept = {key: value for key, value in kept.items() if key not in (*BLOCKS, "base", "exclude")}
@@ -67,10 +67,10 @@ def _known_keys(place: Place) -> Iterable[str]:
     return GridFile.model_fields if not place else PartialScenario.model_fields
 
 
-def _leave_out(kept: dict[str, Any], place: Place, kind: str, unknown: dict[Place, set[str]]) -> bool:
+def _leave_out(kept: dict[str, Any], place: Place, unknown: dict[Place, set[str]]) -> bool:
     """Take out what is wrong; False where then it is open which scenarios there are.
 
-    A field of a level, or all of the level, is noted as unknown; a key that nobody knows is just dropped.
+    A field of a level, or all of the level, is noted as unknown.
     """
     if not place:
         return False
@@ -99,8 +99,7 @@ def _leave_out(kept: dict[str, Any], place: Place, kind: str, unknown: dict[Plac
         return block != "base"
     name = str(place[depth])
     table[level].pop(name, None)
-    if kind != "extra_forbidden":
-        unknown.setdefault(place[:depth], set()).add(name)
+    unknown.setdefault(place[:depth], set()).add(name)
     return True
 
 

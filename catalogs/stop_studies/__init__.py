@@ -1,14 +1,13 @@
 """Studies of one stop predicted from another: which runs, and what is added to the model in which order."""
 
-from functools import cache
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from catalogs.effects import load_effects
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
+from catalogs.vehicles.added import library_units
 from tasks.recordings.stop_study import Rung
 from tasks.vehicle.effects.library import PARAMETER_INDEX
 
@@ -38,7 +37,7 @@ class RungEntry(CatalogueEntry):
     @field_validator("fixed")
     @classmethod
     def _units_are_the_librarys(cls, fixed: dict[str, Scalar]) -> dict[str, Scalar]:
-        units = _library_units()
+        units = library_units()
         problems = [
             f"unit of {name} must be {units[name]}; it is {entry.unit}"
             for name, entry in fixed.items()
@@ -47,11 +46,6 @@ class RungEntry(CatalogueEntry):
         if problems:
             raise ValueError("; ".join(problems))
         return fixed
-
-
-@cache
-def _library_units() -> dict[str, str]:
-    return {p.name: p.unit for effect in load_effects() for p in effect.parameters}
 
 
 class StopStudy(CatalogueEntry):

@@ -101,5 +101,11 @@ def effect_problems(effects: Mapping[str, Scalar], bounds: Mapping[str, Limits])
 
 
 @cache
+def library_units() -> dict[str, str]:
+    """Unit of each parameter as the library of effects writes it, which grown vehicles take over for their bounds."""
+    return {p.name: p.unit for effect in load_effects() for p in effect.parameters}
+
+
+@cache
 def _library_bounds() -> dict[str, tuple[float, float]]:
     return {p.name: (p.lower, p.upper) for effect in load_effects() for p in effect.parameters}
