@@ -11,8 +11,10 @@ import os
 import random
 import shutil
 import stat
+import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -52,7 +54,8 @@ class FaultyDisk:
         self.steps, self.dead, self.struck = 0, False, False
         self._suspended = False
         self._draw = random.Random(seed)
-        self._unflushed_files: set[str] = set()
+        self._unflushed_files: dict[str, None] = {}
+        self._names = count()
         self._unflushed_entries: list[tuple[str, Callable[[], None]]] = []
 
     def __enter__(self) -> "FaultyDisk":
@@ -65,6 +68,9 @@ class FaultyDisk:
         for name in self._real:
             self._stack.enter_context(mock.patch.object(os, name, getattr(self, f"_{name}")))
         self._stack.enter_context(mock.patch.object(io, "open", self._io_open))
+        # the same sequence has to go the same way: no names at random
+        names = (f"{number:08d}" for number in self._names)
+        self._stack.enter_context(mock.patch.object(tempfile, "_get_candidate_names", lambda: names))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -106,7 +112,7 @@ class FaultyDisk:
         raise Killed
 
     def _lose_what_was_not_flushed(self) -> None:
-        for path in sorted(self._unflushed_files):
+        for path in list(self._unflushed_files):
             if self._draw.random() < 0.5 and os.path.isfile(path):
                 with self._real_open(path, "r+b") as stream:
                     stream.truncate(self._draw.randrange(os.path.getsize(path) + 1))
@@ -167,8 +173,8 @@ class FaultyDisk:
         if below:
             place, origin = os.path.abspath(os.fspath(target)), os.path.abspath(os.fspath(source))
             if origin in self._unflushed_files:
-                self._unflushed_files.discard(origin)
-                self._unflushed_files.add(place)
+                del self._unflushed_files[origin]
+                self._unflushed_files[place] = None
             self._remember(target, self._restore(place, before))
 
     _rename = _replace
@@ -185,7 +191,7 @@ class FaultyDisk:
             return
         self._step("fsync", path)
         # nothing is flushed in truth: it costs time, and the faults are ours
-        self._unflushed_files.discard(path)
+        self._unflushed_files.pop(path, None)
         if stat.S_ISDIR(os.fstat(descriptor).st_mode):
             self._unflushed_entries = [entry for entry in self._unflushed_entries if entry[0] != path]
 
@@ -195,7 +201,7 @@ class FaultyDisk:
             return self._real_open(path, mode, *args, **kwargs)
         self._step("open", path)
         stream = self._real_open(path, mode, *args, **kwargs)
-        self._unflushed_files.add(os.path.abspath(os.fspath(path)))
+        self._unflushed_files[os.path.abspath(os.fspath(path))] = None
         real_write = stream.write
 
         def write(content: Any) -> int:

@@ -29,8 +29,8 @@ REFUSED, UNANSWERED, KILLED_BEFORE, KILLED_AFTER = "refused", "unanswered", "kil
 REQUEST_FAULTS = (REFUSED, UNANSWERED, KILLED_BEFORE, KILLED_AFTER)
 LAST_REQUEST = 60
 """Faults strike up to here; a run sends some 60 requests that change something."""
-LEASE_S, RENEW_S, WATCH_S = 0.05, 0.02, 0.005
-"""Short, so that the lock of a dead owner is given up in no time [s]."""
+LEASE_S, RENEW_S, WATCH_S = 0.05, 60.0, 0.005
+"""The lock of a dead owner is given up in no time; no renewal comes between, so that sequences can be repeated [s]."""
 
 faults = st.tuples(st.sampled_from((*REQUEST_FAULTS, None)), st.integers(1, LAST_REQUEST))
 

@@ -20,11 +20,17 @@ from flows.making.generate import generate
 from flows.making.plan import make_plan
 from flows.running.runner import RunnerName
 from flows.scheduled.failure_report import is_webhook, stamp
+from flows.store.address import PREPARED
 from flows.store.layout import Layout, read_json
 from flows.store.objects import Objects, is_address
+from flows.store.staging import BEGUN
 from tasks.errors import InputError
 
 SERVER_START_S = 120.0
+
+
+NO_PLAN = ""
+"""In place of a run's id: a run that stopped so early that nothing binds its place to a grid."""
 
 
 def dataset_place(grid: str, root: str, backend: str, at: datetime) -> str:
@@ -46,7 +52,7 @@ def dataset_place(grid: str, root: str, backend: str, at: datetime) -> str:
     name = plan.settings.name
     begun = _begun_in_store if is_address(root) else _begun_in_folder
     for place, run_id in begun(root, re.compile(rf"{re.escape(name)}-\d{{8}}T\d{{6}}Z")):
-        if run_id == plan.run_id:
+        if run_id in {plan.run_id, NO_PLAN}:
             return place
     return f"{root}/{name}-{stamp(at)}"
 
@@ -56,6 +62,8 @@ def _begun_in_folder(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, s
     folders = [path for path in Path(root).glob("*") if dated.fullmatch(path.name)]
     for folder in sorted(folders, reverse=True):
         layout = Layout(folder)
+        if (layout.staging / BEGUN).is_file() and not layout.plan.is_file():
+            yield str(folder), NO_PLAN
         if layout.plan.is_file() and not layout.manifest.is_file():
             run_id = _run_id(layout.plan.read_bytes(), layout.plan)
             if run_id is not None:
@@ -66,6 +74,8 @@ def _begun_in_store(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, st
     for name in sorted(filter(dated.fullmatch, Objects(root).folders()), reverse=True):
         objects = Objects(f"{root}/{name}")
         plan = objects.read("plan.json")
+        if plan is None and all(name.startswith(PREPARED) for name in objects.sizes()):
+            yield objects.address, NO_PLAN
         if plan is not None and objects.tag("manifest.json") is None:
             run_id = _run_id(plan, objects.address)
             if run_id is not None:

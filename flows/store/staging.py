@@ -40,10 +40,10 @@ def abandoned_scratch(layout: Layout) -> list[Path]:
     )
 
 
-def left_overs(layout: Layout) -> set[Path]:
+def left_overs(layout: Layout) -> list[Path]:
     """What killed runs left: half-written files, scratch folders, and in a finished dataset all that is staged."""
     staged = staged_files(layout) if layout.manifest.is_file() else []
-    return {*partial_files(layout), *abandoned_scratch(layout), *staged}
+    return sorted({*partial_files(layout), *abandoned_scratch(layout), *staged})
 
 
 def remove_staged(paths: Iterable[Path]) -> None:

@@ -62,6 +62,20 @@ def test_an_unfinished_run_is_resumed_and_one_of_another_plan_left_alone(grid, t
     assert len(list(root.iterdir())) == 2
 
 
+def test_the_place_of_a_run_that_stopped_before_its_plan_is_taken_by_the_next(grid, tmp_path, monkeypatch):
+    root = tmp_path / "root"
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(flows.making.generate, "create_frame_arrays", full)
+    with pytest.raises(OSError, match="No space"):
+        scheduled_run(grid, str(root), at=AT, runner="threads")
+    monkeypatch.undo()
+    assert scheduled_run(grid, str(root), at=AT + NIGHT, runner="threads")["made"] == 4
+    assert [path.name for path in root.iterdir()] == ["toy-20260301T030000Z"]
+
+
 def test_a_failure_leaves_a_report_and_runs_the_command_with_it(tmp_path):
     (tmp_path / "hook.sh").write_text(
         f'#!/bin/sh\ncp "$2" "{tmp_path}/told"; echo "$1" >> "{tmp_path}/told"\n'
