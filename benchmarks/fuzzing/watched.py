@@ -20,13 +20,17 @@ from benchmarks.fuzzing.parsers import BY_NAME, Parser
 from tasks.errors import InputError
 
 LONGEST_S = 10.0
-"""An input that takes longer is a hang [s]."""
+"""An input on which a process works longer is a hang [s]: its own time, so that a busy machine makes none."""
+LONGEST_WAIT_S = 120.0
+"""And one that takes longer by the clock: then it waits for what never comes [s]."""
 LARGEST_BYTES = 2**30
 """A process that holds more memory has grown beyond bounds."""
 ROOM_BYTES = 3 * 2**30
 """Address space that a process may take beyond what it starts with; the machine is shared."""
 LONGEST_MESSAGE = 20_000
 """Characters of all the sentences about one input."""
+START = "spawn"
+"""How processes begin: with nothing of this one's memory."""
 CHUNK = 100
 """Inputs that a process is given at once."""
 
@@ -203,13 +207,13 @@ class _Worker:
     """A process that reads one input after the other and tells of each."""
 
     def __init__(self, shelf: Path, seed: int):
-        context = get_context("spawn")
+        context = get_context(START)
         self.line, other = context.Pipe()
         self._process = context.Process(target=_serve, args=(other, str(shelf), seed), daemon=True)
         self._process.start()
         other.close()
         self.alive, self.parser, self.left = True, "", range(0)
-        self._heard, self._started = 0.0, False
+        self._heard, self._worked, self._started = 0.0, 0.0, False
 
     def give(self, task: tuple[str, range]) -> None:
         """Have it read these inputs."""
@@ -221,7 +225,10 @@ class _Worker:
     @property
     def is_late(self) -> bool:
         """Whether the input at hand takes too long; what comes before the first, such as imports, may take longer."""
-        return time.monotonic() - self._heard > (LONGEST_S + 2.0 if self._started else 20 * LONGEST_S)
+        waited = time.monotonic() - self._heard
+        if not self._started or waited <= LONGEST_S:
+            return waited > 2 * LONGEST_WAIT_S
+        return waited > LONGEST_WAIT_S or _cpu_seconds(self._process.pid) - self._worked > LONGEST_S
 
     def collect(self) -> Reading | None:
         """The next reading: as told, or, of a process that hangs or is gone, as seen from here."""
@@ -233,6 +240,7 @@ class _Worker:
             self._process.join(10)
             return self._lost("traceback", f"the process ended with {self._process.exitcode}")
         self._started, self._heard = True, time.monotonic()
+        self._worked = _cpu_seconds(self._process.pid)
         if told is None:
             return None
         self.left = self.left[1:]
@@ -250,6 +258,15 @@ class _Worker:
         self.line.close()
         self._process.kill()
         self._process.join()
+
+
+def _cpu_seconds(process: int | None) -> float:
+    """Time that a process has worked [s]; none of one that is gone."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _serve(line: Connection, shelf: str, seed: int) -> None:
@@ -272,15 +289,15 @@ def _serve(line: Connection, shelf: str, seed: int) -> None:
 def _reading(desk: Desk, name: str, seed: int, number: int) -> Reading:
     before, cpu = time.monotonic(), time.process_time()
     _, outcome, detail = desk.read(name, seed, number)
-    seconds = time.monotonic() - before
+    seconds, worked = time.monotonic() - before, time.process_time() - cpu
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    if seconds > LONGEST_S:
+    if worked > LONGEST_S or seconds > LONGEST_WAIT_S:
         outcome, detail = "hang", f"{seconds:.1f} s; {detail}"
     if peak > LARGEST_BYTES:
         outcome, detail = "memory", f"{peak / 2**20:.0f} MiB; {detail}"
     return Reading(
         parser=name, number=number, outcome=outcome, detail=detail, seconds=seconds,
-        cpu_seconds=time.process_time() - cpu, peak_bytes=peak,
+        cpu_seconds=worked, peak_bytes=peak,
     )  # fmt: skip
 
 
