@@ -99,7 +99,9 @@ def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
         return "a file name in the input holds a zero byte, which no file name can; correct it"
     if isinstance(error, RuntimeError) and "no locator available" in str(error):  # of Numba's cache
         return f"compiled kernels can be kept nowhere; {OWN_CACHE}"
-    if isinstance(error, RuntimeError) and str(error).startswith("Symlink loop from"):  # of pathlib until Python 3.12
+    if isinstance(error, RuntimeError) and str(error).startswith(
+        "Symlink loop from"
+    ):  # of pathlib until Python 3.12
         return f"{shortened(str(error), 200)}: {SURROUNDINGS[errno.ELOOP]}"
     if not isinstance(error, OSError):
         return None
