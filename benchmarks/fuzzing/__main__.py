@@ -27,8 +27,11 @@ def study(
     readings: dict[str, list[Reading]] = {parser.name: [] for parser in parsers}
     with tempfile.TemporaryDirectory() as shelf:
         prepare(parsers, Path(shelf))
-        for reading in read_watched(planned(parsers, count), Path(shelf), seed, workers):
+        plan = planned(parsers, count)
+        for number, reading in enumerate(read_watched(plan, Path(shelf), seed, workers), start=1):
             readings[reading.parser].append(reading)
+            if number % 5_000 == 0:
+                print(f"{number} of {sum(len(numbers) for _, numbers in plan)} inputs read", file=sys.stderr)
     return readings
 
 
