@@ -183,9 +183,8 @@ def _is_in_cache(path: str) -> bool:
 
 
 def _is_given(path: str, given: Sequence[str]) -> bool:
-    """Whether a path is one of the command line's, or lies in one."""
+    """Whether a path is one of the command line's, lies in one or has one below it."""
     place = Path(path).absolute()
     words = [word.partition("=")[2] if word.startswith("--") and "=" in word else word for word in given]
-    return any(
-        place.is_relative_to(Path(word).absolute()) for word in words if word and not word.startswith("-")
-    )
+    paths = [Path(word).absolute() for word in words if word and not word.startswith("-")]
+    return any(place.is_relative_to(path) or path.is_relative_to(place) for path in paths)

@@ -219,7 +219,11 @@ def _no_folder_above(folder: Path, name: str) -> str | None:
     wrong = next(
         (place for place in above if place.is_symlink() or (place.exists() and not place.is_dir())), None
     )
-    return None if wrong is None else f"{wrong}: must be a folder and no link; move it away or name another folder"
+    return (
+        None
+        if wrong is None
+        else f"{wrong}: must be a folder and no link; move it away or name another folder"
+    )
 
 
 def _not_a_marker(path: Path) -> InputError:

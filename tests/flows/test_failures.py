@@ -60,6 +60,7 @@ def oserror(number: int, path: str | None = "data/x.json") -> OSError:
         (oserror(errno.EMFILE, None), "too many files are open"),
         (oserror(errno.ENOENT), "data/x.json: there is no such file"),
         (oserror(errno.EEXIST), "something else lies there"),
+        (oserror(errno.EEXIST, str(Path.cwd())), "something else lies there"),
         (ValueError("embedded null byte"), "zero byte"),
         (RuntimeError("cannot cache function 'f': no locator available for file 'g'"), "set MUSYNC_CACHE"),
     ],
