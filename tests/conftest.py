@@ -1,4 +1,4 @@
-"""Where test data outside the repository lies, when there is any; and one thread for linear algebra."""
+"""Where test data outside the repository lies, one thread for linear algebra, and a small finished dataset."""
 
 import os
 from pathlib import Path
@@ -20,3 +20,22 @@ def outside_data() -> Path:
             f"no reference data at {DATA}; set MUSYNC_DATA to the folder that holds reference/ and measured/"
         )
     return DATA
+
+
+@pytest.fixture(scope="session")
+def toy_dataset(tmp_path_factory):
+    """A small finished dataset that tests of its readers share; who changes files takes a copy.
+
+    Beside it lie its ``grid.yaml``, ``camera.yaml`` and ``scene``.
+    """
+    from catalogs.scenes import write_scene
+    from flows.making.generate import generate
+    from tests.flows.test_pipeline import GRID
+    from tests.toy_street import TOY_CAMERA, toy_street
+
+    folder = tmp_path_factory.mktemp("toy")
+    write_scene(toy_street(), folder / "scene", {})
+    (folder / "camera.yaml").write_text(TOY_CAMERA)
+    grid = folder / "grid.yaml"
+    grid.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=11))
+    return generate(str(grid), str(folder / "data"), runner="threads", workers=1).layout

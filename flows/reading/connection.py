@@ -16,6 +16,8 @@ from flows.store.sealed import read_manifest
 from tasks.conventions import CHECK_CHANNELS
 from tasks.errors import InputError
 
+MOST_COLUMNS = 500
+"""Of a table [1]: ten times what muSync writes; DuckDB takes minutes for some thousands."""
 _SETTINGS: dict[str, str | bool | int | float | list[str]] = {
     "autoinstall_known_extensions": False,
     "autoload_known_extensions": False,
@@ -82,9 +84,12 @@ def connect_sealed(
 
 def _columns(table: str, first: Path) -> str:
     """All columns, with NaN as NULL: SQL's aggregates leave NULL out, and would return NaN for NaN."""
+    schema = pq.read_schema(first)
+    if len(schema) > MOST_COLUMNS:
+        raise pa.ArrowInvalid(f"{table} must have at most {MOST_COLUMNS} columns; it has {len(schema)}")
     if table == "ticks":  # every tick has every number
         return "*"
-    floats = [field.name for field in pq.read_schema(first) if str(field.type) == "double"]
+    floats = [field.name for field in schema if str(field.type) == "double"]
     nulls = ", ".join(f"nullif({name}, 'nan'::DOUBLE) AS {name}" for name in map(quote_identifier, floats))
     return f"* REPLACE ({nulls})" if nulls else "*"
 

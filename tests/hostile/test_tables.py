@@ -1,0 +1,126 @@
+"""Parquet from a stranger: names are names, objects stay data, and every reader ends in numbers or a sentence."""
+
+import base64
+import json
+import pickle
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from tests.flows.reseal import reseal
+from tests.hostile.stage import Stage, endure
+from tests.hostile.test_frames import Payload
+
+READS_TABLES = (
+    "describe", "sql", "open tables", "open windows", "explain", "diff", "audit-physics", "sheets", "preview", "report",
+    "audit",
+)  # fmt: skip
+
+
+def tables(stage: Stage) -> Iterator[Path]:
+    yield from sorted(stage.dataset.telemetry.rglob("*.parquet"))
+
+
+def change_all(stage: Stage, alter: Callable[[pa.Table], pa.Table]) -> None:
+    for path in tables(stage):
+        pq.write_table(alter(pq.read_table(path, partitioning=None)), path)
+
+
+def typed(table: pa.Table, name: str, kind: pa.DataType, value: object) -> pa.Table:
+    """The table with a column, in place of one of that name, of another type."""
+    column = pa.array([value] * table.num_rows, kind)
+    place = table.schema.get_field_index(name)
+    return table.append_column(name, column) if place < 0 else table.set_column(place, name, column)
+
+
+def pickled_type(stage: Stage) -> None:
+    """An extension type as old pyarrow loaded it: from a pickle in the field's metadata."""
+    payload = pickle.dumps(Payload(stage.victim / "PWNED"))
+    metadata = {b"ARROW:extension:name": b"arrow.py_extension_type", b"ARROW:extension:metadata": payload}
+
+    def alter(table: pa.Table) -> pa.Table:
+        field = pa.field("evil", pa.int64(), metadata=metadata)
+        return table.append_column(field, pa.array([1] * table.num_rows))
+
+    change_all(stage, alter)
+
+
+def schema_of_another_file(stage: Stage) -> None:
+    forged = base64.b64encode(pa.schema([("x", pa.list_(pa.float64()))]).serialize().to_pybytes())
+    for path in tables(stage):
+        table = pq.read_table(path, partitioning=None).replace_schema_metadata({b"ARROW:schema": forged})
+        pq.write_table(table, path, store_schema=False)
+
+
+def sql_of(place: Path) -> str:
+    return f"""a" , 1) AS "a") FROM (SELECT 1 AS a); COPY (SELECT 1) TO '{place}'; ATTACH '{place}.db'; --"""
+
+
+TABLES: dict[str, Callable[[Stage], object]] = {
+    "SQL in a column's name": lambda s: change_all(
+        s, lambda t: typed(t, sql_of(s.victim / "PWNED.sh"), pa.float64(), 0.5)
+    ),
+    "SQL in place of every name": lambda s: change_all(
+        s, lambda t: t.rename_columns([f"{name}{sql_of(s.victim / 'PWNED.sh')}" for name in t.column_names])
+    ),
+    "HTML in a column's name": lambda s: change_all(
+        s, lambda t: typed(t, "</script><script>fetch('http://evil')</script>", pa.float64(), 0.5)
+    ),
+    "a type that is a pickle": pickled_type,
+    "the schema of another file": schema_of_another_file,
+    "settings for pandas": lambda s: change_all(
+        s,
+        lambda t: t.replace_schema_metadata(
+            {b"pandas": json.dumps({"index_columns": ["__import__('os')"]}).encode()}
+        ),
+    ),
+    "numbers as text": lambda s: change_all(s, lambda t: typed(t, "speed", pa.string(), "fast")),
+    "numbers in lists": lambda s: change_all(s, lambda t: typed(t, "speed", pa.list_(pa.float64()), [1.0])),
+    "numbers that are none": lambda s: change_all(s, lambda t: typed(t, "speed", pa.float64(), None)),
+    "infinite numbers": lambda s: change_all(s, lambda t: typed(t, "pitch", pa.float64(), float("inf"))),
+    "times of other lengths": lambda s: change_all(s, lambda t: typed(t, "t_ns", pa.int64(), 2**62)),
+    "ids that are numbers": lambda s: change_all(s, lambda t: typed(t, "clip_id", pa.int64(), 7)),
+    "labels that are paths": lambda s: change_all(
+        s, lambda t: typed(t, "label", pa.string(), "../../victim/id_rsa")
+    ),
+    "no rows": lambda s: change_all(s, lambda t: t.slice(0, 0)),
+    "one row": lambda s: change_all(s, lambda t: t.slice(0, 1)),
+    "half of the rows": lambda s: change_all(s, lambda t: t.slice(0, t.num_rows // 2)),
+    "no columns of ours": lambda s: change_all(s, lambda t: pa.table({"x": [1.0]})),
+    "no columns": lambda s: change_all(s, lambda t: pa.table({})),
+    "three thousand columns": lambda s: change_all(
+        s, lambda t: pa.table({f"c{i}": [1.0] * min(t.num_rows, 3) for i in range(3000)})
+    ),
+    "columns twice": lambda s: change_all(
+        s, lambda t: t.append_column("speed", pa.array([1.0] * t.num_rows))
+    ),
+    "no Parquet": lambda s: [
+        path.write_bytes(b"PAR1" + bytes(50) + b"\xff\xff\xff\x7fPAR1") for path in tables(s)
+    ],
+    "ends cut off": lambda s: [path.write_bytes(path.read_bytes()[:-200]) for path in tables(s)],
+    "noise in the middle": lambda s: [
+        path.write_bytes(path.read_bytes()[:900] + bytes(400) + path.read_bytes()[1300:])
+        for path in tables(s)
+    ],
+}
+
+
+@pytest.mark.parametrize("attack", TABLES)
+def test_tables_with(stage, attack):
+    TABLES[attack](stage)
+    reseal(stage.dataset)
+    endure(stage, *READS_TABLES)
+
+
+def test_folders_and_files_that_the_manifest_does_not_name_are_no_tables(stage):
+    part = stage.dataset.telemetry / "ticks" / "family=dry" / "part-0000.parquet"
+    for family in ("family=../../victim", "family='; ATTACH 'x", "family=dry", "family=a=b"):
+        folder = stage.dataset.telemetry / "ticks" / family.replace("/", "%2F")
+        folder.mkdir(exist_ok=True)
+        shutil.copyfile(part, folder / "part-9999.parquet")
+    outcomes = endure(stage, *READS_TABLES)
+    assert outcomes["sql"]["rows"][0]["n"] == 44

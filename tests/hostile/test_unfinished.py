@@ -1,0 +1,134 @@
+"""Unfinished datasets from a stranger: going on with one reaches no other files and takes no receipt on trust."""
+
+import json
+import shutil
+from collections.abc import Callable
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from flows.store.layout import STAGED_TABLES
+from flows.store.telemetry import write_parquet
+from tests.hostile.stage import Stage, endure, listing
+
+GOES_ON = (
+    "verify",
+    "gc --dry-run",
+    "describe",
+    "sql",
+    "open tables",
+    "audit",
+    "repair",
+    "sign",
+    "generate",
+    "gc",
+)
+
+
+@pytest.fixture
+def begun(stage) -> Stage:
+    """The dataset as a killed run leaves it: three clips made, one to go."""
+    layout = stage.dataset
+    clips = stage.manifest()["clips"]
+    for clip in clips:
+        family = f"family={clip['scenario']['weather']}"
+        for table in STAGED_TABLES:
+            rows = pq.read_table(
+                layout.telemetry / table / family / "part-0000.parquet",
+                filters=[("clip_id", "==", clip["clip_id"])], partitioning=None,
+            )  # fmt: skip
+            write_parquet(rows, layout.staged(clip["clip_id"], table))
+        layout.receipt(clip["clip_id"]).write_text(json.dumps(clip))
+    layout.receipt(clips[3]["clip_id"]).unlink()
+    shutil.rmtree(layout.telemetry)
+    shutil.rmtree(layout.previews)
+    layout.manifest.unlink()
+    return stage
+
+
+def edit_receipt(stage: Stage, change: Callable[[Any], object], number: int = 0) -> None:
+    path = stage.dataset.receipt(clip_of(stage, number))
+    receipt = json.loads(path.read_text())
+    change(receipt)
+    path.write_text(json.dumps(receipt))
+
+
+def clip_of(stage: Stage, number: int) -> str:
+    return str(json.loads(stage.dataset.plan.read_text())["clips"][number]["clip_id"])
+
+
+def staged_link(stage: Stage) -> None:
+    path = stage.dataset.staged(clip_of(stage, 0), "ticks")
+    path.unlink()
+    path.symlink_to(stage.victim / "clips.parquet")
+
+
+def lock_link(stage: Stage) -> None:
+    lock = stage.dataset.staging / "lock"
+    lock.unlink(missing_ok=True)
+    lock.symlink_to(stage.victim / "id_rsa")
+
+
+RECEIPTS: dict[str, Callable[[Stage], object]] = {
+    "that names a file outside": lambda s: edit_receipt(
+        s, lambda r: r["artifacts"].update({"../../victim/id_rsa": "0" * 64})
+    ),
+    "that names an absolute file": lambda s: edit_receipt(
+        s, lambda r: r["artifacts"].update({str(s.victim / "id_rsa"): "0" * 64})
+    ),
+    "of another clip": lambda s: edit_receipt(s, lambda r: r.update(clip_id=clip_of(s, 1))),
+    "with an index that is another's": lambda s: edit_receipt(s, lambda r: r.update(index=2)),
+    "with an index out of range": lambda s: edit_receipt(s, lambda r: r.update(index=10**6)),
+    "without files": lambda s: edit_receipt(s, lambda r: r.update(artifacts={})),
+    "without figures": lambda s: edit_receipt(s, lambda r: r.pop("figures")),
+    "with figures that are text": lambda s: edit_receipt(s, lambda r: r.update(figures={"peak_pitch": "<b>"})),
+    "with a label that is a path": lambda s: edit_receipt(s, lambda r: r.update(label="../../victim/id_rsa")),
+    "that is no JSON": lambda s: s.dataset.receipt(clip_of(s, 0)).write_text("{" * 100_000),
+    "that is empty": lambda s: s.dataset.receipt(clip_of(s, 0)).write_text(""),
+    "of a clip that is not there": lambda s: shutil.rmtree(s.dataset.frames / "rgb" / "c" / "0"),
+    "whose rows are a link": staged_link,
+    "whose rows are no Parquet": lambda s: s.dataset.staged(clip_of(s, 0), "frames").write_bytes(b"PAR1PAR1"),
+    "whose rows are missing": lambda s: s.dataset.staged(clip_of(s, 0), "frames").unlink(),
+    "beside a lock that is a link": lock_link,
+    "beside inputs that are a link": lambda s: (
+        shutil.move(s.dataset.inputs, s.victim / "inputs"), s.dataset.inputs.symlink_to(s.victim / "inputs")
+    ),
+    "beside frames that are a link": lambda s: (
+        shutil.move(s.dataset.frames, s.victim / "frames"), s.dataset.frames.symlink_to(s.victim / "frames")
+    ),
+    "beside a shard to be made that is a link": lambda s: (
+        s.dataset.frame_shard("rgb", 3).unlink(), s.dataset.frame_shard("rgb", 3).symlink_to(s.victim / "id_rsa")
+    ),
+    "beside metadata with a codec of pickles": lambda s: (s.dataset.frames / "rgb" / "zarr.json").write_text(
+        (s.dataset.frames / "rgb" / "zarr.json").read_text().replace('"bytes"', '"numcodecs.pickle"', 1)
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("attack", RECEIPTS)
+def test_a_receipt(begun, attack):
+    RECEIPTS[attack](begun)
+    endure(begun, *GOES_ON)
+
+
+def test_what_a_run_without_a_plan_left_is_cleared_in_the_dataset_alone(stage):
+    """`begun` tells a run that inputs and frames are its own: a stranger's may be links to somebody's folders."""
+    layout = stage.dataset
+    shutil.rmtree(layout.root)
+    layout.staging.mkdir(parents=True)
+    (layout.staging / "begun").write_text("")
+    for name in ("inputs", "frames.zarr"):
+        (layout.root / name).symlink_to(stage.victim / "photos")
+    endure(stage, "gc", "generate")
+
+
+def test_a_folder_of_somebody_s_files_is_no_place_for_a_dataset(stage):
+    layout = stage.dataset
+    shutil.rmtree(layout.root)
+    (layout.root / "inputs").mkdir(parents=True)
+    (layout.root / "inputs" / "letters.txt").write_text("mine")
+    (layout.root / "frames.zarr").write_text("mine")
+    before = listing(layout.root)
+    endure(stage, "gc", "sign", "repair", "generate")
+    assert listing(layout.root) == before
