@@ -90,7 +90,9 @@ class FolderMachine(RuleBasedStateMachine):
             if self.damaged:
                 self._repair()
             make(self.folder)
-            assert files_of(self.folder) == undisturbed(), "resumed bytes differ from the undisturbed run's"
+            now, wanted = files_of(self.folder), undisturbed()
+            differing = sorted(name for name in now.keys() | wanted if now.get(name) != wanted.get(name))
+            assert not differing, f"not the bytes of the undisturbed run: {differing}"
             COUNTS["finished with equal bytes"] += 1
         finally:
             shutil.rmtree(self.place)

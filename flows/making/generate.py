@@ -20,7 +20,7 @@ from flows.store.frames import create_arrays
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
 from flows.store.sealed import read_manifest
-from flows.store.staging import BEGUN, left_overs, remove_staged
+from flows.store.staging import BEGUN, left_overs, remove_staged, remove_staging
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 from tasks.render.backend import select_backend
@@ -82,10 +82,13 @@ def generate(
         else:
             with sole_writer(layout):
                 stage(prepare)(layout, plan, inputs)
-                missing = [clip.index for clip in plan.clips if not layout.receipt(clip.clip_id).is_file()]
-                cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
-                bring(layout, needed_to_seal(layout, plan))
-                stage(seal)(layout, plan)
+                if layout.manifest.is_file():  # another run has ended just now
+                    remove_staging(layout)
+                else:
+                    missing = [c.index for c in plan.clips if not layout.receipt(c.clip_id).is_file()]
+                    cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
+                    bring(layout, needed_to_seal(layout, plan))
+                    stage(seal)(layout, plan)
     return _report(reading(out, summary), plan, len(missing), cost)
 
 

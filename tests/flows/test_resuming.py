@@ -1,6 +1,8 @@
 """A run that stops anywhere goes on with the same command, before its plan too; what is another's is left alone."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -138,3 +140,21 @@ def test_faults_of_a_grids_own_catalogue_entries_are_told_with_those_of_the_grid
         make_plan(str(faulty), "cpu")
     told = str(raised.value)
     assert "car.yaml: sprung_mass is missing" in told and "ice-rink: no such surface" in told
+
+
+def test_a_run_that_waited_while_another_ended_makes_nothing_and_leaves_nothing(grid, whole, tmp_path):
+    """Between looking for the manifest and taking the lock, another run can end."""
+    folder = tmp_path / "data"
+    real = flows.making.generate.sole_writer
+
+    @contextmanager
+    def late(layout: Layout) -> Iterator[None]:
+        patch.undo()
+        make(grid, folder)
+        with real(layout):
+            yield
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(flows.making.generate, "sole_writer", late)
+        report = generate(grid, str(folder), runner="threads", workers=1, pictures=False)
+    assert report.made == 0 and files_of(folder) == whole
