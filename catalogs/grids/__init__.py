@@ -1,5 +1,6 @@
 """Scenario grids: a YAML file of blocks whose product is a list of scenarios."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,12 +46,12 @@ class FaultyGrid(InputError):
     Parameters
     ----------
     problems : one sentence each
-    settings : what could be read all the same, so that the entries it names can be checked too; None if nothing
+    grid : what could be read all the same, so that its entries and its route can be checked too; None if nothing
     """
 
-    def __init__(self, problems: list[str], settings: GridFile | None):
+    def __init__(self, problems: Sequence[str], grid: Grid | None):
         super().__init__(problems)
-        self.settings = settings
+        self.grid = grid
 
 
 def grid_names() -> list[str]:
@@ -71,14 +72,15 @@ def load_grid(source: str | Path) -> Grid:
     path = find_entry(GRID_FOLDER, source, "grid")
     form = read_form(read_yaml(path, "grid", finite=False), path)
     problems = cap_problems(form.problems)
-    grid = None
+    grid = None if form.settings is None else Grid(settings=form.settings, scenarios=(), tags=())
     if form.settings is not None and form.is_expandable:
         try:
             grid = expand_grid(form.settings, str(path))
-        except InputError as error:
-            problems += error.problems
+        except FaultyGrid as faults:
+            problems += faults.problems
+            grid = faults.grid
     if problems or grid is None:
-        raise FaultyGrid(problems, form.settings)
+        raise FaultyGrid(problems, grid)
     return grid
 
 
@@ -116,13 +118,11 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
             problems.setdefault(problem, []).append(label)
     if not scenarios:
         problems["exclude leaves nothing to make"] = ["all"]
+    grid = Grid(settings=settings, scenarios=tuple(scenarios), tags=tuple(tags), left_out=left_out)
     if problems:
-        raise InputError(
-            cap_problems(
-                [f"{shorten(place)}: scenario {_some(named)}: {rule}" for rule, named in problems.items()]
-            )
-        )
-    return Grid(settings=settings, scenarios=tuple(scenarios), tags=tuple(tags), left_out=left_out)
+        told = [f"{shorten(place)}: scenario {_some(named)}: {rule}" for rule, named in problems.items()]
+        raise FaultyGrid(cap_problems(told), grid)
+    return grid
 
 
 def _some(labels: list[str]) -> str:

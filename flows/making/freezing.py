@@ -15,7 +15,8 @@ from flows.making.places import find_scene
 from flows.making.plan import Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.running.runner import RunnerName
-from flows.store.layout import read_json, write_atomically
+from flows.store.layout import write_atomically
+from flows.store.outputs import refuse_link
 from flows.store.sealed import read_manifest, recorded_grid
 from flows.store.telemetry import columns_hash
 from manifests.explain import as_sentences, tool_differences, tools_here
@@ -57,6 +58,8 @@ def freeze(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]
     names = [grid] if grid is not None else list(frozen_names())
     if out is not None and grid is None:
         raise InputError("--out FILE: name the grid whose run is to be frozen in it")
+    if out is not None and Path(out).suffix != ".json":
+        raise InputError(f"--out {out}: the file of a frozen run must end in .json; it does not")
     if out is None and (strange := [name for name in names if name not in grid_names()]):
         raise InputError(
             [f"{name}: is no grid of the project: say with --out FILE where to freeze it" for name in strange]
@@ -66,8 +69,11 @@ def freeze(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]
         for name in names:
             run = frozen_run(load_grid(name))
             file = Path(out) if out is not None else FOLDER / f"{run['name']}.json"
-            before = read_json(file) if file.is_file() else {}
-            changed = any(before.get(key) != run[key] for key in ("grid", "parameters", "clips"))
+            refuse_link(file)
+            before = _frozen_before(file, out is None)
+            changed = before is None or any(
+                before[key] != run[key] for key in ("grid", "parameters", "clips")
+            )
             if changed or out is not None:
                 # keys keep their order: that of the axes is the order of the clips
                 write_atomically(file, (json.dumps(run, indent=1, allow_nan=False) + "\n").encode())
@@ -76,6 +82,29 @@ def freeze(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]
             )
             advance(name)
     return {"frozen": rows}
+
+
+def _frozen_before(file: Path, ours: bool) -> FrozenRun | None:
+    """The frozen run that a file holds; None where there is no file, or one of ours that is out of date.
+
+    Raises
+    ------
+    InputError
+        If a user's file holds something else, which must not be lost.
+    """
+    if not file.exists():
+        return None
+    try:
+        return read_frozen(file)
+    except InputError as error:
+        if ours:
+            return None
+        raise InputError(
+            [
+                *error.problems,
+                f"{file}: is no frozen run to be frozen anew: move it away or name another file",
+            ]
+        ) from None
 
 
 def frozen_run(grid: Grid) -> dict[str, Any]:

@@ -220,11 +220,8 @@ def fan_out(
             if error is None:
                 cost[labels[index]] = future.result()["cost"]
                 advance(labels[index])
-            elif disk_full_sentence(error) is not None:
-                raise InputError(
-                    f"{layout}: the disk is full; {len(cost)} of {len(indices)} clips are committed and kept:"
-                    " free space and run the same command again"
-                )
+            elif (told := disk_full_sentence(error)) is not None:
+                raise InputError(f"{layout}: {len(cost)} of {len(indices)} clips are committed; {told}")
             else:
                 failures[labels[index]] = error
                 advance(f"{labels[index]} failed")

@@ -48,7 +48,11 @@ def find_scene(scene: Mapping[str, Any]) -> str:
     if scene["name"] in BUILT_IN:
         return str(scene["name"])
     shelves = [Path(folder) for folder in os.environ.get(SHELVES, "").split(os.pathsep) if folder]
-    places = [noted_place(scene["sha256"]), Path(scene["name"]), *(shelf / scene["name"] for shelf in shelves)]
+    places = [
+        noted_place(scene["sha256"]),
+        Path(scene["name"]),
+        *(shelf / scene["name"] for shelf in shelves),
+    ]
     found = {
         str(place): content
         for place in places

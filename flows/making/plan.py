@@ -124,8 +124,8 @@ def make_plan(
     try:
         grid = source if isinstance(source, Grid) else load_grid(source)
     except FaultyGrid as faults:
-        entries = [] if faults.settings is None else _read_entries(faults.settings)[2]
-        raise InputError([*faults.problems, *(f"{source}: {problem}" for problem in entries)]) from None
+        behind = [] if faults.grid is None else _read_behind(faults.grid)[2]
+        raise InputError([*faults.problems, *(f"{source}: {problem}" for problem in behind)]) from None
     if vehicle is not None:
         grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
     if not pictures:
@@ -137,10 +137,7 @@ def make_plan(
 def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, bytes]]:
     """`make_plan` of a grid that is already read; ``source`` is what messages call it."""
     settings = grid.settings
-    inputs, scene, problems = _read_entries(settings)
-    if scene:
-        problems += _route_problems(grid)
-    problems += _camera_problems(settings)
+    inputs, scene, problems = _read_behind(grid)
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
     hashes = {name: sha256_of([content]) for name, content in inputs.items()}
@@ -247,6 +244,14 @@ def plan_differences(
     rows = input_differences(bare[0], bare[1], their_inputs, our_inputs)
     rest = [(f"{row['input']} {row['path']}".strip(), row["a"], row["b"]) for row in rows]
     return [f"{place} is {shown(a)} there and {shown(b)} here" for place, a, b in (*grid, *rest)]
+
+
+def _read_behind(grid: Grid) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
+    """The catalogue files and the scene behind a grid, and what is wrong with them or with the grid on them."""
+    inputs, scene, problems = _read_entries(grid.settings)
+    if scene:
+        problems += _route_problems(grid)
+    return inputs, scene, problems + _camera_problems(grid.settings)
 
 
 def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str], list[str]]:

@@ -90,7 +90,7 @@ def test_what_can_be_read_of_a_faulty_grid_goes_on_to_the_catalogue(tmp_path):
     path.write_text("{name: t, vehicle: tank, colour: red, axes: {w: 3}}")
     with pytest.raises(FaultyGrid) as caught:
         load_grid(path)
-    assert caught.value.settings is not None and caught.value.settings.vehicle == "tank"
+    assert caught.value.grid is not None and caught.value.grid.settings.vehicle == "tank"
 
 
 def levels(count: int) -> str:

@@ -168,3 +168,20 @@ def test_generate_takes_a_grid_or_a_manifest(arguments, tmp_path):
 def test_an_unknown_manifest_lists_those_that_ship():
     with pytest.raises(InputError, match="multibody-held-out"):
         read_frozen("nowhere")
+
+
+def test_a_users_file_that_is_no_frozen_run_is_not_written_over(tmp_path):
+    precious = tmp_path / "notes.json"
+    precious.write_text('{"mine": 1}')
+    link = tmp_path / "link.json"
+    link.symlink_to(precious)
+    for out, sentence in (
+        (precious, "is no frozen run"),
+        (link, "no link"),
+        (tmp_path / "run.txt", "end in .json"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            freeze(SMALL, out=str(out))
+    assert precious.read_text() == '{"mine": 1}'
+    assert freeze(SMALL, out=str(tmp_path / "run.json"))["frozen"][0]["changed"]
+    assert not freeze(SMALL, out=str(tmp_path / "run.json"))["frozen"][0]["changed"]

@@ -43,9 +43,10 @@ def test_a_disk_that_is_full_before_there_is_a_plan_can_be_freed_and_the_run_goe
     real = os.fsync
 
     def flush(descriptor: int) -> None:
-        if left[0] == 0:
-            raise OSError(28, "No space left on device")
-        left[0] -= 1
+        if str(folder) in os.readlink(f"/proc/self/fd/{descriptor}"):
+            if left[0] == 0:
+                raise OSError(28, "No space left on device")
+            left[0] -= 1
         real(descriptor)
 
     monkeypatch.setattr(os, "fsync", flush)
@@ -130,6 +131,16 @@ def test_a_clip_that_cannot_fit_into_memory_is_refused_before_anything_is_made(g
             InputError, match=r"40000 frames need about 18\.1 GB, and this machine has 8\.0 GB"
         ):
             make_plan(str(big), "cpu")
+
+
+def test_a_road_feature_off_the_route_is_told_with_faults_of_form_and_of_rules(grid, tmp_path):
+    faulty = tmp_path / "faulty.yaml"
+    text = Path(grid).read_text().replace("hazard_center_m: 4", "hazard_center_m: 400")
+    faulty.write_text(text.replace("precipitation_mm_h: 3,", "") + "colour: red\n")
+    with pytest.raises(InputError) as raised:
+        make_plan(str(faulty), "cpu")
+    for rule in ("colour: unknown key", "needs precipitation_mm_h above 0", "must lie on the route of scene"):
+        assert sum(rule in problem for problem in raised.value.problems) == 1, raised.value.problems
 
 
 def test_faults_of_a_grids_own_catalogue_entries_are_told_with_those_of_the_grid(grid, tmp_path):
