@@ -84,13 +84,7 @@ def _read(parser: Parser, folder: Path, broken: str | None) -> tuple[Outcome, st
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
-        frames = [f for f in traceback.extract_tb(error.__traceback__) if ".venv" not in f.filename]
-        own = [
-            f for f in frames if "/lib/python" not in f.filename and "benchmarks/fuzzing" not in f.filename
-        ]
-        last = (own or frames or [None])[-1]
-        at = "" if last is None else f"{'/'.join(Path(last.filename).parts[-3:])}:{last.lineno}"
-        return "traceback", f"{at} {type(error).__name__}: {' '.join(str(error).split())[:120]}"
+        return "traceback", f"{_place(error)} {type(error).__name__}: {' '.join(str(error).split())[:120]}"
     return ("silent", f"accepted although {broken}") if broken else ("accepted", "")
 
 
@@ -100,7 +94,9 @@ def _place(error: BaseException) -> str:
     own = [
         f"{Path(frame.filename).relative_to(root)}:{frame.lineno}"
         for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename.startswith(f"{root}/") and "/.venv/" not in frame.filename
+        if frame.filename.startswith(f"{root}/")
+        and "/.venv/" not in frame.filename
+        and Path(frame.filename).is_file()
     ]
     return own[-1] if own else "elsewhere"
 

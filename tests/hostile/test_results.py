@@ -88,7 +88,7 @@ MARKERS: dict[str, Callable[[Path, Path], Any]] = {
 @pytest.mark.parametrize("command", ["report", "preview", "sheets"])
 @pytest.mark.parametrize("attack", MARKERS)
 def test_a_forged_marker(stage, attack, command):
-    """It names the files that muSync wrote in a folder that came from elsewhere: nothing outside goes, no link is used."""
+    """It names files that muSync wrote, in a folder from elsewhere: nothing outside goes, and no link is followed."""
     out = stage.world / "mine"
     fill(out)
     (out / "link").symlink_to(stage.victim)
