@@ -22,7 +22,7 @@ from flows.store.telemetry import read_columns
 from manifests.canonical import sha256_of
 from manifests.compare import first_pixel_difference, first_row_difference
 from manifests.explain import as_sentences, reasons
-from manifests.manifest import damaged_files
+from manifests.manifest import damaged_files, manifest_damage
 from manifests.records import Manifest, Receipt
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
@@ -68,6 +68,8 @@ def audit(
     with working(dataset, everything) as layout:
         manifest = read_manifest(layout)
         damaged = stage(damaged_files)(layout.root, manifest)
+        if (fault := manifest_damage(layout.manifest.read_bytes())) is not None:
+            damaged.append({"path": "manifest.json", "clip_id": None, "damage": fault})
         chosen = chosen_clips(manifest, share)
         try:
             changes = input_changes(layout, manifest)
@@ -152,6 +154,8 @@ def remake_and_compare(
         for name in ("plan.json", *(f"inputs/{name}" for name in manifest["inputs"])):
             write_atomically(remade.root / name, recorded_bytes(layout.root / name))
         plan = read_plan(remade.root)
+        if [clip.clip_id for clip in plan.clips] != [clip["clip_id"] for clip in manifest["clips"]]:
+            raise InputError(f"{layout.plan}: must plan the clips of the manifest; it plans others")
         create_frame_arrays(remade, plan)
         indices = sorted((clip["index"] for clip in chosen), reverse=True)
         fan_out(remade, plan, indices, runner, workers, scheduler)

@@ -13,12 +13,13 @@ from catalogs.vehicles import load_vehicle
 from flows.making.driving import controls_of, hazard_of, weather_of
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
+from flows.reading.query import VIEWS
 from flows.store.address import reading, telemetry
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
-from tasks.explanation import force_steps, picture_steps, pitch_steps, surface_steps
+from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, surface_steps
 from tasks.scene.route import Route
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.rollout import rollout
@@ -60,7 +61,12 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
     (planned,) = chosen
     scenario = planned.scenario
     folder = layout.telemetry / "frames" / f"family={scenario.weather}"
-    columns = read_columns(folder, planned.clip_id)
+    columns = read_columns(folder, planned.clip_id, [channel.name for channel in VIEWS["frames"]])
+    if len(columns["frame"]) != plan.settings.frames:
+        raise InputError(
+            f"{folder}: must hold {plan.settings.frames} frames of clip {planned.label}; it holds"
+            f" {len(columns['frame'])}: musync repair makes the table again"
+        )
     row, first = ({name: column[i] for name, column in columns.items()} for i in (frame, 0))
     vehicle = load_vehicle(layout.inputs / "vehicle.yaml")
     mode = plan.settings.vehicle_mode
@@ -87,7 +93,7 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
         "vehicle_mode": mode,
         "effects": sorted(vehicle.effects) + [form.name for form in vehicle.forms],
         "asked": _asked(scenario),
-        "steps": [asdict(step) | {"agrees": step.agrees} for step in steps],
+        "steps": [_as_row(step) for step in steps],
         "agrees": all(step.agrees for step in steps),
     }
     results.write_json("explain.json", result)
@@ -120,6 +126,12 @@ def as_text(result: Mapping[str, Any]) -> str:
         lines.append(f"the vehicle adds to these equations: {', '.join(result['effects'])}")
     lines.append("all stored numbers follow" if result["agrees"] else "some stored numbers do not follow")
     return "\n".join(lines) + "\n"
+
+
+def _as_row(step: Step) -> dict[str, Any]:
+    """A step as JSON has it: a number that is none is not represented."""
+    row = asdict(step) | {"agrees": step.agrees}
+    return {name: None if isinstance(v, float) and not isfinite(v) else v for name, v in row.items()}
 
 
 def _asked(scenario: Scenario) -> dict[str, Any]:

@@ -4,15 +4,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
-import yaml
 
+from catalogs.documents import read_yaml
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
 from flows.running.orchestration import stage
 from flows.store.address import reading, telemetry
 from flows.store.layout import Layout, read_json
 from flows.store.outputs import Outputs
-from flows.store.telemetry import table_columns
-from tasks.conventions import FRAME_CHANNELS, TICK_CHANNELS
+from flows.store.telemetry import read_columns, read_table
+from tasks.conventions import CLIP_CHANNELS, FRAME_CHANNELS, IDENTITY_CHANNELS, TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.physics_audit import PhysicsVerdict, audit_clip
 from tasks.eval.physics_constants import Constants, TyreTables
@@ -63,9 +64,8 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
         If the table is missing.
     """
     path = Layout(root).telemetry / "clips.parquet"
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; is {root} a finished muSync dataset?")
-    rows: list[dict[str, Any]] = pq.read_table(path).to_pylist()
+    required = [channel.name for channel in (*IDENTITY_CHANNELS, *CLIP_CHANNELS)]
+    rows: list[dict[str, Any]] = read_table(path, required=required).to_pylist()
     return rows
 
 
@@ -78,15 +78,8 @@ def clip_columns(root: Path, table: str, facts: dict[str, Any]) -> dict[str, np.
         If the clip or one of the table's columns is not there.
     """
     folder = Layout(root).telemetry / table
-    if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; is {root} a finished muSync dataset?")
-    found = pq.read_table(folder, filters=[("clip_id", "==", facts["clip_id"])])
     channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
-    missing = [c.name for c in channels if c.name not in found.column_names]
-    if missing or found.num_rows == 0:
-        what = f"lacks {', '.join(missing)}" if missing else f"holds no row of clip {facts['clip_id']}"
-        raise InputError(f"{folder}: the {table} table {what}; make the dataset again.")
-    return table_columns(found)
+    return read_columns(folder, facts["clip_id"], [channel.name for channel in channels])
 
 
 def read_constants(root: Path) -> Constants:
@@ -106,7 +99,8 @@ def read_constants(root: Path) -> Constants:
     ]
     if missing:
         raise InputError(missing)
-    car, surface = (yaml.safe_load(path.read_text(encoding="utf-8")) for path in files.values())
+    load_vehicle(files["vehicle"]), load_surface(files["surface"])  # of the form that they must have
+    car, surface = (read_yaml(path, "catalogue entry") for path in files.values())
     mode = read_json(layout.plan)["grid"]["vehicle_mode"]
     if mode != "paper" or car.get("effects"):
         raise InputError(

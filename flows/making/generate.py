@@ -19,7 +19,7 @@ from flows.store.address import bring, claim, forget_begun, publish, reading, re
 from flows.store.frames import create_arrays
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
-from flows.store.sealed import read_manifest
+from flows.store.sealed import is_committed, read_manifest
 from flows.store.staging import BEGUN, left_overs, remove_staged, remove_staging
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
@@ -85,7 +85,7 @@ def generate(
                 if layout.manifest.is_file():  # another run has ended just now
                     remove_staging(layout)
                 else:
-                    missing = [c.index for c in plan.clips if not layout.receipt(c.clip_id).is_file()]
+                    missing = [clip.index for clip in plan.clips if not is_committed(layout, clip.clip_id)]
                     cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
                     bring(layout, needed_to_seal(layout, plan))
                     stage(seal)(layout, plan)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from flows.making.plan import Plan
 from flows.store.address import publish, withdraw
@@ -14,7 +13,7 @@ from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_atomically
 from flows.store.sealed import read_receipt
 from flows.store.staging import remove_staged, remove_staging, staged_files
-from flows.store.telemetry import labelled_table, read_columns, write_parquet
+from flows.store.telemetry import labelled_table, read_columns, read_table, write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.environment import environment_bom
 from manifests.manifest import freeze, is_quarantined
@@ -91,7 +90,7 @@ def table_parts(plan: Plan, table: str) -> dict[str, list[str]]:
 
 def write_part(layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -> Path:
     """Gather the staged tables of some clips into one file of the dataset."""
-    staged = [pq.read_table(layout.staged(clip_id, table)) for clip_id in clip_ids]
+    staged = [read_table(layout.staged(clip_id, table)) for clip_id in clip_ids]
     write_parquet(pa.concat_tables(staged).unify_dictionaries().combine_chunks(), layout.root / path)
     return layout.root / path
 

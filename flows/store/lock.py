@@ -4,7 +4,7 @@ import fcntl
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from flows.store.layout import Layout
@@ -37,7 +37,6 @@ def sole_writer(layout: Layout) -> Iterator[None]:
 def _locked_file(layout: Layout) -> int:
     """The lock file, open and locked; a run that ends takes the file away, and then the next one is made."""
     while True:
-        layout.staging.mkdir(parents=True, exist_ok=True)
         lock = _open_lock(layout.staging / "lock")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -60,9 +59,12 @@ def _is_at(lock: int, path: Path) -> bool:
 
 def _open_lock(path: Path) -> int:
     """The lock file, made where there is none; a file that is there is neither followed, nor cut, nor written."""
-    lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK, 0o644)
-    facts = os.fstat(lock)
-    if stat.S_ISREG(facts.st_mode) and facts.st_nlink <= 1 and facts.st_size == 0:
-        return lock
-    os.close(lock)
+    with suppress(FileExistsError):
+        path.parent.mkdir(parents=True)
+    with suppress(IsADirectoryError, NotADirectoryError):
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK, 0o644)
+        facts = os.fstat(lock)
+        if stat.S_ISREG(facts.st_mode) and facts.st_nlink <= 1 and facts.st_size == 0:
+            return lock
+        os.close(lock)
     raise InputError(f"{path}: the lock must be an empty file with one name; it is something else: remove it")

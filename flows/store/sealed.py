@@ -3,12 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 from pydantic import ValidationError
 
 from catalogs.grids import GridFile
 from catalogs.sentences import brief, cap_problems, describe_rules
 from flows.store.arrays import arrays_of
-from flows.store.layout import Layout, read_json
+from flows.store.layout import STAGED_TABLES, Layout, read_json
 from manifests.manifest import MANIFEST_FORMAT
 from manifests.records import Manifest, PlanRecord, Receipt, check_record
 from tasks.errors import InputError
@@ -80,6 +82,24 @@ def read_receipt(layout: Layout, clip_id: str) -> Receipt:
             f"{place}: must be the receipt of clip {clip_id} and name its files; it is another: remove it"
         )
     return receipt
+
+
+def is_committed(layout: Layout, clip_id: str) -> bool:
+    """Whether a clip need not be made again: its receipt is sound, and in a folder its files are there.
+
+    In an object store the receipt is sent last and stands for the rest.
+    """
+    if not layout.receipt(clip_id).is_file():
+        return False
+    try:
+        receipt = read_receipt(layout, clip_id)
+        tables = [layout.staged(clip_id, table) for table in STAGED_TABLES]
+        if layout.origin is None:
+            for table in tables:
+                pq.read_schema(table)
+    except (InputError, pa.ArrowException, OSError):
+        return False
+    return layout.origin is not None or all((layout.root / path).is_file() for path in receipt["artifacts"])
 
 
 def recorded_grid(content: Mapping[str, Any], place: object) -> GridFile:

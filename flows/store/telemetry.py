@@ -8,11 +8,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from catalogs.sentences import shorten
 from flows.store.layout import write_atomically
 from manifests.canonical import sha256_of
 from tasks.conventions import CHANNELS_BY_NAME, Channel
+from tasks.errors import InputError
 
 ROW_GROUP_ROWS = 100_000
+SHOWN_COLUMNS = 8
 
 
 def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | None = None) -> pa.Table:
@@ -62,10 +65,56 @@ def write_parquet(table: pa.Table, path: Path) -> None:
     write_atomically(path, memoryview(buffer.getvalue()))
 
 
-def read_columns(path: Path, clip_id: str | None = None) -> dict[str, np.ndarray]:
-    """The columns of a Parquet file as NumPy arrays, of one clip where it is named."""
+def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] = ()) -> pa.Table:
+    """A Parquet file, or a folder of them.
+
+    Parameters
+    ----------
+    path : file or folder
+    clip_id : clip whose rows are read; None takes all
+    required : names of columns that must be there
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no table as muSync writes it, lacks a column, or has no row of the clip.
+    """
     filters = None if clip_id is None else [("clip_id", "==", clip_id)]
-    return table_columns(pq.read_table(path, filters=filters))
+    try:
+        table = pq.read_table(path, filters=filters)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; is this a finished muSync dataset?") from None
+    except (pa.ArrowException, OSError, ValueError, TypeError) as error:
+        raise InputError(
+            f"{path}: must be a Parquet table as muSync writes it; {shorten(error)}: musync repair makes it again"
+        ) from None
+    odd = [
+        field.name
+        for field in table.schema
+        if field.name in CHANNELS_BY_NAME
+        and CHANNELS_BY_NAME[field.name].unit
+        and not _holds_numbers(field.type)
+    ]
+    faults = {
+        "lacks": [name for name in required if name not in table.column_names],
+        "has no numbers in": odd,
+        "holds no row of clip": [clip_id] if clip_id is not None and not table.num_rows else [],
+    }
+    problems = [
+        f"{path}: {fault} {', '.join(names[:SHOWN_COLUMNS])}: musync repair makes the table again"
+        for fault, names in faults.items()
+        if names
+    ]
+    if problems:
+        raise InputError(problems)
+    return table
+
+
+def read_columns(
+    path: Path, clip_id: str | None = None, required: Iterable[str] = ()
+) -> dict[str, np.ndarray]:
+    """The columns of `read_table` as NumPy arrays."""
+    return table_columns(read_table(path, clip_id, required))
 
 
 def table_columns(table: pa.Table) -> dict[str, np.ndarray]:
@@ -74,7 +123,7 @@ def table_columns(table: pa.Table) -> dict[str, np.ndarray]:
     for name in table.column_names:
         column = table[name].combine_chunks()
         if pa.types.is_fixed_size_list(column.type):
-            columns[name] = column.flatten().to_numpy().reshape(len(column), -1)
+            columns[name] = column.flatten().to_numpy().reshape(len(column), column.type.list_size)
         else:
             columns[name] = column.to_numpy(zero_copy_only=False)
     return columns
@@ -87,6 +136,12 @@ def columns_hash(columns: Mapping[str, np.ndarray], names: Iterable[str]) -> str
         values = np.ascontiguousarray(columns[name])
         parts += [f"{name} {values.dtype.str} {values.shape}\n".encode(), values.data.cast("B")]
     return sha256_of(parts)
+
+
+def _holds_numbers(kind: pa.DataType) -> bool:
+    if pa.types.is_fixed_size_list(kind):
+        kind = kind.value_type
+    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind))
 
 
 def _constant_type(value: Any) -> pa.DataType:
