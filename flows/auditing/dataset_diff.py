@@ -122,7 +122,8 @@ def _clip_row(
 
 
 def _ticks(layout: Layout, clip: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    return read_columns(layout.telemetry / "ticks" / f"family={clip['scenario']['weather']}", clip["clip_id"])
+    folder = layout.telemetry / "ticks" / f"family={clip['scenario']['weather']}"
+    return read_columns(folder, clip["clip_id"], [channel.name for channel in TICK_CHANNELS])
 
 
 def _picture(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | None:

@@ -150,7 +150,9 @@ def _bring(
     with progress_bar("report", len(brought)) as advance:
         for row in brought:
             clip_id = row["clip_id"]
-            ticks = read_columns(layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id)
+            ticks = read_columns(
+                layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id, names
+            )
             page.write(
                 _traces_name(row), f"clipArrived({_script(clip_id)}, {_script(packed(ticks, names))});\n"
             )

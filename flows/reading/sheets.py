@@ -97,7 +97,7 @@ def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
 
 def _still(layout: Layout, clip: Mapping[str, Any], station: float, caption: str) -> Picture:
     """The frame nearest to a station, and a caption with the body's pitch in it."""
-    columns = read_columns(layout.telemetry / "frames", clip["clip_id"])
+    columns = read_columns(layout.telemetry / "frames", clip["clip_id"], ["station", "pitch"])
     frame = int(np.argmin(np.abs(columns["station"] - station)))
     pitch = np.rad2deg(columns["pitch"][frame])
     return f"{caption}  {pitch:.2f} deg", read_clip(layout.frames, clip["index"], "rgb")[frame]
