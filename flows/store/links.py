@@ -7,9 +7,14 @@ from pathlib import Path
 from catalogs.sentences import cap_problems, shorten
 from tasks.errors import InputError
 
+KINDS = {"plan.json": False, "manifest.json": False} | dict.fromkeys(
+    ("inputs", "telemetry", "frames.zarr", "previews", ".staging"), True
+)
+"""Entries of a dataset by name, and whether they are folders."""
+
 
 def foreign_entries(root: Path, wanted: Callable[[str], bool] = lambda name: True) -> list[str]:
-    """Relative paths of all entries below a folder that are neither folders nor regular files, in order.
+    """Relative paths of the entries of a dataset that are neither folders nor files, or the wrong of the two, in order.
 
     Parameters
     ----------
@@ -23,7 +28,10 @@ def foreign_entries(root: Path, wanted: Callable[[str], bool] = lambda name: Tru
         with os.scandir(root / folder) as entries:
             for entry in entries:
                 name = f"{folder}{entry.name}"
-                if not entry.is_dir(follow_symlinks=False):
+                is_folder = entry.is_dir(follow_symlinks=False)
+                if is_folder != KINDS.get(name, is_folder):
+                    found.append(name)
+                elif not is_folder:
                     found += [] if entry.is_file(follow_symlinks=False) else [name]
                 elif entry.name != "c" or not name.startswith("frames.zarr/") or wanted(f"{name}/0"):
                     waiting.append(f"{name}/")
@@ -47,8 +55,14 @@ def refuse_foreign_entries(root: Path, wanted: Callable[[str], bool] = lambda na
 
 
 def _sentence(root: Path, path: str) -> str:
-    kind = "a link" if (root / path).is_symlink() else "neither a file nor a folder"
+    place = root / path
+    if place.is_symlink():
+        kind = "a link"
+    elif path in KINDS and (place.is_dir() or place.is_file()):
+        kind = "a folder where a file belongs" if place.is_dir() else "a file where a folder belongs"
+    else:
+        kind = "neither a file nor a folder"
     return (
-        f"{shorten(root / path)}: a dataset must hold nothing but folders and regular files; this is {kind}:"
-        " remove it, or put the file itself there"
+        f"{shorten(place)}: a dataset must hold nothing but its folders and regular files; this is {kind}:"
+        " remove it, or put back what belongs there"
     )
