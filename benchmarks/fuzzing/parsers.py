@@ -226,7 +226,8 @@ PARSERS: tuple[Parser, ...] = (
         reseal=seals.sealed_dataset,
     ),
     Parser(
-        name="telemetry tables", write=sound.dataset, targets=(r"telemetry/.*\.parquet",), read=read_tables, share=1,
+        name="telemetry tables", write=sound.dataset, read=read_tables, share=1,
+        targets=(r"telemetry/clips\.parquet", r"telemetry/(ticks|frames)/.*"),
     ),
     Parser(
         name="frozen inputs", write=sound.dataset, targets=(r"inputs/(vehicle|surface)\.yaml", r"plan\.json"), share=1,

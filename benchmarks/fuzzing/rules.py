@@ -56,7 +56,8 @@ WRONG_IDS = (
 WRONG_HASHES = ("0" * 63, "z" * 64, "", 7, None, "../" + "0" * 61)
 
 FINITE = Rule(name="numbers are finite", where=r".*", values=(NAN, INF, -INF), numbers_only=True)
-UNITS = Rule(name="units are those of the field", where=r"(.*\|)?unit", values=("furlong", "", 7))
+UNITS = Rule(name="units are those of the field", where=r"(?!printed)(.*\|)?unit", values=("furlong", "", 7))
+"""A printed figure's unit is what is printed beside it."""
 CELLS_FINITE = Rule(
     name="numbers are finite", where=r".*", values=("nan", "inf", "-inf", "1e999"), numbers_only=True
 )
@@ -78,5 +79,5 @@ def hashes_keep_their_form(where: str) -> Rule:
 
 
 def limits(where: str, *values: Any) -> Rule:
-    """Numbers keep their physical limits."""
-    return Rule(name="numbers keep their limits", where=rf"(.*\|)?{where}", values=values)
+    """Numbers keep their physical limits; what a grid leaves out may lie beyond them."""
+    return Rule(name="numbers keep their limits", where=rf"(?!exclude)(.*\|)?{where}", values=values)

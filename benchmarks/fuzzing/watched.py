@@ -31,6 +31,8 @@ LONGEST_MESSAGE = 20_000
 """Characters of all the sentences about one input."""
 START = "spawn"
 """How processes begin: with nothing of this one's memory."""
+RETIRED_BYTES = 3 * 2**28
+"""A process that has come to hold this much is replaced before it reads more: what libraries keep is not the input's."""
 CHUNK = 100
 """Inputs that a process is given at once."""
 
@@ -183,7 +185,7 @@ def read_watched(
                     continue
                 if worker.left:
                     waiting.append((worker.parser, worker.left))
-                if worker.alive and waiting:
+                if worker.alive and waiting and worker.peak_bytes < RETIRED_BYTES:
                     worker.give(waiting.pop())
                 else:
                     worker.stop()
@@ -208,7 +210,7 @@ class _Worker:
         self._process = context.Process(target=_serve, args=(other, str(shelf), seed), daemon=True)
         self._process.start()
         other.close()
-        self.alive, self.parser, self.left = True, "", range(0)
+        self.alive, self.parser, self.left, self.peak_bytes = True, "", range(0), 0
         self._heard, self._worked, self._started = 0.0, 0.0, False
 
     def give(self, task: tuple[str, range]) -> None:
@@ -239,7 +241,7 @@ class _Worker:
         self._worked = _cpu_seconds(self._process.pid)
         if told is None:
             return None
-        self.left = self.left[1:]
+        self.left, self.peak_bytes = self.left[1:], told.peak_bytes
         if told.outcome == "memory":
             self.alive = False
         return told

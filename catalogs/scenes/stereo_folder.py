@@ -169,8 +169,8 @@ def _picture(path: Path, problems: list[str]) -> NDArray[np.uint8] | None:
         problems += error.problems
         return None
     # a PNG says its size before a byte of it is decoded
-    width, height = struct.unpack(">II", content[16:24]) if content[12:16] == b"IHDR" else (0, 0)
-    if not (content.startswith(PNG) and 0 < width * height <= MOST_PIXELS):
+    width, height = struct.unpack(">II", content[16:24]) if len(content) > 24 else (0, 0)
+    if not (content.startswith(PNG) and content[12:16] == b"IHDR" and 0 < width * height <= MOST_PIXELS):
         problems.append(
             f"{path}: must be a PNG of 1 to {MOST_PIXELS} pixels; it cannot be decoded: it is no PNG, or of"
             f" {width} x {height} pixels"

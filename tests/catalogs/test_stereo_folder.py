@@ -93,3 +93,17 @@ def test_a_missing_file_and_sizes_that_differ_are_named(folder: Path) -> None:
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     assert "nowhere" in problems_of(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda b: b[:18], "cannot be decoded"),
+        (lambda b: b[:16] + b"\x7f\xff\xff\xff" * 2 + b[24:], "2147483647 x 2147483647 pixels"),
+        (lambda b: b[:30] + b"damaged", "cannot be decoded"),
+    ],
+)
+def test_a_picture_that_is_cut_or_of_no_camera_s_size_is_refused_before_it_is_decoded(folder, change, words):
+    path = folder / "image_r" / "000001.png"
+    path.write_bytes(change(path.read_bytes()))
+    assert words in problems_of(folder)
