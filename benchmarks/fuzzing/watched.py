@@ -32,7 +32,7 @@ LONGEST_MESSAGE = 20_000
 START = "spawn"
 """How processes begin: with nothing of this one's memory."""
 RETIRED_BYTES = 3 * 2**28
-"""A process that has come to hold this much is replaced before it reads more: what libraries keep is not the input's."""
+"""A process that has come to hold this much is replaced: what libraries keep is not the input's."""
 CHUNK = 100
 """Inputs that a process is given at once."""
 
