@@ -131,12 +131,17 @@ def _checked(folder: Path, header: bytes, table: bytes) -> tuple[MeasuredHeader,
 
 
 def _split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequence[str]) -> list[str]:
-    problems = [f"{name}: stands in both parts of the split" for name in sorted(set(train) & set(held_out))]
-    problems += [
-        f"{name}: is in neither part of the split" for name in names if name not in {*train, *held_out}
+    problems = [
+        f"{shorten(name, 60)}: stands in both parts of the split"
+        for name in sorted(set(train) & set(held_out))
     ]
     problems += [
-        f"{name}: the split names it, but runs.csv does not"
+        f"{shorten(name, 60)}: is in neither part of the split"
+        for name in names
+        if name not in {*train, *held_out}
+    ]
+    problems += [
+        f"{shorten(name, 60)}: the split names it, but runs.csv does not"
         for name in sorted({*train, *held_out} - set(names))
     ]
     problems += [

@@ -17,6 +17,7 @@ from glob import escape
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from catalogs.documents import parse_json
 from flows.store.layout import PARTIAL, write_atomically, write_json
 from tasks.errors import InputError
 
@@ -173,8 +174,8 @@ def read_marker(folder: Path) -> dict[str, str]:
     if not stat.S_ISREG(facts.st_mode) or facts.st_size > MOST_BYTES:
         raise _not_a_marker(path)
     try:
-        value = json.loads(path.read_bytes())
-    except (ValueError, RecursionError):
+        value = parse_json(path.read_bytes(), path, "list of files")
+    except InputError:
         raise _not_a_marker(path) from None
     files = value.get("files") if isinstance(value, dict) and value.get("format") == FORMAT else None
     if not isinstance(files, dict) or not all(

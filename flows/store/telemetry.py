@@ -93,7 +93,7 @@ def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] =
         for field in table.schema
         if field.name in CHANNELS_BY_NAME
         and CHANNELS_BY_NAME[field.name].unit
-        and not _holds_numbers(field.type)
+        and not _holds_numbers(table[field.name])
     ]
     faults = {
         "lacks": [name for name in required if name not in table.column_names],
@@ -138,8 +138,11 @@ def columns_hash(columns: Mapping[str, np.ndarray], names: Iterable[str]) -> str
     return sha256_of(parts)
 
 
-def _holds_numbers(kind: pa.DataType) -> bool:
+def _holds_numbers(column: pa.ChunkedArray) -> bool:
+    kind = column.type
     if pa.types.is_fixed_size_list(kind):
+        if column.null_count:
+            return False
         kind = kind.value_type
     return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind))
 
