@@ -11,7 +11,7 @@ from flows.store.links import foreign_entries
 from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
-from flows.store.staging import left_overs, remove_staged, remove_staging
+from flows.store.staging import BEGUN, left_overs, remove_staged, remove_staging
 from manifests.manifest import damaged_files, manifest_damage, recorded_files
 from manifests.signing import ENVELOPE
 from tasks.errors import InputError
@@ -104,11 +104,11 @@ def gc(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
 
 
 def _collect(layout: Layout, dry_run: bool) -> dict[str, Any]:
-    finished = layout.manifest.is_file()
+    finished, begun = layout.manifest.is_file(), (layout.staging / BEGUN).is_file()
     if not layout.plan.is_file() and not finished:
         raise InputError(
-            f"{layout}: must be a muSync dataset; it has neither plan.json nor manifest.json: what a run began and did"
-            " not plan goes on with its musync generate command"
+            f"{layout}: must be a muSync dataset; it has neither plan.json nor manifest.json"
+            + (": the run that began it goes on with the same musync generate command" if begun else "")
         )
     with sole_writer(layout):
         found = left_overs(layout)

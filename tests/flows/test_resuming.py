@@ -85,7 +85,7 @@ def test_a_folder_with_a_name_of_ours_but_without_our_mark_is_left_alone(grid, t
 def test_what_a_run_began_without_a_plan_is_no_dataset_to_collect_in(tmp_path):
     (tmp_path / "data" / ".staging").mkdir(parents=True)
     (tmp_path / "data" / ".staging" / "begun").touch()
-    with pytest.raises(InputError, match="goes on with its musync generate"):
+    with pytest.raises(InputError, match="goes on with the same musync generate"):
         gc(str(tmp_path / "data"))
 
 
