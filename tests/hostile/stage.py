@@ -119,16 +119,30 @@ COMMANDS: dict[str, Callable[[Stage], Any]] = {
     "gc": lambda s: gc(str(s.dataset.root)),
 }
 """In the order in which they are tried: those that write last."""
-LOOKS = ("verify", "gc --dry-run", "describe", "sql", "open tables")
-"""Those that everybody runs first, and that cost least."""
+LIGHT = (
+    "verify",
+    "gc --dry-run",
+    "describe",
+    "sql",
+    "explain",
+    "diff",
+    "open frames",
+    "repair",
+    "sign",
+    "generate",
+    "gc",
+)
+"""Those that take some hundredths of a second: for attacks that most commands refuse at the door."""
 WRITES = ("repair", "sign", "gc")
 
 
 def listing(folder: Path, *without: Path) -> dict[str, str]:
     """Every entry below a folder with what it is and holds; links are not followed."""
     found = {}
-    for path in sorted(folder.rglob("*")):
-        if not any(path.is_relative_to(other) for other in without):
+    for place, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if Path(place, name) not in without]
+        for name in (*folders, *files):
+            path = Path(place, name)
             found[str(path.relative_to(folder))] = _content(path)
     return found
 

@@ -10,7 +10,7 @@ import pytest
 from tests.flows.reseal import reseal
 from tests.hostile.stage import Stage, endure, refused, unrefused
 
-READS_INPUTS = ("verify", "describe", "explain", "audit-physics", "audit", "repair", "generate")
+READS_INPUTS = ("verify", "explain", "audit-physics", "generate")
 BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10)
 )
@@ -95,9 +95,9 @@ def test_a_dataset_whose_inputs_hold(stage, attack):
         stage.original.manifest.read_text()
     ):  # else it agrees with what it records
         assert refused(outcomes["verify"])
-    reseal(stage.dataset)
-    stage.dataset.frame_shard("rgb", 0).unlink()  # repair has to make a clip with these inputs
-    endure(stage, *READS_INPUTS, "sheets", "preview", "report")
+        reseal(stage.dataset)
+        stage.dataset.frame_shard("rgb", 0).unlink()  # repair has to make a clip with these inputs
+        endure(stage, "repair")
 
 
 def test_an_input_that_is_missing_is_not_taken_from_elsewhere(stage):

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.flows.reseal import reseal
-from tests.hostile.stage import COMMANDS, endure, listing, refused, unrefused
+from tests.hostile.stage import COMMANDS, LIGHT, endure, listing, refused, unrefused
 
 TABLE = "telemetry/clips.parquet"
 PATHS = {
@@ -139,7 +139,7 @@ def test_a_clip_id_that_is(stage, attack):
 def test_a_manifest_with(stage, attack):
     reseal(stage.dataset, CHANGES[attack])
     before = listing(stage.dataset.root)
-    outcomes = endure(stage, *COMMANDS)
+    outcomes = endure(stage, *LIGHT, "report")
     if refused(outcomes["describe"]):  # no record of a dataset: nobody writes into it
         assert listing(stage.dataset.root) == before
 
@@ -166,9 +166,7 @@ CONTENTS = {
 def test_a_record_that_holds(stage, attack, place):
     (stage.dataset.root / place).write_bytes(CONTENTS[attack])
     before = listing(stage.dataset.root)
-    outcomes = endure(
-        stage, *(COMMANDS if place == "manifest.json" else ("verify", "explain", "audit", "generate"))
-    )
+    outcomes = endure(stage, *(COMMANDS if place == "manifest.json" else ("verify", "explain", "generate")))
     assert refused(outcomes["verify"])
     if place == "manifest.json":
         assert (

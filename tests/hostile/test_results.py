@@ -148,9 +148,7 @@ def test_a_label_that_is(stage, attack):
     plan["clips"][0]["label"] = WORDS[attack]
     stage.dataset.plan.write_text(json.dumps(plan))
     reseal(stage.dataset, rename)
-    endure(
-        stage, "describe", "sql", "open windows", "explain", "diff", "sheets", "preview", "report", "audit"
-    )
+    endure(stage, "describe", "preview", "report")
     results = stage.world / "results"
     assert not Path("PWNED").exists() and not Path("/owned-by-a-stranger").exists()
     for page in results.rglob("*.html"):

@@ -15,10 +15,7 @@ from tests.flows.reseal import reseal
 from tests.hostile.stage import Stage, endure
 from tests.hostile.test_frames import Payload
 
-READS_TABLES = (
-    "describe", "sql", "open tables", "open windows", "explain", "diff", "audit-physics", "sheets", "preview", "report",
-    "audit",
-)  # fmt: skip
+READS_TABLES = ("sql", "open tables", "open windows", "explain", "audit-physics", "sheets")
 
 
 def tables(stage: Stage) -> Iterator[Path]:
