@@ -5,6 +5,8 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
 from catalogs.cameras import load_camera
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
@@ -18,6 +20,7 @@ from flows.store.address import reading, telemetry
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
+from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, surface_steps
 from tasks.scene.route import Route
@@ -68,6 +71,12 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
             f" {len(columns['frame'])}: musync repair makes the table again"
         )
     row, first = ({name: column[i] for name, column in columns.items()} for i in (frame, 0))
+    empty = [c.name for c in TICK_CHANNELS for at in (row, first) if not np.isfinite(at[c.name]).all()]
+    if empty:
+        raise InputError(
+            f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"
+            f" {', '.join(dict.fromkeys(empty))}: musync repair makes the table again"
+        )
     vehicle = load_vehicle(layout.inputs / "vehicle.yaml")
     mode = plan.settings.vehicle_mode
     hazard = hazard_of(scenario)
