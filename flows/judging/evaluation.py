@@ -19,8 +19,9 @@ from flows.judging.road_edit_rows import road_edit_rows
 from flows.judging.trajectories import trajectory_files
 from flows.running.orchestration import stage
 from flows.store.address import reading
-from flows.store.layout import Layout, read_json
+from flows.store.layout import Layout
 from flows.store.outputs import Outputs
+from flows.store.sealed import read_manifest
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError
 from tasks.eval.motion import RecoveredMotion
@@ -88,7 +89,7 @@ def evaluate(
     rows += list(mean_rows(rows, clips))
     codec = "lossless" if crf is None else f"H.264 crf {crf}"
     result = {
-        "run_id": read_json(Layout(root).manifest)["run_id"], "codec": codec, "clips": len(clips), "rows": rows
+        "run_id": read_manifest(Layout(root))["run_id"], "codec": codec, "clips": len(clips), "rows": rows
     }  # fmt: skip
     results.write_json("evaluation.json", result)
     write_parquet(pa.Table.from_pylist(rows, SCHEMA), results.path("evaluation.parquet"))

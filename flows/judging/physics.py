@@ -10,8 +10,9 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.running.orchestration import stage
 from flows.store.address import reading, telemetry
-from flows.store.layout import Layout, read_json
+from flows.store.layout import Layout
 from flows.store.outputs import Outputs
+from flows.store.sealed import read_plan_record, recorded_grid
 from flows.store.telemetry import read_columns, read_table
 from tasks.conventions import CLIP_CHANNELS, FRAME_CHANNELS, IDENTITY_CHANNELS, TICK_CHANNELS
 from tasks.errors import InputError
@@ -104,7 +105,7 @@ def read_constants(root: Path) -> Constants:
         raise InputError(missing)
     load_vehicle(files["vehicle"]), load_surface(files["surface"])  # of the form that they must have
     car, surface = (read_yaml(path, "catalogue entry") for path in files.values())
-    mode = read_json(layout.plan)["grid"]["vehicle_mode"]
+    mode = recorded_grid(read_plan_record(layout)["grid"], layout.plan).vehicle_mode
     if mode != "paper" or car.get("effects"):
         raise InputError(
             f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"

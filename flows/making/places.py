@@ -23,14 +23,17 @@ def remember_place(sha256: str, place: str | Path) -> None:
     place : file or folder
     """
     note, absolute = _note(sha256), str(Path(place).resolve())
-    if not (note.is_file() and read_json(note) == absolute):
+    if noted_place(sha256) != Path(absolute):
         write_json(note, absolute)
 
 
 def noted_place(sha256: str) -> Path | None:
-    """Where something of a hash lay when it was last used; None if nothing is noted."""
-    note = _note(sha256)
-    return Path(str(read_json(note))) if note.is_file() else None
+    """Where something of a hash lay when it was last used; None if nothing is noted, or the note is damaged."""
+    try:
+        place = read_json(_note(sha256))
+    except InputError:
+        return None
+    return Path(place) if isinstance(place, str) else None
 
 
 def find_scene(scene: Mapping[str, Any]) -> str:

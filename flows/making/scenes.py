@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from catalogs.documents import read_json_document
 from catalogs.scenes import load_scene, write_scene
 from catalogs.scenes.folder import must_be_new
 from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.scenes.route_files import read_route
-from flows.store.layout import read_json
 from flows.store.outputs import Outputs
 from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
@@ -102,7 +102,9 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
 
 
 def _read_pose(pose: str) -> tuple[np.ndarray, np.ndarray, int, int]:
-    content = read_json(Path(pose))
+    content = read_json_document(Path(pose), "pose")
+    if not isinstance(content, dict):
+        raise InputError(f"{pose}: a pose must be a JSON object with viewmat, K, width and height")
     problems = [
         f"{pose}: {key} is required; it is missing"
         for key in ("viewmat", "K", "width", "height")

@@ -21,8 +21,9 @@ from flows.making.plan import make_plan
 from flows.running.runner import RunnerName
 from flows.scheduled.failure_report import is_webhook, stamp
 from flows.store.address import PREPARED
-from flows.store.layout import Layout, read_json
+from flows.store.layout import Layout
 from flows.store.objects import Objects, is_address
+from flows.store.sealed import read_manifest
 from flows.store.staging import BEGUN
 from tasks.errors import InputError
 
@@ -115,7 +116,7 @@ def scheduled_run(
     """
     place = dataset_place(grid, root, backend, at)
     report = generate(grid, place, runner=runner, workers=workers, scheduler=scheduler, backend=backend)
-    clips = read_json(report.layout.manifest)["clips"]
+    clips = read_manifest(report.layout)["clips"]
     return {
         "dataset": str(report.layout),
         "run_id": report.run_id,

@@ -11,6 +11,7 @@ import flows.making.generate
 from flows.auditing.repair import repair
 from flows.auditing.verify import gc
 from flows.making.generate import generate
+from flows.making.places import noted_place, remember_place
 from flows.making.plan import make_plan
 from flows.store.layout import Layout
 from flows.store.lock import sole_writer
@@ -169,3 +170,15 @@ def test_a_run_that_waited_while_another_ended_makes_nothing_and_leaves_nothing(
         patch.setattr(flows.making.generate, "sole_writer", late)
         report = generate(grid, str(folder), runner="threads", workers=1, pictures=False)
     assert report.made == 0 and files_of(folder) == whole
+
+
+def test_a_damaged_note_of_where_a_scene_lies_is_made_anew(toy_dataset, tmp_path, monkeypatch):
+    monkeypatch.setenv("MUSYNC_CACHE", str(tmp_path))
+    scene, digest = toy_dataset.root.parent / "scene", "0" * 64
+    remember_place(digest, scene)
+    (note,) = (tmp_path / "places").iterdir()
+    for damage in (b"", b"[1]", b"{"):
+        note.write_bytes(damage)
+        assert noted_place(digest) is None
+        remember_place(digest, scene)
+        assert noted_place(digest) == scene
