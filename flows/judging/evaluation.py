@@ -88,12 +88,13 @@ def evaluate(
     rows += [figure_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
     rows += list(mean_rows(rows, clips))
     codec = "lossless" if crf is None else f"H.264 crf {crf}"
+    run_id = read_manifest(Layout(root))["run_id"]
     result = {
-        "run_id": read_manifest(Layout(root))["run_id"], "codec": codec, "clips": len(clips), "rows": rows
+        "run_id": run_id, "codec": codec, "clips": len(clips), "rows": rows
     }  # fmt: skip
     results.write_json("evaluation.json", result)
     write_parquet(pa.Table.from_pylist(rows, SCHEMA), results.path("evaluation.parquet"))
-    results.write("evaluation.html", page(clips, rows, result["run_id"], codec))
+    results.write("evaluation.html", page(clips, rows, run_id, codec))
     return result
 
 
