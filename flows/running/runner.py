@@ -5,7 +5,8 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import Any, Literal
 
 from tasks.errors import InputError
@@ -48,11 +49,23 @@ def open_executor(
             yield executor
     elif runner == "processes":
         # spawn: a forked child would inherit the locks of OpenCV's and Arrow's threads
-        with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as executor:
+        with ProcessPoolExecutor(count, get_context("spawn"), initializer=end_with_parent) as executor:
             yield executor
     else:
         with _dask_client(count, scheduler, warm) as client, client.get_executor(pure=False) as executor:
             yield executor
+
+
+def end_with_parent() -> None:
+    """In a worker process: end when the process that started it does, even if that one is killed."""
+    parent = parent_process()
+    if parent is not None:
+
+        def wait() -> None:
+            parent.join()
+            os._exit(1)
+
+        Thread(target=wait, daemon=True).start()
 
 
 @contextmanager

@@ -1,9 +1,14 @@
 import os
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import pytest
 
 from flows.running.orchestration import stage
 from flows.running.runner import open_executor, run_unordered
+from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 
 
@@ -77,3 +82,31 @@ def test_outside_a_flow_a_stage_is_its_function():
     with pytest.raises(ValueError, match="three"):
         stage(square_or_fail)(3)
     assert stage(square_or_fail).__name__ == "square_or_fail"
+
+
+KILLED = """
+import os, sys, time
+from flows.running.runner import open_executor
+
+if __name__ == "__main__":
+    with open_executor("processes", 2) as executor:
+        print(*{executor.submit(os.getpid).result() for _ in range(2)}, flush=True)
+        executor.submit(time.sleep, 600)
+        time.sleep(600)
+"""
+
+
+def test_workers_end_with_a_run_that_is_killed(tmp_path):
+    (tmp_path / "run.py").write_text(KILLED)
+    run = subprocess.Popen(
+        [sys.executable, "run.py"], cwd=tmp_path, stdout=subprocess.PIPE, text=True,
+        env=os.environ | {"PYTHONPATH": str(SOURCE_ROOT)},
+    )  # fmt: skip
+    workers = [int(pid) for pid in run.stdout.readline().split()]
+    assert workers and all(Path(f"/proc/{pid}").exists() for pid in workers)
+    run.kill()
+    run.wait()
+    until = time.monotonic() + 20
+    while alive := [pid for pid in workers if Path(f"/proc/{pid}").exists()]:
+        assert time.monotonic() < until, f"workers {alive} go on"
+        time.sleep(0.05)
