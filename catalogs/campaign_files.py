@@ -31,7 +31,7 @@ WEATHERS = ("dry", "rain", "snow")
 
 
 class CampaignHeader(BaseModel):
-    """What every reader needs of campaign.yaml; other keys are notes."""
+    """Keys of campaign.yaml that every reader needs; other keys are notes."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 

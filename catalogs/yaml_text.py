@@ -103,7 +103,7 @@ def _check_shape(text: str, start: str) -> None:
 
 
 def _node_problems(loader: Any, root: yaml.Node, finite: bool) -> list[str]:
-    """What is wrong with keys and values, in the order of the text."""
+    """Faults of keys and values, in the order of the text."""
     found: list[tuple[int, str]] = []
     waiting, seen = [root], {id(root)}
     while waiting:

@@ -110,7 +110,7 @@ class Receipt(ClipRecord):
 
 @with_config(STRICT)
 class PlanRecord(TypedDict):
-    """What ``plan.json`` holds."""
+    """The content of ``plan.json``."""
 
     format: Text
     run_id: Id
@@ -124,7 +124,7 @@ class PlanRecord(TypedDict):
 
 @with_config(STRICT)
 class Manifest(TypedDict):
-    """What ``manifest.json`` holds; the form of ``grid`` is checked with the catalogue.
+    """The content of ``manifest.json``; the form of ``grid`` is checked with the catalogue.
 
     ``processor``, ``git`` and ``environment`` say on what, from which commit and beside which packages the bytes were
     made: they decide nothing, and explain a difference.
@@ -159,7 +159,7 @@ class FrozenClip(TypedDict):
 
 @with_config(STRICT)
 class FrozenRun(TypedDict):
-    """What the file of a frozen run holds."""
+    """The content of the file of a frozen run."""
 
     format: Text
     name: Text

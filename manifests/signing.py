@@ -199,7 +199,7 @@ def read_envelope(content: bytes) -> Envelope:
 
 
 def _statement_problems(statement: Any, digest: str) -> list[str]:
-    """What keeps a signed statement from being one about the manifest with this hash."""
+    """List the reasons why a signed statement is not about the manifest with this hash."""
     if not isinstance(statement, Mapping) or statement.get("_type") != STATEMENT_TYPE:
         return [f"the signed statement must be of type {STATEMENT_TYPE}; it is not"]
     problems = []

@@ -115,7 +115,7 @@ def entry(
 
 
 def read_dataset(folder: Path) -> None:
-    """What a reader does first: verify, describe, ask every view."""
+    """Verify, describe and query a dataset, as a reader does first."""
     result = verify(str(folder))
     describe(str(folder))
     for view in VIEWS:

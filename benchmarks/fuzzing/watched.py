@@ -43,7 +43,7 @@ FINDINGS: tuple[Outcome, ...] = ("traceback", "hang", "memory", "silent")
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """What became of one input: the outcome, where it was raised and how, its time [s] and the process's memory."""
+    """Outcome of one input, where it was raised and how, its time [s] and the memory of the process."""
 
     parser: str
     number: int
@@ -157,7 +157,7 @@ class Desk:
 def read_watched(
     plan: Sequence[tuple[str, range]], shelf: Path, seed: int, workers: int
 ) -> Iterator[Reading]:
-    """What becomes of every input of a plan, as it becomes known.
+    """Yield the outcome of every input of a plan, as it becomes known.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
 
 COUNTS: Counter[str] = Counter()
-"""What the sequences of this process have come to."""
+"""Events in the sequences of this process, counted by kind."""
 LAST_STEP = 480
 """Faults strike up to here; a run takes some 480 changes of the disk, a repair and a collection fewer."""
 Told = (InputError, ClipsFailed, OSError)

@@ -16,12 +16,12 @@ from catalogs.sentences import Place, describe_rules
 
 BLOCKS = ("axes", "zip", "scenarios", "latin_hypercube")
 UNKNOWN: dict[str, Any] = {"weather": UNKNOWN_WEATHER, **dict.fromkeys(NUMBERS, nan)}
-"""What a level sets of which nothing can be read."""
+"""Values of a level of which nothing can be read."""
 
 
 @dataclass(kw_only=True)
 class GridForm:
-    """What could be read of a grid.
+    """The readable part of a faulty grid.
 
     Parameters
     ----------

@@ -184,7 +184,7 @@ def _arrays(scene: Scene) -> dict[str, NDArray[Any]]:
 
 
 def read_facts(folder: Path) -> dict[str, Any]:
-    """What scene.json says, in its form.
+    """The facts of scene.json, in their form.
 
     Raises
     ------

@@ -38,7 +38,7 @@ class Element:
 
     @property
     def bytes(self) -> int:
-        """What all of them take in the file [1]."""
+        """Bytes that all of them take in the file [1]."""
         return self.count * sum(SIZES[kind] for kind, _ in self.properties)
 
 

@@ -78,7 +78,7 @@ def _sign_manifest(layout: Layout, signer: CryptoSigner) -> dict[str, Any]:
 
 
 def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
-    """What a dataset's signatures say.
+    """Check the signatures of a dataset.
 
     Parameters
     ----------
@@ -127,5 +127,5 @@ def _load_envelope(layout: Layout) -> bytes | None:
 
 
 def _signed_record(name: str) -> bool:
-    """What signing reads."""
+    """Whether signing reads a file of the dataset."""
     return name in {"plan.json", "manifest.json", ENVELOPE}

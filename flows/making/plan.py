@@ -34,7 +34,7 @@ LOADERS: Mapping[str, Callable[[Path], Any]] = {
     "camera.yaml": load_camera,
     "hazard_marking.yaml": load_marking,
 }
-"""What checks the entries that a user may bring."""
+"""Loaders that check the catalogue entries that a user may bring."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -303,7 +303,7 @@ def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
 
 
 def _camera_problems(settings: GridFile) -> list[str]:
-    """What of a grid its camera cannot do, or this machine not with it; a camera at fault is told elsewhere."""
+    """Settings that the camera or the memory of this machine cannot serve; a faulty camera is told elsewhere."""
     try:
         camera = load_camera(settings.camera)
     except InputError:

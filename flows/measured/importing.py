@@ -215,7 +215,7 @@ def _plan_problems(
 
 
 def _signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
-    """What is wrong with the signals that a faulty map names, as far as it can be read."""
+    """Faults of the signals that a faulty map names, as far as it can be read."""
     if channel_map is None:
         return []
     try:

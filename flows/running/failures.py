@@ -41,7 +41,7 @@ SURROUNDINGS = {
     errno.EMFILE: "too many files are open; raise the limit (ulimit -n) or give fewer --workers",
     errno.ENFILE: "too many files are open on this machine; close some or give fewer --workers",
 }
-"""What a user can do about it, by error number."""
+"""Sentences that say what a user can do, by error number."""
 NAMED = {
     errno.ENOENT: "there is no such file or folder; name one that exists",
     errno.EEXIST: "something else lies there; move it away or name another place",
@@ -88,7 +88,7 @@ def explain_end(error: BaseException, given: Sequence[str]) -> tuple[int, list[s
 
 
 def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
-    """What to tell a user about a place that cannot be used; None for an error that is no fault of such a place.
+    """The sentence for a place that cannot be used; None for an error that is no fault of such a place.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
 
 
 def disk_full_sentence(error: BaseException) -> str | None:
-    """What to tell a user whose disk, quota or file size limit is used up; None for any other error."""
+    """The sentence for a disk, quota or file size limit that is used up; None for any other error."""
     if isinstance(error, OSError) and error.errno in FULL:
         place = f"{error.filename}: " if error.filename else ""
         return place + FULL[error.errno]

@@ -198,7 +198,7 @@ def refuse_link(path: Path) -> None:
 
 
 def _in_the_way(folder: Path, name: str, known: dict[str, str], command: str) -> str | None:
-    """What keeps a command from writing a file; None for a free name and for its own earlier file."""
+    """The reason why a command must not write a file; None for a free name and for its own earlier file."""
     problem, place = _no_folder_above(folder, name), folder / name
     if problem is not None or not os.path.lexists(place):
         return problem

@@ -41,7 +41,7 @@ def abandoned_scratch(layout: Layout) -> list[Path]:
 
 
 def left_overs(layout: Layout) -> list[Path]:
-    """What killed runs left: half-written files, scratch folders, and in a finished dataset all that is staged."""
+    """List what killed runs left: half-written files, scratch folders, and staged files of a finished dataset."""
     staged = staged_files(layout) if layout.manifest.is_file() else []
     return sorted({*partial_files(layout), *abandoned_scratch(layout), *staged})
 

@@ -33,7 +33,7 @@ def documents(shelf) -> dict[str, Documents]:
 
 
 def outcome(documents: Documents, file: str, content: bytes, folder: Path) -> tuple[str, str]:
-    """What becomes of a document with this content in one file, its seals made again where that can be."""
+    """Outcome of a document with this content in one file; its seals are made again where that can be."""
     document, _, name = file.partition("/")
     whole = documents.files[document]
     changed = {name: content}

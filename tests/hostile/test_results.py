@@ -184,7 +184,7 @@ def test_a_terminal_is_given_no_control_characters_of_a_stranger_s(stage, comman
 
 
 def test_every_command_takes_the_honest_dataset(stage: Stage):
-    """What the attacks are held against: nothing is refused that is as muSync wrote it."""
+    """A dataset that is as muSync wrote it is not refused: the control of all attacks."""
     outcomes = endure(stage, *COMMANDS)
     refused = {name: outcome for name, outcome in outcomes.items() if isinstance(outcome, InputError)}
     assert refused == {}

@@ -63,7 +63,7 @@ def problems(envelope, key=OWNER, manifest=MANIFEST) -> str:
 
 
 def pre_authentication_encoding(envelope: bytes) -> tuple[bytes, bytes]:
-    """What the DSSE specification says is signed, and the one signature."""
+    """The bytes that are signed by the DSSE specification, and the one signature."""
     fields = json.loads(envelope)
     kind, body = fields["payloadType"].encode(), base64.b64decode(fields["payload"])
     encoded = b"DSSEv1 " + b" ".join([b"%d" % len(kind), kind, b"%d" % len(body), body])
