@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.fuzzing import seals, sound
+from benchmarks.fuzzing import recorded, seals, sound
 from benchmarks.fuzzing.rules import (
     CELLS_FINITE,
     FINITE,
@@ -261,47 +261,49 @@ PARSERS: tuple[Parser, ...] = (
                                               ' "format": "musync-written/1"}'}),
     ),
     Parser(
-        name="campaign", write=sound.campaigns, read=read_campaign, share=5,
+        name="campaign", write=recorded.campaigns, read=read_campaign, share=5,
         rules=(FINITE, CELLS_FINITE, files_inside("run")),
     ),
     Parser(
-        name="drives", write=sound.campaigns, read=read_drives, share=3,
+        name="drives", write=recorded.campaigns, read=read_drives, share=3,
         rules=(Rule(name="numbers are finite", where="sample_rate_hz", values=(NAN, INF)),
                Rule(name="numbers are finite", where="precipitation_mm_h|snow_accumulation_h", numbers_only=True,
                     values=("nan", "inf")), files_inside("run")),
     ),
     Parser(
-        name="recording", write=sound.recordings, targets=(r"log\..*",), share=4,
+        name="recording", write=recorded.recordings, targets=(r"log\..*",), share=4,
         read=lambda folder: read_signals(next(folder.glob("log.*")), load_channel_map(folder / "map.yaml")[0]),
     ),
     Parser(
-        name="reference", write=sound.references, read=read_reference, share=4,
+        name="reference", write=recorded.references, read=read_reference, share=4,
         rules=(FINITE, files_inside(r"\d+\|case"), Rule(name="cases are names", where=r"\d+\|case", values=("*", "?"))),
     ),
     Parser(
-        name="Gaussians", write=sound.gaussian_files, share=8,
+        name="Gaussians", write=recorded.gaussian_files, share=8,
         read=lambda folder: read_gaussians(next(folder.glob("cloud.*"))),
     ),
-    Parser(name="scene import", write=sound.imports, read=import_scene, share=1, writes=True),
+    Parser(name="scene import", write=recorded.imports, read=import_scene, share=1, writes=True),
     Parser(
         name="scene folder", write=sound.scene_folders, read=read_scene, share=6, reseal=seals.sealed_scene,
         sealed=r".*\.npy",
         rules=(FINITE, files_inside(r"sha256\|.*", of_keys=True), hashes_keep_their_form(r"sha256\|.*")),
     ),
     Parser(
-        name="route", write=sound.routes, share=6, rules=(FINITE, CELLS_FINITE),
+        name="route", write=recorded.routes, share=6, rules=(FINITE, CELLS_FINITE),
         read=lambda folder: read_route(next(folder.glob("route.*")), 1.65),
     ),
-    Parser(name="stereo folder", write=sound.stereo_folders, read=read_stereo_folder, share=2, rules=(CELLS_FINITE,)),
     Parser(
-        name="trajectory", write=sound.texts({"t.txt": sound.trajectory_text()}), share=2, rules=(CELLS_FINITE,),
+        name="stereo folder", write=recorded.stereo_folders, share=2, rules=(CELLS_FINITE,), read=read_stereo_folder
+    ),
+    Parser(
+        name="trajectory", write=sound.texts({"t.txt": recorded.trajectory_text()}), share=2, rules=(CELLS_FINITE,),
         read=lambda folder: read_trajectory(folder / "t.txt"),
     ),
     Parser(
-        name="video", write=sound.videos, read=lambda folder: read_footage(next(folder.glob("video.*"))), share=0.5,
+        name="video", write=recorded.videos, read=lambda folder: read_footage(next(folder.glob("video.*"))), share=0.5,
     ),
     Parser(
-        name="claim", write=sound.claims, read=lambda folder: read_claim(folder / "claim.parquet"), share=3,
+        name="claim", write=recorded.claims, read=lambda folder: read_claim(folder / "claim.parquet"), share=3,
         rules=(FINITE,),
     ),
     Parser(
