@@ -34,7 +34,7 @@ def environment_bom() -> dict[str, Any]:
 def _describe(distribution: importlib.metadata.Distribution) -> Component | None:
     try:
         facts = distribution.metadata
-    except TypeError:  # Python 3.11 on a folder without METADATA, which a broken installation leaves
+    except (TypeError, FileNotFoundError):  # a folder without METADATA, which a broken installation leaves
         return None
     if "Name" not in facts or "Version" not in facts:
         return None
