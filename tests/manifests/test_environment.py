@@ -54,7 +54,9 @@ def test_no_path_of_this_machine_gets_into_it():
 
 @pytest.mark.parametrize("reader", ["importlib.metadata", "importlib_metadata"])
 def test_what_a_broken_installation_leaves_is_passed_over(anew, tmp_path, monkeypatch, reader):
-    pytest.importorskip(reader)  # the second, which packages bring along, takes the place of the first for good
+    pytest.importorskip(
+        reader
+    )  # the second, which packages bring along, takes the place of the first for good
     before = environment_bom()
     environment_bom.cache_clear()
     (tmp_path / "gone-1.0.dist-info").mkdir()
