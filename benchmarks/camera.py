@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from catalogs.cameras import load_camera
 from catalogs.scenes import load_scene
 from tasks.eval.image_quality import psnr
-from tasks.render.backend import CpuBackend
 from tasks.render.camera import Camera, continuous_rig, viewmat
 from tasks.render.composition import compose, encode_8bit
 from tasks.render.environment import environment_view
+from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import Field, read_out, sensor_field
 
 SPEED, PITCH_RATE, STATION = 16.0, 0.15, 8.0

@@ -13,11 +13,11 @@ from benchmarks.synthetic_street import Clip, drive_clip
 from tasks.conventions import SemanticClass
 from tasks.eval.flip import flip
 from tasks.eval.image_quality import ssim
-from tasks.eval.motion import RecoveredMotion
 from tasks.eval.no_reference import piqe, temporal_error
-from tasks.eval.pose_essential import recover_motion_essential
-from tasks.eval.pose_photometric import recover_motion_photometric
-from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.poses.essential import recover_motion_essential
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.photometric import recover_motion_photometric
+from tasks.eval.poses.pnp import recover_motion_pnp
 from tasks.eval.road_edit import score_road_edit
 from tasks.eval.severity import image_statistics, sampled_frames
 

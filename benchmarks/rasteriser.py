@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.corridor import corridor, driver_view
-from tasks.render.rasteriser import prepare, rasterise, splat_back
-from tasks.render.reference_rasteriser import rasterise_reference
+from tasks.render.rasterise.rasteriser import prepare, rasterise, splat_back
+from tasks.render.rasterise.reference_rasteriser import rasterise_reference
 
 STATION = 5.0
 """Near the corridor's beginning, where nearly all of it is in view [m]."""

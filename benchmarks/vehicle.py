@@ -16,13 +16,13 @@ from benchmarks.vehicle_modes import drive
 from catalogs.studies import Condition, load_conditions, load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from tasks.studies.sensitivity import sensitivity_study
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.vehicle import reference
 from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.paper.wheels import stopping_run, wheels_of
 from tasks.vehicle.parameters import Vehicle, surface_response
 from tasks.vehicle.rollout import INTERNAL_STEP_S
-from tasks.vehicle.sensitivity import sensitivity_study
-from tasks.vehicle.wheels import stopping_run, wheels_of
 
 STOPS_PER_CPU_S = 3000.0
 COUPLED_LIMIT_MS = 6.0

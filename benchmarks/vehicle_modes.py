@@ -9,11 +9,11 @@ from catalogs.scenario import Scenario
 from catalogs.studies import load_conditions
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from tasks.studies.mode_comparison import ModeDifference, mode_difference
 from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.mode_comparison import ModeDifference, mode_difference
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
 

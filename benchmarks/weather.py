@@ -12,14 +12,14 @@ from catalogs.weather import load_weather
 from tasks.render.camera import viewmat
 from tasks.render.composition import compose
 from tasks.render.environment import environment_view
-from tasks.render.gbuffer import GBuffer
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.render.weather.atmosphere import air_layer, light_layer
+from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import ClipWeather, apply_weather, particle_layer, pixel_rays, weather_scene
 from tasks.render.weather.parameters import WeatherState
-from tasks.render.weather.particles import Shutter
-from tasks.render.weather.wet_road import wet_layer
+from tasks.render.weather.wet.wet_road import wet_layer
 
 STATES = {
     "rain 10": WeatherState(kind="rain", precipitation_mm_h=10, film_depth_mm=0.489),

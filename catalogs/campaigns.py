@@ -18,8 +18,8 @@ from catalogs.channel_maps import Tolerances as TolerancesEntry
 from catalogs.documents import parse_yaml, read_content
 from catalogs.quantities import Text
 from catalogs.sentences import cap_problems, describe_rules, shorten
-from tasks.closure.campaign import CHANNELS, SESSION, Campaign, Run, Tolerances
-from tasks.closure.validation import COLUMN_UNITS, run_problems
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign, Run, Tolerances
+from tasks.campaign.run_validation import COLUMN_UNITS, run_problems
 from tasks.errors import InputError
 
 TOLERANCE_KEYS = (

@@ -9,9 +9,9 @@ from pydantic import ValidationError
 from catalogs.campaign_files import LARGEST_RUN, CampaignHeader, parse_columns, parse_rows, read_header_bytes
 from catalogs.documents import parse_yaml, read_content
 from catalogs.sentences import cap_problems, describe_rules, shorten
+from tasks.campaign.channels import CHANNELS_BY_NAME
+from tasks.campaign.events import Drive
 from tasks.errors import InputError
-from tasks.recordings.channels import CHANNELS_BY_NAME
-from tasks.recordings.events import Drive
 from tasks.surface.state import Weather
 
 NEEDED = ("brake_pressure", "speed", "pitch", "longitudinal_acceleration")

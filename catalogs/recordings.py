@@ -18,9 +18,9 @@ from catalogs.campaign_files import parse_columns
 from catalogs.channel_maps import ChannelMap
 from catalogs.documents import parse_json, read_content
 from catalogs.sentences import shorten
+from tasks.campaign.channels import unit_factor
+from tasks.campaign.signals import Signal
 from tasks.errors import InputError
-from tasks.recordings.channels import unit_factor
-from tasks.recordings.signals import Signal
 
 SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".json")
 LARGEST_FILE = 2**30

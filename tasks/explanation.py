@@ -16,9 +16,9 @@ from tasks.scene.route import Route
 from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard, road_slope
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
-from tasks.vehicle.axle_ports import signed_slip
+from tasks.vehicle.model.axle_ports import signed_slip
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, surface_response
-from tasks.vehicle.tyre import braking_slip, tyre_friction
+from tasks.vehicle.tyres.burckhardt import braking_slip, tyre_friction
 
 TOLERANCE = 1e-9
 """Largest difference from the stored number, relative to it, that rounding explains [1]."""

@@ -15,7 +15,7 @@ import yaml
 
 from benchmarks.fuzzing.sound import CATALOGUE, small_scene, write_file
 from catalogs.scenes.gaussian_files import write_gaussians
-from tasks.closure.campaign import CHANNELS
+from tasks.campaign.campaign import CHANNELS
 
 
 def braking(samples: int = 120, rate: float = 100.0) -> dict[str, np.ndarray]:

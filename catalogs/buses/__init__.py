@@ -7,9 +7,9 @@ from pydantic import Field, field_validator, model_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, Text, checked, read_entry
-from tasks.recordings.brake_dive import DiveModel
-from tasks.recordings.bus_drive import Bus, BusSignal, DriveStyle
-from tasks.recordings.channels import CHANNELS_BY_NAME, unit_factor
+from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
+from tasks.studies.brake_dive import DiveModel
+from tasks.studies.bus_drive import Bus, BusSignal, DriveStyle
 
 FOLDER = Path(__file__).parent
 Positive = Annotated[float, Field(strict=True, gt=0)]

@@ -10,9 +10,9 @@ from pydantic import Field, field_validator, model_validator
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, checked, read_entry
 from catalogs.vehicles import vehicle_units
-from tasks.calibration.residual import Phase, Response, Yardstick
-from tasks.calibration.scalars import KNOT_GROUPS
-from tasks.calibration.staged import Bounds, Procedure, Stage
+from tasks.identification.calibration.residual import Phase, Response, Yardstick
+from tasks.identification.calibration.scalars import KNOT_GROUPS
+from tasks.identification.calibration.staged import Bounds, Procedure, Stage
 from tasks.vehicle.effects.numbers import EFFECT_UNITS
 
 FOLDER = Path(__file__).parent

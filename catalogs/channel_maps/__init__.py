@@ -11,9 +11,9 @@ from catalogs.entries import find_entry
 from catalogs.names import LONGEST_NAME
 from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.sentences import brief, cap_problems, describe_rules, shorten
+from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
+from tasks.campaign.signals import ChannelRule, Gain
 from tasks.errors import InputError
-from tasks.recordings.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
-from tasks.recordings.signals import ChannelRule, Gain
 
 FOLDER = Path(__file__).parent
 HIGHEST_RATE = 1_000_000.0

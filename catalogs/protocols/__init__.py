@@ -7,8 +7,8 @@ from pydantic import Field, model_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, checked, read_entry
-from tasks.recordings.events import Protocol, Rule
-from tasks.recordings.selection import QUANTITIES
+from tasks.campaign.events import Protocol, Rule
+from tasks.campaign.selection import QUANTITIES
 
 FOLDER = Path(__file__).parent
 Window = Annotated[Table, checked("s")]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from catalogs.documents import read_content
 from catalogs.sentences import cap_problems, shorten
 from tasks.errors import InputError
-from tasks.scene.stereo.sequence import StereoSequence
+from tasks.reconstruction.sequence import StereoSequence
 
 SMALLEST_SEQUENCE = 3
 """Two neighbours check a picture's depth; with fewer pictures nothing can be checked."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import create_model
 
 from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
-from tasks.scene.street import StreetLayout
+from tasks.scene.street.layout import StreetLayout
 
 STREET_FILE = Path(__file__).parent / "street.yaml"
 

@@ -72,7 +72,7 @@ def _make(folder: Path, seed: int) -> None:
 
 
 def _built(seed: int) -> Scene:
-    from tasks.scene.street import build_street
+    from tasks.scene.street.build import build_street
 
     return build_street(seed)
 

@@ -8,7 +8,7 @@ from pydantic import Field, field_validator
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
 from catalogs.vehicles.added import library_units
-from tasks.recordings.stop_study import Rung
+from tasks.studies.stop_study import Rung
 from tasks.vehicle.effects.library import PARAMETER_INDEX
 
 FOLDER = Path(__file__).parent

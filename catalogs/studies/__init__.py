@@ -9,7 +9,7 @@ from pydantic import Field, TypeAdapter
 from catalogs.grids.blocks import PartialScenario
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, checked, read_entries, read_entry
 from catalogs.scenario import Scenario
-from tasks.vehicle.sensitivity import PrintedFigure, StudyProtocol, WeatherStudy
+from tasks.studies.sensitivity import PrintedFigure, StudyProtocol, WeatherStudy
 
 FOLDER = Path(__file__).parent
 

@@ -8,7 +8,7 @@ from pydantic import Field
 from catalogs.documents import read_json_document
 from catalogs.effects.truths import Truth
 from catalogs.quantities import CatalogueEntry, Number, read_entry
-from tasks.closure.drives import TRAINING, Drive
+from tasks.campaign.planned_runs import TRAINING, Drive
 
 FILE = Path(__file__).with_name("closing.yaml")
 ERROR_RATES = Path(__file__).with_name("closing_error_rates.json")

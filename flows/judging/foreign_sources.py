@@ -13,10 +13,10 @@ from catalogs.documents import read_yaml
 from catalogs.sentences import brief
 from flows.judging.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
-from tasks.eval.motion import RecoveredMotion
-from tasks.eval.outside_trajectory import motion_from_trajectory
-from tasks.eval.pose_essential import recover_motion_essential
-from tasks.eval.undistort import COEFFICIENTS, undistorted
+from tasks.eval.poses.essential import recover_motion_essential
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.outside_trajectory import motion_from_trajectory
+from tasks.eval.poses.undistort import COEFFICIENTS, undistorted
 
 MOST_FRAMES, LEAST_FRAMES = 3000, 5
 MOST_PIXELS = 960 * 540

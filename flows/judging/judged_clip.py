@@ -17,16 +17,16 @@ from flows.reading.film import through_film
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from tasks.conventions import ROAD_CLASSES
-from tasks.eval.motion import RecoveredMotion
 from tasks.eval.no_reference import piqe, temporal_error
-from tasks.eval.outside_trajectory import motion_from_trajectory
-from tasks.eval.pose_essential import recover_motion_essential
-from tasks.eval.pose_photometric import recover_motion_photometric
-from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.poses.essential import recover_motion_essential
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.outside_trajectory import motion_from_trajectory
+from tasks.eval.poses.photometric import recover_motion_photometric
+from tasks.eval.poses.pnp import recover_motion_pnp
+from tasks.eval.poses.undistort import undistorted
+from tasks.eval.poses.unroll import one_shutter
+from tasks.eval.poses.unusable import glossy_pixels, unusable_pixels
 from tasks.eval.severity import image_statistics, sampled_frames
-from tasks.eval.undistort import undistorted
-from tasks.eval.unroll import one_shutter
-from tasks.eval.unusable import glossy_pixels, unusable_pixels
 
 Row = dict[str, Any]
 METHODS = ("photometric", "pnp", "essential")

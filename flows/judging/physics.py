@@ -16,9 +16,9 @@ from flows.store.sealed import read_plan_record, recorded_grid
 from flows.store.telemetry import read_columns, read_table
 from tasks.conventions import CLIP_CHANNELS, FRAME_CHANNELS, IDENTITY_CHANNELS, TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.physics_audit import PhysicsVerdict, audit_clip
-from tasks.eval.physics_constants import Constants, TyreTables
-from tasks.eval.physics_laws import finite_rows
+from tasks.eval.physics.audit import PhysicsVerdict, audit_clip
+from tasks.eval.physics.constants import Constants, TyreTables
+from tasks.eval.physics.laws import finite_rows
 
 
 def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:

@@ -36,24 +36,24 @@ from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
-from tasks.eval.pose_pnp import recover_motion_pnp
-from tasks.eval.undistort import undistorted
-from tasks.eval.unroll import one_shutter
-from tasks.eval.unusable import unusable_pixels
-from tasks.render.backend import select_backend
+from tasks.eval.poses.pnp import recover_motion_pnp
+from tasks.eval.poses.undistort import undistorted
+from tasks.eval.poses.unroll import one_shutter
+from tasks.eval.poses.unusable import unusable_pixels
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
 from tasks.render.clip import render_clip
+from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
 from tasks.render.road_paint import HazardMarking, painted
 from tasks.render.road_refinement import refined_road
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene
+from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
-from tasks.vehicle.sensitivity import StudyProtocol
 
 PIXEL_CENTRE = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
 """The renderer puts pixel centres at +0.5, OpenCV and the judges at whole numbers [px]."""

@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from catalogs.scenario import Scenario
+from tasks.studies.label_ranges import label_ranges, sampled_friction
+from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.label_ranges import label_ranges, sampled_friction
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
-from tasks.vehicle.sensitivity import StudyProtocol
 
 
 def drive(

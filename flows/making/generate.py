@@ -23,7 +23,7 @@ from flows.store.sealed import is_committed, read_manifest
 from flows.store.staging import BEGUN, left_overs, remove_staged, remove_staging
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
-from tasks.render.backend import select_backend
+from tasks.render.rasterise.backend import select_backend
 
 SHOWN = 8
 """Differences told when a folder holds another run."""

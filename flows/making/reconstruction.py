@@ -8,8 +8,8 @@ from catalogs.scenes import write_scene
 from catalogs.scenes.folder import must_be_new
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from tasks.errors import InputError
+from tasks.reconstruction.reconstruct import reconstruct
 from tasks.scene.scene import sun_problems
-from tasks.scene.stereo.reconstruct import reconstruct
 
 
 def scene_from_stereo(

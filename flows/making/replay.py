@@ -18,7 +18,7 @@ from flows.store.layout import write_atomically
 from flows.store.outputs import Outputs
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.render.backend import select_backend
+from tasks.render.rasterise.backend import select_backend
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,10 +14,10 @@ from catalogs.scenes.route_files import read_route
 from flows.store.outputs import Outputs
 from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
-from tasks.render.backend import select_backend
 from tasks.render.composition import compose, encode_8bit
 from tasks.render.contact_sheet import encode_png
 from tasks.render.environment import environment_view, plain_sky
+from tasks.render.rasterise.backend import select_backend
 from tasks.scene.classify import classify_road
 from tasks.scene.scene import Scene, sun_problems
 from tasks.scene.transform import moved

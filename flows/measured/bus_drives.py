@@ -9,7 +9,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.store.layout import write_atomically
 from tasks.errors import InputError
-from tasks.recordings.bus_drive import bus_drive
+from tasks.studies.bus_drive import bus_drive
 
 LOGGED_UNITS = {
     "bar": "Unit_Bar", "km/h": "Unit_KiloMeterPerHour", "deg": "Unit_DegreOfArc", "deg/s": "Unit_DegreOfArcPerSecon",

@@ -17,12 +17,12 @@ from flows.store.outputs import Outputs
 from flows.studies.vehicle_model import agreement_of
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
-from tasks.calibration.identifiability import identifiability
-from tasks.calibration.residual import WHEELS, CalibrationCase
-from tasks.calibration.scalars import calibration_scalars, scalar_value, with_scalars
-from tasks.calibration.staged import Procedure
-from tasks.calibration.staged import calibrate as run_stages
 from tasks.errors import InputError
+from tasks.identification.calibration.identifiability import identifiability
+from tasks.identification.calibration.residual import WHEELS, CalibrationCase
+from tasks.identification.calibration.scalars import calibration_scalars, scalar_value, with_scalars
+from tasks.identification.calibration.staged import Procedure
+from tasks.identification.calibration.staged import calibrate as run_stages
 from tasks.vehicle.effects.numbers import EFFECT_UNITS, NUMBERS_OF_EFFECTS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode

@@ -17,10 +17,10 @@ from flows.measured.grown_vehicle import grown_vehicle
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
-from tasks.closure.answer import ChannelError, NamedEffect, Parameter, Verdict
-from tasks.closure.campaign import Campaign
-from tasks.closure.excitation import reached
-from tasks.closure.verdict import attribute
+from tasks.campaign.campaign import Campaign
+from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
+from tasks.identification.decision.excitation import reached
+from tasks.identification.decision.verdict import attribute
 
 
 def close_loop(

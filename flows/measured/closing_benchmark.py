@@ -16,10 +16,10 @@ from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
-from tasks.closure.answer import Verdict
-from tasks.closure.benchmark import covered, outcome, synthetic_campaign
-from tasks.closure.drives import RICH, Drive
-from tasks.closure.verdict import attribute
+from tasks.campaign.planned_runs import RICH, Drive
+from tasks.identification.benchmark import covered, outcome, synthetic_campaign
+from tasks.identification.decision.answer import Verdict
+from tasks.identification.decision.verdict import attribute
 
 FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
 RATES = "closing_error_rates.json"
@@ -30,7 +30,7 @@ pair to the next. None of them has been used while the engine was made."""
 SIZE_SEEDS = 5
 """Campaigns of each size of the power table."""
 JUDGES = (
-    "tasks/closure/",
+    "tasks/identification/",
     "tasks/vehicle/",
     "tasks/surface/",
     "catalogs/effects/",

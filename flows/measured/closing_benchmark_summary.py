@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tasks.closure.benchmark import exact_interval
+from tasks.identification.benchmark import exact_interval
 
 Rows = list[dict[str, Any]]
 KINDS = {"null", "library", "outside", "size", "pair", "poor", "poor null"}

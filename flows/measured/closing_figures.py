@@ -10,13 +10,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from flows.drawing import literal
-from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.closure.evidence import RunEvidence
-from tasks.closure.forms import Leftover, curve, form_hypotheses, scan
-from tasks.closure.forward import CONSTANTS, RunModel, predict, roll
-from tasks.closure.hypothesis import compose
-from tasks.closure.search import Found
-from tasks.closure.verdict import Trace
+from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
+from tasks.identification.decision.forms import Leftover, curve, form_hypotheses, scan
+from tasks.identification.decision.search import Found
+from tasks.identification.decision.verdict import Trace
+from tasks.identification.inference.evidence import RunEvidence
+from tasks.identification.inference.forward import CONSTANTS, RunModel, predict, roll
+from tasks.identification.inference.hypothesis import compose
 from tasks.vehicle.effects.library import ALL_PARAMETERS
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
 

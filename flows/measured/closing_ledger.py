@@ -9,7 +9,7 @@ import numpy as np
 
 from flows.store.journal import append_line, read_lines
 from manifests.provenance import code_version
-from tasks.closure.campaign import Campaign, Run
+from tasks.campaign.campaign import Campaign, Run
 
 LEDGER = Path(".musync") / "held-out-readings.jsonl"
 """Under the working folder, unless MUSYNC_LEDGER names another file."""

@@ -8,8 +8,8 @@ from flows.drawing import NO_SCRIPTS
 from flows.measured import closing_figures as figures
 from flows.measured.closing_error_rates import error_rates_html
 from flows.measured.closing_residuals import residuals_over_time
-from tasks.closure.campaign import Campaign
-from tasks.closure.verdict import Trace
+from tasks.campaign.campaign import Campaign
+from tasks.identification.decision.verdict import Trace
 from tasks.vehicle.effects.library import Effect
 
 STYLE = """

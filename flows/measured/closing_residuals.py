@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from flows.drawing import literal
 from flows.measured.closing_figures import picture
-from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.closure.evidence import RunEvidence
-from tasks.closure.forward import predict
-from tasks.closure.hypothesis import compose
-from tasks.closure.verdict import Trace
+from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
+from tasks.identification.decision.verdict import Trace
+from tasks.identification.inference.evidence import RunEvidence
+from tasks.identification.inference.forward import predict
+from tasks.identification.inference.hypothesis import compose
 from tasks.vehicle.effects.library import ALL_PARAMETERS
 
 TITLES = ("frozen", "after")

@@ -11,8 +11,8 @@ from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
-from tasks.closure.answer import NamedEffect, Parameter, Verdict
-from tasks.closure.forms import form_in_range
+from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
+from tasks.identification.decision.forms import form_in_range
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.numbers import EFFECT_UNITS
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS

@@ -19,11 +19,11 @@ from catalogs.sentences import shorten
 from flows.store.layout import write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
+from tasks.campaign.assembly import Assembled, assemble_run
+from tasks.campaign.channels import CHANNELS_BY_NAME
+from tasks.campaign.episodes import pressure_episodes
+from tasks.campaign.signals import Signal, as_channel
 from tasks.errors import InputError
-from tasks.recordings.assembly import Assembled, assemble_run
-from tasks.recordings.channels import CHANNELS_BY_NAME
-from tasks.recordings.episodes import pressure_episodes
-from tasks.recordings.signals import Signal, as_channel
 
 
 @dataclass(frozen=True, kw_only=True)

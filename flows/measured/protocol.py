@@ -11,10 +11,10 @@ from catalogs.protocols import load_protocol
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.store.outputs import Outputs
-from tasks.recordings.attrition import attrition_table
-from tasks.recordings.brake_dive import pitch_mode, with_model
-from tasks.recordings.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
-from tasks.recordings.selection import Judged, select_events
+from tasks.campaign.attrition import attrition_table
+from tasks.campaign.selection import Judged, select_events
+from tasks.studies.brake_dive import pitch_mode, with_model
+from tasks.studies.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
 from tasks.vehicle.parameters import Vehicle
 
 SCORE_UNITS = {

@@ -9,12 +9,12 @@ from catalogs.stop_studies import load_stop_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.store.outputs import Outputs
-from tasks.closure.campaign import CHANNELS
+from tasks.campaign.campaign import CHANNELS
+from tasks.campaign.events import Drive
 from tasks.errors import InputError
-from tasks.recordings.events import Drive
-from tasks.recordings.stop import Stop, StopErrors, stop_of, stopping_distance
-from tasks.recordings.stop_findings import after_stop, rebound, saturation, slip_cycles
-from tasks.recordings.stop_study import RungResult, climb, uncalibrated
+from tasks.studies.stop import Stop, StopErrors, stop_of, stopping_distance
+from tasks.studies.stop_findings import after_stop, rebound, saturation, slip_cycles
+from tasks.studies.stop_study import RungResult, climb, uncalibrated
 
 NEEDED = (*CHANNELS, "brake_pressure", "brake_torque", "engine_torque")
 ERROR_UNITS = {

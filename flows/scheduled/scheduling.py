@@ -47,7 +47,7 @@ def dataset_place(grid: str, root: str, backend: str, at: datetime) -> str:
     backend : rasteriser
     at : scheduled time of the run
     """
-    from tasks.render.backend import select_backend
+    from tasks.render.rasterise.backend import select_backend
 
     plan, _ = make_plan(grid, select_backend(backend).name)
     name = plan.settings.name

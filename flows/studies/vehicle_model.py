@@ -13,9 +13,9 @@ from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.eval.state_agreement import CaseAgreement, aggregate, case_agreement
+from tasks.studies.sensitivity import beside_print, sensitivity_study
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, rollout
-from tasks.vehicle.sensitivity import beside_print, sensitivity_study
 
 BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries")
 

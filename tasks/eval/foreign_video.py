@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.eval.motion import RecoveredMotion
 from tasks.eval.motion_agreement import PoseThresholds, pose_verdict
-from tasks.eval.rigid import Floats
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.rigid import Floats
 from tasks.eval.video_motion import geometry_error
 
 EVENT_PITCH = np.deg2rad(0.3)

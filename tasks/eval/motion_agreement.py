@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.eval.motion import RecoveredMotion
+from tasks.eval.poses.motion import RecoveredMotion
 
 Floats = NDArray[np.float64]
 

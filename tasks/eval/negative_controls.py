@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tasks.errors import InputError
-from tasks.eval.motion import RecoveredMotion
-from tasks.eval.rigid import Floats
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.rigid import Floats
 from tasks.eval.video_motion import geometry_error, reference_progress, rms
 
 SEES, PARTLY = 0.9, 0.5

@@ -6,19 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.render.backend import Backend
 from tasks.render.camera import Camera, RigAt, viewmat
 from tasks.render.composition import compose, encode_8bit, round_depth
 from tasks.render.environment import environment_view
 from tasks.render.labels import clip_flow, forward_flow, frame_labels, row_flow
+from tasks.render.rasterise.backend import Backend
 from tasks.render.readout import sensor_field
 from tasks.render.road_edit import Profile, RoadRelief
 from tasks.render.sensor import photographed
 from tasks.render.sight import as_drawn, through_sensor
 from tasks.render.weather.attribution import paper_picture
+from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
-from tasks.render.weather.particles import Shutter
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.gbuffer import GBuffer
+from tasks.render.rasterise.gbuffer import GBuffer
 
 DEPTH_BITS_DROPPED = 10
 """Of the 23 explicit mantissa bits; 13 stay, a relative error below 6.2e-5."""

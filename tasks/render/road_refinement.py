@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES
-from tasks.render.preparation import rotation_matrices
+from tasks.render.rasterise.preparation import rotation_matrices
 from tasks.render.road_edit import RoadRelief
 from tasks.scene.gaussians import Gaussians
 

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.camera import Camera, viewmat
-from tasks.render.gbuffer import GBuffer
+from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.readout import Field, read_out
 from tasks.render.weather.attribution import attribution, changed
+from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, particle_layer, pixel_rays
-from tasks.render.weather.particles import Shutter
 
 
 @dataclass(frozen=True, kw_only=True)

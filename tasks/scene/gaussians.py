@@ -29,7 +29,7 @@ class Gaussians:
     class_id : uint8 [N] `SemanticClass`
     surroundings : float32 [N, 2] overlap of the surface about each Gaussian, and root mean square size of its
         neighbours by its own, see `tasks.scene.surroundings`: the cloud is drawn without the painter's bias
-        (`tasks.render.painters_bias`) [1]; None: as its trainer drew it, bias and all
+        (`tasks.render.rasterise.painters_bias`) [1]; None: as its trainer drew it, bias and all
     antialiased : splats narrower than a pixel fade instead of growing (Yu et al. 2024, Mip-Splatting,
         doi:10.1109/CVPR52733.2024.01839); False: the rule of the INRIA code, for which most files are made
     display_encoded : the colours blend in sRGB display space (scenes trained on pictures) and the

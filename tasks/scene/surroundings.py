@@ -20,7 +20,7 @@ _AT_ONCE = 65536
 
 
 def with_surroundings(gaussians: Gaussians) -> Gaussians:
-    """The cloud with `Gaussians.surroundings`, as `tasks.render.painters_bias` wants them.
+    """The cloud with `Gaussians.surroundings`, as `tasks.render.rasterise.painters_bias` wants them.
 
     The overlap of a surface is its Gaussians' opacity times area, added up, per area. It is counted over the
     `NEIGHBOURS` next Gaussians, out to the last of them, as far as they belong to the same surface. A random scatter

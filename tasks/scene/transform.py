@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tasks.render.spherical_harmonics import sh_basis
 from tasks.scene.gaussians import Gaussians, check_gaussians
+from tasks.scene.spherical_harmonics import sh_basis
 
 BANDS = ((1, 4), (4, 9), (9, 16))
 """First and last coefficient of the bands 1, 2 and 3; band 0 does not turn."""

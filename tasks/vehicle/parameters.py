@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.tyre import TyreCurve, tyre_curve
+from tasks.vehicle.tyres.burckhardt import TyreCurve, tyre_curve
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,8 +11,8 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.coupled_mode import run_coupled_mode
-from tasks.vehicle.paper_mode import history_of, run_paper_mode
+from tasks.vehicle.model.coupled_mode import run_coupled_mode
+from tasks.vehicle.paper.paper_mode import history_of, run_paper_mode
 from tasks.vehicle.parameters import Vehicle, surface_response
 
 Mode = Literal["paper", "coupled"]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.synthetic_street import Clip
-from tasks.eval.motion import RecoveredMotion
+from tasks.eval.poses.motion import RecoveredMotion
 
 
 def pitch_rmse_deg(recovered: RecoveredMotion, clip: Clip) -> float:

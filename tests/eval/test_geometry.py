@@ -6,8 +6,8 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks.synthetic_street import camera_matrix, mount
-from tasks.eval.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
-from tasks.eval.rigid import (
+from tasks.eval.poses.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
+from tasks.eval.poses.rigid import (
     adjoint,
     advance_pose,
     invert_pose,
@@ -17,8 +17,8 @@ from tasks.eval.rigid import (
     skew,
     viewing_rays,
 )
-from tasks.eval.solve_pnp import solve_pnp
-from tasks.eval.warp import bilinear_taps, view_from, warp_map
+from tasks.eval.poses.solve_pnp import solve_pnp
+from tasks.eval.poses.warp import bilinear_taps, view_from, warp_map
 
 K = camera_matrix()
 MOTION = pose_from_twist(np.array([0.03, -0.05, -0.9, 0.01, -0.02, 0.005]))

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from benchmarks.synthetic_street import Clip
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.eval.motion import RecoveredMotion
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
-from tasks.eval.pose_essential import recover_motion_essential
-from tasks.eval.pose_photometric import recover_motion_photometric
-from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.poses.essential import recover_motion_essential
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.photometric import recover_motion_photometric
+from tasks.eval.poses.pnp import recover_motion_pnp
 
 THRESHOLDS = PoseThresholds(
     pitch_rmse_deg=0.08, pitch_relative_error=0.10, pitch_correlation=0.98, response_deg=0.2,

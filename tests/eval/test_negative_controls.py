@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tasks.eval.motion import RecoveredMotion
 from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
+from tasks.eval.poses.motion import RecoveredMotion
 
 TIMES = np.arange(81) * 0.1
 PITCH = 0.03 * np.exp(-((TIMES - 3.0) ** 2) / 0.1)

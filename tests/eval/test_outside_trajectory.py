@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.synthetic_street import Clip
 from tasks.errors import InputError
-from tasks.eval.outside_trajectory import motion_from_trajectory
+from tasks.eval.poses.outside_trajectory import motion_from_trajectory
 from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg, progress_rmse
 
 

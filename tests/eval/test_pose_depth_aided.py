@@ -9,9 +9,9 @@ import pytest
 from benchmarks.synthetic_street import Clip
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.eval.motion import RecoveredMotion
-from tasks.eval.pose_photometric import recover_motion_photometric
-from tasks.eval.pose_pnp import recover_motion_pnp
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.photometric import recover_motion_photometric
+from tasks.eval.poses.pnp import recover_motion_pnp
 from tests.eval.scoring import pitch_rmse_deg, progress_rmse
 from tests.eval.weathering import faded, jpeg_coded, with_flakes, with_noise
 

@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks.synthetic_street import Clip, drive_clip
 from tasks.errors import InputError
-from tasks.eval.motion import RecoveredMotion
-from tasks.eval.pose_essential import recover_motion_essential
+from tasks.eval.poses.essential import recover_motion_essential
+from tasks.eval.poses.motion import RecoveredMotion
 from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg
 from tests.eval.weathering import faded, jpeg_coded, with_flakes
 

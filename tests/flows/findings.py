@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from flows.measured.grown_vehicle import grown_vehicle
-from tasks.closure.answer import NamedEffect, Parameter, Verdict
-from tasks.closure.disturbance import Disturbance
+from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
+from tasks.identification.inference.disturbance import Disturbance
 from tasks.vehicle.effects.forms import SHAPES, form_name
 from tasks.vehicle.effects.library import Effect, parameter_vector
 

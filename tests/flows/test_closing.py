@@ -19,11 +19,11 @@ from flows.making.plan import make_plan
 from flows.measured.closing import close_loop, verdict_json
 from flows.measured.closing_ledger import record_reading
 from flows.measured.grown_vehicle import grown_vehicle
-from tasks.closure.answer import ChannelError, NamedEffect, Parameter, Verdict
-from tasks.closure.benchmark import TOLERANCES, synthetic_campaign
-from tasks.closure.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
-from tasks.closure.disturbance import Disturbance
-from tasks.closure.drives import Drive
+from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
+from tasks.campaign.planned_runs import Drive
+from tasks.identification.benchmark import TOLERANCES, synthetic_campaign
+from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
+from tasks.identification.inference.disturbance import Disturbance
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 SHORT = tuple(

@@ -30,8 +30,8 @@ from flows.making.clip import catalogue_of
 from flows.making.generate import generate
 from flows.making.plan import read_plan
 from tasks.errors import InputError
-from tasks.eval.motion import RecoveredMotion
 from tasks.eval.negative_controls import Claim
+from tasks.eval.poses.motion import RecoveredMotion
 from tests.toy_street import TOY_CAMERA, toy_street
 
 GRID = """

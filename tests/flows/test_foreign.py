@@ -24,8 +24,8 @@ from flows.judging.foreign_sources import (
 )
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
-from tasks.eval.motion import RecoveredMotion
-from tasks.eval.undistort import undistorted
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.undistort import undistorted
 from tests.flows.test_trajectories import tum_lines
 
 

@@ -10,7 +10,7 @@ from catalogs.effects import load_effects
 from catalogs.scenes import write_scene
 from flows.auditing.dataset_diff import diff
 from flows.making.generate import generate
-from tasks.closure.answer import NamedEffect
+from tasks.identification.decision.answer import NamedEffect
 from tests.flows.findings import found_effect, found_form, grown_file
 from tests.toy_street import TOY_CAMERA, toy_street
 

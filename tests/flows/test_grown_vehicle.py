@@ -6,8 +6,8 @@ import numpy as np
 
 from catalogs.vehicles import load_vehicle
 from flows.measured.grown_vehicle import grown_vehicle
-from tasks.closure.answer import NamedEffect, Parameter, Verdict
-from tasks.closure.disturbance import Disturbance
+from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
+from tasks.identification.inference.disturbance import Disturbance
 
 
 def drag(value: float, name: str = "aerodynamic_drag") -> NamedEffect:

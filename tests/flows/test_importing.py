@@ -13,9 +13,9 @@ import yaml
 from catalogs.campaigns import read_campaign
 from catalogs.channel_maps import FOLDER, load_channel_map
 from flows.measured.importing import import_measurements
-from tasks.closure.campaign import CHANNELS
+from tasks.campaign.campaign import CHANNELS
 from tasks.errors import InputError
-from tests.recordings.recorded import MAP, braking_columns, logged
+from tests.campaign.recorded import MAP, braking_columns, logged
 
 Columns = dict[str, np.ndarray]
 

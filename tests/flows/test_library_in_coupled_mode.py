@@ -14,10 +14,10 @@ from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.measured.grown_vehicle import grown_vehicle
-from tasks.closure.campaign import Run
-from tasks.closure.excitation import reached
-from tasks.closure.forms import PORT_STEP, RANGE, form_in_range
-from tasks.closure.forward import roll, run_model
+from tasks.campaign.campaign import Run
+from tasks.identification.decision.excitation import reached
+from tasks.identification.decision.forms import PORT_STEP, RANGE, form_in_range
+from tasks.identification.inference.forward import roll, run_model
 from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import Weather, surface_state

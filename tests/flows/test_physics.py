@@ -14,7 +14,7 @@ from flows.judging.physics import audit_physics, clip_columns, clip_facts, read_
 from flows.making.generate import generate
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.physics_audit import audit_clip
+from tasks.eval.physics.audit import audit_clip
 from tests.toy_street import TOY_CAMERA, toy_street
 
 GRID = """

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
-from tasks.render.spherical_harmonics import C0
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.spherical_harmonics import C0
 
 WIDTH, HEIGHT = 72, 52
 K = np.array(((60.0, 0, 35.2), (0, 58.0, 26.9), (0, 0, 1)))

@@ -4,9 +4,9 @@ import numpy as np
 
 from tasks.conventions import SemanticClass
 from tasks.render.camera import viewmat
-from tasks.render.rasteriser import prepare, rasterise
-from tasks.render.spherical_harmonics import C0
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.spherical_harmonics import C0
 
 DARK = 0.1
 """Radiance of the road beside the crossing [1]."""

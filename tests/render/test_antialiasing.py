@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tests.render.clouds import HEIGHT, WIDTH, K, cloud
 from tests.render.striped_road import crossing_row, striped_road, true_row
 

@@ -4,7 +4,7 @@ import pytest
 from tasks.render.composition import compose, encode_8bit, round_depth, to_display, to_linear
 from tasks.render.contact_sheet import CAPTION, CURVE_COLOURS, MARGIN, contact_sheet, encode_png
 from tasks.render.environment import environment_view, plain_sky
-from tasks.render.gbuffer import GBuffer
+from tasks.render.rasterise.gbuffer import GBuffer
 
 K = np.array([[40.0, 0, 24], [0, 40.0, 16], [0, 0, 1]])
 

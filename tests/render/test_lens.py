@@ -7,7 +7,7 @@ import yaml
 
 from catalogs.cameras import camera_source, load_camera
 from tasks.errors import InputError
-from tasks.eval.undistort import undistorted as seen_by_pinhole
+from tasks.eval.poses.undistort import undistorted as seen_by_pinhole
 from tasks.render.lens import Lens, distorted, pixel_directions, undistorted
 
 LENS = Lens(k1=-0.37, k2=0.197, p1=1.4e-3, p2=5.7e-4, k3=-0.068)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import torch
 
-from tasks.render.painters_bias import FURTHEST, MOST_OVERLAP, lead, lead_terms
-from tasks.render.painters_bias_torch import means_nearer
-from tasks.render.projection import ANTIALIASED_LOW_PASS, X, Y, project
-from tasks.render.rasteriser import prepare, rasterise
-from tasks.render.reference_rasteriser import rasterise_reference
-from tasks.render.view import view_of
+from tasks.render.rasterise.painters_bias import FURTHEST, MOST_OVERLAP, lead, lead_terms
+from tasks.render.rasterise.painters_bias_torch import means_nearer
+from tasks.render.rasterise.projection import ANTIALIASED_LOW_PASS, X, Y, project
+from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.reference_rasteriser import rasterise_reference
+from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.surroundings import with_surroundings
 from tests.render.clouds import HEIGHT, WIDTH, K, cloud, random_cloud

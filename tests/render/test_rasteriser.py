@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.render.gbuffer import GBuffer
-from tasks.render.projection import project
-from tasks.render.rasteriser import prepare, rasterise
-from tasks.render.reference_rasteriser import blend_steps, rasterise_reference
-from tasks.render.view import view_of
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.rasterise.projection import project
+from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.reference_rasteriser import blend_steps, rasterise_reference
+from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, cloud, random_cloud, rotation
 

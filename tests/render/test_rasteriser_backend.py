@@ -12,10 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.render import backend
-from tasks.render.backend import CpuBackend, probe, probe_scene, select_backend
-from tasks.render.gbuffer import GBuffer
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise import backend
+from tasks.render.rasterise.backend import CpuBackend, probe, probe_scene, select_backend
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"
@@ -55,7 +55,7 @@ def test_probe_names_what_a_wrong_backend_draws_wrong() -> None:
 
 def test_auto_without_a_gpu_is_the_cpu_and_does_not_import_torch() -> None:
     code = (
-        "import sys; from pathlib import Path; from tasks.render import backend;"
+        "import sys; from pathlib import Path; from tasks.render.rasterise import backend;"
         "backend._GPU_DEVICES = (Path('/nowhere/gpu'),);"
         "print(backend.select_backend('auto').name, 'torch' in sys.modules)"
     )
@@ -80,7 +80,7 @@ def test_gsplats_class_is_found_where_light_falls_below_one_half() -> None:
     pytest.importorskip("gsplat", reason="gsplat is not installed")
     import torch
 
-    from tasks.render.gsplat_backend import first_below_half
+    from tasks.render.rasterise.gsplat_backend import first_below_half
 
     alpha = torch.tensor([0.3, 0.2, 0.9, 0.6, 0.9, 0.2, 0.2, 0.5, 0.1])
     pixel = torch.tensor([0, 0, 0, 3, 3, 4, 4, 6, 6])

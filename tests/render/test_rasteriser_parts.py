@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from scipy.special import sph_harm_y
 
 from tasks.errors import InputError
-from tasks.render.binning import TILE_HEIGHT, TILE_WIDTH, depth_order, tile_lists
-from tasks.render.blending import absorb
-from tasks.render.preparation import morton_order, prepare
-from tasks.render.projection import (
+from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH, depth_order, tile_lists
+from tasks.render.rasterise.blending import absorb
+from tasks.render.rasterise.preparation import morton_order, prepare
+from tasks.render.rasterise.projection import (
     COLUMN_FALLOFF,
     DEPTH,
     LOG_ALPHA,
@@ -24,10 +24,10 @@ from tasks.render.projection import (
     Y,
     project,
 )
-from tasks.render.rasteriser import rasterise, splat_back
-from tasks.render.reference_rasteriser import blend_steps
-from tasks.render.spherical_harmonics import sh_basis
-from tasks.render.view import view_of
+from tasks.render.rasterise.rasteriser import rasterise, splat_back
+from tasks.render.rasterise.reference_rasteriser import blend_steps
+from tasks.render.rasterise.view import view_of
+from tasks.scene.spherical_harmonics import sh_basis
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
 
 

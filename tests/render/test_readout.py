@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tasks.eval.unroll import row_times, unrolled
+from tasks.eval.poses.unroll import row_times, unrolled
 from tasks.render.composition import encode_8bit
 from tasks.render.labels import row_flow
 from tasks.render.lens import distorted

@@ -8,11 +8,11 @@ import pytest
 from catalogs.weather import load_weather
 from tasks.errors import InputError
 from tasks.eval.image_quality import psnr
-from tasks.render.backend import CpuBackend
 from tasks.render.camera import body_poses, continuous_rig, viewmat
 from tasks.render.clip import render_clip
 from tasks.render.composition import compose, encode_8bit
 from tasks.render.environment import environment_view
+from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import sensor_field
 from tasks.render.sight import row_points
 from tasks.render.weather.attribution import LAYER_BITS

@@ -5,7 +5,7 @@ import pytest
 
 from tasks.conventions import ROAD_CLASSES
 from tasks.render.labels import HAZARD, hazard_mark
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.render.road_edit import apply_road_profile
 from tasks.render.road_refinement import refined_road
 from tasks.surface.road_profile import RoadHazard, road_elevation

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.render.road_refinement import LENGTH_BY_FEATURE, refined_road
 from tasks.scene.surroundings import with_surroundings
 from tasks.surface.road_profile import RoadHazard

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
-from tasks.render.blending import SURFACE_RATIO
 from tasks.render.camera import viewmat
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.blending import SURFACE_RATIO
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.scene.gaussians import Gaussians
 
 WIDTH, HEIGHT, EYE = 96, 64, 1.4

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from catalogs.scenes.street import load_street_layout
 from tasks.conventions import ROAD_CLASSES, SemanticClass
-from tasks.render.gbuffer import GBuffer
-from tasks.render.preparation import PreparedGaussians, rotation_matrices
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.rasterise.preparation import PreparedGaussians, rotation_matrices
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.scene.gaussians import check_gaussians
 from tasks.scene.scene import Scene
-from tasks.scene.street import StreetLayout, build_street
+from tasks.scene.street.build import build_street
+from tasks.scene.street.layout import StreetLayout
 
 WIDTH, HEIGHT = 480, 320
 K = np.array([[400.0, 0, WIDTH / 2], [0, 400.0, HEIGHT / 2], [0, 0, 1]])

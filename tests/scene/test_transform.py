@@ -2,8 +2,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
-from tasks.render.spherical_harmonics import sh_basis
 from tasks.scene.classify import classify_road
+from tasks.scene.spherical_harmonics import sh_basis
 from tasks.scene.transform import moved, rotated_sh
 from tests.toy_street import toy_street
 

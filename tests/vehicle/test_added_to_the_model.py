@@ -11,7 +11,7 @@ from tasks.vehicle.effects.numbers import EFFECT_UNITS
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.rollout import Controls, rollout
-from tasks.vehicle.tyre import tyre_friction
+from tasks.vehicle.tyres.burckhardt import tyre_friction
 from tests.vehicle.conftest import HUMP, command
 
 STOP = command(1.5, onset=0.5)

@@ -9,12 +9,12 @@ from scipy.integrate import solve_ivp
 
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle import reference
-from tasks.vehicle.chassis import chassis_of
-from tasks.vehicle.coupled_step import body_rates, motion_rates
+from tasks.vehicle.model.chassis import chassis_of
+from tasks.vehicle.model.coupled_step import body_rates, motion_rates
+from tasks.vehicle.model.ports import ports_at
+from tasks.vehicle.model.states import AT_REST, Instant, Memory, Motion
 from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.ports import ports_at
 from tasks.vehicle.road import road_feature
-from tasks.vehicle.states import AT_REST, Instant, Memory, Motion
 from tests.vehicle.conftest import HUMP, command
 
 COAST = command(0.0, onset=None)

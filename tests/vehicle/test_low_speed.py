@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.vehicle.low_speed import brake_pitch_input
+from tasks.vehicle.paper.low_speed import brake_pitch_input
 
 STEP = 0.001
 RULE = {"hold_s": 0.2, "release_s": 0.1, "hold_ratio": 0.8}

@@ -11,9 +11,9 @@ from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import Weather, surface_state
 from tasks.vehicle import reference
-from tasks.vehicle.paper_mode import body_response, run_paper_mode
+from tasks.vehicle.paper.paper_mode import body_response, run_paper_mode
+from tasks.vehicle.paper.wheels import stopping_run, wheels_of
 from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.wheels import stopping_run, wheels_of
 from tests.vehicle.conftest import HUMP, command
 
 ONSET_NOW = command(onset=0.0)

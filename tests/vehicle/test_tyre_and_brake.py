@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from tasks.errors import InputError
 from tasks.vehicle import reference
-from tasks.vehicle.axle_ports import lock_share, signed_friction, signed_slip
 from tasks.vehicle.brake import BrakeCommand, abs_command, abs_update, brake_pressure, onset_by_position
 from tasks.vehicle.effects.chassis import ChassisEffects
+from tasks.vehicle.model.axle_ports import lock_share, signed_friction, signed_slip
 from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.tyre import braking_slip, tyre_friction, tyre_slope
+from tasks.vehicle.tyres.burckhardt import braking_slip, tyre_friction, tyre_slope
 
 SURFACES = [("dry", 0.82), ("rain", 0.347126), ("rain", 0.5), ("snow", 0.24), ("snow", 0.51)]
 

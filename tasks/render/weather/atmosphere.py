@@ -7,9 +7,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.gbuffer import GBuffer
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.weather.falling.precipitation import NearField, Population, drawn_optical_depth
 from tasks.render.weather.layer import Layer
-from tasks.render.weather.precipitation import NearField, Population, drawn_optical_depth
 from tasks.render.weather.sky import SkyLight, sample_panorama
 
 CONTRAST_THRESHOLD = 0.05

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES
 from tasks.render.composition import encode_8bit, to_display
-from tasks.render.gbuffer import GBuffer
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import Layer, recompose
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
-from tasks.render.weather.particles import Shutter
-from tasks.render.weather.snow_field import coverage_rank, tracks_at
-from tasks.render.weather.snow_layer import GROUND_CLASSES, steepest_bearing
+from tasks.render.weather.snow.field import coverage_rank, tracks_at
+from tasks.render.weather.snow.layer import GROUND_CLASSES, steepest_bearing
 
 LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
 """Bit of each layer in an attribution picture."""

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.render.gbuffer import GBuffer
+from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.road_edit import RoadRelief, road_lift
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
+from tasks.render.weather.falling.particles import Shutter, visible_streaks
+from tasks.render.weather.falling.precipitation import Population, population
+from tasks.render.weather.falling.streaks import draw_streaks
 from tasks.render.weather.layer import Layer, recompose
 from tasks.render.weather.parameters import WeatherParameters, WeatherState
-from tasks.render.weather.particles import Shutter, visible_streaks
-from tasks.render.weather.precipitation import Population, population
 from tasks.render.weather.relief import clear_light, overcast_light, relit
 from tasks.render.weather.scene_light import ground_light, without_sun
 from tasks.render.weather.sky import (
@@ -33,10 +34,9 @@ from tasks.render.weather.sky import (
     overcast_environment,
     sky_light,
 )
-from tasks.render.weather.snow_field import SnowField, snow_field
-from tasks.render.weather.snow_layer import snow_layer, snowed_over, whitened
-from tasks.render.weather.streaks import draw_streaks
-from tasks.render.weather.wet_road import wet_layer
+from tasks.render.weather.snow.field import SnowField, snow_field
+from tasks.render.weather.snow.layer import snow_layer, snowed_over, whitened
+from tasks.render.weather.wet.wet_road import wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from tasks.render.weather.precipitation import NearField, ParticleParameters
+from tasks.render.weather.falling.precipitation import NearField, ParticleParameters
 from tasks.render.weather.sky import SkyParameters
-from tasks.render.weather.snow_layer import SnowCoverParameters
-from tasks.render.weather.wet_road import WetRoadParameters
+from tasks.render.weather.snow.layer import SnowCoverParameters
+from tasks.render.weather.wet.wet_road import WetRoadParameters
 
 
 @dataclass(frozen=True, kw_only=True)

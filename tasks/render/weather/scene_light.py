@@ -10,10 +10,10 @@ from scipy.ndimage import distance_transform_edt
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.composition import to_linear
-from tasks.render.spherical_harmonics import C0
 from tasks.render.weather.ground_grid import GroundGrid, ground_grid, read_between, window_sums
 from tasks.render.weather.sky import LUMINANCE
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.spherical_harmonics import C0
 
 LIGHT_CELL_M = 0.3
 """Light and shade are read over windows of three cells: wider than the grain, narrow enough for a shadow's edge."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from numba import njit
 
 from tasks.vehicle.road import RoadFeature, height_at, slope_at
-from tasks.vehicle.tyre import TyreCurve, tyre_friction, tyre_slope
+from tasks.vehicle.tyres.burckhardt import TyreCurve, tyre_friction, tyre_slope
 
 STICK_SLIP = 0.01
 """Slip over which a sticking tyre builds up its force; any value well below the curve's peak serves [1]."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from catalogs.weather import load_weather
+from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.parameters import WeatherParameters
-from tasks.render.weather.particles import Shutter
 
 WIDTH, HEIGHT, FOCAL = 480, 320, 400.0
 EYE_HEIGHT = 1.4

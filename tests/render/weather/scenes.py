@@ -3,10 +3,10 @@
 import numpy as np
 
 from tasks.conventions import SemanticClass
-from tasks.render.gbuffer import GBuffer
-from tasks.render.spherical_harmonics import C0
-from tasks.render.weather.particles import Shutter
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.weather.falling.particles import Shutter
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.spherical_harmonics import C0
 
 ASPHALT = 0.17
 

@@ -8,13 +8,13 @@ import pytest
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.render.composition import encode_8bit, to_linear
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.render.weather.attribution import LAYER_BITS, attribution, paper_picture, snow_on
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import apply_weather, weather_scene
 from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.scene_light import appended, to_display_unclipped
-from tasks.render.weather.snow_layer import GROUND_CLASSES
+from tasks.render.weather.snow.layer import GROUND_CLASSES
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import clear_sky, road, surfels
 

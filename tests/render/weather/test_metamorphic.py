@@ -10,13 +10,13 @@ from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.composition import compose, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.labels import forward_flow
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.render.weather.atmosphere import air_layer, light_layer, precipitating_air
 from tasks.render.weather.attribution import snow_on
+from tasks.render.weather.falling.precipitation import population
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import apply_weather, pixel_rays, weather_scene
 from tasks.render.weather.parameters import WeatherState
-from tasks.render.weather.precipitation import population
 from tasks.render.weather.scene_light import appended
 from tasks.render.weather.sky import sky_light
 from tests.render.weather.conftest import shutter

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tasks.render.lens import Lens, distorted
-from tasks.render.weather.particles import visible_streaks
-from tasks.render.weather.precipitation import drawn_optical_depth, drawn_reach, population
-from tasks.render.weather.streaks import draw_streaks
+from tasks.render.weather.falling.particles import visible_streaks
+from tasks.render.weather.falling.precipitation import drawn_optical_depth, drawn_reach, population
+from tasks.render.weather.falling.streaks import draw_streaks
 from tests.render.weather.conftest import shutter
 
 CALM = np.zeros(3)

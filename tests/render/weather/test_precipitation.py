@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from tasks.errors import InputError
-from tasks.render.weather.precipitation import (
+from tasks.render.weather.falling.precipitation import (
     atlas_fall_speed,
     drawn_optical_depth,
     drawn_reach,

@@ -9,7 +9,7 @@ from tasks.render.road_edit import RoadRelief, apply_road_profile, road_lift
 from tasks.render.weather.layers import weather_scene
 from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.relief import ReliefLight, clear_light, relief_ratios, relit, sun_in
-from tasks.render.weather.road_anchors import road_anchors
+from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tests.render.weather.scenes import clear_sky, road
 from tests.toy_street import toy_street

@@ -7,7 +7,6 @@ import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.render.spherical_harmonics import C0
 from tasks.render.weather.ground_grid import ground_grid, read_between, window_sums
 from tasks.render.weather.scene_light import (
     appended,
@@ -17,6 +16,7 @@ from tasks.render.weather.scene_light import (
     recoloured,
     without_sun,
 )
+from tasks.scene.spherical_harmonics import C0
 from tests.render.weather.scenes import ASPHALT, road, surfels
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.render.weather.scene_light import appended
-from tasks.render.weather.shelter import open_share
+from tasks.render.weather.snow.shelter import open_share
 from tests.render.weather.scenes import surfels
 
 SPACING, SIZE = 0.05, 0.012

@@ -12,9 +12,9 @@ from tasks.render.weather.atmosphere import (
     optical_depth,
     precipitating_air,
 )
+from tasks.render.weather.falling.precipitation import population
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import pixel_rays
-from tasks.render.weather.precipitation import population
 from tasks.render.weather.sky import (
     LUMINANCE,
     cloud_transmittance,

@@ -8,13 +8,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
-from tasks.render.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare, rasterise
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
 from tasks.render.weather.layers import pixel_rays
-from tasks.render.weather.road_anchors import road_anchors
 from tasks.render.weather.scene_light import appended, mean_colours, without
-from tasks.render.weather.snow_field import coverage_rank, local_depth_mm, snow_field, tracks_at
-from tasks.render.weather.snow_layer import hidden_share, snow_layer, snowed_over, whitened
+from tasks.render.weather.snow.field import coverage_rank, local_depth_mm, snow_field, tracks_at
+from tasks.render.weather.snow.layer import hidden_share, snow_layer, snowed_over, whitened
+from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.scene.route import Route
 from tasks.scene.surroundings import with_surroundings
 from tests.render.weather.conftest import shutter

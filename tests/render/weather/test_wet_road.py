@@ -8,10 +8,10 @@ import pytest
 from tasks.conventions import SemanticClass
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import pixel_rays
-from tasks.render.weather.puddles import water_surface, wetness
-from tasks.render.weather.reflection import mirrored_scene
 from tasks.render.weather.sky import LUMINANCE, sky_light
-from tasks.render.weather.wet_road import fresnel_reflectance, wet_albedo_ratio, wet_layer
+from tasks.render.weather.wet.puddles import water_surface, wetness
+from tasks.render.weather.wet.reflection import mirrored_scene
+from tasks.render.weather.wet.wet_road import fresnel_reflectance, wet_albedo_ratio, wet_layer
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import ASPHALT, flat_gbuffer
 

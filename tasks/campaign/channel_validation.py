@@ -1,0 +1,297 @@
+"""What can be wrong in measured channels, imported or given as a campaign: rules on arrays, answers in sentences."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.channels import CHANNELS_BY_NAME, likely_unit
+from tasks.campaign.signals import Signal
+
+GAP_STEPS = 5.0
+"""A step between samples beyond this many usual ones is a gap."""
+FROZEN_SECONDS = 0.5
+FROZEN_DWELLS = 20.0
+"""A frozen sensor holds a value that long, and that many times longer than it usually does."""
+SHORT_FREEZE_SECONDS = 0.25
+"""Held that long is enough where hardly any value is held: that many times longer than 95 % of the holds."""
+MOVING = 2.0
+"""Speed from which a car shakes its sensors [m/s]."""
+SMOOTHING = 0.2
+"""Width of the mean over which two channels are compared [s]."""
+DECELERATION_PER_PRESSURE = (0.3, 8.0)
+"""Deceleration that a road car's brake may give per pressure; the paper's vehicle has 2.4 [m/s^2 per MPa]."""
+WITHOUT_BRAKE = 3.0
+"""Deceleration that drag, an engine or a generator gives without brake pressure at most [m/s^2]."""
+DIVE_PER_DECELERATION = (0.02, 2.0)
+"""Pitch that a road car's body gives per deceleration; the paper's vehicle has 0.4 [deg per m/s^2]."""
+ROLLING_RADIUS = (0.2, 0.6)
+"""Rolling radius of a road car [m]."""
+AXLES_APART = 0.07
+"""Share by which the rolling radii of a road car's axles differ at most [1]."""
+LARGEST_ACCELERATION, LARGEST_CORRECTION = 20.0, 0.5
+"""Rate [m/s^2] and correction [m/s] by which speed changes at once at most, besides ten usual steps of its sensor."""
+
+
+def signal_problems(signal: Signal) -> list[str]:
+    """What is wrong with one signal on its own clock: empty, gaps, clock jumps, values that are not numbers.
+
+    Parameters
+    ----------
+    signal : within the run's window
+    """
+    if len(signal.time) < 2:
+        return [f"has {len(signal.time)} samples in the run; it needs at least 2: is the window right?"]
+    problems = []
+    bad = ~np.isfinite(signal.values)
+    if bad.any():
+        at = float(signal.time[np.argmax(bad)])
+        problems.append(
+            f"has {np.count_nonzero(bad)} samples that are not numbers, the first at {at:.3f} s: cut the run there"
+        )
+    steps = np.diff(signal.time)
+    usual = float(np.median(steps))
+    back = np.flatnonzero(steps <= 0)
+    if back.size:
+        at = back[0]
+        problems.append(
+            f"has a clock that does not advance at {back.size} samples, first from {signal.time[at]:.3f} to"
+            f" {signal.time[at + 1]:.3f} s: cut the run there"
+        )
+    gaps = np.flatnonzero(steps > GAP_STEPS * max(usual, 1e-9)) if usual > 0 else np.array([], dtype=np.int64)
+    if gaps.size:
+        at = gaps[np.argmax(steps[gaps])]
+        problems.append(
+            f"has {gaps.size} gaps or forward jumps of its clock, the largest from {signal.time[at]:.3f} to"
+            f" {signal.time[at + 1]:.3f} s where samples come every {usual:.3g} s: cut the run there"
+        )
+    return problems
+
+
+def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | None:
+    """Whether a sensor held one value while the car moved.
+
+    Parameters
+    ----------
+    name : channel
+    signal : its samples
+    speed : of the car [m/s]; None takes the car to move all the time
+    """
+    if not CHANNELS_BY_NAME[name].moves or len(signal.time) < 3:
+        return None
+    moving = np.ones(len(signal.time), dtype=bool)
+    if speed is not None and len(speed.time) > 1:
+        moving = np.interp(signal.time, speed.time, speed.values) > MOVING
+    differences = np.abs(np.diff(signal.values))
+    changes = np.flatnonzero(differences)
+    edges = np.concatenate(([0], changes + 1, [len(signal.time) - 1]))
+    dwells = np.diff(signal.time[edges])
+    usual, most = np.quantile(dwells, (0.5, 0.95)) if len(changes) > 2 else (0.0, np.inf)
+    jumps = differences[changes]
+    beside = np.maximum(np.concatenate(([0.0], jumps)), np.concatenate((jumps, [0.0])))
+    # a coarse sensor holds a value until its next step; one that was frozen has more to make up for
+    coarse = beside < 1.5 * jumps.min() if len(changes) > 2 else np.zeros(len(dwells), dtype=bool)
+    locked = signal.values[edges[:-1]] == 0.0  # a locked wheel reads 0 for a while
+    held = (dwells >= FROZEN_SECONDS) & (dwells >= FROZEN_DWELLS * usual)
+    held |= (dwells >= SHORT_FREEZE_SECONDS) & (dwells >= FROZEN_DWELLS * most) & ~locked
+    long = np.flatnonzero(held & ~coarse & moving[edges[:-1]])
+    if not long.size:
+        return None
+    at = long[np.argmax(dwells[long])]
+    return (
+        f"is frozen: it holds {signal.values[edges[at]]:.4g} for {dwells[at]:.2f} s from {signal.time[edges[at]]:.3f} s"
+        " while the car moves"
+    )
+
+
+def plausibility_problems(
+    columns: Mapping[str, NDArray[np.float64]], interval: float, units: Mapping[str, str]
+) -> list[str]:
+    """Wrong units and signs by magnitude and by what other channels say; every sentence names its channel.
+
+    Parameters
+    ----------
+    columns : channels on a common clock, each float64 [N], in campaign units
+    interval : of the clock [s]
+    units : the unit that each channel's values were taken to be in
+    """
+    problems = _step_problems(columns, interval) + _pressure_problems(columns, interval)
+    for name, values in columns.items():
+        channel = CHANNELS_BY_NAME[name]
+        peak = float(np.max(np.abs(values)))
+        if peak > channel.limit:
+            problems.append(
+                f"channel {name} reaches {peak:.4g} {channel.unit}, which no road car does (limit {channel.limit:g}):"
+                " correct its unit or scale"
+            )
+    smooth = {name: _smoothed(values, interval) for name, values in columns.items()}
+    problems += _radius_problems(smooth, interval)
+    if "speed" in smooth:
+        rate = np.gradient(smooth["speed"], interval)
+        if "longitudinal_acceleration" in smooth:
+            problems += _pair_problems(
+                "longitudinal_acceleration",
+                smooth["longitudinal_acceleration"],
+                "the rate of speed",
+                rate,
+                0.8,
+                units["longitudinal_acceleration"],
+            )
+        problems += _braking_problems(smooth, rate, interval)
+    if "pitch" in smooth and "pitch_rate" in smooth:
+        slope = np.gradient(smooth["pitch"], interval)
+        problems += _pair_problems(
+            "pitch_rate", smooth["pitch_rate"], "the slope of pitch", slope, 0.8, units["pitch_rate"]
+        )
+    if "vertical_acceleration" in smooth:
+        mean = float(np.mean(smooth["vertical_acceleration"]))
+        if abs(mean) > 4.9:
+            problems.append(
+                f"channel vertical_acceleration must exclude gravity; its mean is {mean:.2f} m/s^2:"
+                f" take it out, by an offset of {-mean:.2f}"
+            )
+    return problems
+
+
+def _step_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
+    """Speed that jumps where its clock does not: samples are lost."""
+    if "speed" not in columns:
+        return []
+    steps = np.abs(np.diff(columns["speed"]))
+    usual = float(np.median(steps[steps > 0])) if steps.any() else 0.0
+    wrong = np.flatnonzero(steps > LARGEST_ACCELERATION * interval + LARGEST_CORRECTION + 10 * usual)
+    if not wrong.size:
+        return []
+    at = wrong[np.argmax(steps[wrong])]
+    return [
+        f"channel speed must not jump; {wrong.size} steps do, the largest by {steps[at]:.3g} m/s at sample {at + 1}"
+        f" ({(at + 1) * interval:.3f} s into the run): samples are lost or its clock jumps, cut the run there"
+    ]
+
+
+def _pressure_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
+    """Pressure that never changes: of a car that never brakes it is 0, and the car does not brake."""
+    pressure = columns.get("brake_pressure")
+    if pressure is None or np.ptp(pressure) > 0:
+        return []
+    if pressure[0] != 0.0:
+        return [
+            f"channel brake_pressure is frozen: it holds {pressure[0]:.4g} MPa over the whole run; record it anew, or"
+            " leave the run out"
+        ]
+    lost = 0.0
+    if "speed" in columns:
+        rate = np.sort(np.gradient(_smoothed(columns["speed"], interval), interval))
+        lost = -float(np.mean(rate[: max(round(SMOOTHING / interval), 1)]))
+    if lost <= WITHOUT_BRAKE:
+        return []
+    return [
+        f"channel brake_pressure is 0 over the whole run while speed falls at {lost:.1f} m/s^2, which needs the brake"
+        f" beyond {WITHOUT_BRAKE:g}: record it anew, or leave the run out"
+    ]
+
+
+def _radius_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
+    problems = []
+    radii = {}
+    for name in ("wheel_speed_front", "wheel_speed_rear"):
+        if name not in columns or "speed" not in columns:
+            continue
+        rolling = (columns["speed"] > MOVING) & (np.abs(columns[name]) > 1e-3)
+        if np.count_nonzero(rolling) < 10:
+            continue
+        free = rolling & (np.gradient(columns["speed"], interval) > -1.0)
+        taken = free if np.count_nonzero(free) >= 10 else rolling
+        radius = float(np.median(columns["speed"][taken] / columns[name][taken]))
+        low, high = ROLLING_RADIUS
+        if radius < 0:
+            problems.append(f"channel {name} is negative while the car drives forward: turn its sign over")
+        elif not low < radius < high:
+            problems.append(
+                f"channels speed and {name} give a rolling radius of {radius:.3g} m, which must lie in {low:g} to"
+                f" {high:g}: correct the unit of one of them"
+            )
+        elif taken is free:
+            radii[name] = radius
+    if len(radii) == 2 and abs(np.log(radii["wheel_speed_front"] / radii["wheel_speed_rear"])) > AXLES_APART:
+        front, rear = radii.values()
+        problems.append(
+            f"channels wheel_speed_front and wheel_speed_rear give rolling radii of {front:.3g} and {rear:.3g} m, which"
+            f" must agree within {AXLES_APART:.0%}: correct the unit of one of them"
+            + (" (one looks like km/h)" if min(abs(3.6 * front - 1), abs(3.6 * rear - 1)) < 0.01 else "")
+        )
+    return problems
+
+
+def _pair_problems(
+    name: str,
+    values: NDArray[np.float64],
+    other_name: str,
+    other: NDArray[np.float64],
+    correlation: float,
+    mapped_unit: str | None,
+) -> list[str]:
+    """Sign and, where the two must be equal and so the mapped unit is given, size of one channel by another."""
+    x, y = other - other.mean(), values - values.mean()
+    spread = float(np.sqrt((x @ x) * (y @ y)))
+    if spread <= 0 or abs(float(x @ y)) < correlation * spread:
+        return []
+    slope = float(x @ y) / float(x @ x)
+    if slope < 0:
+        return [
+            f"channel {name} runs against {other_name} (correlation {float(x @ y) / spread:.2f}): turn its sign over"
+        ]
+    if 0.4 < slope < 2.5 or mapped_unit is None:
+        return []
+    guess = likely_unit(mapped_unit, slope)
+    hint = f"; taken as {mapped_unit}, it looks like {guess}" if guess else ""
+    return [
+        f"channel {name} is {slope:.3g} times {other_name}: the unit or scale of one of them is wrong{hint}"
+    ]
+
+
+def _braking_problems(
+    columns: Mapping[str, NDArray[np.float64]], rate: NDArray[np.float64], interval: float
+) -> list[str]:
+    moving = columns["speed"] > MOVING
+    braking = moving & (rate < -1.0)
+    if "brake_pressure" in columns:
+        braking &= columns["brake_pressure"] > 0.1 * float(np.max(columns["brake_pressure"]))
+    if np.count_nonzero(braking) < 20:
+        return []
+    problems = []
+    if "pitch" in columns:
+        # changes over half a second: the body's answer to the brake, without the slow slope of the road
+        lag = max(round(0.5 / interval), 1)
+        dive, less = columns["pitch"][lag:] - columns["pitch"][:-lag], rate[:-lag] - rate[lag:]
+        found = _pair_problems("pitch", dive, "the deceleration", less, 0.5, None)
+        problems += found or _dive_problems(dive, less)
+    if "brake_pressure" in columns:
+        gain = -float(np.mean(rate[braking])) / float(np.mean(columns["brake_pressure"][braking]))
+        low, high = DECELERATION_PER_PRESSURE
+        if not low < gain < high:
+            problems.append(
+                f"channel brake_pressure gives {gain:.3g} m/s^2 per MPa, which must lie in {low:g} to {high:g}:"
+                " correct its unit or scale"
+            )
+    return problems
+
+
+def _dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list[str]:
+    """Size of the body's answer to the brake, where it answers at all."""
+    x, y = less - less.mean(), dive - dive.mean()
+    if float(x @ y) < 0.5 * float(np.sqrt((x @ x) * (y @ y))) or not x.any():
+        return []
+    slope = float(x @ y) / float(x @ x)
+    low, high = DIVE_PER_DECELERATION
+    if low < slope < high:
+        return []
+    return [
+        f"channel pitch gives {slope:.3g} deg per m/s^2 of deceleration, which must lie in {low:g} to {high:g}: correct"
+        f" the unit or scale of it{' (it looks like rad)' if slope < low else ''} and of pitch_rate"
+    ]
+
+
+def _smoothed(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+    width = min(max(round(SMOOTHING / interval), 1), len(values))
+    return np.convolve(values, np.ones(width) / width, mode="valid")

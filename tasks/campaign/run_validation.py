@@ -1,0 +1,77 @@
+"""What can be wrong in a run of a campaign: its columns, their declared clock, and the rules for measured channels."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
+from tasks.campaign.channels import MAIN_CHANNELS
+from tasks.campaign.signals import Signal
+
+COLUMN_UNITS = {"time": "s", **{channel.name: channel.unit for channel in MAIN_CHANNELS}}
+LEAST_SAMPLES = 100
+CLOCK_STEP, CLOCK_DRIFT = 0.1, 0.001
+"""Share by which a step, and a run, may be longer or shorter than declared [1]."""
+
+
+def run_problems(
+    columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str], interval: float
+) -> list[str]:
+    """Every problem of one run, one sentence each; empty when it can be used.
+
+    Parameters
+    ----------
+    columns : measured columns by name, each float64 [N]
+    units : units from the file's metadata, by column; a column without one is taken on trust
+    interval : declared time between samples [s]
+    """
+    problems = [f"channel {name} is missing" for name in COLUMN_UNITS if name not in columns]
+    count = max((len(values) for values in columns.values()), default=0)
+    if count < LEAST_SAMPLES:
+        return [*problems, f"a run needs at least {LEAST_SAMPLES} samples; it has {count}"]
+    misread = {name for name in columns if units.get(name, COLUMN_UNITS[name]) != COLUMN_UNITS[name]}
+    problems += [
+        f"channel {name} must be in {COLUMN_UNITS[name]}; its metadata says {units[name]}"
+        for name in COLUMN_UNITS
+        if name in misread
+    ]
+    if "time" in columns and "time" not in misread:
+        problems += _clock_problems(columns["time"], interval)
+    clock = interval * np.arange(count, dtype=np.float64)
+    usable = {}
+    for name in COLUMN_UNITS:
+        if name == "time" or name not in columns:
+            continue
+        gaps = signal_problems(Signal(time=clock, values=columns[name]))
+        problems += [f"channel {name} has a gap: it {problem}" for problem in gaps]
+        if not gaps and name not in misread:
+            usable[name] = columns[name]
+    signals = {name: Signal(time=clock, values=values) for name, values in usable.items()}
+    for name, signal in signals.items():
+        frozen = frozen_problem(name, signal, signals.get("speed"))
+        problems += [] if frozen is None else [f"channel {name} {frozen}"]
+    return problems + plausibility_problems(usable, interval, COLUMN_UNITS)
+
+
+def _clock_problems(time: NDArray[np.float64], interval: float) -> list[str]:
+    bad = ~np.isfinite(time)
+    if bad.any():
+        return [
+            f"channel time has {np.count_nonzero(bad)} samples that are not numbers, the first at sample"
+            f" {np.argmax(bad)}: cut the run there"
+        ]
+    wrong = np.flatnonzero(np.abs(np.diff(time) - interval) > CLOCK_STEP * interval)
+    if wrong.size:
+        at = wrong[0]
+        return [
+            f"channel time must advance by {interval:g} s; {wrong.size} steps do not, the first from {time[at]:.3f}"
+            f" to {time[at + 1]:.3f} s: resample the run, or cut it there"
+        ]
+    declared, taken = (len(time) - 1) * interval, float(time[-1] - time[0])
+    if abs(taken - declared) > max(CLOCK_DRIFT * declared, interval):
+        return [
+            f"channel time must advance by {interval:g} s; {len(time)} samples take {taken:.3f} s instead of"
+            f" {declared:.3f} s: correct sample_rate_hz, or resample the run"
+        ]
+    return []

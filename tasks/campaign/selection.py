@@ -1,0 +1,152 @@
+"""Conjunctive selection of braking events: what the rules measure, and what becomes of each event."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isnan, nan
+
+import numpy as np
+
+from tasks.campaign.events import Drive, Event, Protocol, Rule, Window, drive_events
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """What a rule measures.
+
+    Parameters
+    ----------
+    unit : of the result
+    channels : that must have been measured
+    measure : its function of an event
+    """
+
+    unit: str
+    channels: tuple[str, ...]
+    measure: Callable[[Event], float]
+
+
+def _p95(event: Event, channel: str, window: Window) -> float:
+    return float(np.percentile(np.abs(event.columns[channel][event.within(window)]), 95))
+
+
+def _largest_rise(event: Event, channel: str, sign: float) -> float:
+    inside = event.within(event.protocol.evaluation)
+    return max(float(np.max(sign * event.change(channel)[inside])), 0.0)
+
+
+def _onset_residual(event: Event) -> float:
+    return float(abs(event.dive[int(np.argmin(np.abs(event.time)))]))
+
+
+def _deviation(event: Event) -> float:
+    return float(np.std(event.columns["pitch"][event.within(event.protocol.baseline)]))
+
+
+def _quality(channel: str, unit: str) -> Quantity:
+    return Quantity(
+        unit=unit, channels=(channel,), measure=lambda event: _p95(event, channel, event.protocol.quality)
+    )
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "pressure_duration": Quantity(unit="s", channels=(), measure=lambda event: event.duration),
+    "start_speed": Quantity(unit="m/s", channels=("speed",), measure=lambda event: event.start_speed),
+    "pressure_increase": Quantity(
+        unit="MPa", channels=(), measure=lambda event: _largest_rise(event, "brake_pressure", 1.0)
+    ),
+    "deceleration_increase": Quantity(
+        unit="m/s^2",
+        channels=("longitudinal_acceleration",),
+        measure=lambda event: _largest_rise(event, "longitudinal_acceleration", -1.0),
+    ),
+    "steering_p95": _quality("steering_angle", "deg"),
+    "yaw_rate_p95": _quality("yaw_rate", "deg/s"),
+    "pitch_slope": Quantity(
+        unit="deg/s", channels=("pitch",), measure=lambda event: abs(event.pitch_baseline[0])
+    ),
+    "pitch_deviation": Quantity(unit="deg", channels=("pitch",), measure=_deviation),
+    "onset_residual": Quantity(unit="deg", channels=("pitch",), measure=_onset_residual),
+    "vertical_acceleration_p95": _quality("vertical_acceleration", "m/s^2"),
+    "roll_rate_p95": _quality("roll_rate", "deg/s"),
+    "pressure_before_p95": Quantity(
+        unit="MPa", channels=(), measure=lambda event: _p95(event, "brake_pressure", event.protocol.baseline)
+    ),
+}
+"""What selection rules may measure (paper, Appendix C.5)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """One event held against every rule.
+
+    Parameters
+    ----------
+    event : the event
+    values : measured quantity by rule; NaN where its channel was not measured
+    failed : names of the rules that it breaks
+    """
+
+    event: Event
+    values: dict[str, float]
+    failed: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """The events of a campaign and what became of them.
+
+    Parameters
+    ----------
+    episodes : detected pressure episodes
+    judged : those that support the analysis window, in order of drive and time
+    unassessed : rules whose channel no run has
+    """
+
+    episodes: int
+    judged: tuple[Judged, ...]
+    unassessed: tuple[str, ...]
+
+    @property
+    def retained(self) -> tuple[Event, ...]:
+        """Events that keep every rule that could be assessed."""
+        return tuple(judged.event for judged in self.judged if not judged.failed)
+
+
+def select_events(drives: Sequence[Drive], protocol: Protocol) -> Selection:
+    """Detect, cut and judge the braking events of all drives.
+
+    Parameters
+    ----------
+    drives : with at least brake_pressure, speed and pitch
+    protocol : windows and rules
+    """
+    episodes, events = 0, []
+    for drive in drives:
+        found = drive_events(drive, protocol)
+        episodes += found[0]
+        events += found[1]
+    judged = tuple(judge(event, protocol.rules) for event in events)
+    unassessed = tuple(
+        rule.name for rule in protocol.rules if judged and all(isnan(one.values[rule.name]) for one in judged)
+    )
+    return Selection(episodes=episodes, judged=judged, unassessed=unassessed)
+
+
+def judge(event: Event, rules: Sequence[Rule]) -> Judged:
+    """Hold one event against every rule; a rule whose channel is missing is neither kept nor broken.
+
+    Parameters
+    ----------
+    event : the event
+    rules : all are tried, none ends the trial
+    """
+    values = {
+        rule.name: QUANTITIES[rule.name].measure(event)
+        if all(channel in event.columns for channel in QUANTITIES[rule.name].channels)
+        else nan
+        for rule in rules
+    }
+    failed = tuple(
+        rule.name for rule in rules if not isnan(values[rule.name]) and not rule.holds(values[rule.name])
+    )
+    return Judged(event=event, values=values, failed=failed)

@@ -1,0 +1,137 @@
+"""A logged signal: its own clock, what the channel map makes of it, and its way onto a common clock."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signal:
+    """Samples with the times at which they were taken.
+
+    Parameters
+    ----------
+    time : float64 [N] as logged [s]
+    values : float64 [N] [unit]
+    unit : unit that the file itself states; empty if it states none
+    """
+
+    time: NDArray[np.float64]
+    values: NDArray[np.float64]
+    unit: str = ""
+
+    def between(self, start: float, end: float) -> "Signal":
+        """The samples from ``start`` to ``end`` [s], both included."""
+        inside = (self.time >= start) & (self.time <= end)
+        return Signal(time=self.time[inside], values=self.values[inside], unit=self.unit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gain:
+    """A constant that turns one quantity into another, such as wheel torque into brake pressure.
+
+    Parameters
+    ----------
+    value : of one unit of ``source_unit`` [target_unit / source_unit]
+    source_unit, target_unit : units on both sides
+    """
+
+    value: float
+    source_unit: str
+    target_unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelRule:
+    """How one channel of a campaign comes from a logger's signals.
+
+    Parameters
+    ----------
+    channel : name in the campaign
+    sources : names of the logged signals; of several the mean is taken
+    unit : unit of the signals
+    sign : -1 where the logger's positive direction is the opposite one
+    scale : correction of the sensor's gain [1]
+    offset : added last [the channel's unit]
+    delay : how much later than the truth the logger's time stamp is [s]
+    gain : change of quantity, or None
+    """
+
+    channel: str
+    sources: tuple[str, ...]
+    unit: str
+    sign: int = 1
+    scale: float = 1.0
+    offset: float = 0.0
+    delay: float = 0.0
+    gain: Gain | None = None
+
+    @property
+    def factor(self) -> float:
+        """What a logged value is multiplied with to be in the channel's unit.
+
+        Raises
+        ------
+        InputError
+            If the units do not lead to the channel's.
+        """
+        target = CHANNELS_BY_NAME[self.channel].unit
+        if self.gain is None:
+            return self.sign * self.scale * unit_factor(self.unit, target)
+        inward = unit_factor(self.unit, self.gain.source_unit)
+        return self.sign * self.scale * inward * self.gain.value * unit_factor(self.gain.target_unit, target)
+
+
+def as_channel(signal: Signal, rule: ChannelRule) -> Signal:
+    """The signal in the channel's unit and direction, at the times when it was true.
+
+    Parameters
+    ----------
+    signal : as logged
+    rule : from the channel map
+    """
+    return Signal(
+        time=signal.time - rule.delay,
+        values=rule.factor * signal.values + rule.offset,
+        unit=CHANNELS_BY_NAME[rule.channel].unit,
+    )
+
+
+def on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values at the times of a uniform clock.
+
+    A slower signal is linear between its samples. A faster one is averaged over the clock's interval, so that
+    what the clock cannot carry does not fold into it.
+
+    Parameters
+    ----------
+    signal : finite, with ascending times
+    clock : float64 [M] uniform and within the signal's times [s]
+    """
+    interval = float(clock[1] - clock[0])
+    if float(np.median(np.diff(signal.time))) > 0.55 * interval:
+        return np.interp(clock, signal.time, signal.values)
+    steps = np.diff(signal.time)
+    area = np.concatenate(([0.0], np.cumsum(0.5 * (signal.values[1:] + signal.values[:-1]) * steps)))
+    first, last = float(signal.time[0]), float(signal.time[-1])
+    left = np.maximum(clock - 0.5 * interval, first)
+    right = np.minimum(clock + 0.5 * interval, last)
+    # the trapezoid's area is only piecewise linear at the samples: exact enough for more than two of them
+    return (np.interp(right, signal.time, area) - np.interp(left, signal.time, area)) / (right - left)
+
+
+def common_clock(signals: list[Signal], rate: float) -> NDArray[np.float64]:
+    """Times at ``rate`` [Hz] over what all signals cover [s]; empty if they share less than two samples.
+
+    Parameters
+    ----------
+    signals : at least one, none empty
+    rate : [Hz]
+    """
+    start = max(float(signal.time[0]) for signal in signals)
+    end = min(float(signal.time[-1]) for signal in signals)
+    count = int(np.floor((end - start) * rate + 1e-9)) + 1
+    return start + np.arange(max(count, 0) if count > 1 else 0) / rate

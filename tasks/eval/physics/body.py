@@ -1,0 +1,306 @@
+"""Laws of body, axles, frames and outcome; the half-car of Appendix B from its stored columns."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import TICK_CHANNELS
+from tasks.eval.physics.constants import Constants, Floats, surface_of
+from tasks.eval.physics.half_step import INNER_STEP, onset_of
+from tasks.eval.physics.laws import Law, law, rounding
+from tasks.eval.poses.rigid import invert_pose
+
+DT = 0.001
+"""Tick interval [s]."""
+
+ROUND = 1e-9
+"""Relative rounding of closed forms [1]."""
+
+STOP_PASS = 10
+"""Ticks between the stops that the last two fixed-point passes over a road feature end in; 6 were seen [1]."""
+
+
+def body_laws(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+) -> list[Law | None]:
+    """Rates, the half-car's four equations, and the contact loads (paper, Eqs. app_half_car_complete and on).
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    constants : car and pavement
+    """
+    car = constants.car
+    z, dz, theta, dtheta = (ticks[c] for c in ("heave", "heave_rate", "pitch", "pitch_rate"))
+    a = ticks["longitudinal_acceleration"]
+    # the brake moment follows dv/dt, so its jumps within a few ticks bend both rates
+    jumpy = _reach(_swing(ticks, facts, constants), 3)
+    pitch_input = 1.3 * car["sprung_mass"] * car["cg_height"] / car["pitch_inertia"]
+    laws: list[Law | None] = []
+    for name, x, dx, per_jump in (("heave", z, dz, 0.05), ("pitch", theta, dtheta, pitch_input)):
+        step = x[2:] - x[:-2] - DT / 3 * (dx[2:] + 4 * dx[1:-1] + dx[:-2])
+        tolerance = DT**2 * per_jump * jumpy[1:-1] + 1e-6 * DT * np.abs(dx).max() + 1e-12
+        laws.append(law(f"{name} is the integral of its rate", f"{name} {name}_rate", step, tolerance))
+
+    forces = {}
+    for axle, lever in (("f", -car["cg_to_front_axle"]), ("r", car["cg_to_rear_axle"])):
+        u = ticks[f"unsprung_heave_{axle}"]
+        du = np.full_like(u, np.nan)
+        du[2:-2] = (u[:-4] - 8 * u[1:-3] + 8 * u[3:-1] - u[4:]) / (12 * DT)
+        forces[axle] = car[f"suspension_stiffness_{axle}"] * (z - u + lever * theta) + car[
+            f"suspension_damping_{axle}"
+        ] * (dz - du + lever * dtheta)
+        load, static = ticks[f"axle_load_{axle}"], constants.static_load(axle)
+        squeeze = car[f"tyre_stiffness_{axle}"] * (ticks[f"road_height_{axle}"] - u)
+        laws.append(
+            law(f"contact load of tyre squeeze, {axle}",
+                f"axle_load_{axle} road_height_{axle} unsprung_heave_{axle}",
+                load - np.maximum(static + squeeze, 0.0), rounding(load))
+        )  # fmt: skip
+        laws.append(
+            law(f"contact is a load, {axle}", f"contact_{axle} axle_load_{axle}",
+                (ticks[f"contact_{axle}"] != (load > 0)).astype(float), 0.5)
+        )  # fmt: skip
+        mass = car[f"unsprung_mass_{axle}"]
+        inner = slice(3, -3)
+        bend = (u[2:] - 2 * u[1:-1] + u[:-2])[2:-2] / DT**2
+        push = forces[axle] + load - static
+        size = np.abs(load - static).max() + np.abs(forces[axle][inner]).max() + 1e-6
+        laws.append(
+            law(f"axle's own motion, {axle}",
+                f"unsprung_heave_{axle} axle_load_{axle} heave pitch heave_rate pitch_rate",
+                mass * bend - push[inner], 5e-3 * size + mass * 5 * jumpy[inner])
+        )  # fmt: skip
+    if constants.mode == "paper":
+        laws += _sprung_laws(dz, dtheta, a, forces, ticks, facts, constants, jumpy)
+    return laws
+
+
+def _sprung_laws(
+    dz: Floats, dtheta: Floats, a: Floats, forces: Mapping[str, Floats], ticks: Mapping[str, Floats],
+    facts: Mapping[str, Any], constants: Constants, jumpy: Floats,
+) -> list[Law | None]:  # fmt: skip
+    car, tyre = constants.car, constants.tyres[facts["weather"]]
+    gamma = tyre.at(tyre.pitch_scale, facts["surface_friction"])
+    gamma *= 1.0 if facts["hazard_height_m"] == 0 else car["coupled_pitch_scale"]
+    moment = gamma * car["sprung_mass"] * car["cg_height"] * np.maximum(-a, 0.0)
+    up = -(forces["f"] + forces["r"]) / car["sprung_mass"]
+    nose = car["cg_to_front_axle"] * forces["f"] - car["cg_to_rear_axle"] * forces["r"] + moment
+    nose = nose / car["pitch_inertia"]
+    # the low-speed rule replaces the moment's input from the hold on
+    hold = len(a)
+    standing = np.flatnonzero(ticks["speed"] <= 0)
+    if standing.size:
+        tau = max(tyre.at(tyre.hold_s, facts["surface_friction"]), 0.2)
+        hold = int(standing[0]) - round(tau / DT) - 2
+    laws = []
+    for name, rate, acceleration, last, per_jump in (
+        ("heave", dz, up, len(a), 0.05), ("pitch", dtheta, nose, hold, 1.0),
+    ):  # fmt: skip
+        k = np.arange(3, max(min(last, len(a)) - 3, 3))
+        step = rate[k + 1] - rate[k - 1]
+        drive = DT / 3 * (acceleration[k + 1] + 4 * acceleration[k] + acceleration[k - 1])
+        size = np.abs(acceleration[3:-3]).max() if len(k) else 0.0
+        tolerance = DT * (per_jump * jumpy[k] + 1e-3 * size) + 1e-10
+        columns = "heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
+        braking = " longitudinal_acceleration" if name == "pitch" else ""
+        laws.append(law(f"body's {name} equation", columns + braking, step - drive, tolerance))
+    return laws
+
+
+def _swing(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> Floats:
+    """Largest change of what drives the brake moment within each tick, [N - 1] [m/s2]."""
+    v, a = ticks["speed"], ticks["longitudinal_acceleration"]
+    between = np.diff(v) / INNER_STEP - a[:-1]
+    swing = np.maximum(np.abs(between - a[:-1]), np.abs(a[1:] - between))
+    standing = np.flatnonzero(v <= 0)
+    if standing.size:
+        tyre = constants.tyres[facts["weather"]]
+        apart = 0 if facts["hazard_height_m"] == 0 else STOP_PASS
+        hold, release = (tyre.at(t, facts["surface_friction"]) for t in (tyre.hold_s, tyre.release_s))
+        # the low-speed rule sets in, caps, lets go of and ends its input at these times before the stop
+        for before in (hold, 0.2, 0.0, -release):
+            k = min(max(int(standing[0]) - round(before / DT), 1), len(swing) - 1)
+            swing[max(k - 1 - apart, 0) : k + 1 + apart] = np.abs(a).max()
+    return swing
+
+
+def _reach(swing: Floats, ticks: int) -> Floats:
+    """Largest change within so many ticks of each tick, [N] from [N - 1]."""
+    wide = np.concatenate([swing[:1], np.maximum(swing[1:], swing[:-1]), swing[-1:]])
+    padded = np.pad(wide, ticks, mode="edge")
+    return np.max(np.lib.stride_tricks.sliding_window_view(padded, 2 * ticks + 1), axis=1)
+
+
+def surface_laws(facts: Mapping[str, Any], constants: Constants) -> list[Law | None]:
+    """Film, snow, friction and the tyre's peak, mu_eff = eta mu_c (paper, Appendix E).
+
+    Parameters
+    ----------
+    facts : the clip's row
+    constants : car and pavement
+    """
+    expected = surface_of(
+        facts["weather"], facts["precipitation_mm_h"], facts["snow_accumulation_h"], constants.surface
+    )
+    feeds = {
+        "film_depth_mm": "clips.precipitation_mm_h" if facts["weather"] == "rain" else "",
+        "snow_depth_mm": "clips.precipitation_mm_h clips.snow_accumulation_h" if facts["weather"] == "snow" else "",
+        "snow_coverage": "clips.snow_depth_mm" if facts["weather"] == "snow" else "",
+        "surface_friction": {"rain": "clips.film_depth_mm", "snow": "clips.snow_coverage", "dry": ""}[facts["weather"]],
+    }  # fmt: skip
+    tyre = constants.tyres[facts["weather"]]
+    eta = tyre.at(tyre.efficiency, facts["surface_friction"])
+    laws = [
+        law(f"{name} of the precipitation", f"clips.{name} {feeds[name]}",
+            np.array([facts[name] - value]), ROUND * (1 + abs(value)))
+        for name, value in expected.items()
+    ]  # fmt: skip
+    peak = np.array([facts["tyre_peak"] - eta * facts["surface_friction"]])
+    laws.append(law("mu_eff is eta mu_c", "clips.tyre_peak clips.surface_friction", peak, ROUND))
+    return laws
+
+
+def frame_laws(
+    ticks: Mapping[str, Floats], frames: Mapping[str, NDArray[Any]], facts: Mapping[str, Any]
+) -> list[Law | None]:
+    """Frame rows are the nearest ticks, their poses move with them, and their surface is the clip's.
+
+    Parameters
+    ----------
+    ticks, frames : columns of the two tables
+    facts : the clip's row
+    """
+    tick, number = frames["tick"], np.arange(len(frames["tick"]))
+    last = len(ticks["speed"]) - 1
+    spacing = last / max(len(number) - 1, 1)
+    laws = [
+        law("frames are counted", "frame", (frames["frame"] - number).astype(float), 0.5, "frames"),
+        law("frames show the nearest tick", "tick", tick - number * spacing, 0.5 + 1e-6, "frames"),
+    ]
+    rows = np.clip(tick, 0, last)
+    for channel in TICK_CHANNELS:
+        here = np.asarray(frames[channel.name], float)
+        there = np.asarray(ticks[channel.name], float)[rows]
+        laws.append(
+            law(f"frame rows are ticks: {channel.name}",
+                f"frames.{channel.name} ticks.{channel.name} frames.tick", here - there, 1e-300)
+        )  # fmt: skip
+    for name in ("film_depth_mm", "snow_depth_mm", "snow_coverage", "surface_friction", "tyre_peak"):
+        laws.append(
+            law(f"frame rows hold the clip's {name}", f"frames.{name} clips.{name}",
+                frames[name] - facts[name], 1e-300)
+        )  # fmt: skip
+    return laws
+
+
+def pose_laws(frames: Mapping[str, NDArray[Any]], constants: Constants) -> list[Law | None]:
+    """The rig pose less heave and pitch follows the route by as much as the station (paper, Eq. camera_pose).
+
+    Parameters
+    ----------
+    frames : columns of the frame table
+    constants : car and pavement
+    """
+    T = frames["T_world_rig"].reshape(-1, 4, 4)
+    turn = T[:, :3, :3]
+    heave, pitch, station = frames["heave"], frames["pitch"], frames["station"]
+    body = np.tile(np.eye(4), (len(T), 1, 1))
+    body[:, 0, 0] = body[:, 2, 2] = np.cos(pitch)
+    body[:, 0, 2], body[:, 2, 0] = np.sin(pitch), -np.sin(pitch)
+    centre = np.array([-constants.car["cg_to_front_axle"], 0.0, constants.car["cg_height"]])
+    body[:, :3, 3] = centre - body[:, :3, :3] @ centre
+    body[:, 2, 3] += heave
+    route = T @ invert_pose(body)
+    move = np.diff(route[:, :3, 3], axis=0)
+    middle = route[1:, :3, :3] + route[:-1, :3, :3]
+    across = np.einsum("nij,ni->nj", middle / np.linalg.norm(middle, axis=1, keepdims=True), move)
+    gone = np.diff(station)
+    # chords of a bend are shorter than its arc, and the road's crown and slope turn the axes a little
+    slack = 1e-3 * gone + 1e-4
+    identity = np.eye(3) - np.swapaxes(turn, 1, 2) @ turn
+    return [
+        law("rig poses are rigid", "T_world_rig", np.abs(identity).max(axis=(1, 2)), 1e-9, "frames"),
+        law("rig poses end in 0 0 0 1", "T_world_rig",
+            np.abs(T[:, 3] - [0, 0, 0, 1]).max(axis=1), 1e-12, "frames"),
+        law("rig moves by the station", "T_world_rig station ticks.station",
+            np.linalg.norm(move, axis=1) - gone, slack, "frames"),
+        law("rig less heave and pitch stays on the route", "T_world_rig heave pitch ticks.heave ticks.pitch",
+            across[:, 2], 0.02 * gone + 1e-4, "frames"),
+    ]  # fmt: skip
+
+
+def outcome_laws(
+    ticks: Mapping[str, Floats], frames: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+) -> list[Law | None]:
+    """Stop, distance, peak pitch and the recorded pose check, worked out again.
+
+    Parameters
+    ----------
+    ticks, frames : columns of the two tables
+    facts : the clip's row
+    constants : car and pavement
+    """
+    s, v, pitch = ticks["station"], ticks["speed"], ticks["pitch"]
+    laws = [
+        law("peak pitch is the largest", "clips.peak_pitch pitch", pitch.max() - facts["peak_pitch"], 1e-12),
+        law("static pitch is the car's", "clips.static_pitch",
+            np.array([facts["static_pitch"] - constants.car["static_pitch"]]), 1e-9),
+    ]  # fmt: skip
+    standing = np.flatnonzero(v <= 0)
+    if standing.size:
+        laws.append(
+            law("stop time is the first standing tick", "clips.stop_time speed",
+                np.array([facts["stop_time"] - DT * standing[0]]), DT)
+        )  # fmt: skip
+        onset = onset_of(ticks, facts)
+        if np.isfinite(onset):
+            way = s[-1] - np.interp(onset, DT * np.arange(len(s)), s)
+            laws.append(
+                law("stopping distance from the onset", "clips.stopping_distance station",
+                    np.array([facts["stopping_distance"] - way]), 1e-5)
+            )  # fmt: skip
+    seen = np.isfinite(frames["recovered_pitch"])
+    if not seen.any():  # telemetry alone has no verdict to work out
+        return laws
+    claimed = np.rad2deg(frames["pitch"] - frames["pitch"][0])[seen]
+    found = np.rad2deg(frames["recovered_pitch"])[seen]
+    way = (frames["station"] - frames["station"][0])[seen]
+    response = float(np.sqrt(np.mean(claimed**2)))
+    error = float(np.sqrt(np.mean((found - claimed) ** 2)))
+    drift = float(np.sqrt(np.mean((frames["recovered_progress"][seen] - way) ** 2)))
+    checks = [
+        ("check_claimed_pitch_rms_deg", "frames.pitch ticks.pitch", response),
+        ("check_pitch_rmse_deg", "frames.recovered_pitch frames.pitch ticks.pitch", error),
+        ("check_progress_rmse_m", "frames.recovered_progress frames.station ticks.station", drift),
+        ("check_failed_frames", "frames.recovered_pitch", float(np.sum(~seen))),
+    ]
+    if np.isfinite(facts["check_pitch_relative_error"]):
+        checks.append(
+            ("check_pitch_relative_error", "frames.recovered_pitch frames.pitch ticks.pitch clips.check_pitch_rmse_deg",
+             error / response)
+        )  # fmt: skip
+    if np.isfinite(facts["check_pitch_correlation"]):
+        correlation = float(np.corrcoef(found, claimed)[0, 1])
+        checks.append(
+            ("check_pitch_correlation", "frames.recovered_pitch frames.pitch ticks.pitch", correlation)
+        )
+    if way[-1] > 0 and np.isfinite(facts["check_normalised_progress_rmse"]):
+        progress = frames["recovered_progress"][seen]
+        share = float(np.sqrt(np.mean((progress / progress[-1] - way / way[-1]) ** 2)))
+        checks.append(
+            (
+                "check_normalised_progress_rmse",
+                "frames.recovered_progress frames.station ticks.station",
+                share,
+            )
+        )
+    laws += [
+        law(f"{name} worked out again", f"clips.{name} {columns}",
+            np.array([facts[name] - value]), 1e-9 * (1 + abs(value)))
+        for name, columns, value in checks
+    ]  # fmt: skip
+    return laws

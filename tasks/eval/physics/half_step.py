@@ -1,0 +1,110 @@
+"""What acts between two ticks: the car followed half a tick on, where the ABS may differ from both."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tasks.eval.physics.constants import Constants, Floats, burckhardt, peak_slip, pressure_at, raised_cosine
+
+INNER_STEP = 0.0005
+"""Step of the integration behind the ticks (paper, Table frozen_physical_params) [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfStep:
+    """What acts half a tick after each tick but the last, worked out from the tick's own state.
+
+    Parameters
+    ----------
+    acceleration : dv/dt [N - 1] [m/s2]
+    rate : wheel acceleration [N - 1] of axles f and r [rad/s2]
+    load_doubt : largest error of each axle's load there, from its bend over the ticks around [N - 1] [N]
+    """
+
+    acceleration: Floats
+    rate: Mapping[str, Floats]
+    load_doubt: Mapping[str, Floats]
+
+
+def half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> HalfStep:
+    """Follow the car half a tick on from each tick (paper, Eqs. app_abs_command to app_longitudinal_complete).
+
+    The ABS lets the wheels chatter from one inner step to the next, so ticks alone do not say what drove them.
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    constants : car and pavement
+    """
+    car, m, L = constants.car, constants.mass, constants.wheelbase
+    tyre = constants.tyres[facts["weather"]]
+    beta, top = tyre.at(tyre.slip_stiffness, facts["surface_friction"]), peak_slip(tyre.burckhardt)
+    target, width, radius = top / beta, car["abs_release_width"], car["wheel_radius"]
+    s, v, a = ticks["station"], ticks["speed"], ticks["longitudinal_acceleration"]
+    speed = v[:-1] + INNER_STEP * a[:-1]
+    station = s[:-1] + 0.5 * INNER_STEP * (v[:-1] + speed)
+    time = 0.001 * np.arange(len(s) - 1, dtype=np.float64) + INNER_STEP
+    pressure = pressure_at(time - onset_of(ticks, facts), *pressure_shape(facts))
+    hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
+    analytic = constants.mode == "paper" and hump[2] == 0.0
+    forward, rates, doubts = np.zeros(len(speed)), {}, {}
+    for axle, behind, sign in (("f", 0.0, -1.0), ("r", L, 1.0)):
+        force, torque = ticks[f"tyre_force_{axle}"], ticks[f"brake_torque_{axle}"]
+        omega = ticks[f"wheel_speed_{axle}"][:-1]
+        omega = omega + INNER_STEP * (radius * force - torque)[:-1] / car[f"wheel_inertia_{axle}"]
+        slip = np.clip((speed - radius * omega) / np.maximum(speed, car["slip_speed_floor"]), 0.0, 1.0)
+        load = ticks[f"tyre_load_{axle}"]
+        between = 0.5 * (load[1:] + load[:-1])
+        bend = np.abs(np.diff(load, 2, prepend=load[:1], append=load[-1:]))
+        doubts[axle] = np.zeros(len(speed)) if analytic else np.maximum(bend[1:], bend[:-1])
+        if analytic:
+            lever = car["cg_to_rear_axle" if axle == "f" else "cg_to_front_axle"]
+            between = m / L * (car["gravity"] * lever + sign * a[:-1] * car["cg_height"])
+        grip = burckhardt(beta * slip, tyre.burckhardt) / burckhardt(np.array(top), tyre.burckhardt)
+        push = facts["tyre_peak"] * grip * between
+        share = np.clip((target * (1 + width) - slip) / (width * target), 0.0, 1.0)
+        brake = share * constants.brake_share(axle) * car["brake_gain"] * pressure
+        rates[axle] = (radius * push - brake) / car[f"wheel_inertia_{axle}"]
+        forward -= push + between * raised_cosine(station - behind, *hump)[1]
+    return HalfStep(
+        acceleration=forward / m - car["coast_deceleration"],
+        rate=rates,
+        load_doubt=doubts,
+    )
+
+
+def pressure_shape(facts: Mapping[str, Any]) -> tuple[float, float, float, float]:
+    """Peak [MPa], ramp, hold and release [s] that the scenario commands.
+
+    Parameters
+    ----------
+    facts : the clip's row
+    """
+    hold = facts["hold_s"]
+    endless = hold is None or np.isnan(hold)
+    return facts["peak_pressure_mpa"], facts["ramp_s"], np.inf if endless else hold, facts["release_s"]
+
+
+def onset_of(ticks: Mapping[str, Floats], facts: Mapping[str, Any]) -> float:
+    """Brake onset [s]; infinite without one.
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    """
+    at_time, at_place = facts["brake_onset_s"], facts["brake_onset_m"]
+    if not facts["peak_pressure_mpa"]:
+        return float("inf")
+    if at_time is not None and np.isfinite(at_time):
+        return float(at_time)
+    if at_place is None or not np.isfinite(at_place):
+        return float("inf")
+    passed = np.flatnonzero(ticks["station"] >= at_place)
+    if passed.size == 0 or ticks["speed"][passed[0]] <= 0:
+        return float("inf")
+    k = int(passed[0])
+    return max(1e-3 * k - float((ticks["station"][k] - at_place) / ticks["speed"][k]), 0.0)

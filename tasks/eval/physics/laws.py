@@ -1,0 +1,264 @@
+"""The laws that stored telemetry must keep, each as a residual over its tolerance at every tick.
+
+A tolerance is what 1 kHz sampling of a 0.5 ms solution leaves undecided, from the data beside the tick, and
+otherwise rounding; none is a share of the fault that is looked for.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.eval.physics.constants import Constants, Floats, burckhardt, peak_slip, pressure_at, raised_cosine
+from tasks.eval.physics.half_step import INNER_STEP, HalfStep, onset_of, pressure_shape
+
+ROUNDING = 1e-9
+"""Relative error that double-precision sums of a run may carry [1]."""
+
+ASKED = "clips.peak_pressure_mpa clips.ramp_s"
+"""Columns that decide the brake pressure between ticks."""
+
+ROAD_PASS = 2e-5
+"""Road height left between the last two fixed-point passes over a road feature [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law:
+    """One law, evaluated on one clip.
+
+    Parameters
+    ----------
+    name : what it says
+    columns : the columns it ties, as table.column
+    excess : largest residual over its tolerance; above 1 the law is broken [1]
+    at : row of the largest excess [1]
+    """
+
+    name: str
+    columns: frozenset[str]
+    excess: float
+    at: int
+
+    @property
+    def broken(self) -> bool:
+        """Whether the telemetry breaks it; a law that cannot be evaluated is broken."""
+        return not self.excess <= 1.0
+
+
+def law(
+    name: str, columns: str, residual: Floats, tolerance: Floats | float, table: str = "ticks"
+) -> Law | None:
+    """A law from its residual; None where no row can be judged.
+
+    Parameters
+    ----------
+    name : what it says
+    columns : names, separated by blanks; those without a table are of ``table``
+    residual, tolerance : [N], in one unit; NaN residuals of masked rows must be left out before [any]
+    table : default table
+    """
+    residual = np.atleast_1d(residual)
+    if residual.size == 0:
+        return None
+    excess = np.abs(residual) / tolerance
+    worst = int(np.argmax(np.where(np.isfinite(excess), excess, np.inf)))
+    names = frozenset(c if "." in c else f"{table}.{c}" for c in columns.split())
+    value = float(excess[worst])
+    return Law(name=name, columns=names, excess=value if np.isfinite(value) else np.inf, at=worst)
+
+
+def rounding(*terms: Floats) -> Floats:
+    """Tolerance of an algebraic law: rounding of its terms, never below that of their largest over a clip.
+
+    Parameters
+    ----------
+    terms : [N] the law's terms, in one unit [any]
+    """
+    size = np.sum([np.abs(term) for term in terms], axis=0)
+    return ROUNDING * (size + 1e-3 * size.max() + 1e-12)
+
+
+def wheel_laws(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], axle: str, constants: Constants, half: HalfStep
+) -> list[Law | None]:
+    """Slip, tyre force, brake torque, ABS and torque balance of one axle (paper, Appendix B).
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    axle : f or r
+    constants : car and pavement
+    half : what acts between the ticks
+    """
+    car, tyre = constants.car, constants.tyres[facts["weather"]]
+    v, omega = ticks["speed"], ticks[f"wheel_speed_{axle}"]
+    kappa, force = ticks[f"braking_slip_{axle}"], ticks[f"tyre_force_{axle}"]
+    torque, q, load = (ticks[f"{c}_{axle}"] for c in ("brake_torque", "abs_scale", "tyre_load"))
+    radius, inertia = car["wheel_radius"], car[f"wheel_inertia_{axle}"]
+    beta = tyre.at(tyre.slip_stiffness, facts["surface_friction"])
+    top = peak_slip(tyre.burckhardt)
+    target, width = top / beta, car["abs_release_width"]
+
+    slip = np.clip((v - radius * omega) / np.maximum(v, car["slip_speed_floor"]), 0.0, 1.0)
+    grip = facts["tyre_peak"] * burckhardt(beta * kappa, tyre.burckhardt)
+    grip = grip / burckhardt(np.array(top), tyre.burckhardt)
+    asked = np.clip((target * (1 + width) - kappa) / (width * target), 0.0, 1.0)
+    gain = constants.brake_share(axle) * car["brake_gain"]
+
+    rate = (radius * force - torque) / inertia
+    rolls = np.flatnonzero((v[1:] > 0) & (v[:-1] > 0))
+    after = half.rate[axle][rolls]
+    step = np.diff(omega)[rolls] - INNER_STEP * (rate[rolls] + after)
+    doubt = radius / inertia * half.load_doubt[axle][rolls]
+    undecided = INNER_STEP * (doubt + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0))
+    x = f"_{axle}"
+    laws = [
+        law(f"slip of wheel speed, {axle}", f"braking_slip{x} wheel_speed{x} speed", kappa - slip, 1e-9),
+        law(f"tyre force of slip and load, {axle}",
+            f"tyre_force{x} braking_slip{x} tyre_load{x} clips.tyre_peak",
+            force - grip * load, rounding(force, load)),
+        law(f"brake torque of pressure, {axle}", f"brake_torque{x} abs_scale{x} brake_pressure_mpa",
+            torque - q * gain * ticks["brake_pressure_mpa"], rounding(torque) + 1e-9),
+        law(f"wheel torque balance, {axle}", f"wheel_speed{x} tyre_force{x} brake_torque{x} tyre_load{x} speed"
+            f" longitudinal_acceleration {ASKED}",
+            step, undecided),
+        law(f"wheel starts rolling, {axle}", f"wheel_speed{x} clips.initial_speed_km_h",
+            omega[:1] * radius - facts["initial_speed_km_h"] / 3.6, 1e-9),
+    ]  # fmt: skip
+    if car["abs_build_rate"] * INNER_STEP >= 1 and car["abs_release_rate"] * INNER_STEP >= 1:
+        laws.append(law(f"ABS command of slip, {axle}", f"abs_scale{x} braking_slip{x}", q - asked, 1e-7))
+    else:
+        outside = np.maximum(np.maximum(-q, q - 1.0), 0.0)
+        laws.append(law(f"ABS within its bounds, {axle}", f"abs_scale{x}", outside, 1e-9))
+    return laws
+
+
+def motion_laws(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, half: HalfStep
+) -> list[Law | None]:
+    """Station, speed, forces, energy, loads and time (paper, Eq. app_longitudinal_complete).
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    constants : car and pavement
+    half : what acts between the ticks
+    """
+    car, m, L = constants.car, constants.mass, constants.wheelbase
+    s, v, a = ticks["station"], ticks["speed"], ticks["longitudinal_acceleration"]
+    force = ticks["tyre_force_f"] + ticks["tyre_force_r"]
+    load_f, load_r = ticks["tyre_load_f"], ticks["tyre_load_r"]
+    road = ticks["road_force"]
+    moves = v > 0
+    both = np.flatnonzero(moves[1:] & moves[:-1]) + 1
+    h = INNER_STEP
+    coast = np.where(moves, car["coast_deceleration"], 0.0)
+    net = np.where(moves, (road - force) / m, 0.0) - coast
+    time = ticks["t_ns"]
+
+    later = half.acceleration
+    doubt = (half.load_doubt["f"] + half.load_doubt["r"])[both - 1] / m
+    between = v[:-1] + h * a[:-1]
+    way = (np.diff(s) - 0.5 * h * (v[:-1] + 2 * between + v[1:]))[both - 1]
+    gained = (np.diff(v) - h * (a[:-1] + later))[both - 1]
+    power = 0.5 * h * (net[:-1] * (v[:-1] + between) + later * (between + v[1:]))
+    energy = 0.5 * (v**2 - v[0] ** 2) - np.concatenate([[0.0], np.cumsum(power)])
+    rolling = np.flatnonzero(moves)
+    drives = " ".join(
+        f"{c}_{x}" for c in ("wheel_speed", "tyre_force", "brake_torque", "tyre_load") for x in "fr"
+    )
+    drives += f" {ASKED}"
+    stays = np.flatnonzero(~moves)
+
+    hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
+    slope_f, slope_r = raised_cosine(s, *hump)[1], raised_cosine(s - L, *hump)[1]
+    uphill = np.where(moves, -load_f * slope_f - load_r * slope_r, 0.0)
+    laws = [
+        law("time counts milliseconds", "t_ns", time - 1e6 * np.arange(len(time)), 0.5),
+        law("station starts at zero", "station", s[:1], 1e-9),
+        law("speed starts as commanded", "speed clips.initial_speed_km_h",
+            v[:1] - facts["initial_speed_km_h"] / 3.6, 1e-9),
+        law("station is the integral of speed", "station speed longitudinal_acceleration", way, 1e-10),
+        law("station rests with the car", "station speed", np.diff(s)[stays[1:] - 1], 1e-9),
+        law("speed is the integral of acceleration", "speed longitudinal_acceleration " + drives,
+            gained, h * (doubt + 1e-5)),
+        law("m dv/dt is the sum of forces", "longitudinal_acceleration tyre_force_f tyre_force_r road_force",
+            a - net, rounding(a, force / m, road / m)),
+        law("kinetic energy falls by the work done", "speed longitudinal_acceleration road_force " + drives,
+            energy[rolling], 2e-5 * v[0] ** 2),
+        law("road force of load and slope", "road_force tyre_load_f tyre_load_r station clips.hazard_height_m"
+            " clips.hazard_center_m clips.hazard_length_m", road - uphill, rounding(load_f, load_r)),
+    ]  # fmt: skip
+    if constants.mode == "paper" and hump[2] == 0.0:
+        # Euler's half step between two ticks follows from both speeds, and so does the load it asks for
+        before = np.diff(v)[both - 1] / h - a[both - 1]
+        moved = m * car["cg_height"] / L * before
+        weight = m * car["gravity"]
+        for axle, load, sign in (("f", load_f, -1.0), ("r", load_r, 1.0)):
+            lever = car["cg_to_rear_axle" if axle == "f" else "cg_to_front_axle"] / L
+            expected = np.maximum(weight * lever + sign * moved, 0.0)
+            laws.append(
+                law(f"analytic load transfer, {axle}", f"tyre_load_{axle} speed longitudinal_acceleration",
+                    load[both] - expected, 1e-4)
+            )  # fmt: skip
+        laws.append(law("tyre loads sum to the weight", "tyre_load_f tyre_load_r",
+                        load_f + load_r - weight, 1e-6))  # fmt: skip
+    else:
+        laws += [
+            law(f"tyre load is the contact load, {axle}", f"tyre_load_{axle} axle_load_{axle}",
+                ticks[f"tyre_load_{axle}"] - ticks[f"axle_load_{axle}"], 1e-6)
+            for axle in "fr"
+        ]  # fmt: skip
+    return laws
+
+
+def command_laws(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+) -> list[Law | None]:
+    """Brake pressure and road heights as the scenario commands them.
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    constants : car and pavement
+    """
+    s, v = ticks["station"], ticks["speed"]
+    time: Floats = 1e-3 * np.arange(len(s), dtype=np.float64)
+    onset = onset_of(ticks, facts)
+    peak, ramp, hold, lasting = pressure_shape(facts)
+    wanted = pressure_at(time - onset, peak, ramp, hold, lasting)
+    steepest = peak / max(ramp, 1e-3)
+    by_place = facts["brake_onset_m"] is not None and np.isfinite(facts["brake_onset_m"])
+    slack = 1e-9 + (steepest * 1e-5 if by_place else 0.0)
+    release = "" if np.isinf(hold) else " clips.hold_s clips.release_s"
+    columns = f"brake_pressure_mpa clips.peak_pressure_mpa clips.ramp_s clips.brake_onset_s{release}"
+    if by_place:
+        columns = columns.replace("brake_onset_s", "brake_onset_m")
+    laws = [law("brake pressure as commanded", columns, ticks["brake_pressure_mpa"] - wanted, slack)]
+    hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
+    moves = v > 0
+    for axle, behind in (("f", 0.0), ("r", constants.wheelbase)):
+        height, _ = raised_cosine(s - behind, *hump)
+        laws.append(
+            law(f"road height as commanded, {axle}", f"road_height_{axle} station clips.hazard_height_m"
+                " clips.hazard_center_m clips.hazard_length_m",
+                (ticks[f"road_height_{axle}"] - height)[moves], ROAD_PASS)
+        )  # fmt: skip
+    return laws
+
+
+def finite_rows(columns: Mapping[str, NDArray[Any]]) -> list[str]:
+    """Names of the columns that hold a value that is not finite.
+
+    Parameters
+    ----------
+    columns : columns of a table
+    """
+    return [
+        name for name, values in columns.items() if values.dtype.kind == "f" and not np.isfinite(values).all()
+    ]

@@ -1,0 +1,292 @@
+"""Pose check without depth: a chain of essential matrices, by corners and intrinsics alone.
+
+It never sees a renderer's data, so it can judge any video; the price is an unknown scale.
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners
+from tasks.eval.poses.epipolar import (
+    fit_rotation,
+    five_point_pose,
+    refine_essential,
+    scaled_step,
+    step_length,
+    triangulate,
+)
+from tasks.eval.poses.links import Link, link_placements
+from tasks.eval.poses.motion import (
+    MAX_GAP,
+    FrameStep,
+    Placement,
+    RecoveredMotion,
+    check_clip,
+    failed_step,
+    integrate_motion,
+)
+from tasks.eval.poses.point_pairs import PointPairs, track_pairs
+from tasks.eval.poses.rigid import Floats, invert_pose
+from tasks.eval.poses.solve_pnp import solve_pnp
+
+
+@dataclass(frozen=True, kw_only=True)
+class EssentialSettings:
+    """Settings of the camera-only check.
+
+    Parameters
+    ----------
+    cells_across : grid cells over the picture's width, which give one corner each [1]
+    corner_quality : least corner strength as a share of the frame's 95th percentile [1]
+    window : side of the tracked patches [px]
+    track_levels : pyramid levels above full resolution where motion and depth are predicted [1]
+    search_levels : the same where they are not: at the start, and after a failure [1]
+    forward_backward : largest distance between a point and its track there and back [px]
+    epipolar : RANSAC's largest distance from the epipolar line [px]
+    min_parallax : median shift that no turn explains, below which two frames share one place [px]
+    min_points : fewest points that carry a pose [1]
+    min_inlier_share : least share of tracked points that must agree on the pose [1]
+    noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
+    link_span : frames that the longer steps beside the chain span [1]
+    link_stride : frames between their starts [1]
+    """
+
+    cells_across: int = 34
+    corner_quality: float = 0.02
+    window: int = 11
+    track_levels: int = 1
+    search_levels: int = 4
+    forward_backward: float = 0.3
+    epipolar: float = 0.7
+    min_parallax: float = 0.5
+    min_points: int = 40
+    min_inlier_share: float = 0.3
+    noise_floor: float = 0.01
+    noise_ceiling: float = 2.0
+    link_span: int = 8
+    link_stride: int = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Key:
+    """The frame that later ones are placed against, and what is known of its depth, in the chain's unit."""
+
+    index: int
+    grey: NDArray[np.uint8]
+    corners: NDArray[np.float32]
+    depth: Floats  # [N]
+    precision: Floats  # [N], relative, up to a factor; 0 where the depth is unknown
+    inverse_depth: NDArray[np.float32]  # [H, W], a guess for every pixel
+
+
+def recover_motion_essential(
+    frames: NDArray[np.uint8],
+    K: Floats,
+    T_rig_camera: Floats,
+    route_rotations: Floats | None = None,
+    settings: EssentialSettings | None = None,
+) -> RecoveredMotion:
+    """Ego motion up to scale by frame-to-frame essential matrices (Nister 2004, DOI 10.1109/TPAMI.2004.17).
+
+    Each step's turn and direction come from the five-point method, refined on Sampson's error; its length
+    from the depth that the step before gave the same corners. Steps over more frames tie the chain together.
+    While the car stands, frames are placed against the last one that moved. Path and heave are those of
+    the camera: the way from there to the rig's origin is in metres, which the chain's unknown unit cannot
+    express.
+
+    Parameters
+    ----------
+    frames : uint8 [F, H, W, 3] sRGB pictures [1]
+    K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
+    T_rig_camera : float64 [4, 4] camera mount; only its rotation is used [m]
+    route_rotations : float64 [F, 3, 3] route-to-world rotations of the undisturbed rig, for a route that
+        is not level [1]
+    settings : thresholds of the check
+
+    Raises
+    ------
+    InputError
+        If an array has the wrong shape, type or values.
+    """
+    check_clip(frames, K, T_rig_camera, route_rotations=route_rotations)
+    chosen = settings or EssentialSettings()
+    key = _key(0, frames[0], chosen)
+    placements: list[Placement] = []
+    poses, passed, links = [np.eye(4)], dict[int, _Key](), list[Link]()
+    missed, velocity, T_key_last, last = 0, np.eye(4), np.eye(4), 0
+    for k in range(1, len(frames)):
+        anchor, later = key.index, _key(k, frames[k], chosen)
+        if missed > MAX_GAP:
+            step, moved_on = failed_step(f"the track was lost after frame {last} and not found again", 0), key
+        else:
+            predicted = T_key_last @ np.linalg.matrix_power(velocity, k - last)
+            step, moved_on = _place(key, later, predicted, K, chosen)
+        missed = missed + 1 if step.failure else 0
+        placements.append(Placement(anchor=anchor, step=step))
+        poses.append(poses[anchor] @ step.T_earlier_later)
+        start = passed.pop(k - chosen.link_span, None)
+        if start is not None and start.index % chosen.link_stride == 0 and not step.failure:
+            between = invert_pose(poses[start.index]) @ poses[k]
+            link, _ = _solve(start, later, between, chosen.track_levels, K, chosen, trusted=True)
+            links.append(Link(earlier=start.index, later=k, step=link))
+        if not step.failure:
+            if k - last == 1:
+                velocity = invert_pose(T_key_last) @ step.T_earlier_later
+            T_key_last = step.T_earlier_later if moved_on is key else np.eye(4)
+            key, last = moved_on, k
+            if key.index == k:
+                passed[k] = key
+    turned = np.eye(4)
+    turned[:3, :3] = T_rig_camera[:3, :3]
+    return integrate_motion(
+        "essential", link_placements(placements, links), turned, route_rotations, metric=False
+    )
+
+
+def _key(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> _Key:
+    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+    corners = grid_corners(
+        corner_strength(grey), settings.cells_across, settings.window // 2, settings.corner_quality
+    )
+    unknown = np.zeros(len(corners))
+    return _Key(
+        index=index,
+        grey=grey,
+        corners=corners.astype(np.float32),
+        depth=unknown,
+        precision=unknown,
+        inverse_depth=np.zeros(grey.shape, np.float32),
+    )
+
+
+def _place(
+    key: _Key, later: _Key, predicted: Floats, K: Floats, settings: EssentialSettings
+) -> tuple[FrameStep, _Key]:
+    """The step to a frame, and the frame that the next one is to be placed against."""
+    fewest = min(len(key.corners), len(later.corners))
+    if fewest < settings.min_points:
+        return failed_step(
+            f"{fewest} points to track, at least {settings.min_points} are needed", fewest
+        ), key
+    if (key.precision > 0).any():
+        found = _solve(key, later, predicted, settings.track_levels, K, settings)
+        if not found[0].failure:
+            return found
+    # nothing to predict by: find motion and depth from the bare pictures, then again with their help
+    blind = replace(key, inverse_depth=np.zeros_like(key.inverse_depth))
+    step, rough = _solve(blind, later, np.eye(4), settings.search_levels, K, settings)
+    if step.failure or rough is blind:
+        return step, key
+    return _solve(
+        replace(key, inverse_depth=rough.inverse_depth),
+        later,
+        step.T_earlier_later,
+        settings.track_levels,
+        K,
+        settings,
+    )
+
+
+def _solve(
+    key: _Key,
+    later: _Key,
+    predicted: Floats,
+    levels: int,
+    K: Floats,
+    settings: EssentialSettings,
+    trusted: bool = False,
+) -> tuple[FrameStep, _Key]:
+    """The step by the tracked points; a trusted prediction stands in for the random draws' first guess."""
+    focal = float(K[0, 0] + K[1, 1]) / 2
+    tracker = (settings.window, levels, settings.forward_backward)
+    pairs = track_pairs(
+        (key.grey, key.corners), (later.grey, later.corners), key.inverse_depth, predicted, K, *tracker
+    )
+    count = len(pairs.rays)
+    if count < settings.min_points:
+        return failed_step(f"{count} points tracked, at least {settings.min_points} are needed", count), key
+    turn, parallax = fit_rotation(pairs.rays, pairs.later_rays, focal)
+    if parallax < settings.min_parallax:
+        return _standing_step(key, turn, pairs, K, settings), key
+
+    if trusted:
+        ahead = invert_pose(predicted)
+        R, t, inliers = ahead[:3, :3], ahead[:3, 3] / np.linalg.norm(ahead[:3, 3]), count
+    else:
+        R, t, inliers = five_point_pose(pairs.pixels, pairs.later_pixels, K, settings.epipolar)
+        if inliers == 0:
+            return failed_step("the points fix no essential matrix", 0), key
+    R, t, covariance, weight = refine_essential(
+        R, t, pairs.rays, pairs.later_rays, focal, settings.noise_floor
+    )
+    inliers = min(inliers, int((weight > 0).sum()))
+    if inliers < max(settings.min_points, settings.min_inlier_share * count):
+        return failed_step(f"{inliers} of {count} tracked points agree on a pose", inliers), key
+
+    depth, later_depth, precision = triangulate(pairs.rays, pairs.later_rays, R, t)
+    precision = np.where((weight > 0) & (depth > 0) & (later_depth > 0), precision, 0.0)
+    split = int(pairs.kept.sum())
+    length, length_std = 1.0, 0.0
+    if (key.precision > 0).any():
+        before = key.depth[pairs.kept], key.precision[pairs.kept]
+        length, length_std = step_length(*before, depth[:split], precision[:split])
+        if np.isnan(length):
+            if (key.precision[pairs.kept] > 0).sum() < settings.min_points:
+                return failed_step("no point links this step's length to the one before", inliers), key
+            # a nod on the spot: too short a way to see depth by, so the depth known before must do
+            return _standing_step(key, turn, pairs, K, settings), key
+    placed = replace(
+        later,
+        depth=_scatter(later_depth[split:] * length, pairs.later_kept),
+        precision=_scatter(precision[split:], pairs.later_kept),
+        inverse_depth=_spread(
+            pairs.later_pixels[precision > 0],
+            1 / (later_depth[precision > 0] * length),
+            later.grey.shape,
+            settings,
+        ),
+    )
+    return scaled_step(R, t, covariance, length, length_std, inliers), placed
+
+
+def _standing_step(
+    key: _Key, turn: Floats, pairs: PointPairs, K: Floats, settings: EssentialSettings
+) -> FrameStep:
+    """A frame taken from about where the key frame was: by the depth of its corners, or else as a turn."""
+    T = np.eye(4)
+    T[:3, :3] = turn
+    split = int(pairs.kept.sum())
+    known = key.precision[pairs.kept] > 0
+    if known.sum() >= settings.min_points:
+        points = pairs.rays[:split][known] * key.depth[pairs.kept][known, None]
+        seen = pairs.later_pixels[:split][known]
+        return solve_pnp(
+            points, seen, T, K, settings.min_points, settings.noise_floor, settings.noise_ceiling
+        )
+    covariance = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]) * (settings.min_parallax / K[0, 0]) ** 2
+    return FrameStep(T_earlier_later=invert_pose(T), covariance=covariance, inliers=len(pairs.rays))
+
+
+def _spread(
+    pixels: Floats, inverse_depth: Floats, shape: tuple[int, ...], settings: EssentialSettings
+) -> NDArray[np.float32]:
+    """A smooth guess of inverse depth for every pixel, by normalised convolution over the grid cells."""
+    cell = cell_size(shape[1], settings.cells_across)
+    rows, columns = -(-shape[0] // cell), -(-shape[1] // cell)
+    at = np.clip((pixels[:, ::-1] / cell).astype(np.int64), 0, [rows - 1, columns - 1])
+    total, count = np.zeros((rows, columns)), np.zeros((rows, columns))
+    np.add.at(total, tuple(at.T), inverse_depth)
+    np.add.at(count, tuple(at.T), 1.0)
+    near, far = ([cv2.GaussianBlur(a, (0, 0), width) for a in (total, count)] for width in (1.0, 6.0))
+    # the wide blur only matters where no point lies near
+    guess = (near[0] + 1e-3 * far[0]) / (near[1] + 1e-3 * far[1] + 1e-12)
+    return cv2.resize(guess.astype(np.float32), (columns * cell, rows * cell))[: shape[0], : shape[1]]
+
+
+def _scatter(values: Floats, where: NDArray[np.bool_]) -> Floats:
+    spread = np.zeros(len(where))
+    spread[where] = values
+    return spread

@@ -1,0 +1,173 @@
+"""The tool's own error rates: campaigns with a known truth, made unlike the model that judges them.
+
+The generator integrates at a quarter of the step, draws session and run offsets, Gauss-Markov disturbances in
+force, friction and pitch moment on knots of its own, AR(1) sensor noise and coloured noise on the pressure that
+the model is given; wheel inertia is off by an amount that no nuisance covers.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from tasks.campaign.campaign import Campaign, Run, Tolerances
+from tasks.campaign.planned_runs import RICH, TRAINING, Drive, planned_run
+from tasks.identification.decision.answer import Verdict
+from tasks.identification.inference.evidence import SESSION_INDEX
+from tasks.identification.inference.forward import SUBSTEPS, instruments, roll, run_model
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.library import PARAMETER_INDEX, parameter_vector
+from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.parameters import Vehicle
+
+NOISE_SIGMA = np.array([0.03, 0.05, 0.09, 0.09, 0.015, 0.1, 0.1])
+NOISE_RHO = np.array([0.6, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0])
+PRESSURE_NOISE = 0.01
+TOLERANCES = Tolerances(
+    session=(0.02, 0.01, 0.02, 0.005, 0.04, 0.02, 0.0015),
+    initial_speed=0.05,
+    friction=0.03,
+    acceleration_bias=0.03,
+    pitch_offset=0.03,
+)
+DISTURBANCE = (
+    ("longitudinal_force", 50.0, 0.9, 0.12),
+    ("friction", 0.008, 0.6, 0.2),
+    ("pitch_moment", 70.0, 0.3, 0.08),
+)
+"""Port, standard deviation [unit of the port], correlation time and knot spacing [s]."""
+
+
+def synthetic_campaign(
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    truth: Mapping[str, float],
+    seed: int,
+    *,
+    slots: tuple[Slot, ...] = (),
+    design: Sequence[Drive] = RICH,
+) -> Campaign:
+    """A campaign of a car that has what ``truth`` says.
+
+    Parameters
+    ----------
+    vehicle, surface : the car before anything is added
+    truth : effect parameters by name
+    seed : of all that is drawn
+    slots : forms outside any library
+    design : the runs; the first `TRAINING` of them train
+    """
+    rng = np.random.Generator(np.random.Philox(seed))
+    theta = parameter_vector(truth)
+    theta[list(SESSION_INDEX)] += rng.standard_normal(len(SESSION_INDEX)) * TOLERANCES.session
+    theta[PARAMETER_INDEX["wheel_inertia"]] += 0.05 * rng.random()
+    runs = tuple(
+        _measure(drive, i, 1 if rng.random() < 0.5 else -1, vehicle, surface, theta, slots, rng)
+        for i, drive in enumerate(design)
+    )  # fmt: skip
+    return Campaign(
+        name=f"synthetic-{seed}",
+        vehicle=vehicle.name,
+        runs=runs,
+        tolerances=TOLERANCES,
+        content_hash="",
+        split_hash="",
+    )
+
+
+def _measure(
+    drive: Drive,
+    number: int,
+    direction: int,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    theta: NDArray[np.float64],
+    slots: tuple[Slot, ...],
+    rng: np.random.Generator,
+) -> Run:
+    run = planned_run(drive, f"run-{number + 1:02d}", direction, held_out=number >= TRAINING)
+    pressure, count = run.pressure, len(run.pressure)
+    model = run_model(run, vehicle, surface)
+    own = theta.copy()
+    own[PARAMETER_INDEX["friction"]] += TOLERANCES.friction * rng.standard_normal()
+    disturbed = tuple(_disturbance(*entry, drive.duration, rng) for entry in DISTURBANCE)
+    speed = drive.speed + TOLERANCES.initial_speed * rng.standard_normal()
+    out, _ = roll(model, own, slots=(*slots, *disturbed), initial_speed=speed, substeps=4 * SUBSTEPS)
+    y = instruments(model, own, out)
+    y[:, 1] += TOLERANCES.acceleration_bias * rng.standard_normal()
+    y[:, 4] += TOLERANCES.pitch_offset * rng.standard_normal()
+    for j in range(y.shape[1]):
+        y[:, j] += NOISE_SIGMA[j] * _autoregressive(NOISE_RHO[j], count, rng)
+    seen = np.maximum(pressure + PRESSURE_NOISE * _autoregressive(0.5, count, rng), 0.0)
+    return replace(run, response=y, pressure=seen if drive.peak else pressure)
+
+
+def _disturbance(
+    port: str, scale: float, time: float, spacing: float, duration: float, rng: np.random.Generator
+) -> Slot:
+    count = int(duration / spacing) + 2
+    values = scale * _autoregressive(float(np.exp(-spacing / time)), count, rng)
+    return Slot(port=port, variable="time", origin=0.0, spacing=spacing, values=values)
+
+
+def _autoregressive(rho: float, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    x = rng.standard_normal(count)
+    for i in range(1, count):
+        x[i] = rho * x[i - 1] + np.sqrt(1.0 - rho**2) * x[i]
+    return x
+
+
+def outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] | None = None) -> str:
+    """How a verdict stands to the truth: right, wrong, set (with or without the truth), form or refused.
+
+    Parameters
+    ----------
+    verdict : what the tool said
+    truth : name of the effect in the data; None where there is none
+    form : port and variable of a truth that no library holds
+    """
+    names = [effect.name for effect in verdict.effects]
+    if truth is None:
+        return "right" if not names else "false discovery"
+    if not names:
+        return "refused"
+    if verdict.verdict == "UNKNOWN_FORM":
+        if form is None:
+            return "form"
+        right = form in {(e.port, e.variable) for e in verdict.effects if e.effect_class == "form"}
+        return "right form" if right else "wrong form"
+    if verdict.verdict == "SET":
+        told = truth in {*names, *(rival.name for _, rival in verdict.rivals)}
+        return "set with truth" if told else "set without truth"
+    return "right" if names == [truth] else "wrong"
+
+
+def covered(verdict: Verdict, truth: str, values: Mapping[str, float]) -> bool | None:
+    """Whether the 95 % interval of the first parameter holds the truth; None unless the truth alone is named.
+
+    Parameters
+    ----------
+    verdict : what the tool said
+    truth : name of the effect in the data
+    values : its parameters
+    """
+    if [effect.name for effect in verdict.effects] != [truth]:
+        return None
+    first = verdict.effects[0].parameters[0]
+    return first.ci_low <= values[first.name] <= first.ci_high
+
+
+def exact_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Clopper-Pearson interval of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404).
+
+    Parameters
+    ----------
+    hits, trials : counts
+    confidence : of the interval [1]
+    """
+    tail = 0.5 * (1.0 - confidence)
+    low = float(beta.ppf(tail, hits, trials - hits + 1)) if hits else 0.0
+    high = float(beta.ppf(1.0 - tail, hits + 1, trials - hits)) if hits < trials else 1.0
+    return low, high

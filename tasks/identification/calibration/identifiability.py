@@ -1,0 +1,141 @@
+"""Which calibrated scalars the reference runs determine, and which they cannot tell apart."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.identification.calibration.residual import CalibrationCase
+from tasks.identification.calibration.scalars import CalibrationScalar, calibration_scalars, scalar_value
+from tasks.identification.calibration.staged import Procedure, Stage, smoothness, stage_jacobian
+from tasks.vehicle.parameters import Vehicle
+
+Floats = NDArray[np.float64]
+CONFOUNDED = 0.95
+"""Correlation from which two scalars count as not told apart [1]."""
+DETERMINED = 0.5
+"""Share of the prior's standard deviation below which a scalar counts as determined [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScalarKnowledge:
+    """How well one scalar is known.
+
+    Parameters
+    ----------
+    name : of the scalar
+    value : as calibrated [unit]
+    unit : of the value
+    sd : standard deviation, all others unknown too [unit]
+    sd_alone : the same were all others known [unit]
+    share_of_prior : sd over that of a uniform distribution between the bounds [1]
+    determined : whether that share is below `DETERMINED`
+    """
+
+    name: str
+    value: float
+    unit: str
+    sd: float
+    sd_alone: float
+    share_of_prior: float
+    determined: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identifiability:
+    """The report of one calibration.
+
+    Parameters
+    ----------
+    scalars : one entry each
+    confounded : pairs of names with their correlation, strongest first
+    eigenvalues : of the prior-scaled Fisher information, descending; one is what the bounds alone say [1]
+    weakest : direction of the smallest eigenvalue: share of each scalar that has more than a tenth, by name
+    """
+
+    scalars: tuple[ScalarKnowledge, ...]
+    confounded: tuple[tuple[str, str, float], ...]
+    eigenvalues: tuple[float, ...]
+    weakest: dict[str, float]
+
+
+def identifiability(
+    vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
+) -> Identifiability:
+    """Fisher information of all scalars from all responses of all cases, with bounds and smoothness as the
+    prior.
+
+    Every response of every case counts as one observation whose standard deviation is the response's scale:
+    residuals of a deterministic model are one smooth curve a case and not thousands of independent samples.
+
+    Parameters
+    ----------
+    vehicle : calibrated
+    cases : development cases
+    procedure : groups, bounds and scales
+    """
+    scalars = calibration_scalars(vehicle, procedure.groups)
+    everything = Stage(
+        name="all", groups=procedure.groups, responses=("speed", "pitch", "slip", "wheel_load", "stop"),
+        kinds=("flat", "hump", "depression"), phase="event",
+    )  # fmt: skip
+    x = np.array([scalar_value(vehicle, s) for s in scalars])
+    coasting = replace(everything, responses=("speed_drop",), phase="start")
+    jacobian = np.vstack(
+        [
+            stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
+            stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
+            smoothness(scalars, procedure),
+        ]
+    )
+    bounds = [procedure.bounds[s.group] for s in scalars]
+    return knowledge(
+        jacobian, scalars, x, [b.unit for b in bounds], np.array([b.upper - b.lower for b in bounds])
+    )
+
+
+def knowledge(
+    jacobian: Floats,
+    scalars: Sequence[CalibrationScalar],
+    values: Floats,
+    units: Sequence[str],
+    widths: Floats,
+) -> Identifiability:
+    """Standard deviations, correlations and directions from a Jacobian.
+
+    Parameters
+    ----------
+    jacobian : of residuals in units of their standard deviation, shape (m, n) [1 / unit]
+    scalars, units : names and units, n of each
+    values : shape (n,) [unit]
+    widths : between the bounds, shape (n,) [unit]
+    """
+    prior_sd = widths / np.sqrt(12.0)
+    scaled = jacobian * prior_sd
+    fisher = scaled.T @ scaled + np.eye(len(values))
+    covariance = np.linalg.inv(fisher)
+    share = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(share, share)
+    alone = 1.0 / np.sqrt(np.diag(fisher))
+    eigenvalues, vectors = np.linalg.eigh(fisher)
+    names = [s.name for s in scalars]
+    pairs = [
+        (names[i], names[j], float(correlation[i, j]))
+        for i in range(len(names))
+        for j in range(i + 1, len(names))
+        if abs(correlation[i, j]) >= CONFOUNDED
+    ]
+    weakest = {n: float(w**2) for n, w in zip(names, vectors[:, 0], strict=True) if w**2 > 0.1}
+    return Identifiability(
+        scalars=tuple(
+            ScalarKnowledge(
+                name=name, value=float(value), unit=unit, sd=float(s * sd), sd_alone=float(a * sd),
+                share_of_prior=float(s), determined=bool(s < DETERMINED),
+            )
+            for name, value, unit, s, a, sd in zip(names, values, units, share, alone, prior_sd, strict=True)
+        ),
+        confounded=tuple(sorted(pairs, key=lambda pair: -abs(pair[2]))),
+        eigenvalues=tuple(float(e) for e in eigenvalues[::-1]),
+        weakest=weakest,
+    )  # fmt: skip

@@ -1,0 +1,276 @@
+"""The paper's staged calibration: each group of scalars against the response it acts on, then all cases again."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from tasks.identification.calibration.residual import (
+    CalibrationCase,
+    Phase,
+    Response,
+    Yardstick,
+    driven,
+    residuals,
+)
+from tasks.identification.calibration.scalars import (
+    CalibrationScalar,
+    calibration_scalars,
+    scalar_value,
+    with_scalars,
+)
+from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.rollout import Mode
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """What one group may take.
+
+    Parameters
+    ----------
+    unit : of the group's scalars
+    lower, upper : limits of every scalar [unit]
+    step : for finite differences [unit]
+    smooth : standard deviation of the difference between neighbouring knots of a family; infinite for none [unit]
+    start : where an effect begins that the vehicle does not have yet; None for 0 [unit]
+    """
+
+    unit: str
+    lower: float
+    upper: float
+    step: float
+    smooth: float = inf
+    start: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One step of the procedure (paper, Table frozen_calibration_count).
+
+    Parameters
+    ----------
+    name : what it is called
+    groups : whose scalars move together
+    responses : what they are held against
+    kinds : of the cases that are used: flat, hump, depression
+    phase : start, braking, tail or event
+    """
+
+    name: str
+    groups: tuple[str, ...]
+    responses: tuple[Response, ...]
+    kinds: tuple[str, ...]
+    phase: Phase
+
+
+@dataclass(frozen=True, kw_only=True)
+class Procedure:
+    """A whole calibration.
+
+    Parameters
+    ----------
+    mode : paper or coupled
+    stages : in order
+    passes : how often the stages are gone through
+    evaluations : most Jacobians of one stage
+    bounds : by group
+    yardstick : scales and speeds
+    """
+
+    mode: Mode
+    stages: tuple[Stage, ...]
+    passes: int
+    evaluations: int
+    bounds: Mapping[str, Bounds]
+    yardstick: Yardstick
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Every group that some stage moves, in order of first appearance."""
+        return tuple(dict.fromkeys(group for stage in self.stages for group in stage.groups))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageRecord:
+    """What one stage did.
+
+    Parameters
+    ----------
+    stage, turn : its name, and which pass it belongs to, from 1
+    before, after : its own loss, the sum of (RMSE / scale)^2 over its cases [1]
+    moved : largest change of a scalar as a share of its bounds [1]
+    at_bounds : scalars that came to rest on a bound
+    """
+
+    stage: str
+    turn: int
+    before: float
+    after: float
+    moved: float
+    at_bounds: tuple[str, ...]
+
+
+def calibrate(
+    vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
+) -> tuple[Vehicle, tuple[StageRecord, ...]]:
+    """Go through the stages; a stage that does not lower its own loss is not accepted.
+
+    Parameters
+    ----------
+    vehicle : where it starts
+    cases : the development cases
+    procedure : stages, bounds, scales
+
+    Returns
+    -------
+    The calibrated vehicle and a record of every stage.
+    """
+    records: list[StageRecord] = []
+    vehicle = _begun(vehicle, procedure)
+    for turn in range(1, procedure.passes + 1):
+        for stage in procedure.stages:
+            vehicle, record = run_stage(vehicle, cases, stage, procedure)
+            records.append(replace(record, turn=turn))
+    return vehicle, tuple(records)
+
+
+def run_stage(
+    vehicle: Vehicle, cases: Sequence[CalibrationCase], stage: Stage, procedure: Procedure
+) -> tuple[Vehicle, StageRecord]:
+    """Bounded nonlinear least squares over one stage's scalars (Branch, Coleman and Li 1999,
+    doi:10.1137/S1064827595289108).
+
+    The bounds act as a weak prior about the start, so that a scalar to which no run answers stays where it was.
+
+    Parameters
+    ----------
+    vehicle : where it starts
+    cases : the development cases
+    stage : which scalars against which responses
+    procedure : bounds, scales, number of evaluations
+    """
+    scalars = calibration_scalars(vehicle, stage.groups)
+    chosen = [case for case in cases if case.kind in stage.kinds]
+    limits = np.array([(procedure.bounds[s.group].lower, procedure.bounds[s.group].upper) for s in scalars])
+    width = limits[:, 1] - limits[:, 0]
+    start = np.array([scalar_value(vehicle, s) for s in scalars])
+    start = np.clip(start, limits[:, 0] + 1e-6 * width, limits[:, 1] - 1e-6 * width)
+
+    prior = np.diag(np.sqrt(12.0) / width)
+    smooth = smoothness(scalars, procedure)
+
+    def residual(x: Floats) -> Floats:
+        changed = with_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
+        parts = [_case_residual(changed, case, stage, procedure) for case in chosen]
+        return np.concatenate([*parts, prior @ (x - start), smooth @ x])
+
+    def jacobian(x: Floats) -> Floats:
+        return np.vstack([stage_jacobian(vehicle, chosen, stage, procedure, scalars, x), prior, smooth])
+
+    before = float(np.sum(residual(start) ** 2))
+    solution = least_squares(
+        residual, start, jacobian, bounds=(limits[:, 0], limits[:, 1]), x_scale=width,
+        max_nfev=procedure.evaluations, xtol=1e-5, ftol=1e-5,
+    )  # fmt: skip
+    after = float(np.sum(solution.fun**2))
+    best = solution.x if after < before else start
+    on_bound = np.minimum(best - limits[:, 0], limits[:, 1] - best) < 1e-3 * width
+    record = StageRecord(
+        stage=stage.name,
+        turn=0,
+        before=before,
+        after=min(after, before),
+        moved=float(np.max(np.abs(best - start) / width)),
+        at_bounds=tuple(s.name for s, hit in zip(scalars, on_bound, strict=True) if hit),
+    )
+    return with_scalars(vehicle, dict(zip(scalars, map(float, best), strict=True))), record
+
+
+def stage_jacobian(
+    vehicle: Vehicle,
+    cases: Sequence[CalibrationCase],
+    stage: Stage,
+    procedure: Procedure,
+    scalars: Sequence[CalibrationScalar],
+    x: Floats,
+) -> Floats:
+    """Derivatives of the stage's residuals by central differences; a case that a scalar cannot reach is not driven.
+
+    Parameters
+    ----------
+    vehicle : gives all that does not move
+    cases, stage, procedure : as in ``run_stage``
+    scalars : what moves
+    x : their values, shape (n,) [units of the scalars]
+
+    Returns
+    -------
+    Shape (residuals, n) [1 / unit].
+    """
+    here = with_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
+    unmoved = [np.zeros_like(_case_residual(here, case, stage, procedure)) for case in cases]
+    columns = []
+    for scalar in scalars:
+        step, value = procedure.bounds[scalar.group].step, scalar_value(here, scalar)
+        above, below = (with_scalars(here, {scalar: value + side * step}) for side in (1.0, -1.0))
+        parts = []
+        for case, zeros in zip(cases, unmoved, strict=True):
+            if _sees_no_difference(above, below, case):
+                parts.append(zeros)
+                continue
+            up, down = (_case_residual(side, case, stage, procedure) for side in (above, below))
+            parts.append((up - down) / (2 * step))
+        columns.append(np.concatenate(parts))
+    return np.stack(columns, axis=1)
+
+
+def smoothness(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Floats:
+    """Rows that weigh the difference between neighbouring knots of a family, so that interpolation between them
+    holds where one of them is poorly determined.
+
+    Parameters
+    ----------
+    scalars : n of them
+    procedure : holds the allowed differences
+
+    Returns
+    -------
+    Shape (pairs, n) [1 / unit].
+    """
+    rows = []
+    for i, (one, other) in enumerate(pairwise(scalars)):
+        spread = procedure.bounds[one.group].smooth
+        neighbours = one.group == other.group and len(one.places) == len(other.places) == 1
+        if isfinite(spread) and neighbours and one.places[0][0] == other.places[0][0]:
+            row = np.zeros(len(scalars))
+            row[i], row[i + 1] = 1 / spread, -1 / spread
+            rows.append(row)
+    return np.array(rows).reshape(-1, len(scalars))
+
+
+def _begun(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
+    """The vehicle with the start values of effects that it does not have yet."""
+    missing = [group for group in procedure.groups if group in EFFECT_UNITS and group not in vehicle.effects]
+    starts = {group: procedure.bounds[group].start or 0.0 for group in missing}
+    return replace(vehicle, effects={**vehicle.effects, **starts})
+
+
+def _case_residual(vehicle: Vehicle, case: CalibrationCase, stage: Stage, procedure: Procedure) -> Floats:
+    ride = driven(vehicle, case, procedure.mode, procedure.yardstick.margin_s)
+    return residuals(ride, case, stage.responses, stage.phase, procedure.yardstick)
+
+
+def _sees_no_difference(one: Vehicle, other: Vehicle, case: CalibrationCase) -> bool:
+    """Whether a case's conditions hide all that differs between two vehicles."""
+    if replace(one, families={}) != replace(other, families={}):
+        return False
+    at = (case.family, case.surface_friction)
+    return surface_response(one, *at) == surface_response(other, *at)

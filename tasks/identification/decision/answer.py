@@ -1,0 +1,157 @@
+"""The parts of an answer: effects with their parameters, errors by channel, the verdict itself."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.identification.decision.attribution import Candidate
+from tasks.identification.decision.correlation import Correlation
+from tasks.identification.decision.experiment import Experiment
+from tasks.identification.decision.intervals import Bounds
+from tasks.identification.inference.disturbance import Disturbance
+from tasks.vehicle.effects.slots import Slot
+
+VerdictName = Literal["FOUND", "SET", "UNKNOWN_FORM", "RETUNE", "SENSOR", "NOTHING"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """An estimated parameter with its 95 % interval and bounds [unit]."""
+
+    name: str
+    value: float
+    ci_low: float
+    ci_high: float
+    lower: float
+    upper: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedEffect:
+    """An effect of the verdict or a rival of one.
+
+    Parameters
+    ----------
+    name, effect_class, port, variable : as in the library, or of the form found
+    parameters : estimates
+    score : gain / inflation - parameters x log N, beyond the other effects
+    gain, inflation, held_out_gain, win_share : what the score is made of and the gates it met
+    """
+
+    name: str
+    effect_class: str
+    port: str
+    variable: str
+    parameters: tuple[Parameter, ...]
+    score: float
+    gain: float
+    inflation: float
+    held_out_gain: float
+    win_share: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelError:
+    """RMSE of one channel or figure over the held-out runs: as delivered, re-tuned, and with the effects.
+
+    Parameters
+    ----------
+    frozen, retuned, after : RMSE [unit]
+    ci_low, ci_high : 95 % bootstrap interval over runs of ``after`` [unit]
+    change_low, change_high : the same of after minus frozen, paired [unit]
+    wins : held-out runs in which ``after`` is below ``frozen``
+    worst_run : the run with the largest ``after``
+    """
+
+    frozen: float
+    retuned: float
+    after: float
+    ci_low: float
+    ci_high: float
+    change_low: float
+    change_high: float
+    wins: int
+    worst_run: str
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What `attribute` concludes.
+
+    Parameters
+    ----------
+    verdict : the kind of answer
+    effects : the effects named, in the order found
+    rivals : effects that cannot be told from the named ones, with the effect each rivals
+    tried : best candidates of the last round that were not accepted
+    error : by channel, on held-out runs
+    manoeuvre_error : the same of stopping distance [m] and peak pitch [deg], on held-out runs that brake
+    correlation : by channel, of the residual with brake pressure, on held-out runs
+    session_pulls : session nuisances in prior sigmas, before and after
+    noise : AR(1) coefficient and sigma by channel
+    disturbance : scales and times of the smooth disturbances
+    detectable : by library effect, the smallest value of its first parameter that would be named
+    campaign, content_hash, split_hash : what was read
+    theta : float64 full parameter vector of the effects, without session nuisances
+    slots : tables of the forms found
+    experiment : the planned run that would tell the first effect from its closest alternative best
+    torn : runs left out because they fork when the integration step is halved
+    reasons : sentences that say why the answer is what it is
+    """
+
+    verdict: VerdictName
+    effects: tuple[NamedEffect, ...]
+    rivals: tuple[tuple[str, NamedEffect], ...]
+    tried: tuple[NamedEffect, ...]
+    error: dict[str, ChannelError]
+    manoeuvre_error: dict[str, ChannelError]
+    correlation: dict[str, Correlation]
+    session_pulls: dict[str, tuple[float, float]]
+    noise: dict[str, tuple[float, float]]
+    disturbance: Disturbance
+    detectable: dict[str, float]
+    campaign: str
+    content_hash: str
+    split_hash: str
+    theta: NDArray[np.float64]
+    slots: tuple[Slot, ...]
+    experiment: Experiment | None
+    torn: tuple[str, ...]
+    reasons: tuple[str, ...]
+
+
+def named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:
+    """A candidate as it is reported.
+
+    Parameters
+    ----------
+    candidate : refined and judged
+    share : bootstrap win share
+    interval : ends of the parameters' 95 % intervals, float64 [K] each
+    """
+    h = candidate.hypothesis
+    values = candidate.fitted.values[-len(h.names) :]
+    return NamedEffect(
+        name=h.name,
+        effect_class=h.effect_class,
+        port=h.port,
+        variable=h.variable,
+        parameters=tuple(
+            Parameter(
+                name=n, value=float(v), ci_low=float(low), ci_high=float(high), lower=float(lo), upper=float(hi),
+                unit=u,
+            )
+            for n, v, low, high, lo, hi, u in zip(
+                h.names, values, *interval, h.lower, h.upper, h.units, strict=True
+            )
+        ),
+        score=candidate.score,
+        gain=candidate.gain,
+        inflation=candidate.inflation,
+        held_out_gain=candidate.held_out_gain,
+        win_share=share,
+    )  # fmt: skip

@@ -1,0 +1,258 @@
+"""Which effect, if any, the model lacks: screening, refinement, gates, rivals."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.screening import inflation, look_alikes, screen
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.fit import Fit, fall, fit, misfit_by_run
+from tasks.identification.inference.hypothesis import Hypothesis, library_hypothesis
+
+ACCEPT_SCORE = 25.0
+RIVAL_SPAN = 10.0
+HELD_OUT_GAIN = 4.0
+WIN_SHARE = 0.6
+REFINED = 5
+"""Candidates of each screening that are refined through the simulation."""
+BOOTSTRAP = 400
+ALIKE_REFINED = 4
+DECIDED = 0.1
+"""Share of the best gain over inflation so far below which the linear screen is taken at its word."""
+LARGE_GAIN = 300.0
+"""Gain from which derivatives taken without an effect no longer hold with it."""
+REACHED = 0.8
+"""Share of the linear gain that a refined one reaches where the start did not matter."""
+
+Misfits = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One hypothesis added to what is already accepted, refined and judged.
+
+    Parameters
+    ----------
+    hypothesis : what is added
+    fitted : joint fit of it and all accepted ones; its parameters come last
+    gain : log likelihood gained
+    inflation : empirical-null factor by which the gain is divided
+    score : gain / inflation - parameters x log N
+    held_out_gain : fall of the held-out marginal misfit, divided by the inflation; 0 where the score fails
+    informed : number of training runs that inform its first parameter
+    """
+
+    hypothesis: Hypothesis
+    fitted: Fit
+    gain: float
+    inflation: float
+    score: float
+    held_out_gain: float
+    informed: int
+
+    @property
+    def passes(self) -> bool:
+        """Whether score, held-out test and bounds all hold."""
+        return self.score > ACCEPT_SCORE and self.held_out_gain > HELD_OUT_GAIN and not self.fitted.at_bound
+
+
+def judge(
+    evidence: Evidence,
+    base: Fit,
+    base_held_out: Misfits | None,
+    hypothesis: Hypothesis,
+    foreseen: float = np.inf,
+) -> Candidate:
+    """Refine a hypothesis on top of ``base`` and judge it on training and held-out runs.
+
+    Parameters
+    ----------
+    evidence : the runs
+    base : fit of what is accepted so far
+    base_held_out : `misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
+    hypothesis : what may be added
+    foreseen : gain by the linear screen: a first fit that reaches it needs no other start
+    """
+    first = np.arange(len(hypothesis.names)) == 0
+    if hypothesis.names[0] in SESSION:
+        # the session already carries the same number under a prior: hand it over to the free parameter
+        hypothesis = replace(hypothesis, start=base.session[[SESSION.index(hypothesis.names[0])]])
+    # Starts: where the accepted fit is, which the hypothesis extends; and the linear estimate with fresh offsets,
+    # which have not yet absorbed what is sought.
+    free = hypothesis.names[0] in SESSION
+    none = hypothesis.start * (~first if hypothesis.effect_class != "form" and not free else free)
+    starts = ((none, base.offsets), (hypothesis.start, None))
+    trials: list[Fit] = []
+    for begin, offsets in starts:
+        trials.append(
+            fit(
+                evidence.train,
+                (*base.parts, hypothesis),
+                evidence.session_sigma,
+                values=np.concatenate((base.values, begin)),
+                session=base.session,
+                offsets=offsets,
+                # parameters that can be traded for each other are found along a valley, in more steps
+                iterations=4 + 4 * len(hypothesis.names),
+            )
+        )
+        gain = 0.5 * (base.objective - trials[-1].objective)
+        # a large one is only ranked here: derivatives are taken anew at it
+        enough = REACHED * foreseen if len(hypothesis.names) == 1 else np.inf
+        if gain > min(enough, LARGE_GAIN) or max(gain, foreseen) < 0.3 * ACCEPT_SCORE:
+            break
+    fitted = min(trials, key=lambda trial: trial.objective)
+    return assess(evidence, base, base_held_out, hypothesis, fitted)
+
+
+def assess(
+    evidence: Evidence,
+    base: Fit,
+    base_held_out: Misfits | None,
+    hypothesis: Hypothesis,
+    fitted: Fit,
+) -> Candidate:
+    """Judge a fit that extends ``base`` by a hypothesis.
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at the fit
+    base : fit of what is accepted so far
+    base_held_out : `misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
+    hypothesis : what was added; its parameters come last
+    fitted : the joint fit
+    """
+    gain = 0.5 * (base.objective - fitted.objective)
+    own = _own_scores(evidence, fitted, hypothesis)
+    factor = inflation(evidence, fitted, own)
+    penalty = float(len(hypothesis.names) * np.log(evidence.samples))
+    if gain / factor - penalty > ACCEPT_SCORE and base_held_out is not None:
+        # what the base reaches from here as well is no merit of the hypothesis
+        gain = min(gain, 0.5 * (_back(evidence, base, hypothesis, fitted).objective - fitted.objective))
+    score = gain / factor - penalty
+    held_out = 0.0
+    if score > ACCEPT_SCORE and base_held_out is not None:
+        held_out = fall(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
+    return Candidate(
+        hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
+        informed=len(own) or len(evidence.train),
+    )  # fmt: skip
+
+
+def _back(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
+    """The base fitted again from where a fit that extends it ended."""
+    session = fitted.session.copy()
+    k = len(hypothesis.names)
+    if hypothesis.names[0] in SESSION:
+        session[SESSION.index(hypothesis.names[0])] += fitted.values[-k]
+    return fit(
+        evidence.train, base.parts, evidence.session_sigma, values=fitted.values[:-k], session=session,
+        offsets=fitted.offsets, iterations=4,
+    )  # fmt: skip
+
+
+def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDArray[np.float64]:
+    names = [e.name for e in evidence.effects]
+    if hypothesis.name not in names:
+        return np.empty(0)
+    j = names.index(hypothesis.name)
+    scores = []
+    for run, r in zip(evidence.train, fitted.residuals, strict=True):
+        a = run.library[:, j]
+        q = run.library_q[:, j]
+        information = float(a @ a - q @ q)
+        if information * hypothesis.step[0] ** 2 > 0.05:
+            scores.append(float(a @ r - q @ run.project(r)) / np.sqrt(information))
+    return np.array(scores)
+
+
+def ladder(
+    evidence: Evidence,
+    base: Fit,
+    count: int = REFINED,
+    *,
+    gated: bool = True,
+    also: frozenset[str] = frozenset(),
+) -> list[Candidate]:
+    """The best candidates to add to ``base``, refined and sorted by score, best first.
+
+    Parameters
+    ----------
+    evidence : the runs
+    base : fit of what is accepted so far
+    count : how many of the screening are refined
+    gated : judge them on held-out runs as well, and refine what looks like the best of them too
+    also : names of effects that are refined whatever the screen says of them
+    """
+    gains, estimates, seconds = screen(evidence, base)
+    held_out = misfit_by_run(evidence.held_out, base) if gated else None
+    order = [int(j) for j in np.argsort(-gains, kind="stable") if gains[j] > 0.3 * ACCEPT_SCORE][:count]
+
+    def judged(j: int) -> Candidate:
+        hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
+        return judge(evidence, base, held_out, hypothesis, float(gains[j]))
+
+    candidates: list[Candidate] = []
+    refined: list[int] = []
+    for j in order:
+        if gains[j] > DECIDED * max((c.gain / c.inflation for c in candidates), default=0.0):
+            candidates.append(judged(j))
+            refined.append(j)
+    known = {p.name for p in base.parts}
+    for j, effect in enumerate(evidence.effects):
+        if effect.name in also and effect.name not in known and j not in refined:
+            candidates.append(judged(j))
+            refined.append(j)
+    if candidates and gated:
+        best = max(range(len(candidates)), key=lambda i: candidates[i].score)
+        if candidates[best].score > ACCEPT_SCORE:
+            near = [j for j in look_alikes(evidence, refined[best]) if j not in refined and gains[j] > 0.0]
+            candidates += [judged(j) for j in near[:ALIKE_REFINED]]
+    return sorted(candidates, key=lambda c: -c.score)
+
+
+def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
+    """Share of bootstrap resamples of the runs in which the first candidate keeps the best score.
+
+    Parameters
+    ----------
+    candidates : refined, best first
+    base : the fit they were added to
+    seed : of the resampling
+    """
+    draws = np.random.Generator(np.random.Philox(seed)).integers(
+        0, len(base.by_run), (BOOTSTRAP, len(base.by_run))
+    )
+    scores = []
+    for c in candidates:
+        per_run = 0.5 * (base.by_run - c.fitted.by_run) / c.inflation
+        penalty = c.gain / c.inflation - c.score
+        scores.append(per_run[draws].sum(axis=1) - penalty)
+    winner = np.argmax(np.array(scores), axis=0)
+    return float(np.mean((winner == 0) & (scores[0] > 0.0)))
+
+
+def nested(small: Hypothesis, large: Hypothesis) -> bool:
+    """Whether every parameter of ``small`` is also one of ``large``."""
+    return set(small.names) < set(large.names)
+
+
+def without(base: Fit, index: int, evidence: Evidence) -> Fit:
+    """Refit with one accepted part left out.
+
+    Parameters
+    ----------
+    base : fit with all parts
+    index : the part to leave out
+    evidence : the runs
+    """
+    parts = tuple(p for i, p in enumerate(base.parts) if i != index)
+    sizes = [len(p.names) for p in base.parts]
+    at = sum(sizes[:index])
+    values = np.delete(base.values, np.arange(at, at + sizes[index]))
+    return fit(
+        evidence.train, parts, base.session_sigma, values=values, session=base.session, offsets=base.offsets,
+        iterations=8,
+    )  # fmt: skip

@@ -1,0 +1,88 @@
+"""Cross-correlation of what a model leaves over with the brake pressure it was given.
+
+A model that holds all that the input does leaves nothing that goes with it at any lag (Ljung 1999, System
+Identification, section 16.6).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNELS
+from tasks.identification.inference.evidence import RunEvidence
+from tasks.identification.inference.forward import predict
+from tasks.identification.inference.noise import whiten
+from tasks.vehicle.effects.slots import Slot
+
+MOST_LAG = 1.0
+"""Lags up to this are looked at [s]."""
+CORRELATED = ("longitudinal_acceleration", "pitch")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Correlation:
+    """Residual of one channel against brake pressure.
+
+    Parameters
+    ----------
+    lags : float64 [L] time by which the residual follows the pressure [s]
+    frozen, after : float64 [L] correlation coefficients [1]
+    band : half width within which 95 % would lie if they had nothing to do with each other [1]
+    """
+
+    lags: NDArray[np.float64]
+    frozen: NDArray[np.float64]
+    after: NDArray[np.float64]
+    band: float
+
+
+def residual_input_correlation(
+    runs: tuple[RunEvidence, ...], theta: NDArray[np.float64], slots: tuple[Slot, ...]
+) -> dict[str, Correlation]:
+    """Correlation over the held-out runs, residual and pressure whitened by the channel's noise.
+
+    Parameters
+    ----------
+    runs : held-out
+    theta, slots : full parameters of the grown model
+    """
+    plain = np.zeros(len(theta))
+    residuals = [
+        [(run.model.measured - predict(run.model, p, slots=s)) for run in runs]
+        for p, s in ((plain, ()), (theta, slots))
+    ]
+    return {name: _channel(runs, residuals, CHANNELS.index(name)) for name in CORRELATED}
+
+
+def _channel(
+    runs: tuple[RunEvidence, ...], residuals: list[list[NDArray[np.float64]]], channel: int
+) -> Correlation:
+    interval = runs[0].model.run.interval
+    most = round(MOST_LAG / interval)
+    sums = np.zeros((2, 2 * most + 1))
+    powers, pressed, count = np.zeros(2), 0.0, 0
+    for i, run in enumerate(runs):
+        rho, sigma = run.rho[channel : channel + 1], run.sigma[channel : channel + 1]
+        u = _white(run.model.run.pressure[: run.model.samples], rho, sigma)
+        pressed += float(u @ u)
+        count += len(u)
+        for j in range(2):
+            e = _white(residuals[j][i][:, channel], rho, sigma)
+            powers[j] += float(e @ e)
+            sums[j] += np.correlate(np.pad(e, most), u, mode="valid")
+    scale = np.sqrt(np.maximum(powers * pressed, 1e-300))[:, None]
+    frozen, after = sums / scale
+    return Correlation(
+        lags=interval * np.arange(-most, most + 1, dtype=np.float64),
+        frozen=frozen,
+        after=after,
+        band=float(1.96 / np.sqrt(max(count, 1))),
+    )
+
+
+def _white(
+    x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    white = whiten(x[:, None], rho, sigma)[1:]
+    return np.asarray(white - white.mean(), dtype=np.float64)

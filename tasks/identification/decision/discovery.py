@@ -1,0 +1,150 @@
+"""Everything the engine looks for in one order: the library, wrong numbers, then forms outside the library."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.identification.decision.attribution import ACCEPT_SCORE, RIVAL_SPAN, Candidate, judge
+from tasks.identification.decision.forms import form_hypotheses, is_constant, scan, spline_slopes
+from tasks.identification.decision.screening import inflation
+from tasks.identification.decision.search import (
+    MAX_EFFECTS,
+    Found,
+    Round,
+    retuned,
+    scale_disturbances,
+    search,
+    settle,
+)
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.fit import Fit, fit, misfit_by_run
+from tasks.identification.inference.linearisation import rederived, rescaled
+
+FAR_PULL = 2.5
+"""Pull, in prior sigmas, from which the model without effects has its derivatives taken anew at its session."""
+AT_ODDS = 2.0
+"""Inflation of a named effect from which its runs are at odds about it, and a form alone is held against it."""
+WORTHY = 0.3
+"""Share of the gain of what is named that a form alone must have, linearly, to be held against it."""
+
+
+def forms(
+    start: Found,
+    null: Found,
+    reasons: list[str],
+    splines: tuple[NDArray[np.float64], ...] | None = None,
+) -> tuple[Found, Candidate | None]:
+    """Look for forms outside the library: alone against all that was named, and in what the named leave over.
+
+    Parameters
+    ----------
+    start : what the library explains
+    null : nothing accepted, same scales
+    reasons : is added to
+    splines : `spline_slopes` of ``start`` where they are known
+
+    Returns
+    -------
+    The state, and a form alone that cannot be told from the first effect.
+    """
+    state, near = start, None
+    left = best_form(state.evidence, state.base, splines=splines)
+    over = left is not None and left.passes
+    torn = any(r.accepted.inflation > AT_ODDS for r in state.rounds)
+    if state.rounds and (over or torn):
+        alone = best_form(null.evidence, null.base, WORTHY * sum(r.accepted.gain for r in state.rounds))
+        ahead = -np.inf
+        if alone is not None and alone.passes:
+            # a form has no direction of its own to be judged by, so both sides take the larger inflation
+            common = max(alone.inflation, *(r.accepted.inflation for r in state.rounds))
+            log_n = float(np.log(state.evidence.samples))
+            extra = len(alone.hypothesis.names) - sum(len(r.accepted.hypothesis.names) for r in state.rounds)
+            ahead = (alone.gain - sum(r.accepted.gain for r in state.rounds)) / common - extra * log_n
+        first = state.rounds[0].accepted.hypothesis
+        # a form of the same variable at the same port is the named effect in another dress, not an unknown one
+        dressed = (
+            alone is not None
+            and alone.hypothesis.port == first.port
+            and (
+                alone.hypothesis.variable == first.variable
+                or (first.variable == "constant" and is_constant(alone.hypothesis))
+            )
+        )
+        if alone is not None and ahead > RIVAL_SPAN and not dressed:
+            reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
+            state = Found(
+                evidence=null.evidence,
+                base=alone.fitted,
+                rounds=(Round(base=null.base, tried=(), accepted=alone, evidence=null.evidence),),
+            )
+        elif alone is not None and ahead > -RIVAL_SPAN:
+            elsewhere = alone.hypothesis.port != first.port
+            near = alone if (ahead > RIVAL_SPAN if dressed else elsewhere or torn) else None
+    if left is not None and over and state is start and len(state.rounds) < MAX_EFFECTS:
+        reasons.append(f"something is left over: {left.hypothesis.name}")
+        state = replace(
+            state,
+            base=left.fitted,
+            rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left, evidence=state.evidence)),
+        )
+    return state, near
+
+
+def best_form(
+    evidence: Evidence,
+    base: Fit,
+    least: float = 0.0,
+    splines: tuple[NDArray[np.float64], ...] | None = None,
+) -> Candidate | None:
+    """The form that explains most of what a fit leaves over, refined and judged; None if nothing real is left.
+
+    Parameters
+    ----------
+    evidence : the runs
+    base : the fit
+    least : gain in log likelihood from which a spline is followed up
+    splines : `spline_slopes` where they are known
+    """
+    level = inflation(evidence, base, None)
+    enough = max(ACCEPT_SCORE + float(np.log(evidence.samples)), least / level)
+    leftovers = [x for x in scan(evidence, base, splines)[:2] if x.gain > enough]
+    if not leftovers:
+        return None
+    held_out = misfit_by_run(evidence.held_out, base)
+    judged = [
+        judge(evidence, base, held_out, h) for x in leftovers for h in form_hypotheses(x, evidence.samples)
+    ]
+    return settle(evidence, base, max(judged, key=lambda c: c.score))[1]
+
+
+def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found, Found, Candidate | None]:
+    """Scale the disturbances, then search library and forms under every gate.
+
+    Parameters
+    ----------
+    evidence : the runs under a first guess of the scales
+    null : fit without effects
+    reasons : is added to
+
+    Returns
+    -------
+    The start without effects, what was found, and a form alone that cannot be told from the first effect.
+    """
+    if np.any(np.abs(null.session) > FAR_PULL * evidence.session_sigma):
+        evidence = rederived(evidence, null, library=True)
+        null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+    explored = search(Found(evidence=evidence, base=null), gated=False)
+    splines = spline_slopes(explored.evidence, explored.base)
+    scales = scale_disturbances(explored, splines)
+    evidence = rescaled(evidence, scales)
+    explored = replace(
+        explored, rounds=tuple(replace(r, evidence=rescaled(r.evidence, scales)) for r in explored.rounds)
+    )
+    null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+    start = Found(evidence=evidence, base=null)
+    found = search(start, gated=True, explored=explored)
+    if not found.rounds:
+        found = replace(retuned(start, reasons), tried=found.tried)
+    found, near = forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
+    return start, found, near

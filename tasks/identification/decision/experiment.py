@@ -1,0 +1,74 @@
+"""The next experiment: which planned run would tell two fitted explanations apart best."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tasks.campaign.planned_runs import EXPERIMENTS, planned_run
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.evidence import run_evidence
+from tasks.identification.inference.fit import Fit
+from tasks.identification.inference.forward import predict, run_model
+from tasks.identification.inference.hypothesis import compose
+from tasks.identification.inference.noise import whiten
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.parameters import Vehicle
+
+TELLING = 1.0
+"""Expected D2 below which a run says nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A planned run and what it is expected to say.
+
+    Parameters
+    ----------
+    between : the two explanations
+    plan : in words
+    expected_d2 : squared distance between their predictions, nuisances and noise taken out; each unit is half a
+        unit of log likelihood, so 20 from one run settles it
+    """
+
+    between: tuple[str, str]
+    plan: str
+    expected_d2: float
+
+
+def next_experiment(
+    evidence: Evidence, first: Fit, second: Fit, vehicle: Vehicle, surface: SurfaceParameters
+) -> Experiment | None:
+    """The planned run with the largest nuisance-marginalised D2 between two fits; None if none tells them apart.
+
+    Parameters
+    ----------
+    evidence : whose noise and priors hold
+    first, second : fitted explanations
+    vehicle, surface : the model
+    """
+    rho, sigma = evidence.train[0].rho, evidence.train[0].sigma
+    best = ("", -1.0)
+    for plan, drive in EXPERIMENTS:
+        theta, slots = compose(first.parts, first.values, first.session)
+        other, other_slots = compose(second.parts, second.values, second.session)
+        model = run_model(planned_run(drive, plan), vehicle, surface)
+        ridden = predict(model, theta, slots=slots)
+        # planned again with the speed it will have, so that the run ends where the car is slow
+        model = run_model(replace(model.run, response=ridden), vehicle, surface)
+        expected = run_evidence(
+            model, rho, sigma, theta, (), evidence.tolerances, evidence.disturbance, slots
+        )
+        change = whiten(
+            predict(model, other, slots=other_slots) - predict(model, theta, slots=slots), rho, sigma
+        )
+        q = expected.project(change)
+        session = expected.session.T @ expected.session - expected.session_q.T @ expected.session_q
+        session += np.diag(1.0 / np.square(evidence.session_sigma))
+        shared = expected.session.T @ change - expected.session_q.T @ q
+        distance = float(change @ change - q @ q - shared @ np.linalg.solve(session, shared))
+        if distance > best[1]:
+            best = (plan, distance)
+    if best[1] < TELLING:
+        return None
+    names = (first.parts[-1].name, second.parts[-1].name if second.parts else "the model as it stands")
+    return Experiment(between=names, plan=best[0], expected_d2=best[1])

@@ -1,0 +1,236 @@
+"""What is left over: port by variable splines, and the simple shape that a spline has."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.errors import InputError
+from tasks.identification.decision.screening import inflation
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.evidence import RunEvidence
+from tasks.identification.inference.fit import Fit
+from tasks.identification.inference.forward import predict
+from tasks.identification.inference.hypothesis import Hypothesis, compose
+from tasks.identification.inference.noise import whiten
+from tasks.vehicle.effects.forms import SHAPES, Form, form_name
+from tasks.vehicle.effects.library import ALL_PARAMETERS
+from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
+from tasks.vehicle.effects.slots import Slot
+
+KNOTS = 5
+PORT_STEP = {
+    "longitudinal_force": 30.0,
+    "brake_torque": 0.02,
+    "friction": 0.02,
+    "pitch_moment": 60.0,
+    "suspension_force": 40.0,
+}
+"""Size of a form that matters at each port, for derivatives [unit of the port]."""
+SCANNED = {
+    "longitudinal_force": ("speed", "deceleration", "pressure"),
+    "brake_torque": ("speed", "pressure", "disc_temperature", "pressure_rate"),
+    "friction": ("speed", "load_ratio", "pressure_rate"),
+    "pitch_moment": ("speed", "deceleration", "pressure_rate"),
+    "suspension_force": ("suspension_travel", "suspension_speed"),
+}
+"""Variables that each port is scanned over."""
+RANGE = {
+    "speed": (2.0, 34.0), "deceleration": (0.0, 9.0), "pressure": (0.0, 3.6), "disc_temperature": (0.0, 400.0),
+    "pressure_rate": (-12.0, 12.0), "load_ratio": (0.4, 1.6), "suspension_travel": (-0.06, 0.06),
+    "suspension_speed": (-0.6, 0.6),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leftover:
+    """A spline of one variable at one port, fitted linearly to what a fit leaves.
+
+    Parameters
+    ----------
+    port, variable : where
+    grid : float64 [K] knots [unit of the variable]
+    values : float64 [K] [unit of the port]
+    covariance : float64 [K, K]
+    gain : log likelihood gained, divided by the inflation
+    score : gain less K log N
+    """
+
+    port: str
+    variable: str
+    grid: NDArray[np.float64]
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    gain: float
+    score: float
+
+
+KEYS = tuple((port, variable) for port, variables in SCANNED.items() for variable in variables)
+RIDGE = np.repeat([(20.0 * PORT_STEP[port]) ** -2 for port, _ in KEYS], KNOTS)
+"""Precision of the broad priors of all knots, in the order of `KEYS`."""
+
+
+def scan(
+    evidence: Evidence, at: Fit, splines: tuple[NDArray[np.float64], ...] | None = None
+) -> list[Leftover]:
+    """Fit a spline at every scanned port and variable to the residuals of ``at``; best first.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit whose residuals are scanned
+    splines : of `spline_slopes` where they are known
+    """
+    size, n_session = KNOTS * len(KEYS), len(evidence.session_sigma)
+    gram, cross, right = np.zeros((size, size)), np.zeros((size, n_session)), np.zeros(size)
+    session = np.diag(1.0 / np.square(evidence.session_sigma))
+    pull = -at.session / np.square(evidence.session_sigma)
+    slopes = spline_slopes(evidence, at) if splines is None else splines
+    for run, r, columns in zip(evidence.train, at.residuals, slopes, strict=True):
+        q, qr = run.project(columns), run.project(r)
+        gram += columns.T @ columns - q.T @ q
+        cross += columns.T @ run.session - q.T @ run.session_q
+        session += run.session.T @ run.session - run.session_q.T @ run.session_q
+        right += columns.T @ r - q.T @ qr
+        pull = pull + run.session.T @ r - run.session_q.T @ qr
+    inverse = np.linalg.inv(session)
+    gram -= cross @ inverse @ cross.T
+    right = right - cross @ inverse @ pull
+    level = inflation(evidence, at, None)
+    found = []
+    for i, (port, variable) in enumerate(KEYS):
+        block = slice(KNOTS * i, KNOTS * (i + 1))
+        covariance = np.asarray(np.linalg.inv(gram[block, block] + np.diag(RIDGE[block])), dtype=np.float64)
+        values = covariance @ right[block]
+        gain = 0.5 * float(values @ right[block]) / level
+        found.append(
+            Leftover(
+                port=port,
+                variable=variable,
+                grid=np.linspace(*RANGE[variable], KNOTS),
+                values=values,
+                covariance=level * covariance,
+                gain=gain,
+                score=gain - KNOTS * float(np.log(evidence.samples)),
+            )
+        )
+    return sorted(found, key=lambda leftover: -leftover.score)
+
+
+def spline_slopes(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], ...]:
+    """Whitened derivatives of every training run by all knots of all scanned splines, float64 [M, K] each.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit about which
+    """
+    theta, slots = compose(at.parts, at.values, at.session)
+    return tuple(_hats(run, theta, slots) for run in evidence.train)
+
+
+def _hats(run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...]) -> NDArray[np.float64]:
+    y = predict(run.model, theta, slots=slots, substeps=run.substeps)
+    columns = []
+    for port, variable in KEYS:
+        low, high = RANGE[variable]
+        for k in range(KNOTS):
+            hat = np.zeros(KNOTS)
+            hat[k] = PORT_STEP[port]
+            extra = Slot(
+                port=port, variable=variable, origin=low, spacing=(high - low) / (KNOTS - 1), values=hat
+            )
+            moved = predict(run.model, theta, slots=(*slots, extra), substeps=run.substeps)
+            columns.append((moved - y) / PORT_STEP[port])
+    return whiten(np.stack(columns, axis=-1), run.rho, run.sigma)
+
+
+def form_hypotheses(leftover: Leftover, samples: int, count: int = 2) -> list[Hypothesis]:
+    """The grammar's shapes that fit a spline best, as hypotheses for the simulation.
+
+    Parameters
+    ----------
+    leftover : the spline
+    samples : N of the score's penalty
+    count : how many shapes to return
+    """
+    scale = float(np.max(np.abs(leftover.grid)))
+    precision = np.linalg.inv(leftover.covariance)
+    ranked = []
+    for name, shape in SHAPES.items():
+        basis = shape(leftover.grid / scale)
+        normal = basis.T @ precision @ basis
+        coefficients = np.linalg.solve(normal, basis.T @ precision @ leftover.values)
+        miss = leftover.values - basis @ coefficients
+        cost = 0.5 * float(miss @ precision @ miss) + basis.shape[1] * np.log(samples)
+        ranked.append((cost, name, np.asarray(coefficients, dtype=np.float64)))
+    ranked.sort(key=lambda entry: entry[0])
+    return [_form(leftover, name, coefficients, scale) for _, name, coefficients in ranked[:count]]
+
+
+def curve(form: Hypothesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A form at its first values: its variable and its value at the port, float64 [TABLE] each.
+
+    Parameters
+    ----------
+    form : of `form_hypotheses`
+    """
+    (slot,) = form.build(form.start)[1]
+    return slot.origin + slot.spacing * np.arange(len(slot.values), dtype=np.float64), slot.values
+
+
+def form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: float) -> Form:
+    """A form that was found, held constant beyond the range of its variable that the runs reached.
+
+    Parameters
+    ----------
+    name : of its hypothesis
+    coefficients : a, or a and b [unit of the port]
+    low, high : what the runs reached [unit of the variable]; the scanned range bounds it
+
+    Raises
+    ------
+    InputError
+        If no hypothesis of the grammar has that name.
+    """
+    for port, variables in SCANNED.items():
+        for variable in variables:
+            first, last = RANGE[variable]
+            scale = max(abs(first), abs(last))
+            for shape in SHAPES:
+                if form_name(port, variable, shape, scale) == name:
+                    return Form(
+                        port=port, variable=variable, shape=shape, coefficients=coefficients, scale=scale,
+                        low=max(first, low), high=min(last, high),
+                    )  # fmt: skip
+    raise InputError(f"form {name}: no port, variable and shape of the grammar have that name")
+
+
+def is_constant(form: Hypothesis) -> bool:
+    """Whether a form does not depend on its variable.
+
+    Parameters
+    ----------
+    form : of `form_hypotheses`
+    """
+    return bool(np.ptp(curve(form)[1]) == 0.0)
+
+
+def _form(leftover: Leftover, name: str, start: NDArray[np.float64], scale: float) -> Hypothesis:
+    port, variable = leftover.port, leftover.variable
+    low, high = RANGE[variable]
+
+    def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+        form = Form(
+            port=port, variable=variable, shape=name, coefficients=tuple(values.tolist()), scale=scale, low=low,
+            high=high,
+        )  # fmt: skip
+        return np.zeros(len(ALL_PARAMETERS)), (form.slot,)
+
+    k = len(start)
+    step = np.full(k, PORT_STEP[port])
+    return Hypothesis(
+        name=form_name(port, variable, name, scale), effect_class="form", port=port, variable=variable,
+        names=("a", "b")[:k], units=(PORT_UNITS[PORTS.index(port)],) * k, lower=-100.0 * step, upper=100.0 * step,
+        step=step, start=start.copy(), build=build,
+    )  # fmt: skip

@@ -1,0 +1,77 @@
+"""Error on runs that no fit has seen: as delivered, re-tuned without any new effect, and with the effects."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
+from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
+from tasks.identification.decision.answer import ChannelError
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.fit import Fit, fit
+from tasks.identification.inference.forward import predict
+from tasks.identification.inference.hypothesis import compose
+from tasks.vehicle.effects.library import ALL_PARAMETERS
+
+RETUNE_WIDENING = 10.0
+"""Factor on the session's tolerances when a model is re-tuned without any new effect."""
+ERROR_DRAWS = 1000
+
+
+def held_out_error(
+    evidence: Evidence, null: Fit, base: Fit
+) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
+    """RMSE on held-out runs under the frozen, the re-tuned and the grown model.
+
+    Parameters
+    ----------
+    evidence : the runs
+    null : fit without effects, where re-tuning starts
+    base : fit with the accepted effects
+
+    Returns
+    -------
+    Errors by channel; and of stopping distance and peak pitch, over the runs that brake.
+    """
+    retuned = fit(
+        evidence.train, (), RETUNE_WIDENING * evidence.session_sigma, session=null.session, iterations=8
+    )
+    models = (
+        (np.zeros(len(ALL_PARAMETERS)), ()),
+        compose((), np.empty(0), retuned.session),
+        compose(base.parts, base.values, base.session),
+    )
+    names, square, braked, manoeuvres = [], [], [], []
+    for run in evidence.held_out:
+        model = run.model
+        y = np.array([predict(model, theta, slots=slots) for theta, slots in models])
+        names.append(model.run.name)
+        square.append(np.mean((model.measured - y) ** 2, axis=1))
+        pressure = model.run.pressure[: model.samples]
+        errors = manoeuvre_errors(model.measured, y, pressure, model.run.interval)
+        if errors is not None:
+            braked.append(model.run.name)
+            manoeuvres.append(errors**2)
+    channels = _errors(np.array(square), names, dict(zip(CHANNELS, CHANNEL_UNITS, strict=True)))
+    return channels, _errors(np.array(manoeuvres), braked, MANOEUVRE_UNITS) if braked else {}
+
+
+def _errors(
+    square: NDArray[np.float64], runs: list[str], units: Mapping[str, str]
+) -> dict[str, ChannelError]:
+    """Root mean squares with bootstrap intervals from mean squares by run and model, float64 [R, 3, C]."""
+    draws = np.random.Generator(np.random.Philox(0)).integers(0, len(runs), (ERROR_DRAWS, len(runs)))
+    errors = {}
+    for c, (name, unit) in enumerate(units.items()):
+        frozen, tuned, after = np.sqrt(square[:, :, c].mean(axis=0))
+        resampled = np.sqrt(square[draws, :, c].mean(axis=1))
+        low, high = np.percentile(resampled[:, 2], (2.5, 97.5))
+        change = np.percentile(resampled[:, 2] - resampled[:, 0], (2.5, 97.5))
+        errors[name] = ChannelError(
+            frozen=float(frozen), retuned=float(tuned), after=float(after), ci_low=float(low), ci_high=float(high),
+            change_low=float(change[0]), change_high=float(change[1]),
+            wins=int(np.sum(square[:, 2, c] < square[:, 0, c])),
+            worst_run=runs[int(np.argmax(square[:, 2, c]))], unit=unit,
+        )  # fmt: skip
+    return errors

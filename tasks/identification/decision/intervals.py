@@ -1,0 +1,163 @@
+"""95 % intervals of a hypothesis' parameters, within their bounds and at one with the likelihood."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.attribution import Candidate
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.fit import Fit, fit
+from tasks.identification.inference.linearisation import rederived
+
+SECANTS = 5
+"""Points of the profile that are tried on each side of an estimate."""
+CLOSE = 0.05
+"""Relative error of the limit, as a root of the deviance, at which the profile is followed no further."""
+
+Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def refitted(
+    evidence: Evidence, base: Fit, candidates: Sequence[Candidate]
+) -> tuple[Evidence, Fit, list[Candidate]]:
+    """What is named, fitted with derivatives that are taken at it.
+
+    Derivatives of the nuisances that were taken elsewhere take too little from those of an effect: on a road feature
+    that is reached a moment later most of all. The search can live with that; the information that they promise is up
+    to three times too large, and estimates stop short.
+
+    Parameters
+    ----------
+    evidence : the runs
+    base : fit of all that is named
+    candidates : each named effect as it was judged, beyond all others
+
+    Returns
+    -------
+    The runs with derivatives at ``base``, the fits again.
+    """
+    here = rederived(evidence, base, library=False)
+
+    def again(fitted: Fit) -> Fit:
+        return fit(
+            here.train,
+            fitted.parts,
+            here.session_sigma,
+            values=fitted.values,
+            session=fitted.session,
+            iterations=8,
+        )
+
+    return here, again(base), [replace(c, fitted=again(c.fitted)) for c in candidates]
+
+
+def quantile(candidate: Candidate) -> float:
+    """Student's t with as many runs as inform the parameter, less one: the runs' scatter is itself estimated."""
+    return float(student.ppf(0.975, max(candidate.informed - 1, 1)))
+
+
+def curvature_interval(candidate: Candidate) -> Bounds:
+    """Intervals from the curvature at the estimate, widened by the runs' disagreement, cut at the bounds.
+
+    Parameters
+    ----------
+    candidate : refined and judged
+
+    Returns
+    -------
+    Lower and upper ends, float64 [K] each.
+    """
+    h = candidate.hypothesis
+    k = len(h.names)
+    values = candidate.fitted.values[-k:]
+    variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation
+    # the session's own doubt about the same number belongs to the car's
+    doubt = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
+    reach = np.sqrt(variance + np.square(doubt)) * quantile(candidate)
+    return np.clip(values - reach, h.lower, h.upper), np.clip(values + reach, h.lower, h.upper)
+
+
+def profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
+    """Intervals of an effect of several parameters from its profile likelihood.
+
+    A value belongs to the interval where the best fit that holds it is worse by less than t^2 times the inflation
+    (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter matters only together with another,
+    curvature at the estimate says nothing about 'no effect'; the profile says there what the score says: its deviance
+    at 0 is twice the gain.
+
+    Parameters
+    ----------
+    candidate : refined and judged; of one parameter, the curvature is taken
+    evidence : the runs
+
+    Returns
+    -------
+    Lower and upper ends, float64 [K] each.
+    """
+    low, high = curvature_interval(candidate)
+    k = len(candidate.hypothesis.names)
+    if k == 1:
+        return low, high
+    fitted = candidate.fitted
+    centre = fit(
+        evidence.train, fitted.parts, evidence.session_sigma, values=fitted.values, session=fitted.session,
+        iterations=4,
+    )  # fmt: skip
+    for j in range(k):
+        low[j] = _limit(candidate, centre, evidence, j, low[j], candidate.hypothesis.lower[j])
+        high[j] = _limit(candidate, centre, evidence, j, high[j], candidate.hypothesis.upper[j])
+    values = fitted.values[-k:]
+    return np.minimum(low, values), np.maximum(high, values)
+
+
+def _limit(
+    candidate: Candidate, centre: Fit, evidence: Evidence, place: int, guess: float, bound: float
+) -> float:
+    """Where the profile's root deviance reaches the quantile between the estimate and a bound, by false position."""
+    k = len(candidate.hypothesis.names)
+    wanted = quantile(candidate)
+    inside, outside = float(centre.values[place - k]), float(bound)
+    if inside == outside:
+        return outside
+
+    def root(x: float) -> float:
+        rise = _pinned(centre, evidence, place - k, x).objective - centre.objective
+        return float(np.sqrt(max(rise, 0.0) / candidate.inflation))
+
+    at_inside, at_outside = 0.0, root(outside)
+    if at_outside <= wanted:
+        return outside
+    x = guess if min(inside, outside) < guess < max(inside, outside) else 0.5 * (inside + outside)
+    for _ in range(SECANTS):
+        here = root(x)
+        if abs(here - wanted) < CLOSE * wanted:
+            return x
+        if here < wanted:
+            inside, at_inside = x, here
+        else:
+            outside, at_outside = x, here
+        # away from both ends, so that a bent profile cannot hold one of them for ever
+        share = np.clip((wanted - at_inside) / (at_outside - at_inside), 0.1, 0.9)
+        x = inside + float(share) * (outside - inside)
+    return x
+
+
+def _pinned(centre: Fit, evidence: Evidence, place: int, value: float) -> Fit:
+    """The best fit that holds one parameter of the last hypothesis (``place`` counts from the end)."""
+    last = centre.parts[-1]
+    lower, upper = last.lower.copy(), last.upper.copy()
+    lower[place] = upper[place] = value
+    moved = value - centre.values[place]
+    start = centre.values + moved * centre.covariance[:, place] / max(centre.covariance[place, place], 1e-300)
+    start[place] = value
+    k = len(last.names)
+    start[-k:] = np.clip(start[-k:], lower, upper)
+    pinned = (*centre.parts[:-1], replace(last, lower=lower, upper=upper))
+    return fit(
+        evidence.train, pinned, evidence.session_sigma, values=start, session=centre.session,
+        iterations=4,
+    )  # fmt: skip

@@ -1,0 +1,115 @@
+"""What cannot be told from what was named, and how large an effect would have to be to be named at all."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.attribution import (  # fmt: skip
+    ACCEPT_SCORE,
+    RIVAL_SPAN,
+    WIN_SHARE,
+    Candidate,
+    judge,
+    ladder,
+    nested,
+    win_share,
+    without,
+)
+from tasks.identification.decision.screening import inflation
+from tasks.identification.decision.search import RETUNE_PULL, Round
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.fit import Fit, misfit_by_run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """An accepted effect beside all else that was tried in its place.
+
+    Parameters
+    ----------
+    own : the effect, beyond all other accepted ones
+    share : bootstrap win share
+    others : what was tried in its place, with win shares, best first
+    near : those of them that cannot be told from it
+    """
+
+    own: Candidate
+    share: float
+    others: tuple[tuple[Candidate, float], ...]
+    near: tuple[tuple[Candidate, float], ...]
+
+
+def compare(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Compared]:
+    """Hold every accepted effect against its alternatives, all other accepted ones present.
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at ``base``
+    base : fit of all accepted effects
+    rounds : how they were found
+    """
+    compared = []
+    for i, found in enumerate(rounds):
+        rest, own, tried = found.base, found.accepted, found.tried
+        if i + 1 < len(rounds):
+            # what was accepted later may change how this effect compares with its rivals
+            rest = without(base, i, evidence)
+            at = sum(len(p.names) for p in base.parts[:i])
+            part = replace(base.parts[i], start=base.values[at : at + len(base.parts[i].names)])
+            own = judge(evidence, rest, misfit_by_run(evidence.held_out, rest), part)
+            tried = tuple(ladder(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
+        others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
+        share = win_share([own, *others], rest)
+        shares = [win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
+        near = tuple(
+            (c, wins)
+            for c, wins in zip(others, shares, strict=True)
+            if c.score > 0.0
+            and _close(own, share, c, wins)
+            and not nested(own.hypothesis, c.hypothesis)
+            and _credible(c, own, evidence)
+        )
+        compared.append(
+            Compared(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
+        )
+    return compared
+
+
+def _close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
+    return other.score > own.score - RIVAL_SPAN or (share < WIN_SHARE and wins > 0.5 * (1.0 - WIN_SHARE))
+
+
+def _credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
+    """An explanation that still bends the session beyond belief is none, beside one that does not."""
+    bent, straight = (float(np.max(np.abs(c.fitted.session) / evidence.session_sigma)) for c in (other, own))
+    return bent <= RETUNE_PULL or straight > RETUNE_PULL
+
+
+def detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
+    """Smallest first parameter whose linear gain would pass the score gate, at the level of the null's inflation.
+
+    Infinite where the library's bounds end before.
+
+    Parameters
+    ----------
+    evidence : the runs
+    base : fit without effects
+    """
+    level = inflation(evidence, base, None)
+    library = np.zeros((len(evidence.effects),) * 2)
+    cross = np.zeros((len(evidence.effects), len(SESSION)))
+    session = np.diag(1.0 / np.square(evidence.session_sigma))
+    for run in evidence.train:
+        q = run.library_q
+        library += run.library.T @ run.library - q.T @ q
+        cross += run.library.T @ run.session - q.T @ run.session_q
+        session += run.session.T @ run.session - run.session_q.T @ run.session_q
+    information = np.diag(library) - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(session), cross)
+    sizes = {}
+    for effect, known in zip(evidence.effects, information, strict=True):
+        needed = 2.0 * level * (ACCEPT_SCORE + len(effect.parameters) * np.log(evidence.samples))
+        first = effect.parameters[0]
+        size = float(np.sqrt(needed / known)) if known > 0 else np.inf
+        sizes[effect.name] = size if size <= max(first.upper, -first.lower) else np.inf
+    return sizes

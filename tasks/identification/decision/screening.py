@@ -1,0 +1,109 @@
+"""The library held against residuals: gain and estimate of every effect, linearly."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.evidence import second_values
+from tasks.identification.inference.fit import Fit
+
+ALIKE = 0.85
+"""Cosine between two library directions, nuisances taken out, from which both are refined if one is good."""
+
+
+def screen(
+    evidence: Evidence, at: Fit
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Gain and estimate of every library effect, linearly, beyond the accepted ones.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit that holds the accepted effects
+
+    Returns
+    -------
+    gains float64 [E], estimates float64 [E] of the first parameter, and float64 [E] the value of the second at which
+    the gain is largest (nan where its first value is, or where there is none)
+    """
+    effects = evidence.effects
+    accepted = [j for j, e in enumerate(effects) if e.name in {p.name for p in at.parts}]
+    tried = [(j, np.nan) for j in range(len(effects))] + second_values(effects)
+    library, n_session = len(tried), len(evidence.session_sigma)
+    gram, right = np.zeros((library + n_session,) * 2), np.zeros(library + n_session)
+    several = bool(second_values(effects))
+    for run, r in zip(evidence.train, at.residuals, strict=True):
+        extra, extra_q = ((run.others,), (run.others_q,)) if several else ((), ())
+        b = np.column_stack((run.library, *extra, run.session))
+        q = np.column_stack((run.library_q, *extra_q, run.session_q))
+        gram += b.T @ b - q.T @ q
+        right += b.T @ r - q.T @ run.project(r)
+    others = [*accepted, *range(library, library + n_session)]
+    precision = np.concatenate((np.zeros(len(accepted)), 1.0 / np.square(evidence.session_sigma)))
+    right[library:] -= at.session / np.square(evidence.session_sigma)
+    inner = np.linalg.inv(
+        gram[np.ix_(others, others)] + np.diag(precision) + 1e-9 * np.diag(np.diag(gram)[others])
+    )
+    gains, estimates, seconds = np.zeros(len(effects)), np.zeros(len(effects)), np.full(len(effects), np.nan)
+    for i, (j, second) in enumerate(tried):
+        if j in accepted:
+            continue
+        cross = gram[i, others]
+        information = gram[i, i] - cross @ inner @ cross
+        if information <= 1e-6 * gram[i, i] or gram[i, i] <= 0.0:
+            continue
+        slope = right[i] - cross @ inner @ right[others]
+        first = effects[j].parameters[0]
+        value = min(max(slope / information, first.lower), first.upper)
+        gain = value * slope - 0.5 * information * value**2
+        if i == j or gain > gains[j]:
+            gains[j], estimates[j], seconds[j] = gain, value, second
+    return gains, estimates, seconds
+
+
+def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> float:
+    """How much the runs disagree beyond their noise about one direction and about the library's in general.
+
+    Under a right model every run's score z in any direction is standard normal. Q is the sum of z^2 over runs
+    (Cochran 1954, doi:10.2307/3001666); the null's level is the median over the library's directions, and the
+    direction's own Q counts beside it.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit whose residuals are looked at
+    own : float64 [R] z of the direction itself, or None
+    """
+    z = np.full((len(evidence.train), len(evidence.effects)), np.nan)
+    for i, (run, r) in enumerate(zip(evidence.train, at.residuals, strict=True)):
+        q, qr = run.library_q, run.project(r)
+        information = np.einsum("ij,ij->j", run.library, run.library) - np.einsum("ij,ij->j", q, q)
+        alive = information * np.array([e.parameters[0].step for e in evidence.effects]) ** 2 > 0.05
+        z[i, alive] = ((run.library.T @ r - q.T @ qr) / np.sqrt(np.maximum(information, 1e-30)))[alive]
+    count = np.sum(np.isfinite(z), axis=0)
+    mean_square = np.nansum(z**2, axis=0)[count >= 4] / count[count >= 4]
+    level = max(float(np.median(mean_square)), 1.0) if mean_square.size else 1.0
+    if own is None or len(own) < 3:
+        return level
+    return max(level, (float(np.sum(own**2)) + 6.0 * level) / (len(own) - 1 + 6.0))
+
+
+def look_alikes(evidence: Evidence, index: int) -> list[int]:
+    """Library effects that the runs can hardly tell from one of them, the most alike first.
+
+    Parameters
+    ----------
+    evidence : the runs
+    index : of the effect in the library
+    """
+    size, n_session = len(evidence.effects), len(evidence.session_sigma)
+    gram, cross = np.zeros((size, size)), np.zeros((size, n_session))
+    session = np.diag(1.0 / np.square(evidence.session_sigma))
+    for run in evidence.train:
+        gram += run.library.T @ run.library - run.library_q.T @ run.library_q
+        cross += run.library.T @ run.session - run.library_q.T @ run.session_q
+        session += run.session.T @ run.session - run.session_q.T @ run.session_q
+    gram = gram - cross @ np.linalg.solve(session, cross.T)
+    length = np.sqrt(np.maximum(np.diag(gram), 1e-30))
+    cosine = np.abs(gram[index]) / (length * length[index])
+    return [int(j) for j in np.argsort(-cosine, kind="stable") if j != index and cosine[j] > ALIKE]

@@ -1,0 +1,214 @@
+"""The search: what is added to the model, round by round, and where derivatives must be taken anew."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.attribution import (
+    ACCEPT_SCORE,
+    HELD_OUT_GAIN,
+    LARGE_GAIN,
+    REFINED,
+    RIVAL_SPAN,
+    Candidate,
+    assess,
+    judge,
+    ladder,
+    nested,
+)
+from tasks.identification.decision.forms import RIDGE
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.inference.fit import Fit, fall, fit, misfit_by_run
+from tasks.identification.inference.hypothesis import library_hypothesis
+from tasks.identification.inference.linearisation import fit_disturbance, rederived, whitened_residuals
+
+MAX_EFFECTS = 3
+RETUNE_PULL = 4.0
+"""Pull of a session nuisance, in prior sigmas, from which it is called a wrong number of the vehicle."""
+NEAR = 0.1
+"""Relative change of the parameters below which derivatives need not be taken anew once more."""
+EXPLORED = 3
+"""Candidates that are refined while only the disturbances are to be scaled: any that explains as much will do."""
+SETTLED = 2
+"""Candidates of a round that are settled, if their gain is large."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """One round of the search: what was tried on top of ``base`` and which candidate was accepted.
+
+    ``evidence`` has its derivatives at the accepted one.
+    """
+
+    base: Fit
+    tried: tuple[Candidate, ...]
+    accepted: Candidate
+    evidence: Evidence
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """State of the search.
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at ``base``
+    base : fit of what is accepted
+    rounds : how it came about
+    tried : candidates of the last round, none of which was accepted
+    """
+
+    evidence: Evidence
+    base: Fit
+    rounds: tuple[Round, ...] = ()
+    tried: tuple[Candidate, ...] = ()
+
+
+def settle(
+    evidence: Evidence, base: Fit, candidate: Candidate, *, gated: bool = True, known: Evidence | None = None
+) -> tuple[Evidence, Candidate]:
+    """Take derivatives anew at a candidate whose gain is large, refit it and judge it there.
+
+    Parameters
+    ----------
+    evidence : the runs as differentiated for ``base``
+    base : fit of what is accepted so far
+    candidate : judged with them
+    gated : judge it on held-out runs as well
+    known : derivatives that were taken at the candidate before
+
+    Returns
+    -------
+    The runs with derivatives that hold at the candidate, and the candidate.
+    """
+    if candidate.gain < LARGE_GAIN:
+        return evidence, candidate
+    here, fitted = evidence, candidate.fitted
+    for _ in range(2):
+        here = known or rederived(here, fitted, library=True)
+        known = None
+        again = fit(
+            here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
+        )  # fmt: skip
+        shift = np.abs(again.values - fitted.values) / np.maximum(np.abs(again.values), 1e-9)
+        fitted = again
+        if np.all(shift < NEAR):
+            break
+    base_held_out = misfit_by_run(evidence.held_out, base) if gated else None
+    return here, assess(here, base, base_held_out, candidate.hypothesis, fitted)
+
+
+def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
+    """Add library effects one by one, the best first.
+
+    Parameters
+    ----------
+    start : what is accepted already
+    gated : accept only what passes every gate; else whatever explains most, to learn what is left beside it
+    explored : an earlier search whose first effect, where it is met again, need not be looked for anew
+    """
+    state = start
+    met = frozenset(r.accepted.hypothesis.name for r in explored.rounds) if explored else frozenset()
+    for _ in range(MAX_EFFECTS):
+        count = REFINED if gated else EXPLORED
+        tried = ladder(state.evidence, state.base, count, gated=gated, also=met)
+        places: dict[str, Evidence] = {}
+        for i, candidate in enumerate(tried[:SETTLED] if gated else tried[:1]):
+            if candidate.score > max(ACCEPT_SCORE, 0.3 * tried[0].score):
+                near, known = candidate, None
+                if explored and candidate.gain >= LARGE_GAIN:
+                    near, known = _met_before(explored, candidate)
+                places[candidate.hypothesis.name], tried[i] = settle(
+                    state.evidence, state.base, near, gated=gated, known=known
+                )
+        tried.sort(key=lambda c: -c.score)
+        passing = [c for c in tried if (c.passes if gated else c.score > ACCEPT_SCORE)]
+        if not passing:
+            return replace(state, tried=tuple(tried))
+        best = passing[0]
+        simpler = [
+            c for c in passing if nested(c.hypothesis, best.hypothesis) and c.score > best.score - RIVAL_SPAN
+        ]
+        best = simpler[0] if simpler else best
+        here = places.get(best.hypothesis.name, state.evidence)
+        if gated and here is not state.evidence:
+            held_out = misfit_by_run(state.evidence.held_out, state.base)
+            tried = [
+                c if c.score < 0.3 * best.score or c.hypothesis.name in places
+                else judge(here, state.base, held_out, c.hypothesis)
+                for c in tried
+            ]  # fmt: skip
+        state = Found(
+            evidence=here,
+            base=best.fitted,
+            rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best, evidence=here)),
+        )
+    return state
+
+
+def _met_before(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
+    """The candidate at the values that an earlier search settled it at, and its derivatives there."""
+    k = len(candidate.hypothesis.names)
+    for earlier in explored.rounds:
+        known = earlier.accepted
+        if known.hypothesis.name == candidate.hypothesis.name:
+            values = np.concatenate((candidate.fitted.values[:-k], known.fitted.values[-k:]))
+            near = replace(
+                candidate, fitted=replace(candidate.fitted, values=values, session=known.fitted.session)
+            )
+            alone = len(known.fitted.values) == len(values) and known.gain >= LARGE_GAIN
+            return near, earlier.evidence if alone else None
+    return candidate, None
+
+
+def scale_disturbances(explored: Found, splines: tuple[NDArray[np.float64], ...]) -> Disturbance:
+    """Scales of the disturbances beside whatever explains the runs best.
+
+    A large effect that is not yet named would otherwise pass for a disturbance, which then hides it.
+
+    Parameters
+    ----------
+    explored : an ungated search under a first guess of the scales
+    splines : `spline_slopes` there
+    """
+    residuals = whitened_residuals(explored.evidence, explored.base)
+    here = explored.evidence
+    return fit_disturbance(
+        here.train, residuals, here.tolerances, here.effects, here.disturbance, splines, RIDGE
+    )
+
+
+def retuned(start: Found, reasons: list[str]) -> Found:
+    """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session.
+
+    Parameters
+    ----------
+    start : nothing accepted
+    reasons : is added to
+    """
+    evidence, null = start.evidence, start.base
+    pulls = np.abs(null.session / evidence.session_sigma)
+    judged = []
+    for place in np.flatnonzero(pulls > RETUNE_PULL):
+        reasons.append(f"session nuisance {SESSION[place]} is pulled by {pulls[place]:.1f} sigma")
+        effect = next(
+            e for e in evidence.effects if e.parameters[0].name == SESSION[place] and len(e.parameters) == 1
+        )
+        frozen = null.session.copy()
+        frozen[place] = 0.0
+        held_out = misfit_by_run(evidence.held_out, replace(null, session=frozen))
+        found = judge(evidence, null, held_out, library_hypothesis(effect, float(null.session[place])))
+        gained = fall(held_out, misfit_by_run(evidence.held_out, found.fitted))
+        judged.append(replace(found, held_out_gain=gained / found.inflation))
+    accepted = [c for c in judged if c.held_out_gain > HELD_OUT_GAIN and c.gain > 0.0]
+    if not accepted:
+        return start
+    best = max(accepted, key=lambda c: c.gain)
+    return replace(
+        start,
+        base=best.fitted,
+        rounds=(Round(base=null, tried=tuple(judged), accepted=best, evidence=evidence),),
+    )

@@ -1,0 +1,184 @@
+"""The decision: what is missing, how sure, and what it does to the error on runs that no fit has seen."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
+from tasks.identification.decision.answer import ChannelError, NamedEffect, Verdict, VerdictName, named_effect
+from tasks.identification.decision.attribution import RIVAL_SPAN, Candidate
+from tasks.identification.decision.correlation import residual_input_correlation
+from tasks.identification.decision.discovery import search_all
+from tasks.identification.decision.experiment import next_experiment
+from tasks.identification.decision.held_out import held_out_error
+from tasks.identification.decision.intervals import curvature_interval, profile_interval, refitted
+from tasks.identification.decision.rivals import Compared, compare, detectable
+from tasks.identification.decision.search import Found
+from tasks.identification.inference.fit import Fit, fit
+from tasks.identification.inference.hypothesis import compose
+from tasks.identification.inference.linearisation import prepare
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.parameters import Vehicle
+
+WORSE_LIMIT = 1.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """A verdict with what it stands on.
+
+    Parameters
+    ----------
+    verdict : the answer
+    start : the model as it stands, with the runs differentiated about it
+    end : the grown model, with the runs differentiated about it; ``start`` where nothing is named
+    compared : every named effect beside its alternatives
+    """
+
+    verdict: Verdict
+    start: Found
+    end: Found
+    compared: tuple[Compared, ...]
+
+
+def attribute(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    effects: tuple[Effect, ...],
+    *,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Trace:
+    """Trace the residual of a campaign to what the model lacks.
+
+    Parameters
+    ----------
+    campaign : measured runs with their split
+    vehicle, surface : the model that is judged
+    effects : the library of candidates
+    progress : called with the name of each stage as it begins
+
+    Returns
+    -------
+    The verdict and what it stands on; nothing in it has been fitted to a held-out run.
+    """
+    progress("derivatives")
+    evidence = prepare(campaign, vehicle, surface, tuple(e for e in effects if not _fixed(e, vehicle)))
+    reasons: list[str] = []
+    progress("search")
+    null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
+    start, found, near_form = search_all(evidence, null, reasons)
+    progress("rivals")
+    compared = compare(found.evidence, found.base, found.rounds)
+    progress("held-out error")
+    error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
+    tried = list(found.tried)
+    while compared and (worse := _worse(error)):
+        # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
+        reasons.append(
+            f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
+            " held-out runs worse than the frozen model: not named"
+        )
+        last, near_form = found.rounds[-1], None
+        tried = [last.accepted, *tried]
+        found = replace(
+            start, base=last.base, rounds=found.rounds[:-1],
+            evidence=found.rounds[-2].evidence if found.rounds[1:] else start.evidence,
+        )  # fmt: skip
+        compared = compare(found.evidence, found.base, found.rounds)
+        error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
+    progress("intervals")
+    if compared:
+        here, settled, again = refitted(found.evidence, found.base, [c.own for c in compared])
+        found = replace(found, evidence=here, base=settled)
+        compared = [replace(c, own=own) for c, own in zip(compared, again, strict=True)]
+        error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
+    named = [named_effect(c.own, c.share, profile_interval(c.own, found.evidence)) for c in compared]
+    near = [
+        (c.own.hypothesis.name, named_effect(o, wins, profile_interval(o, found.evidence)))
+        for c in compared
+        for o, wins in c.near
+    ]
+    if near_form is not None:
+        near.append(
+            (named[0].name, named_effect(near_form, 0.0, profile_interval(near_form, start.evidence)))
+        )
+    kind = _kind(named, near)
+    if kind == "SET":
+        reasons.append(
+            f"{len(near)} other explanation(s) lie within {RIVAL_SPAN:g} units or win too many resamples"
+        )
+    if not named and not reasons:
+        reasons.append("no candidate passes the score, held-out and bound gates together")
+    present = [name for name, value in vehicle.effects.items() if value] + [f.name for f in vehicle.forms]
+    if present:
+        reasons.append(f"{vehicle.name} already has {', '.join(present)}: what is named comes on top of that")
+    experiment = None
+    if compared:
+        pair = _to_tell_apart(compared, near_form, start)
+        experiment = next_experiment(start.evidence, *pair, vehicle, surface)
+    theta, slots = compose(found.base.parts, found.base.values, np.zeros(len(SESSION)))
+    grown = compose(found.base.parts, found.base.values, found.base.session)
+    sigma, lead = evidence.session_sigma, evidence.train[0]
+    pulls = zip(SESSION, start.base.session / sigma, found.base.session / sigma, strict=True)
+    verdict = Verdict(
+        verdict=kind,
+        effects=tuple(named),
+        rivals=tuple(near),
+        tried=tuple(named_effect(c, 0.0, curvature_interval(c)) for c in tried[:6]),
+        error=error,
+        manoeuvre_error=manoeuvres,
+        correlation=residual_input_correlation(start.evidence.held_out, *grown),
+        session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
+        noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
+        disturbance=start.evidence.disturbance,
+        detectable=detectable(start.evidence, start.base),
+        campaign=campaign.name,
+        content_hash=campaign.content_hash,
+        split_hash=campaign.split_hash,
+        theta=theta,
+        slots=slots,
+        experiment=experiment,
+        torn=evidence.torn,
+        reasons=tuple(reasons),
+    )
+    return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
+
+
+def _worse(error: Mapping[str, ChannelError]) -> list[str]:
+    return [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
+
+
+def _fixed(effect: Effect, vehicle: Vehicle) -> bool:
+    """Whether the vehicle has an effect of several parameters already: those cannot be found as a change of it."""
+    return len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
+
+
+def _to_tell_apart(
+    compared: Sequence[Compared], near_form: Candidate | None, start: Found
+) -> tuple[Fit, Fit]:
+    """The two explanations to tell apart next: rivals first, else the best of the others, else the plain model."""
+    first = compared[0].own.fitted
+    if near_form is not None:
+        return first, near_form.fitted
+    near = [(c.own, other) for c in compared for other, _ in c.near]
+    others = [(compared[0].own, other) for other, _ in compared[0].others]
+    if not (near or others):
+        return first, start.base
+    own, other = max(near or others, key=lambda pair: pair[1].score)
+    return own.fitted, other.fitted
+
+
+def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
+    if not named:
+        return "NOTHING"
+    classes = {effect.effect_class for effect in named}
+    if "form" in classes:
+        return "UNKNOWN_FORM"
+    if near:
+        return "SET"
+    if "effect" in classes:
+        return "FOUND"
+    return "RETUNE" if "retune" in classes else "SENSOR"

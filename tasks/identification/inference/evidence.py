@@ -1,0 +1,256 @@
+"""One run as evidence: derivatives, nuisances and smooth disturbances, marginalised linearly.
+
+residual = A theta + S session + J d + noise, with d the run's own offsets and disturbances under a Gaussian
+prior. Integrating d out leaves inner products x' L y with L = I - J (J'J + P)^-1 J', one small Gram matrix a
+run, so that screening, bootstrap and leave-one-run-out are sums of small matrices (Woodbury, Schur).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from tasks.campaign.campaign import CHANNELS, SESSION, Tolerances
+from tasks.identification.inference.disturbance import (
+    DISTURBED,
+    KNOT_SPACING,
+    N_OFFSETS,
+    Disturbance,
+    prior_precision,
+)
+from tasks.identification.inference.forward import (
+    COARSE_SUBSTEPS,
+    SUBSTEPS,
+    RunModel,
+    instruments,
+    roll,
+    starting_speed,
+)
+from tasks.identification.inference.noise import whiten
+from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
+from tasks.vehicle.effects.slots import Slot
+
+SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
+BROKEN = 1e4
+"""Whitened residual of a trial that the integration does not survive: no fit goes there."""
+STEADY = 20.0
+"""Misfit by the longer step below which derivatives are taken with it."""
+SECOND_SHARES = (0.3, 0.6)
+"""Where in its range an effect's second parameter is tried by the screen, besides its first value."""
+KNOT_STEP = (30.0, 0.01, 30.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunEvidence:
+    """Whitened derivatives of one run about a base point.
+
+    Parameters
+    ----------
+    model : the run
+    rho, sigma : noise of its channels
+    nuisance : float64 [M, D] derivatives by the run's offsets and disturbance knots
+    knots : number of knots at each disturbed port
+    information : float64 [D, D] nuisance' nuisance
+    session : float64 [M, 7] derivatives by the session's nuisances
+    library : float64 [M, E] derivatives by the first parameter of every library effect
+    others : float64 [M, X] the same with the second parameter at `second_values`
+    factor : Cholesky factor (lower) of information + prior precision
+    session_q : float64 [D, 7] factor^-1 nuisance' session
+    library_q, others_q : float64 [D, E], [D, X] factor^-1 nuisance' library, and others
+    substeps : integration steps between samples with which derivatives are taken
+    """
+
+    model: RunModel
+    rho: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    nuisance: NDArray[np.float64]
+    knots: tuple[int, ...]
+    information: NDArray[np.float64]
+    session: NDArray[np.float64]
+    library: NDArray[np.float64]
+    others: NDArray[np.float64]
+    factor: NDArray[np.float64]
+    session_q: NDArray[np.float64]
+    library_q: NDArray[np.float64]
+    others_q: NDArray[np.float64]
+    substeps: int
+
+    def residual(
+        self,
+        theta: NDArray[np.float64],
+        slots: tuple[Slot, ...] = (),
+        offsets: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Whitened measured-minus-model at ``theta`` (full vector), float64 [M].
+
+        With ``offsets`` (float64 [D]) the model is simulated with this run's own offsets and disturbances and
+        their linear part is put back: the same residual to first order, but right where the run is not linear
+        in them, as on a road feature that is reached a moment later.
+        """
+        if offsets is None:
+            out, _ = roll(self.model, theta, slots=slots)
+            if not np.isfinite(out).all():
+                return np.full(len(self.nuisance), BROKEN)
+            return whiten(self.model.measured - instruments(self.model, theta, out), self.rho, self.sigma)
+        moved = theta.copy()
+        moved[PARAMETER_INDEX["friction"]] += offsets[1]
+        at = N_OFFSETS
+        for port, count, spacing in zip(DISTURBED, self.knots, KNOT_SPACING, strict=True):
+            slots += (
+                Slot(
+                    port=port, variable="time", origin=0.0, spacing=spacing, values=offsets[at : at + count]
+                ),
+            )
+            at += count
+        out, _ = roll(
+            self.model, moved, slots=slots, initial_speed=starting_speed(self.model, theta) + offsets[0]
+        )
+        if not np.isfinite(out).all():
+            return np.full(len(self.nuisance), BROKEN)
+        y = instruments(self.model, moved, out)
+        y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
+        y[:, CHANNELS.index("pitch")] += offsets[3]
+        return whiten(self.model.measured - y, self.rho, self.sigma) + self.nuisance @ offsets
+
+    def offsets(self, projected: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Posterior mean of the run's offsets and disturbance knots given a residual's `project`, float64 [D]."""
+        return solve_triangular(self.factor, projected, lower=True, trans="T", check_finite=False)
+
+    def project(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """factor^-1 nuisance' x: what the nuisances can take from x."""
+        return solve_triangular(self.factor, self.nuisance.T @ x, lower=True, check_finite=False)
+
+
+def run_evidence(
+    model: RunModel,
+    rho: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    base: NDArray[np.float64],
+    effects: tuple[Effect, ...],
+    tolerances: Tolerances,
+    disturbance: Disturbance,
+    slots: tuple[Slot, ...] = (),
+) -> RunEvidence:
+    """Simulate a run and its derivatives.
+
+    Parameters
+    ----------
+    model : the run
+    rho, sigma : channel noise
+    base : float64 full parameter vector to differentiate at
+    effects : the library; may be empty for runs that only judge
+    tolerances : priors of the run's offsets
+    disturbance : prior of the disturbances
+    slots : forms that belong to the base point
+    """
+    substeps = SUBSTEPS
+    out, states = roll(model, base, slots=slots)
+    y = instruments(model, base, out)
+    coarse, coarse_states = roll(model, base, slots=slots, substeps=COARSE_SUBSTEPS)
+    coarse_y = instruments(model, base, coarse)
+    if np.sum(whiten(y - coarse_y, rho, sigma) ** 2) < STEADY:
+        substeps, out, states, y = COARSE_SUBSTEPS, coarse, coarse_states, coarse_y
+
+    def slope(
+        theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
+    ) -> NDArray[np.float64]:
+        moved, _ = roll(model, theta, slots=(*slots, *extra), substeps=substeps, **options)
+        return (instruments(model, theta, moved) - y) / step
+
+    columns = [
+        slope(base, 0.02, initial_speed=starting_speed(model, base) + 0.02),
+        slope(_moved(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
+    ]
+    for name in ("longitudinal_acceleration", "pitch"):
+        offset = np.zeros_like(y)
+        offset[:, CHANNELS.index(name)] = 1.0
+        columns.append(offset)
+    knots = []
+    dt = model.run.interval
+    for port, spacing, step in zip(DISTURBED, KNOT_SPACING, KNOT_STEP, strict=True):
+        count = int(np.ceil(model.samples * dt / spacing)) + 1
+        knots.append(count)
+        for k in range(count):
+            first = min(max(int((k - 1) * spacing / dt), 0), model.samples - 1)
+            slot = Slot(
+                port=port,
+                variable="time",
+                origin=(k - 1) * spacing,
+                spacing=spacing,
+                values=np.array([0.0, step, 0.0]),
+            )
+            columns.append(slope(base, step, (slot,), start=(first, states, out)))
+    session = [
+        slope(_moved(base, i, 0.5 * s), 0.5 * s)
+        for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
+    ]
+    library, others = [], []
+    for effect in effects:
+        theta = base.copy()
+        leading = effect.parameters[0]
+        if base[leading.index] == 0.0:
+            for parameter in effect.parameters[1:]:
+                theta[parameter.index] = parameter.start
+        library.append(slope(_moved(theta, leading.index, leading.step), leading.step))
+    for place, value in second_values(effects):
+        leading, second = effects[place].parameters
+        theta = base.copy()
+        theta[second.index] = value
+        # an effect that is there already is not looked for
+        there = base[leading.index] != 0.0
+        others.append(
+            np.zeros_like(y) if there else slope(_moved(theta, leading.index, leading.step), leading.step)
+        )
+    library, others = library or [np.zeros_like(y)], others or [np.zeros_like(y)]
+    nuisance = whiten(np.stack(columns, axis=-1), rho, sigma)
+    evidence = RunEvidence(
+        model=model,
+        rho=rho,
+        sigma=sigma,
+        nuisance=nuisance,
+        knots=tuple(knots),
+        information=nuisance.T @ nuisance,
+        session=whiten(np.stack(session, axis=-1), rho, sigma),
+        library=whiten(np.stack(library, axis=-1), rho, sigma),
+        others=whiten(np.stack(others, axis=-1), rho, sigma),
+        factor=np.empty(0),
+        session_q=np.empty(0),
+        library_q=np.empty(0),
+        others_q=np.empty(0),
+        substeps=substeps,
+    )
+    return with_disturbance(evidence, tolerances, disturbance)
+
+
+def with_disturbance(evidence: RunEvidence, tolerances: Tolerances, disturbance: Disturbance) -> RunEvidence:
+    """The same run under another prior of the disturbances."""
+    precision = prior_precision(evidence.knots, tolerances, disturbance)[0]
+    factor = cholesky(evidence.information + precision, lower=True, check_finite=False)
+    changed = replace(evidence, factor=factor)
+    return replace(
+        changed, session_q=changed.project(changed.session), library_q=changed.project(changed.library),
+        others_q=changed.project(changed.others),
+    )  # fmt: skip
+
+
+def second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
+    """Places of the effects with a second parameter, and the values at which the screen tries it.
+
+    Parameters
+    ----------
+    effects : the library
+    """
+    return [
+        (place, second.lower + share * (second.upper - second.lower))
+        for place, effect in enumerate(effects)
+        for second in effect.parameters[1:]
+        for share in SECOND_SHARES
+    ]
+
+
+def _moved(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
+    moved = theta.copy()
+    moved[index] += step
+    return moved

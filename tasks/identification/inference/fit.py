@@ -1,0 +1,233 @@
+"""Fitting a hypothesis through the simulation: Gauss-Newton with every nuisance integrated out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import SESSION
+from tasks.identification.inference.evidence import SESSION_INDEX, RunEvidence
+from tasks.identification.inference.hypothesis import Hypothesis, compose
+from tasks.identification.inference.linearisation_points import (
+    Place,
+    misfits,
+    places_at,
+    relinearised,
+    settled,
+)
+
+HELD = 1e18
+"""Prior precision that holds a nuisance at 0."""
+MISSED = 0.3
+"""Relative miss of the foreseen fall of the misfit from which derivatives are taken anew."""
+
+TRIALS = ((1.0, True), (0.4, True), (1.0, False), (0.4, False), (0.16, False), (0.064, False))
+"""Shares of a step that are tried, and whether the runs' own offsets move along."""
+
+Slopes = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Derivatives by parameters and session, float64 [M, K + 7], and what the nuisances can take from them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A fitted set of hypotheses.
+
+    Parameters
+    ----------
+    parts : the hypotheses, in the order of the parameters
+    values : float64 [K] all parameters
+    session : float64 [7] session nuisances
+    session_sigma : float64 [7] their prior sigmas
+    objective : sum over runs of the marginalised misfit, plus the session's prior term
+    by_run : float64 [R] misfit of each run without the session's prior
+    covariance : float64 [K, K] of the parameters, session marginalised
+    residuals : whitened residual of each run at the fit
+    offsets : the run's own offsets about which each residual is linearised
+    """
+
+    parts: tuple[Hypothesis, ...]
+    values: NDArray[np.float64]
+    session: NDArray[np.float64]
+    session_sigma: NDArray[np.float64]
+    objective: float
+    by_run: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    residuals: tuple[NDArray[np.float64], ...]
+    offsets: tuple[NDArray[np.float64], ...]
+
+    @property
+    def at_bound(self) -> bool:
+        """Whether a parameter sits on its bound, other than at 0 for a second parameter."""
+        lower = np.concatenate([p.lower for p in self.parts]) if self.parts else np.empty(0)
+        upper = np.concatenate([p.upper for p in self.parts]) if self.parts else np.empty(0)
+        first = (
+            np.concatenate([np.arange(len(p.names)) == 0 for p in self.parts]) if self.parts else np.empty(0)
+        )
+        margin = 1e-6 * (upper - lower)
+        touching = (self.values <= lower + margin) | (self.values >= upper - margin)
+        return bool(np.any(touching & (first.astype(bool) | (self.values != 0.0))))
+
+
+def fit(
+    evidence: tuple[RunEvidence, ...],
+    parts: tuple[Hypothesis, ...],
+    session_sigma: NDArray[np.float64],
+    *,
+    values: NDArray[np.float64] | None = None,
+    session: NDArray[np.float64] | None = None,
+    offsets: tuple[NDArray[np.float64], ...] | None = None,
+    iterations: int = 5,
+) -> Fit:
+    """Fit all parameters and the session's nuisances to the runs.
+
+    Parameters
+    ----------
+    evidence : the runs
+    parts : hypotheses; none fits the session alone
+    session_sigma : float64 [7] prior sigmas of the session
+    values, session, offsets : where to start
+    iterations : at most so many Gauss-Newton steps
+    """
+    lower, upper, steps, first = (
+        np.concatenate([np.empty(0), *(getattr(p, field) for p in parts)])
+        for field in ("lower", "upper", "step", "start")
+    )
+    x = first if values is None else values.copy()
+    s = np.zeros(len(SESSION_INDEX)) if session is None else session.copy()
+    prior = 1.0 / np.square(session_sigma)
+    # a free parameter that is also a session nuisance is the same number: the nuisance rests at 0
+    taken = [SESSION.index(name) for part in parts for name in part.names if name in SESSION]
+    s[taken], prior[taken] = 0.0, HELD
+    k = len(x)
+    places = settled(evidence, parts, x, s) if offsets is None else places_at(evidence, parts, x, s, offsets)
+    objective = _objective(places, prior, s)
+    slopes: list[Slopes] = []
+    normal = np.eye(k + len(s))
+    blind, fell, foreseen = False, np.inf, np.inf
+    for _ in range(iterations):
+        if (
+            not slopes
+            or (k and np.isfinite(fell) and abs(fell - foreseen) > MISSED * foreseen + 1.0)
+            or blind
+        ):
+            slopes = _slopes(evidence, parts, x, s, np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps)
+            normal = np.diag(np.concatenate((np.zeros(k), prior)))
+            for columns, q in slopes:
+                normal += columns.T @ columns - q.T @ q
+            # a threshold of what is still 0 shows only once that has moved
+            blind = bool(np.any(np.diag(normal)[:k] == 0.0))
+        right = np.concatenate((np.zeros(k), -prior * s))
+        for place, (columns, q) in zip(places, slopes, strict=True):
+            right += columns.T @ place.residual - q.T @ place.projected
+        move = _move(normal, right, x, lower, upper)
+        foreseen = float(move @ right)
+        if foreseen < 0.1 and abs(fell) < 3.0:
+            break
+        before = objective
+        # parameters and each run's own offsets move together; where that does not help, one after the other
+        ahead = tuple(
+            run.offsets(place.projected - q @ move)
+            for run, place, (_, q) in zip(evidence, places, slopes, strict=True)
+        )
+        for share, together in TRIALS:
+            x_try, s_try = np.clip(x + share * move[:k], lower, upper), s + share * move[k:]
+            own = tuple(
+                place.offsets + share * together * (d - place.offsets)
+                for place, d in zip(places, ahead, strict=True)
+            )
+            trial = places_at(evidence, parts, x_try, s_try, own)
+            better = _objective(trial, prior, s_try) < objective
+            if better or foreseen < 0.1:
+                break
+        if not better:
+            break
+        x, s = x_try, s_try
+        places = trial if together else relinearised(evidence, parts, x, s, trial)
+        objective = _objective(places, prior, s)
+        fell = before - objective
+        if abs(fell) < 0.3 and foreseen < 0.5:
+            break
+    # scaled first: in their own units the parameters' information spans more than double precision can invert
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse = np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size)
+    covariance = np.asarray(inverse[:k, :k], dtype=np.float64)
+    return Fit(
+        parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
+        by_run=misfits(places), covariance=covariance,
+        residuals=tuple(place.residual for place in places), offsets=tuple(place.offsets for place in places),
+    )  # fmt: skip
+
+
+def _slopes(
+    evidence: tuple[RunEvidence, ...],
+    parts: tuple[Hypothesis, ...],
+    x: NDArray[np.float64],
+    s: NDArray[np.float64],
+    steps: NDArray[np.float64],
+) -> list[Slopes]:
+    """Derivatives of every run by parameters and session, and what its nuisances can take from them.
+
+    Taken where the nuisances' own are, with the run's offsets at 0: on a road feature that is reached a moment later
+    the nuisances cannot take from derivatives about other offsets what is theirs, and the information comes out many
+    times too large.
+    """
+    slopes = []
+    there = compose(parts, x, s)
+    moved = [compose(parts, x + step * unit, s) for step, unit in zip(steps, np.eye(len(x)), strict=True)]
+    for run in evidence:
+        if not moved:
+            slopes.append((run.session, run.session_q))
+            continue
+        r = run.residual(*there)
+        a = [(r - run.residual(*far)) / step for far, step in zip(moved, steps, strict=True)]
+        columns = np.column_stack((*a, run.session))
+        slopes.append((columns, np.column_stack((run.project(columns[:, : len(x)]), run.session_q))))
+    return slopes
+
+
+def _move(
+    normal: NDArray[np.float64],
+    right: NDArray[np.float64],
+    x: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The Gauss-Newton step of parameters and session, what sits on a bound and pushes beyond it left out."""
+    k = len(x)
+    free = np.ones(len(right), dtype=bool)
+    move = np.zeros(len(right))
+    for _ in range(k + 1):
+        move = np.zeros(len(right))
+        block = normal[np.ix_(free, free)]
+        move[free] = np.linalg.solve(block + 1e-12 * np.diag(np.diag(block) + 1e-30), right[free])
+        outside = (x + move[:k] < lower) & (x <= lower) | (x + move[:k] > upper) & (x >= upper)
+        if not np.any(outside & free[:k]):
+            break
+        free[:k] &= ~outside
+    return move
+
+
+def misfit_by_run(
+    evidence: tuple[RunEvidence, ...], fitted: Fit
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Marginalised misfit of runs under a fit made on other runs, and how far it is from settled; float64 [R]."""
+    places = settled(evidence, fitted.parts, fitted.values, fitted.session)
+    return misfits(places), np.array([place.doubt for place in places])
+
+
+def fall(
+    before: tuple[NDArray[np.float64], NDArray[np.float64]],
+    after: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> float:
+    """Fall of the misfit summed over runs, each run's counted only beyond its numerical doubt.
+
+    Parameters
+    ----------
+    before, after : of `misfit_by_run`
+    """
+    change = before[0] - after[0]
+    return float(np.sum(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0)))
+
+
+def _objective(places: tuple[Place, ...], prior: NDArray[np.float64], session: NDArray[np.float64]) -> float:
+    return float(misfits(places).sum() + np.sum(prior * session**2))

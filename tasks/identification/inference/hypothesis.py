@@ -1,0 +1,85 @@
+"""What may be added to the model: parameters with bounds, and how they enter."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.identification.inference.evidence import SESSION_INDEX
+from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
+from tasks.vehicle.effects.slots import Slot
+
+Build = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], tuple[Slot, ...]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hypothesis:
+    """What may be added to the model: parameters and how they enter.
+
+    Parameters
+    ----------
+    name : label
+    effect_class : effect, retune, sensor or form
+    port, variable : where it enters and what it depends on
+    names, units : of the parameters
+    lower, upper, step, start : float64 [K] bounds, finite-difference step and first value
+    build : parameters to full theta (float64) and slots
+    """
+
+    name: str
+    effect_class: str
+    port: str
+    variable: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    step: NDArray[np.float64]
+    start: NDArray[np.float64]
+    build: Build
+
+
+def library_hypothesis(effect: Effect, start: float | None = None, second: float = np.nan) -> Hypothesis:
+    """A library effect as a hypothesis; ``start`` and ``second`` replace the first values of its parameters."""
+    indices = [p.index for p in effect.parameters]
+
+    def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+        theta = np.zeros(len(ALL_PARAMETERS))
+        theta[indices] = values
+        return theta, ()
+
+    first = effect.parameters[0]
+    begin = np.array([p.start for p in effect.parameters])
+    begin[0] = min(max(first.step if start is None else start, first.lower), first.upper)
+    if np.isfinite(second):
+        begin[1] = second
+    return Hypothesis(
+        name=effect.name,
+        effect_class=effect.effect_class,
+        port=effect.port,
+        variable=effect.variable,
+        names=tuple(p.name for p in effect.parameters),
+        units=tuple(p.unit for p in effect.parameters),
+        lower=np.array([p.lower for p in effect.parameters]),
+        upper=np.array([p.upper for p in effect.parameters]),
+        step=np.array([p.step for p in effect.parameters]),
+        start=begin,
+        build=build,
+    )
+
+
+def compose(
+    parts: tuple[Hypothesis, ...], values: NDArray[np.float64], session: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+    """Full theta and slots of all parts together with the session's nuisances."""
+    theta = np.zeros(len(ALL_PARAMETERS))
+    theta[list(SESSION_INDEX)] += session
+    slots: tuple[Slot, ...] = ()
+    at = 0
+    for part in parts:
+        added, more = part.build(values[at : at + len(part.names)])
+        theta += added
+        slots += more
+        at += len(part.names)
+    return theta, slots

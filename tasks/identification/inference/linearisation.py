@@ -1,0 +1,184 @@
+"""Derivatives of all runs about a point, the scales of their disturbances, and both again about another point."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from tasks.campaign.campaign import Campaign, Tolerances
+from tasks.campaign.gauge import braking_pressure
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.disturbance import Disturbance, prior_precision
+from tasks.identification.inference.evidence import RunEvidence, run_evidence, with_disturbance
+from tasks.identification.inference.fit import Fit
+from tasks.identification.inference.forward import SUBSTEPS, RunModel, predict, run_model
+from tasks.identification.inference.hypothesis import compose
+from tasks.identification.inference.noise import channel_noise, whiten
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
+from tasks.vehicle.parameters import Vehicle
+
+TORN = 100.0
+"""Misfit by halving the step from which a run is left out: sound runs have under 20, forked ones over 10,000."""
+FEWEST = 3
+FREED = 20.0
+"""Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
+
+
+def prepare(
+    campaign: Campaign, vehicle: Vehicle, surface: SurfaceParameters, effects: tuple[Effect, ...]
+) -> Evidence:
+    """Noise and derivatives about the model as it stands, under the first guess of the disturbances.
+
+    Parameters
+    ----------
+    campaign : measured runs with their split
+    vehicle, surface : the model that is judged
+    effects : the library of candidates
+    """
+    rho, sigma = channel_noise(campaign)
+    plain = np.zeros(len(ALL_PARAMETERS))
+    guess = Disturbance()
+    runs = [replace(run, pressure=braking_pressure(run.pressure)) for run in campaign.runs]
+    models = [run_model(run, vehicle, surface) for run in runs]
+    used: list[str] = []
+
+    def derived(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
+        own = [m for m in models if m.run.held_out == held_out]
+        sound = [m for m in own if step_change(m, rho, sigma) <= TORN]
+        # too few sound runs to do without the others
+        kept = sound if len(sound) >= FEWEST else own
+        used.extend(m.run.name for m in kept)
+        return tuple(
+            run_evidence(model, rho, sigma, plain, library, campaign.tolerances, guess) for model in kept
+        )
+
+    train, held_out = derived(False, effects), derived(True, ())
+    torn = tuple(run.name for run in campaign.runs if run.name not in used)
+    return Evidence(
+        train=train, held_out=held_out, effects=effects,
+        tolerances=campaign.tolerances, disturbance=guess, torn=torn,
+    )  # fmt: skip
+
+
+def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.float64]) -> float:
+    """Misfit that halving the integration step alone makes: a run that forks, as at the ABS threshold, has much.
+
+    Parameters
+    ----------
+    model : the run
+    rho, sigma : channel noise
+    """
+    plain = np.zeros(len(ALL_PARAMETERS))
+    change = predict(model, plain) - predict(model, plain, substeps=2 * SUBSTEPS)
+    return float(np.sum(whiten(change, rho, sigma) ** 2))
+
+
+def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
+    """The same runs with derivatives taken about a fit.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : where to
+    library : also the library's derivatives; else the old ones are kept
+    """
+    theta, slots = compose(at.parts, at.values, at.session)
+
+    def moved(run: RunEvidence, effects: tuple[Effect, ...]) -> RunEvidence:
+        fresh = run_evidence(
+            run.model, run.rho, run.sigma, theta, effects, evidence.tolerances, evidence.disturbance, slots
+        )
+        if effects:
+            return fresh
+        kept = replace(fresh, library=run.library, others=run.others)
+        return with_disturbance(kept, evidence.tolerances, evidence.disturbance)
+
+    return replace(
+        evidence,
+        train=tuple(moved(run, evidence.effects if library else ()) for run in evidence.train),
+        held_out=tuple(moved(run, ()) for run in evidence.held_out),
+    )
+
+
+def rescaled(evidence: Evidence, disturbance: Disturbance) -> Evidence:
+    """The same runs under other scales of the disturbances.
+
+    Parameters
+    ----------
+    evidence : the runs
+    disturbance : the scales
+    """
+    return replace(
+        evidence,
+        disturbance=disturbance,
+        train=tuple(with_disturbance(run, evidence.tolerances, disturbance) for run in evidence.train),
+        held_out=tuple(with_disturbance(run, evidence.tolerances, disturbance) for run in evidence.held_out),
+    )
+
+
+def whitened_residuals(evidence: Evidence, at: Fit) -> list[NDArray[np.float64]]:
+    """Whitened measured-minus-model of every training run at a fit, its own offsets at 0; float64 [M] each."""
+    theta, slots = compose(at.parts, at.values, at.session)
+    return [run.residual(theta, slots) for run in evidence.train]
+
+
+def fit_disturbance(
+    evidence: tuple[RunEvidence, ...],
+    residuals: list[NDArray[np.float64]],
+    tolerances: Tolerances,
+    effects: tuple[Effect, ...],
+    start: Disturbance,
+    splines: tuple[NDArray[np.float64], ...],
+    ridge: NDArray[np.float64],
+) -> Disturbance:
+    """Scales and times by marginal likelihood, every library direction, every spline and the session free.
+
+    With the directions fixed at 0 an effect or a form would inflate the disturbance that then hides it.
+
+    Parameters
+    ----------
+    evidence : training runs
+    residuals : whitened residual of each run at the base point, float64 [M]
+    tolerances : session priors
+    effects : the library, whose steps set broad priors
+    start : first guess
+    splines : derivatives of each run by the knots of the splines, float64 [M, K]
+    ridge : float64 [K] precision of their priors
+    """
+    broad = [(30.0 * e.parameters[0].step) ** -2 for e in effects]
+    prior = np.concatenate((1.0 / np.square(FREED * np.array(tolerances.session)), broad, ridge))
+    blocks = []
+    for run, r, columns in zip(evidence, residuals, splines, strict=True):
+        b = np.column_stack((r, run.session, run.library, columns))
+        blocks.append((b.T @ b, run.nuisance.T @ b))
+
+    def cost(trial: Disturbance) -> float:
+        total = np.zeros_like(blocks[0][0])
+        value = 0.0
+        for run, (gram, cross) in zip(evidence, blocks, strict=True):
+            precision, log_det = prior_precision(run.knots, tolerances, trial)
+            factor = cholesky(run.information + precision, lower=True, check_finite=False)
+            q = solve_triangular(factor, cross, lower=True, check_finite=False)
+            total += gram - q.T @ q
+            value += 2.0 * float(np.sum(np.log(np.diag(factor)))) - log_det
+        inner = cholesky(total[1:, 1:] + np.diag(prior), lower=True, check_finite=False)
+        q = solve_triangular(inner, total[1:, 0], lower=True, check_finite=False)
+        return value + float(total[0, 0] - q @ q) + 2.0 * float(np.sum(np.log(np.diag(inner))))
+
+    best, lowest = start, cost(start)
+    for factor in (2.0, 1.4):
+        for field in ("scale", "time"):
+            for port in range(3):
+                for direction in (factor, 1.0 / factor):
+                    improved = True
+                    while improved:
+                        values = list(getattr(best, field))
+                        values[port] *= direction
+                        trial = replace(best, **{field: tuple(values)})
+                        value = cost(trial) if 0.15 <= trial.time[port] <= 6.0 else np.inf
+                        improved = value < lowest - 0.5
+                        if improved:
+                            best, lowest = trial, value
+    return best

@@ -1,0 +1,123 @@
+"""Sensor noise from quiet stretches, without a model: AR(1) noise under a slow disturbance."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.errors import InputError
+
+LAGS = (1, 2, 3, 4, 6, 8)
+INTEGRALS = tuple(
+    (CHANNELS.index(level), CHANNELS.index(rate))
+    for level, rate in (("speed", "longitudinal_acceleration"), ("pitch", "pitch_rate"))
+)
+QUIET_PRESSURE = 0.1
+"""A run is quiet until its pressure first exceeds this [MPa]."""
+BEFORE_BRAKE, ON_HAZARD = 5, 40
+"""Samples that the quiet stretch ends before the brake, and that it has at most where the road is not flat."""
+
+
+def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """AR(1) coefficient and standard deviation of every channel.
+
+    The half variogram of AR(1) noise under a smooth motion is sigma^2 (1 - rho^k) + a k^2 at lag k; rho is
+    taken on a grid, sigma^2 and a by least squares, over what precedes the brake on flat roads. A coarse channel
+    has the variance of its rounding, step^2 / 12, at least.
+
+    Parameters
+    ----------
+    campaign : only its training runs are looked at
+
+    Returns
+    -------
+    rho float64 [7] and sigma float64 [7] [unit of the channel]
+
+    Raises
+    ------
+    InputError
+        If no training run is quiet for long enough, or a channel never changes.
+    """
+    sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros(len(LAGS))
+    for run in campaign.train:
+        quiet = run.response[: _quiet_samples(run)].copy()
+        for level, rate in INTEGRALS:
+            # what the rate explains is motion, not noise of the level
+            quiet[:, level] -= np.cumsum(quiet[:, rate]) * run.interval
+        for i, lag in enumerate(LAGS):
+            if len(quiet) > 3 * lag:
+                difference = quiet[lag:] - quiet[:-lag]
+                sums[i] += 0.5 * np.sum((difference - difference.mean(0)) ** 2, axis=0)
+                counts[i] += len(difference) - 1
+    floor = _rounding_variance(campaign)
+    problems = _problems(campaign, floor)
+    if problems:
+        raise InputError(problems)
+    variogram = np.maximum(sums / counts[:, None], floor)
+    rho, sigma = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
+    k = np.array(LAGS, dtype=np.float64)
+    for j in range(len(CHANNELS)):
+        best = np.inf
+        for trial in np.arange(0.0, 0.95, 0.02):
+            basis = np.column_stack((1.0 - trial**k, k**2)) / variogram[:, j : j + 1]
+            (power, slow), *_ = np.linalg.lstsq(basis, np.ones(len(k)), rcond=None)
+            misfit = float(np.sum((basis @ (power, slow) - 1.0) ** 2))
+            if misfit < best and power > 0 and slow > -0.05 * power:
+                best, rho[j], sigma[j] = misfit, trial, np.sqrt(power)
+    return rho, np.maximum(sigma, np.sqrt(floor))
+
+
+def _quiet_samples(run: Run) -> int:
+    pressed = np.flatnonzero(run.pressure > QUIET_PRESSURE)
+    end = int(pressed[0]) - BEFORE_BRAKE if pressed.size else len(run.pressure)
+    if run.hazard_length > 0:
+        end = min(end, ON_HAZARD)
+    return max(end, 0)
+
+
+def _rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
+    """Variance of rounding to every channel's smallest step, float64 [7] [unit^2]; NaN where nothing changes."""
+    values = np.concatenate([run.response for run in campaign.train])
+    gaps = np.diff(np.sort(values, axis=0), axis=0)
+    # equal readings may differ by the last bits of a change of unit
+    gaps[gaps <= 1e-12 * np.abs(values).max(axis=0)] = np.inf
+    steps = gaps.min(axis=0)
+    return np.where(np.isfinite(steps), steps, np.nan) ** 2 / 12
+
+
+def _problems(campaign: Campaign, floor: NDArray[np.float64]) -> list[str]:
+    problems = [
+        f"{campaign.name}: channel {CHANNELS[j]} must change; it holds one value in all training runs: record it anew"
+        for j in np.flatnonzero(np.isnan(floor))
+    ]
+    longest = max(campaign.train, key=_quiet_samples)
+    needed = 3 * LAGS[-1] + 1
+    if _quiet_samples(longest) < needed:
+        seconds = (needed + BEFORE_BRAKE) * longest.interval
+        pressed = np.flatnonzero(longest.pressure > QUIET_PRESSURE)
+        first = f"{pressed[0] * longest.interval:.2f} s" if pressed.size else "the end"
+        problems.append(
+            f"{campaign.name}: sensor noise is read before the brake, so at least one training run must stay at or"
+            f" below {QUIET_PRESSURE:g} MPa for its first {seconds:.2f} s; the longest, {longest.name}, does until"
+            f" {first}: start the runs earlier, best 0.4 s before the brake in three training runs"
+        )
+    return problems
+
+
+def whiten(
+    x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Make AR(1) noise of unit variance white along the first axis and stack the channels.
+
+    Parameters
+    ----------
+    x : float64 [N, 7] or [N, 7, P] residuals or derivatives [unit of the channel]
+    rho, sigma : float64 [7] from `channel_noise`
+
+    Returns
+    -------
+    float64 [7 N] or [7 N, P]
+    """
+    shape = (1, -1) + (1,) * (x.ndim - 2)
+    r, s = rho.reshape(shape), sigma.reshape(shape)
+    white = np.concatenate((x[:1] / s, (x[1:] - r * x[:-1]) / (s * np.sqrt(1.0 - r**2))))
+    return white.reshape((-1, *x.shape[2:]))

@@ -1,0 +1,143 @@
+"""The Gaussians of the samples: on the road where they are road, classed, and small where a car may come near."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tasks.conventions import SemanticClass
+from tasks.reconstruction.carriageway import carriageway_extents, classify
+from tasks.reconstruction.normals import turned_to_camera
+from tasks.reconstruction.surfels import COVERAGE, Surfels, ellipses
+from tasks.scene.gaussians import Gaussians
+from tasks.scene.route import Route
+from tasks.scene.spherical_harmonics import C0
+
+INITIAL_OPACITY = 0.9
+LEAST_COSINE = 0.25
+"""Surfaces other than the ground are not taken to be seen flatter than this [1]."""
+SADDLE = 0.02
+"""The road surface deviates this much from the route's plane [m]."""
+DISPARITY_ERROR = 0.3
+"""Standard deviation of a disparity [px]."""
+FAR_GROUND = 14.0
+"""Ground farther from the camera than this is taken to be level, its measured normal being noise [m]."""
+LONGEST = 0.15
+"""Largest standard deviation of a Gaussian on the ground [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloud:
+    """Gaussians with what else is known about them.
+
+    Parameters
+    ----------
+    gaussians : N Gaussians, world frame
+    rays : float64 [N, 3] world direction along which the depth of each is uncertain, per metre of depth [1]
+    extents : left (positive) and right (negative) edge of the carriageway from the route [m]
+    """
+
+    gaussians: Gaussians
+    rays: NDArray[np.float64]
+    extents: tuple[float, float]
+
+
+def cloud_of(
+    surfels: Surfels,
+    T_world_camera: NDArray[np.float64],
+    route: Route,
+    focal_length: float,
+    disparity_scale: float,
+    carriageway_limit: float,
+) -> Cloud:
+    """Place, class, turn and size the samples.
+
+    Parameters
+    ----------
+    surfels : N samples
+    T_world_camera : float64 [N, 4, 4] pose of the camera that took each
+    route : the route, on the road
+    focal_length : of the camera [px]
+    disparity_scale : focal length times baseline [px m]
+    carriageway_limit : largest extent of the carriageway on either side [m]
+    """
+    R, t = T_world_camera[:, :3, :3], T_world_camera[:, :3, 3]
+    rays = np.einsum("nij,nj->ni", R, surfels.rays)
+    station, lateral, height = route.project(rays * surfels.depth[:, None] + t)
+    extents = carriageway_extents(station, lateral, height, surfels.depth, route.length, carriageway_limit)
+    class_id = classify(lateral, height, surfels.depth, extents)
+    up = route.pose(np.clip(station, 0, route.length))[:, :3, 2]
+
+    road = class_id == SemanticClass.ROAD
+    depth = surfels.depth.copy()
+    depth[road] *= _onto_route(
+        height[road], -(rays[road] * up[road]).sum(axis=1), depth[road], disparity_scale
+    )
+
+    level = road | ((class_id == SemanticClass.TERRAIN) & (depth > FAR_GROUND))
+    normals = turned_to_camera(surfels.normals, surfels.rays, LEAST_COSINE)
+    normals[level] = np.einsum("nji,nj->ni", R[level], up[level])
+    rotation, scales = ellipses(surfels.rays, depth, normals, surfels.spacing, focal_length)
+    rotation = R @ rotation
+
+    ground = np.isin(class_id, (SemanticClass.ROAD, SemanticClass.TERRAIN))
+    of, offset = _split(scales[:, 0], ground)
+    pieces = np.bincount(of, minlength=len(scales))
+    means = rays * depth[:, None] + t
+    means = means[of] + offset[:, None] * rotation[of, :, 0]
+    scales = np.concatenate([scales[:, :1] / pieces[:, None], scales[:, 1:]], axis=1)[of]
+    gaussians = Gaussians(
+        means=means.astype(np.float32),
+        quats_wxyz=Rotation.from_matrix(rotation).as_quat(scalar_first=True)[of].astype(np.float32),
+        scales=scales.astype(np.float32),
+        opacities=np.full(len(of), INITIAL_OPACITY, dtype=np.float32),
+        sh=((surfels.radiance - 0.5) / C0)[of, None, :].astype(np.float32),
+        normals=np.ascontiguousarray(rotation[of, :, 2], dtype=np.float32),
+        class_id=class_id[of],
+        antialiased=True,
+    )
+    return Cloud(gaussians=gaussians, rays=rays[of], extents=extents)
+
+
+def _onto_route(
+    height: NDArray[np.float64],
+    descent: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    disparity_scale: float,
+) -> NDArray[np.float64]:
+    """Factor by which a road point's depth changes so that its height becomes the likeliest one.
+
+    Stereo's error of height grows as depth squared times the ray's descent; the route says that the height
+    is 0 but for the saddle of the road. Near the camera stereo is right, far away the route is.
+
+    Parameters
+    ----------
+    height : [N] measured height over the route [m]
+    descent : [N] how far the ray descends per metre of depth [1]
+    depth : [N] camera z [m]
+    disparity_scale : focal length times baseline [px m]
+    """
+    error = depth**2 * descent * DISPARITY_ERROR / disparity_scale
+    lowered = height * error**2 / (error**2 + SADDLE**2)
+    return np.clip(1 + lowered / np.maximum(descent * depth, 1e-3), 0.5, 2.0)
+
+
+def _split(
+    length: NDArray[np.float64], splittable: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Pieces that replace Gaussians which are too long: whose piece each is, and how far along its first axis.
+
+    A disc seen at a grazing angle from afar is metres long; a camera that later drives over it would see it
+    smeared over the whole picture, since a Gaussian's picture is taken to be an ellipse around its middle.
+
+    Parameters
+    ----------
+    length : [N] standard deviation along the first axis [m]
+    splittable : bool [N] Gaussians that may be split
+    """
+    pieces = np.where(splittable, np.maximum(np.ceil(length / LONGEST), 1), 1).astype(np.int64)
+    of = np.repeat(np.arange(len(length)), pieces)
+    place = np.arange(len(of)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    distance = length / COVERAGE / pieces
+    return of, (place - (pieces[of] - 1) / 2) * distance[of]

@@ -1,0 +1,255 @@
+"""The whole way from a posed stereo sequence to a street one can drive, and how well it shows what it never saw."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.errors import InputError
+from tasks.reconstruction.camera import rasteriser_intrinsics
+from tasks.reconstruction.cloud import cloud_of
+from tasks.reconstruction.disparity import filled, match
+from tasks.reconstruction.exposure import Exposure, estimate_exposure
+from tasks.reconstruction.fusion import fuse_depth, seen_finest
+from tasks.reconstruction.held_out import HeldOutFrame, judge
+from tasks.reconstruction.normals import camera_normals
+from tasks.reconstruction.pose_correction import correct_poses
+from tasks.reconstruction.refinement import TrainingView, refine
+from tasks.reconstruction.road_plane import fit_road_plane, route_below, settled
+from tasks.reconstruction.sequence import StereoSequence, StereoSettings
+from tasks.reconstruction.sky import fit_sky, panorama, sky_mask, sky_view
+from tasks.reconstruction.surfels import Surfels, joined, sample
+from tasks.render.camera import viewmat
+from tasks.scene.route import Route
+from tasks.scene.scene import Scene
+from tasks.scene.surroundings import with_surroundings
+
+CLIPPED = 254
+"""Pixel values from here on may stand for any brighter light."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reconstruction:
+    """A scene and what is known about it.
+
+    Parameters
+    ----------
+    scene : the street
+    held_out : figures of the frames left out of the build
+    T_world_camera : float64 [F, 4, 4] corrected poses of all frames in the scene's world frame
+    exposure : how each picture was taken
+    """
+
+    scene: Scene
+    held_out: tuple[HeldOutFrame, ...]
+    T_world_camera: NDArray[np.float64]
+    exposure: Exposure
+
+    def figures(self) -> dict[str, Any]:
+        """Means over the held-out frames and the table, in plain numbers."""
+        frames = [vars(frame) for frame in self.held_out]
+        means = {
+            f"held_out_{name}": float(np.nanmean([frame[name] for frame in frames]))
+            for name in ("psnr_db", "ssim", "road_psnr_db", "road_ssim")
+        }
+        return means | {"held_out_frames": frames}
+
+
+def reconstruct(sequence: StereoSequence, settings: StereoSettings | None = None) -> Reconstruction:
+    """Build a Gaussian street from a posed stereo sequence.
+
+    The held-out frames are left out of everything: their pose receives the correction, and their exposure
+    the gain, interpolated between the neighbouring training frames.
+
+    Parameters
+    ----------
+    sequence : the pictures and poses
+    settings : choices; None for the defaults
+
+    Returns
+    -------
+    Reconstruction
+
+    Raises
+    ------
+    InputError
+        Too few pictures remain, no road is seen, or the drive is too short.
+    """
+    settings = settings or StereoSettings()
+    held_out = settings.held_out(len(sequence))
+    training = np.setdiff1d(np.arange(len(sequence)), held_out)
+    if len(training) < 3:
+        raise InputError(
+            f"at least 3 pictures must remain for the build; of {len(sequence)}, {len(held_out)} are held out"
+        )
+    disparity = np.full(sequence.left.shape[:3], np.nan, dtype=np.float32)
+    for i in training:
+        disparity[i] = match(sequence.left[i], sequence.right[i], settings.disparities)
+    poses, route = _poses_and_route(sequence, disparity, training, settings)
+    grey = sequence.left[..., 1]
+    exposure = estimate_exposure(
+        grey, disparity, sequence.intrinsics, sequence.disparity_scale, poses, training
+    )
+    environment, is_sky = _sky(sequence, exposure, poses, training, settings)
+    depth, confirmed = _fused(sequence, disparity[training], is_sky, poses[training], settings)
+    route, poses = _on_the_road(route, poses, depth, confirmed, sequence, training)
+    surfels, picture = _surfels(sequence, exposure, depth, confirmed, poses, training, settings)
+    cloud = cloud_of(
+        surfels,
+        poses[training][picture],
+        route,
+        float(sequence.intrinsics[0, 0]),
+        sequence.disparity_scale,
+        settings.carriageway_limit,
+    )
+
+    K = rasteriser_intrinsics(sequence.intrinsics)
+    shape = (grey.shape[1], grey.shape[2])
+
+    def training_view(n: int) -> TrainingView:
+        i = int(training[n])
+        return TrainingView(
+            viewmat=viewmat(poses[i]),
+            K=K,
+            radiance=exposure.radiance(sequence.left[i], i),
+            clipped=sequence.left[i].min(axis=2) >= CLIPPED,
+            gain=exposure.falloff * np.float32(exposure.gains[i]),
+            sky=sky_view(environment, shape, sequence.intrinsics, poses[i]),
+        )
+
+    scene = Scene(
+        name=sequence.name,
+        gaussians=with_surroundings(
+            refine(
+                with_surroundings(cloud.gaussians),
+                cloud.rays,
+                training_view,
+                len(training),
+                settings.refinement_passes,
+            )
+        ),
+        route=route,
+        environment=environment,
+        carriageway_left=cloud.extents[0],
+        carriageway_right=cloud.extents[1],
+    )
+    return Reconstruction(
+        scene=scene,
+        held_out=judge(scene, sequence, poses, exposure, held_out),
+        T_world_camera=poses,
+        exposure=exposure,
+    )
+
+
+def _poses_and_route(
+    sequence: StereoSequence,
+    disparity: NDArray[np.float32],
+    training: NDArray[np.int64],
+    settings: StereoSettings,
+) -> tuple[NDArray[np.float64], Route]:
+    """Corrected poses and the route, in the rig frame at the start of the route."""
+    scale = sequence.disparity_scale
+    poses = correct_poses(
+        sequence.left[..., 1], disparity, sequence.intrinsics, scale, sequence.T_origin_camera, training
+    )
+    planes = np.array([fit_road_plane(disparity[i], sequence.intrinsics, scale) for i in training])
+    route = route_below(
+        poses[training],
+        planes,
+        settings.camera_ahead_of_front_axle,
+        settings.first_station,
+        settings.extension,
+    )
+    return _from_start(route, poses)
+
+
+def _from_start(route: Route, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], Route]:
+    """Poses and route in the frame of the route's first pose."""
+    T = np.linalg.inv(route.T_world_rig[0])
+    return T @ poses, Route(station=route.station, T_world_rig=T @ route.T_world_rig)
+
+
+def _sky(
+    sequence: StereoSequence,
+    exposure: Exposure,
+    poses: NDArray[np.float64],
+    training: NDArray[np.int64],
+    settings: StereoSettings,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """The panorama, and the sky pixels of each training picture."""
+    radiance = [exposure.radiance(sequence.left[i], int(i)) for i in training]
+    sky = fit_sky(radiance, sequence.intrinsics, poses[training])
+    masks = [
+        sky_mask(picture, sky, sequence.intrinsics, poses[i])
+        for picture, i in zip(radiance, training, strict=True)
+    ]
+    environment = panorama(
+        sky, radiance, masks, sequence.intrinsics, poses[training], settings.environment_rows
+    )
+    return environment, np.array(masks)
+
+
+def _fused(
+    sequence: StereoSequence,
+    disparity: NDArray[np.float32],
+    is_sky: NDArray[np.bool_],
+    poses: NDArray[np.float64],
+    settings: StereoSettings,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Depth of the training pictures, filled, averaged over neighbours, and which of it is confirmed."""
+    scale = sequence.disparity_scale
+    complete = np.array([filled(d, sky) for d, sky in zip(disparity, is_sky, strict=True)])
+    guessed = np.isnan(disparity) & np.isfinite(complete)
+    depth = np.minimum(scale / np.maximum(complete, 1e-3), settings.maximum_depth).astype(np.float32)
+    depth[is_sky] = np.inf
+    return fuse_depth(depth, guessed, sequence.intrinsics, scale, poses)
+
+
+def _on_the_road(
+    route: Route,
+    poses: NDArray[np.float64],
+    depth: NDArray[np.float32],
+    confirmed: NDArray[np.bool_],
+    sequence: StereoSequence,
+    training: NDArray[np.int64],
+) -> tuple[Route, NDArray[np.float64]]:
+    """Route settled on the measured road, and everything in the frame of its new start."""
+    stride = 4
+    points, distances = [], []
+    for n, i in enumerate(training):
+        rows, columns = np.nonzero(confirmed[n, ::stride, ::stride])
+        rows, columns = rows * stride, columns * stride
+        z = depth[n, rows, columns].astype(np.float64)
+        rays = np.stack([columns, rows, np.ones(len(z))], axis=1) @ np.linalg.inv(sequence.intrinsics).T
+        points.append(rays * z[:, None] @ poses[i, :3, :3].T + poses[i, :3, 3])
+        distances.append(z)
+    poses, route = _from_start(settled(route, np.concatenate(points), np.concatenate(distances)), poses)
+    return route, poses
+
+
+def _surfels(
+    sequence: StereoSequence,
+    exposure: Exposure,
+    depth: NDArray[np.float32],
+    confirmed: NDArray[np.bool_],
+    poses: NDArray[np.float64],
+    training: NDArray[np.int64],
+    settings: StereoSettings,
+) -> tuple[Surfels, NDArray[np.int64]]:
+    """Samples of all training pictures, each surface from the picture that shows it largest, and which one."""
+    K, scale = sequence.intrinsics, sequence.disparity_scale
+    parts = [
+        sample(
+            seen_finest(n, depth, confirmed, K, scale, poses[training]),
+            depth[n],
+            camera_normals(depth[n], K, scale),
+            sequence.left[i],
+            exposure.radiance(sequence.left[i], int(i)),
+            K,
+            scale,
+            settings.spacing,
+        )
+        for n, i in enumerate(training)
+    ]
+    return joined(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])

@@ -1,0 +1,190 @@
+"""The same views drawn by gsplat 1.5 (Apache-2.0) on a CUDA device.
+
+gsplat compiles its kernels with nvcc at first use. It blends colours that are evaluated before, here
+three of light and three of the normal, and expected depth; class and surface depth are found from the
+list of (Gaussian, pixel) pairs that it can return.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import gsplat
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from tasks.render.rasterise.blending import MAX_ALPHA, SURFACE_RATIO
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.rasterise.painters_bias_torch import means_nearer
+from tasks.render.rasterise.projection import NEAR, low_pass
+from tasks.render.rasterise.view import view_of
+from tasks.scene.gaussians import Gaussians, check_gaussians
+
+_EVERY_BATCH = 2**31 - 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceGaussians:
+    """A cloud on the device: the arrays of `Gaussians` as tensors."""
+
+    means: torch.Tensor
+    quats: torch.Tensor
+    scales: torch.Tensor
+    opacities: torch.Tensor
+    sh: torch.Tensor
+    normals: torch.Tensor
+    class_id: torch.Tensor
+    surroundings: torch.Tensor | None
+    antialiased: bool
+
+
+class GsplatBackend:
+    """gsplat as a `tasks.render.rasterise.backend.Backend`.
+
+    Parameters
+    ----------
+    device : torch device with gsplat's kernels
+    """
+
+    name = "gsplat"
+
+    def __init__(self, device: str = "cuda"):
+        self.device = torch.device(device)
+        if self.device.type == "cuda" and not torch.cuda.is_available():
+            raise RuntimeError("torch finds no CUDA device")
+
+    def prepare(self, gaussians: Gaussians) -> DeviceGaussians:
+        """Check a cloud and copy it to the device.
+
+        Raises
+        ------
+        InputError
+            An array has a wrong shape, a NaN or a value out of range.
+        """
+        check_gaussians(gaussians)
+        return DeviceGaussians(
+            means=self._tensor(gaussians.means),
+            quats=self._tensor(gaussians.quats_wxyz),
+            scales=self._tensor(gaussians.scales),
+            opacities=self._tensor(gaussians.opacities),
+            sh=self._tensor(gaussians.sh),
+            normals=self._tensor(gaussians.normals),
+            class_id=self._tensor(gaussians.class_id),
+            surroundings=None if gaussians.surroundings is None else self._tensor(gaussians.surroundings),
+            antialiased=gaussians.antialiased,
+        )
+
+    @torch.no_grad()
+    def rasterise(
+        self,
+        prepared: DeviceGaussians,
+        viewmat: NDArray[np.floating],
+        K: NDArray[np.floating],
+        width: int,
+        height: int,
+    ) -> GBuffer:
+        """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise`."""
+        view = view_of(viewmat, K, width, height)
+        direction = prepared.means - self._tensor(view.eye.astype(np.float32))
+        degree = int(prepared.sh.shape[1] ** 0.5) - 1
+        colours = (gsplat.spherical_harmonics(degree, direction, prepared.sh) + 0.5).clamp_min(0)
+        away = (prepared.normals * direction).sum(dim=1, keepdim=True) > 0
+        facing = torch.where(away, -prepared.normals, prepared.normals)
+        means = prepared.means
+        if prepared.surroundings is not None:
+            means = means_nearer(
+                means,
+                prepared.quats,
+                prepared.scales,
+                prepared.normals,
+                prepared.surroundings,
+                view,
+                low_pass(prepared.antialiased),
+            )
+        blended, alpha, splats = gsplat.rasterization(
+            means=means,
+            quats=prepared.quats,
+            scales=prepared.scales,
+            opacities=prepared.opacities,
+            colors=torch.cat((colours, facing), dim=1),
+            viewmats=self._tensor(view.viewmat.astype(np.float32))[None],
+            Ks=self._tensor(view.K.astype(np.float32))[None],
+            width=width,
+            height=height,
+            near_plane=NEAR,
+            eps2d=low_pass(prepared.antialiased),
+            rasterize_mode="antialiased" if prepared.antialiased else "classic",
+            render_mode="RGB+ED",
+            packed=False,
+        )
+        alpha = alpha[0, ..., 0]
+        normal = torch.nn.functional.normalize(blended[0, ..., 3:6], dim=-1)
+        expected = torch.where(alpha > 0, blended[0, ..., 6], torch.nan)
+        front = self._front(splats, width, height)
+        seen, splat = front >= 0, front.clamp_min(0)
+        pixels = np.dstack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5, 1.0))
+        rays = self._tensor((pixels @ view.rays).astype(np.float32))
+        plane = (facing * direction).sum(dim=1)[splat] / (facing[splat] * rays).sum(dim=-1)
+        centre = splats["depths"][0, splat]
+        tilted = (plane < centre * SURFACE_RATIO) & (centre < plane * SURFACE_RATIO)
+        depth = torch.where(seen, torch.where(tilted, plane, centre), expected)
+        class_id = torch.where(seen, prepared.class_id[splat], 0)
+        return GBuffer(
+            rgb=blended[0, ..., :3].cpu().numpy(),
+            depth=depth.cpu().numpy(),
+            expected_depth=expected.cpu().numpy(),
+            alpha=alpha.cpu().numpy(),
+            normal=normal.cpu().numpy(),
+            class_id=class_id.cpu().numpy(),
+        )
+
+    def _front(self, splats: dict[str, Any], width: int, height: int) -> torch.Tensor:
+        """Gaussian at which each pixel's transmittance falls below one half, -1 where none does; [H, W]."""
+        gaussian, pixel, _ = gsplat.rasterize_to_indices_in_range(
+            0,
+            _EVERY_BATCH,
+            torch.ones((1, height, width), device=self.device),
+            splats["means2d"],
+            splats["conics"],
+            splats["opacities"],
+            width,
+            height,
+            splats["tile_size"],
+            splats["isect_offsets"],
+            splats["flatten_ids"],
+        )
+        a, b, c = splats["conics"][0, gaussian].T
+        dx = pixel % width + 0.5 - splats["means2d"][0, gaussian, 0]
+        dy = pixel // width + 0.5 - splats["means2d"][0, gaussian, 1]
+        power = 0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy
+        alpha = (splats["opacities"][0, gaussian] * torch.exp(-power)).clamp_max(MAX_ALPHA)
+        halves = first_below_half(alpha, pixel)
+        front = torch.full((height * width,), -1, dtype=torch.int64, device=self.device)
+        front[pixel[halves]] = gaussian[halves]
+        return front.reshape(height, width)
+
+    def _tensor(self, array: NDArray[Any]) -> torch.Tensor:
+        return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)
+
+
+def first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
+    """Which splats bring their pixel's transmittance from one half or more to less.
+
+    Parameters
+    ----------
+    alpha : [M] opacity of each splat at its pixel, below 1 [1]
+    pixel : [M] pixel of each, all of one pixel together and nearest first [1]
+
+    Returns
+    -------
+    bool [M]
+    """
+    opaqueness = -torch.log1p(-alpha.double())
+    behind = torch.cumsum(opaqueness, dim=0)
+    front = behind - opaqueness
+    starts = torch.ones_like(pixel, dtype=torch.bool)
+    starts[1:] = pixel[1:] != pixel[:-1]
+    # What had gathered before the pixel's own first splat.
+    before = front[starts][torch.cumsum(starts, dim=0) - 1]
+    half = np.log(2.0)
+    return (front - before <= half) & (behind - before > half)

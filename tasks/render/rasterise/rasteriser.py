@@ -1,0 +1,57 @@
+"""One view of a cloud of Gaussians: colour, depth, opacity, normal and class in one pass."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.render.rasterise.binning import tile_lists
+from tasks.render.rasterise.blending import blend
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.rasterise.preparation import PreparedGaussians, prepare
+from tasks.render.rasterise.projection import project
+from tasks.render.rasterise.splat_back import splat_back
+from tasks.render.rasterise.view import view_of
+
+__all__ = ["PreparedGaussians", "prepare", "rasterise", "splat_back"]
+
+
+def rasterise(
+    prepared: PreparedGaussians,
+    viewmat: NDArray[np.floating],
+    K: NDArray[np.floating],
+    width: int,
+    height: int,
+) -> GBuffer:
+    """Blend the cloud front to back as seen by one pinhole camera.
+
+    Parameters
+    ----------
+    prepared : the cloud, from `prepare`
+    viewmat : [4, 4] world to camera; camera axes x right, y down, z forward [m]
+    K : [3, 3] intrinsics; the top left pixel's centre is (0.5, 0.5) [px]
+    width, height : picture size [px]
+
+    Returns
+    -------
+    GBuffer
+
+    Raises
+    ------
+    InputError
+        The camera is not finite, has no positive focal length or the picture has no pixels.
+    """
+    view = view_of(viewmat, K, width, height)
+    records, _ = project(prepared, view)
+    starts, splats = tile_lists(records, width, height)
+    buffers = GBuffer(
+        rgb=np.empty((height, width, 3), dtype=np.float32),
+        depth=np.empty((height, width), dtype=np.float32),
+        expected_depth=np.empty((height, width), dtype=np.float32),
+        alpha=np.empty((height, width), dtype=np.float32),
+        normal=np.empty((height, width, 3), dtype=np.float32),
+        class_id=np.empty((height, width), dtype=np.uint8),
+    )
+    blend(
+        records, view.rays.astype(np.float32), starts, splats,
+        buffers.rgb, buffers.depth, buffers.expected_depth, buffers.alpha, buffers.normal, buffers.class_id
+    )  # fmt: skip
+    return buffers

@@ -1,0 +1,287 @@
+"""Snow on the road as a layer of Gaussians of its own, and snow on what else faces up."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import ROAD_CLASSES, SemanticClass
+from tasks.render.weather.coverage_field import FieldParameters, height_field
+from tasks.render.weather.scene_light import appended, recoloured, to_display_unclipped, without
+from tasks.render.weather.snow.field import SnowField, coverage_rank, local_depth_mm, tracks_at
+from tasks.render.weather.snow.road_anchors import AnchorParameters, road_anchors
+from tasks.render.weather.snow.shelter import open_share
+from tasks.render.weather.snow.wheel_tracks import TrackParameters
+from tasks.scene.gaussians import Gaussians
+from tasks.scene.spherical_harmonics import C0
+from tasks.scene.surroundings import in_surface
+
+EDGE_WIDTHS = 1.4
+"""Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
+BURIED = 0.98
+"""Share of an anchor that its snow hides from which on the anchor itself need not be drawn."""
+GROUND_CLASSES = (*ROAD_CLASSES, SemanticClass.KERB, SemanticClass.SIDEWALK, SemanticClass.TERRAIN)
+NARROWEST = 0.35
+"""Width of the narrowest Gaussian, at the very edge, by that of its anchor."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SnowCoverParameters:
+    """How snow lies and looks.
+
+    Parameters
+    ----------
+    patches : waves of the coverage field
+    tracks : wheel tracks in it
+    anchors : which Gaussians of the road carry it
+    lumps : waves of the micro-height
+    lump_share : standard deviation of the micro-height by the local depth [1]
+    relief : standard deviation of the snow's brightness from hollow to lump, by its mean [1]
+    full_cover_mm : depth at which the road is covered, h_cover [mm]
+    hiding_mm : depth at which 1 - 1/e of the ground is hidden [mm]
+    albedo : reflectance of fresh snow, red, green, blue [1]
+    damp_albedo_ratio : reflectance of the damp road between the snow by its dry one [1]
+    """
+
+    patches: FieldParameters
+    tracks: TrackParameters
+    anchors: AnchorParameters
+    lumps: FieldParameters
+    lump_share: float
+    relief: float
+    full_cover_mm: float
+    hiding_mm: float
+    albedo: tuple[float, float, float]
+    damp_albedo_ratio: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SnowLayer:
+    """Snow on the road.
+
+    Parameters
+    ----------
+    gaussians : to append to the scene; they keep their anchors' class
+    anchors : int64 [A] the road Gaussian under each [1]
+    cover : float64 [A] opacity times area of each by its anchor's [1]
+    buried : int64 [B] road Gaussians that nobody sees any more [1]
+    """
+
+    gaussians: Gaussians
+    anchors: NDArray[np.int64]
+    cover: NDArray[np.float64]
+    buried: NDArray[np.int64]
+
+
+def hidden_share(depth_mm: NDArray[np.floating], parameters: SnowCoverParameters) -> NDArray[np.float64]:
+    """Share of the ground that snow of a depth hides.
+
+    Parameters
+    ----------
+    depth_mm : [...] local depth [mm]
+    parameters : hiding depth
+
+    Returns
+    -------
+    float64 [...] share [1]
+    """
+    return 1 - np.exp(-np.asarray(depth_mm, dtype=np.float64) / parameters.hiding_mm)
+
+
+def snow_layer(
+    gaussians: Gaussians,
+    field: SnowField,
+    white: NDArray[np.floating],
+    coverage: float,
+    depth_mm: float,
+    parameters: SnowCoverParameters,
+    lift: NDArray[np.floating] | None = None,
+) -> SnowLayer:
+    """The Gaussians of the snow on the road.
+
+    Parameters
+    ----------
+    gaussians : the scene with the clip's road edit
+    field : its coverage field
+    white : [3] radiance of a white surface lying on the road, as the scene's colours have it [1]
+    coverage : c_s [1]
+    depth_mm : h_s [mm]
+    parameters : how snow lies and looks
+    lift : [N] height of a road feature under each Gaussian, as `road_anchors` takes it [m]
+
+    Returns
+    -------
+    SnowLayer
+    """
+    p = parameters
+    anchors = road_anchors(gaussians, p.anchors, lift)
+    x, y = gaussians.means[anchors.index, :2].T
+    tracks = tracks_at(field, x, y)
+    xi = coverage_rank(field, x, y, tracks)
+    depth = local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm)
+    hidden = hidden_share(depth, p) * gaussians.opacities[anchors.index]
+    on = (xi <= coverage) & (hidden > 1 / 255)
+    index, normal, flat, xi, depth = (
+        anchors.index[on],
+        anchors.normal[on],
+        anchors.flat[on],
+        xi[on],
+        depth[on],
+    )
+
+    place = gaussians.means[index].astype(np.float64)
+    scales, quats = _lying(gaussians, index, normal, flat)
+    wide = scales.max(axis=1)
+    kept = np.ones(len(index))
+    if coverage < 1:
+        # no wider than the way to the edge of the patch
+        inside = (coverage - xi) / _steepness(field, place, tracks[on], wide)
+        kept = np.clip(inside / (EDGE_WIDTHS * wide), NARROWEST, 1)
+        scales *= kept[:, None]
+    lumps = height_field(place[:, 0], place[:, 1], p.lumps, field.seed, "snow-lumps", wide)
+    rise = 1e-3 * depth * np.clip(1 + p.lump_share * lumps, 0.2, 2)
+    thin = np.argmin(scales, axis=1)
+    scales[np.arange(len(index)), thin] = np.clip(0.3 * rise, 1e-3, 5e-3)
+
+    colour = _snow_colour(lumps, tracks[on], white, p)
+    if gaussians.display_encoded:
+        colour = to_display_unclipped(colour)
+    sh = np.zeros((len(index), *gaussians.sh.shape[1:]), dtype=np.float32)
+    sh[:, 0] = (colour - 0.5) / C0
+    share = hidden_share(depth, p)
+    buried = (kept == 1) & (share >= BURIED)
+    # Where the ground is not buried, its discs lie among those of the snow.
+    area = in_surface(scales).prod(axis=1) / in_surface(gaussians.scales[index]).prod(axis=1)
+    layer = replace(
+        gaussians,
+        means=(place + rise[:, None] * normal).astype(np.float32),
+        quats_wxyz=quats.astype(np.float32),
+        scales=scales.astype(np.float32),
+        opacities=np.clip(hidden[on], 1 / 255, 1).astype(np.float32),
+        sh=sh,
+        normals=normal.astype(np.float32),
+        class_id=gaussians.class_id[index],
+        surroundings=_surroundings(gaussians, index, area, share * area + ~buried),
+    )
+    return SnowLayer(gaussians=layer, anchors=index, cover=share * area, buried=index[buried])
+
+
+def snowed_over(gaussians: Gaussians, snow: SnowLayer) -> Gaussians:
+    """The scene with the layer on it, less what it buries.
+
+    Parameters
+    ----------
+    gaussians : the scene that the layer was made for, in whatever colours
+    snow : the layer
+
+    Returns
+    -------
+    Gaussians
+        The layer comes last.
+    """
+    if gaussians.surroundings is not None:
+        about = gaussians.surroundings.copy()
+        about[snow.anchors, 0] *= (1 + snow.cover).astype(np.float32)
+        gaussians = replace(gaussians, surroundings=about)
+    return appended(without(gaussians, snow.buried), snow.gaussians)
+
+
+def whitened(
+    gaussians: Gaussians,
+    field: SnowField,
+    white: NDArray[np.floating],
+    coverage: float,
+    depth_mm: float,
+    parameters: SnowCoverParameters,
+) -> Gaussians:
+    """The scene with snow on everything that faces up, and damp road between the snow.
+
+    What stands on the ground gets as much as reaches it past what hangs above; ground gets it all, drifted there.
+
+    The road under the snow layer is whitened too: far away a pixel blends many Gaussians, and dark ones between
+    the layer's would show through.
+
+    Parameters
+    ----------
+    gaussians : the scene
+    field : its coverage field
+    white : [3] radiance of a white surface lying on the road, as the scene's colours have it [1]
+    coverage : c_s [1]
+    depth_mm : h_s [mm]
+    parameters : how snow lies and looks
+
+    Returns
+    -------
+    Gaussians
+        The same Gaussians with other colours.
+    """
+    p = parameters
+    road = np.isin(gaussians.class_id, ROAD_CLASSES)
+    up = np.where(gaussians.class_id == SemanticClass.SKY, 0.0, gaussians.normals[:, 2])
+    limit = steepest_bearing(p)
+    facing = np.clip((up - limit) / limit, 0, 1)
+    bears = np.flatnonzero(facing > 0)
+    place = gaussians.means[bears]
+    x, y = place[:, 0], place[:, 1]
+    # wheels ran on the road alone
+    tracks = np.zeros(len(bears))
+    tracks[road[bears]] = tracks_at(field, x[road[bears]], y[road[bears]])
+    xi = coverage_rank(field, x, y, tracks)
+    hidden = np.zeros(len(gaussians))
+    reached = np.where(np.isin(gaussians.class_id, GROUND_CLASSES), 1.0, open_share(gaussians))
+    depth = reached[bears] * local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm)
+    hidden[bears] = facing[bears] * hidden_share(depth, p)
+    damp = np.where(road, p.damp_albedo_ratio, 1.0)
+    even = np.zeros(len(gaussians))
+    snow = _snow_colour(even, even, white, p)
+    return recoloured(gaussians, (1 - hidden) * damp, hidden[:, None] * snow)
+
+
+def steepest_bearing(parameters: SnowCoverParameters) -> float:
+    """Upward part of a normal from which on a surface bears some snow; at twice that it bears all [1]."""
+    return 0.5 * float(np.cos(np.deg2rad(parameters.anchors.tilt_limit_deg)))
+
+
+def _steepness(
+    field: SnowField, place: NDArray[np.float64], tracks: NDArray[np.float64], width: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Slope of the coverage field over a Gaussian's width [m-1]; where it is level the edge is far away."""
+    x, y = place[:, 0], place[:, 1]
+    along = coverage_rank(field, x + width, y, tracks) - coverage_rank(field, x - width, y, tracks)
+    across = coverage_rank(field, x, y + width, tracks) - coverage_rank(field, x, y - width, tracks)
+    return np.hypot(along, across) / (2 * width) + 1e-6
+
+
+def _snow_colour(
+    lumps: NDArray[np.floating],
+    tracks: NDArray[np.floating],
+    white: NDArray[np.floating],
+    p: SnowCoverParameters,
+) -> NDArray[np.float64]:
+    """Radiance of snow: hollows get and give less light than lumps, wheels press it grey."""
+    shade = (1 + p.relief * np.clip(np.asarray(lumps), -2.5, 1.5)) * (1 - p.tracks.compaction * tracks)
+    return shade[:, None] * (np.array(p.albedo) * np.asarray(white))
+
+
+def _surroundings(
+    gaussians: Gaussians, index: NDArray[np.int64], area: NDArray[np.float64], cover: NDArray[np.float64]
+) -> NDArray[np.float32] | None:
+    """Of Gaussians over these, so much of their area, on a surface so much more densely covered."""
+    if gaussians.surroundings is None:
+        return None
+    overlap, ratio = gaussians.surroundings[index].T
+    return np.column_stack((overlap * cover, ratio / np.sqrt(area))).astype(np.float32)
+
+
+def _lying(
+    gaussians: Gaussians, index: NDArray[np.int64], normal: NDArray[np.float64], flat: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Scales and quaternions of Gaussians that lie in the surface: flat anchors' own, else discs turned to it."""
+    scales = gaussians.scales[index].astype(np.float64)
+    quats = gaussians.quats_wxyz[index].astype(np.float64)
+    middle = np.sort(scales[~flat], axis=1)[:, 1]
+    scales[~flat] = np.column_stack((middle, middle, 1e-3 * np.ones(len(middle))))
+    x, y, z = normal[~flat].T
+    turned = np.column_stack((1 + z, -y, x, np.zeros(len(z))))
+    quats[~flat] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return scales, quats

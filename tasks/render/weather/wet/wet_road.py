@@ -1,0 +1,218 @@
+"""The wet road: darker under its film, and a mirror where the film lies over the texture.
+
+Pavement and earth beside it drain: water fills their pores, so that they are darker, but no film stands on them.
+
+Refraction of the texture below shifts it by at most the film depth, about a millimetre, which is under a tenth
+of a pixel at three metres: it is left out.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import ROAD_CLASSES, SemanticClass
+from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.weather.layer import Layer
+from tasks.render.weather.sky import LUMINANCE, SkyLight
+from tasks.render.weather.wet.puddles import RoadWaterParameters, water_surface, wetness
+from tasks.render.weather.wet.reflection import mirrored_scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class WetRoadParameters:
+    """Optics of the wet road.
+
+    Parameters
+    ----------
+    water : how the film lies
+    refractive_index : of water [1]
+    diffuse_reflectance : mean reflectance of the water surface for diffuse light from above [1]
+    rough_slope : standard deviation of the slopes of wet texture that stands out of the film [1]
+    normal_window : width of the window over which road normals are averaged, by picture height [1]
+    """
+
+    water: RoadWaterParameters
+    refractive_index: float
+    diffuse_reflectance: float
+    rough_slope: float
+    normal_window: float
+
+
+@numba.njit(cache=True, nogil=True)
+def fresnel_reflectance(cosine, refractive_index):  # type: ignore[no-untyped-def]
+    """Unpolarised reflectance of a smooth surface (Fresnel; Born & Wolf 1999, section 1.5).
+
+    Parameters
+    ----------
+    cosine : number or array, cosine of the angle of incidence, in air [1]
+    refractive_index : of the medium below [1]
+
+    Returns
+    -------
+    number or array, reflectance [1]
+    """
+    n = refractive_index
+    inside = np.sqrt(n * n - 1 + cosine * cosine)
+    across = (cosine - inside) / (cosine + inside)
+    along = (n * n * cosine - inside) / (n * n * cosine + inside)
+    return (across * across + along * along) / 2
+
+
+@numba.njit(cache=True, nogil=True)
+def wet_albedo_ratio(albedo, refractive_index, diffuse_reflectance):  # type: ignore[no-untyped-def]
+    """Diffuse reflectance of a surface under a water film by its dry one.
+
+    Lekner & Dorf (1988, doi:10.1364/AO.27.001278), after Angstrom: light that the surface scatters back meets the
+    water surface from below and is returned with probability p = 1 - (1 - R) / n^2; summed over all returns,
+    (1 - R) A (1 - p) / (1 - p A) comes out.
+
+    Parameters
+    ----------
+    albedo : number or array, dry reflectance A [1]
+    refractive_index : n of water [1]
+    diffuse_reflectance : R of the water surface for diffuse light from above [1]
+
+    Returns
+    -------
+    number or array, wet by dry reflectance [1]
+    """
+    p = 1 - (1 - diffuse_reflectance) / refractive_index**2
+    return (1 - diffuse_reflectance) * (1 - p) / (1 - p * albedo)
+
+
+def wet_layer(
+    picture: NDArray[np.float32],
+    gbuffer: GBuffer,
+    environment: NDArray[np.float32],
+    sky: SkyLight,
+    extinction: float,
+    rays: NDArray[np.float32],
+    T_world_camera: NDArray[np.floating],
+    K: NDArray[np.floating],
+    film_depth_mm: float,
+    parameters: WetRoadParameters,
+    seed: int,
+) -> Layer:
+    """The water on the road and on the ground beside it.
+
+    Parameters
+    ----------
+    picture : float32 [H, W, 3] the dry scene in its light, without the veil of the air [1]
+    gbuffer : the rasterisation
+    environment : float32 [h, w, 3] sky and far field under cloud [1]
+    sky : the light under cloud
+    extinction : extinction coefficient of the air [m-1]
+    rays : float32 [H, W, 3] world directions of the pixels, of camera z 1 [1]
+    T_world_camera : [4, 4] camera pose [m]
+    K : [3, 3] intrinsics [px]
+    film_depth_mm : total film depth h_t [mm]
+    parameters : optics of the wet road
+    seed : visual seed of the clip [1]
+
+    Returns
+    -------
+    Layer
+    """
+    p = parameters
+    height = gbuffer.depth.shape[0]
+    focal_px = float(K[1, 1])
+    road = np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5)
+    normal = _road_normals(gbuffer.normal, road, 2 * round(p.normal_window * height / 2) + 1)
+    water = water_surface(
+        gbuffer.depth, rays, normal, road, T_world_camera[:3, 3], focal_px, film_depth_mm, p.water, seed
+    )
+    light = mirrored_scene(
+        picture, gbuffer.depth, water.normal, road, environment, T_world_camera, K, extinction, sky.airlight
+    )
+    # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
+    # narrow across at grazing angles
+    sharp = _column_mean(light, road, round(p.water.ripple_slope * focal_px))
+    rough = _column_mean(light, road, round(p.rough_slope * focal_px))
+    gain = np.ones((*road.shape, 1), dtype=np.float32)
+    add = np.zeros_like(picture)
+    facing = np.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
+    drained = np.where(np.isin(gbuffer.class_id, DRAINED_CLASSES), facing, np.float32(0))
+    _wet(
+        picture, road, drained, water.smooth, water.cosine, sharp, rough, wetness(film_depth_mm, p.water),
+        p.water.ripple_slope, p.rough_slope, p.refractive_index, p.diffuse_reflectance,
+        LUMINANCE / float(LUMINANCE @ sky.white), gain, add,
+    )  # fmt: skip
+    return Layer(name="wet", gain=gain, add=add)
+
+
+DRAINED_CLASSES = (SemanticClass.SIDEWALK, SemanticClass.KERB, SemanticClass.TERRAIN)
+"""Rough ground with pores that water runs off."""
+STEEPEST_SOAKED = 0.5
+"""Upward part of a normal from which on ground is soaked through: 60 deg steep, it still gets half the rain [1]."""
+ALBEDO_RANGE = (0.02, 0.9)
+"""Reflectances that a road's own paint and stone can have; beyond them it is the light that was misread."""
+
+
+@numba.njit(cache=True, nogil=True)
+def _wet(  # type: ignore[no-untyped-def]
+    picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
+    to_albedo, gain, add,
+):  # fmt: skip
+    """Mirror lobes of smooth water and of wet texture over the darkened road.
+
+    Facets tilted towards the eye meet its line of sight more steeply than the mean surface: a lobe of slope s
+    reflects as a mirror does at the cosine sqrt(cos^2 + s^2). Drained ground is as wet as it faces the rain.
+    """
+    for row in range(road.shape[0]):
+        for column in range(road.shape[1]):
+            soaked = wet if road[row, column] else wet * drained[row, column]
+            if soaked <= 0:
+                continue
+            albedo = 0.0
+            for c in range(3):
+                albedo += to_albedo[c] * picture[row, column, c]
+            albedo = min(max(albedo, ALBEDO_RANGE[0]), ALBEDO_RANGE[1])
+            darker = 1 - soaked * (1 - wet_albedo_ratio(albedo, index, diffuse))
+            if not road[row, column]:
+                gain[row, column, 0] = darker
+                continue
+            share, steep = smooth[row, column], cosine[row, column] ** 2
+            mirror = share * fresnel_reflectance(min(1.0, sqrt(steep + ripple_slope**2)), index)
+            sheen = (wet - share) * fresnel_reflectance(min(1.0, sqrt(steep + rough_slope**2)), index)
+            gain[row, column, 0] = (1 - mirror - sheen) * darker
+            for c in range(3):
+                add[row, column, c] = mirror * sharp[row, column, c] + sheen * rough[row, column, c]
+
+
+def _road_normals(normal: NDArray[np.float32], road: NDArray[np.bool_], window: int) -> NDArray[np.float32]:
+    """Road normals averaged over a window of the road alone; up where there is no road."""
+    mean = cv2.blur(np.where(road[..., None], normal, np.float32(0)), (window, window))
+    mean[~road] = (0, 0, 1)
+    return mean / np.sqrt((mean * mean).sum(axis=-1, keepdims=True))
+
+
+def _column_mean(light: NDArray[np.float32], road: NDArray[np.bool_], reach: int) -> NDArray[np.float32]:
+    """Mean of the road pixels of each column within ``reach`` rows."""
+    out = np.zeros_like(light)
+    _slide(light, road, reach, out)
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _slide(light, road, reach, out):  # type: ignore[no-untyped-def]
+    height, width = road.shape
+    total = np.zeros((width, 3))
+    count = np.zeros(width)
+    for row in range(-reach, height):
+        enters, leaves = row + reach, row - reach - 1
+        for column in range(width):
+            if enters < height and road[enters, column]:
+                count[column] += 1
+                for c in range(3):
+                    total[column, c] += light[enters, column, c]
+            if leaves >= 0 and road[leaves, column]:
+                count[column] -= 1
+                for c in range(3):
+                    total[column, c] -= light[leaves, column, c]
+            if row >= 0 and road[row, column]:
+                for c in range(3):
+                    out[row, column, c] = total[column, c] / count[column]

@@ -1,0 +1,155 @@
+"""What people fix to house fronts: awnings, balconies, flower boxes and downpipes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import SemanticClass
+from tasks.scene.street import palette
+from tasks.scene.street.houses.facade_paint import look_of
+from tasks.scene.street.houses.openings import SIGN_BOTTOM, Part
+from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
+from tasks.scene.street.noise import stream
+from tasks.scene.street.plan import Building
+from tasks.scene.street.surfels import Surfels, box, join, tiles, tube
+from tasks.scene.street.vegetation import leaves
+
+Floats = NDArray[np.float64]
+
+_AWNING_REACH, _AWNING_DROP, _VALANCE = 1.05, 0.45, 0.2
+_STRIPE = 0.4
+_BALCONY_REACH, _RAIL_HEIGHT, _BAR_GAP = 0.8, 0.95, 0.16
+_SILL = 0.95
+_KIND = SemanticClass.BUILDING
+
+
+def adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
+    """Surfels of what is fixed to the fronts, classes building and vegetation.
+
+    Parameters
+    ----------
+    layout : dimensions
+    buildings : the houses
+    seed : the street's seed [1]
+    """
+    parts = []
+    for house in buildings:
+        front = layout.front(house.side) + house.side * house.setback
+        depth = float(nearest_depth(layout, house.nearest_station, front, 4.0))
+        if depth > 40:
+            continue
+        rng = stream(seed, f"adornments {house.number}")
+        parts.append(_downpipe(layout, house, front))
+        if house.shop and house.awnings:
+            parts += _awnings(layout, house, front, depth, rng)
+        upper = [
+            (
+                storey,
+                bay,
+                layout.kerb_height + layout.ground_storey_height + (storey - 1) * layout.storey_height,
+            )
+            for storey in range(1, house.storeys)
+            for bay in range(house.bays)
+        ]
+        window = look_of(house, seed).window[0]
+        slab = look_of(house, seed).colours[Part.TRIM]
+        for storey, bay, floor in upper:
+            middle = house.start + (bay + 0.5) * house.bay
+            if house.balconies and bay % 2 == house.bays % 2 and storey < house.storeys - 1:
+                parts += _balcony(house, middle, front, floor, window + 0.7, slab)
+            elif house.flowers and storey < 3 and rng.random() < 0.6:
+                parts += _flower_box(house, middle, front, floor + _SILL, window, PIXEL * depth, rng)
+    return join(parts)
+
+
+def awning_boxes(layout: StreetLayout, buildings: tuple[Building, ...]) -> Floats:
+    """Boxes [K, 2, 3] that cast the awnings' shadows [m]."""
+    boxes = []
+    for house in buildings:
+        if house.shop and house.awnings:
+            front = layout.front(house.side) + house.side * house.setback
+            d = sorted((front, front - house.side * _AWNING_REACH))
+            top = layout.kerb_height + SIGN_BOTTOM
+            boxes += [[[a, d[0], top - 0.3], [b, d[1], top - 0.2]] for a, b in _shop_bays(house)]
+    return np.array(boxes).reshape(-1, 2, 3)
+
+
+def _shop_bays(house: Building) -> list[tuple[float, float]]:
+    edges = house.start + house.bay * np.arange(house.bays + 1)
+    return [(edges[k] + 0.08, edges[k + 1] - 0.08) for k in range(house.bays) if k != house.door]
+
+
+def _awnings(
+    layout: StreetLayout, house: Building, front: float, depth: float, rng: np.random.Generator
+) -> list[Surfels]:
+    cloth = palette.AWNINGS[rng.integers(len(palette.AWNINGS))]
+    top = layout.kerb_height + SIGN_BOTTOM + 0.02
+    rows = max(int(_AWNING_REACH / (7 * PIXEL * depth)), 3)
+    parts = []
+    for start, stop in _shop_bays(house):
+        n = 2 * round((stop - start) / _STRIPE / 2) + 1
+        per = 2
+        step = (stop - start) / (n * per)
+        s = start + (np.arange(n * per) + 0.5) * step
+        colour = np.where((np.arange(n * per) // per % 2 == 0)[:, None, None], cloth, palette.CURTAIN)
+        t = (np.arange(rows) + 0.5) / rows
+        along, across = np.meshgrid(s, t, indexing="ij")
+        out = np.array([0, -house.side * _AWNING_REACH, -_AWNING_DROP])
+        centre = np.stack([along, front + across * out[1], top + across * out[2]], axis=-1)
+        # the cloth lies face up: along the street to the left of the outward slope
+        edge_u = np.array([house.side * step, 0, 0])
+        parts.append(tiles(centre, edge_u, -out / rows, _KIND, colour * np.ones((1, rows, 1))))
+        hem = np.stack(
+            [s, np.full(len(s), front + out[1]), np.full(len(s), top + out[2] - _VALANCE / 2)], axis=-1
+        )
+        parts.append(tiles(hem, edge_u, [0, 0, _VALANCE], _KIND, colour[:, 0] * 0.95))
+    return parts
+
+
+def _balcony(
+    house: Building, middle: float, front: float, floor: float, width: float, slab: Floats
+) -> list[Surfels]:
+    out = -house.side * _BALCONY_REACH
+    d = sorted((front, front + out))
+    half = width / 2
+    bars = np.arange(-half, half + 0.01, _BAR_GAP)
+    height = (np.arange(4) + 0.5) / 4 * _RAIL_HEIGHT
+    s, z = np.meshgrid(middle + bars, floor + height, indexing="ij")
+    centre = np.stack([s, np.full(s.shape, front + out), z], axis=-1)
+    rail = tiles(centre, [house.side * 0.028, 0, 0], [0, 0, _RAIL_HEIGHT / 4], _KIND, palette.METAL_DARK)
+    ends = np.array([-half, half])[:, None] + np.zeros(5)
+    depth = front + out * (np.arange(5) + 0.5) / 5 + 0 * ends
+    sides = np.stack([middle + ends, depth, np.full(ends.shape, floor + _RAIL_HEIGHT / 2)], axis=-1)
+    side_bars = tiles(sides, [0, 0.03, 0], [0, 0, 0.6 * _RAIL_HEIGHT], _KIND, palette.METAL_DARK)
+    path = np.linspace(-half, half, 5)[:, None] * [1, 0, 0] + [middle, front + out, floor + _RAIL_HEIGHT]
+    return [
+        box([middle - half, d[0], floor - 0.16], [middle + half, d[1], floor], 0.35, _KIND, slab),
+        rail,
+        side_bars,
+        tube(path, 0.028, 4, _KIND, palette.METAL_DARK),
+    ]
+
+
+def _flower_box(
+    house: Building,
+    middle: float,
+    front: float,
+    sill: float,
+    width: float,
+    pixel: float,
+    rng: np.random.Generator,
+) -> list[Surfels]:
+    n = 5
+    s = middle + (np.arange(n) + 0.5) / n * width - width / 2
+    d = front - house.side * 0.16
+    balls = np.column_stack([s, np.full(n, d), sill + rng.uniform(0.08, 0.14, n), np.full(n, 0.14)])
+    bloom = palette.FLOWERS[rng.integers(len(palette.FLOWERS))]
+    return [
+        leaves(balls, palette.HEDGE, 4.0 * pixel, rng),
+        leaves(balls + np.array([0, 0, 0.06, -0.02]), bloom, 2.6 * pixel, rng),
+    ]
+
+
+def _downpipe(layout: StreetLayout, house: Building, front: float) -> Surfels:
+    foot = np.array([house.start, front - house.side * 0.09, layout.kerb_height])
+    path = foot + np.linspace(0, 1, 16)[:, None] * [0, 0, house.eaves(layout) - layout.kerb_height]
+    return tube(path, 0.055, 5, _KIND, palette.METAL_GREY)

@@ -1,0 +1,239 @@
+"""One axle at one instant: slip, tyre force and torques, each with its own function."""
+
+from typing import NamedTuple
+
+from numba import njit
+
+from tasks.vehicle.brake import abs_command, abs_update
+from tasks.vehicle.effects.brake_line import acting_pressure
+from tasks.vehicle.effects.chassis import ChassisEffects, effective_friction, grip_reserve, stick_share
+from tasks.vehicle.effects.exact import friction_factor, slot_sum
+from tasks.vehicle.effects.ports import INDEX, PORTS
+from tasks.vehicle.effects.slots import SlotTables
+from tasks.vehicle.model.chassis import Chassis
+from tasks.vehicle.model.states import AxleMemory, Instant
+from tasks.vehicle.model.vertical_ports import Ground, Strut
+from tasks.vehicle.paper.wheels import Wheels
+from tasks.vehicle.tyres.burckhardt import TyreCurve
+
+_PAD, _ROLL, _ROLL_SPEED, _RELAXATION = (
+    INDEX[name] for name in ("pad_drag", "rolling_coefficient", "rolling_speed", "relaxation_length")
+)
+_BRAKE_FORM, _FRICTION_FORM = PORTS.index("brake_torque"), PORTS.index("friction")
+Senses = tuple[float, float, float, float, float, float, float, float, float]
+"""What a form can depend on, in the order of `VARIABLES`."""
+
+
+class AxlePorts(NamedTuple):
+    """What acts at one axle.
+
+    Parameters
+    ----------
+    ground : road and load
+    slip : signed braking slip; negative where the tyre drives the vehicle [1]
+    force_slip : slip that builds up the tyre's force; another one where the tyre has a relaxation length [1]
+    tyre_force : braking force at the contact, rearward positive [N]
+    abs_scale : share of the brake torque let through [1]
+    full_torque : brake torque that the pressure gives to a turning wheel without ABS [N m]
+    brake_torque : against the wheel's rotation [N m]
+    shaft_torque : of the engine, against the wheel's rotation [N m]
+    suspension_force : spring, damper and what the links pass on [N]
+    lever : of the tyre force about the wheel centre [m]
+    ground_moment : of the ground's load, against the wheel's rotation [N m]
+    """
+
+    ground: Ground
+    slip: float
+    force_slip: float
+    tyre_force: float
+    abs_scale: float
+    full_torque: float
+    brake_torque: float
+    shaft_torque: float
+    suspension_force: float
+    lever: float
+    ground_moment: float
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
+    """Braking slip that is negative for a driven wheel, within [-1, 1]; ISO 8855's is its negative [1].
+
+    Parameters
+    ----------
+    speed : v [m/s]
+    rim_speed : R omega [m/s]
+    speed_floor : v_epsilon [m/s]
+    """
+    return min(max((speed - rim_speed) / max(speed, speed_floor), -1.0), 1.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def signed_friction(slip: float, share: float, tyre: TyreCurve, effects: ChassisEffects) -> float:
+    """Friction of the tyre, continued oddly to driving slip [1].
+
+    Parameters
+    ----------
+    slip : signed braking slip [1]
+    share : of the tyre that sticks [1]
+    tyre : the scaled curve
+    effects : the numbers
+    """
+    friction = effective_friction(abs(slip), share, tyre, effects)
+    return friction if slip >= 0.0 else -friction
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def lock_share(omega: float, lock_speed: float) -> float:
+    """Share of the brake torque that friction gives at a wheel speed: all of it, save around standstill [1].
+
+    Parameters
+    ----------
+    omega : [rad/s]
+    lock_speed : [rad/s]
+    """
+    return min(max(omega / lock_speed, -1.0), 1.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def senses_of(speed: float, load_ratio: float, strut: Strut, memory: AxleMemory, instant: Instant) -> Senses:
+    """What a form at an axle can depend on, in the order of `VARIABLES`.
+
+    Parameters
+    ----------
+    speed : [m/s]
+    load_ratio : contact load over that at rest [1]
+    strut, memory, instant : of the axle, and what acts from outside
+    """
+    return (
+        instant.time, speed, instant.pressure, memory.disc_rise, instant.pressure_rate, load_ratio, strut.travel,
+        strut.rate, instant.deceleration,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
+    """How fast the slip that builds up force follows the slip: v / length; 0 where it does at once [1/s].
+
+    Parameters
+    ----------
+    speed : [m/s]
+    speed_floor : v_epsilon, the least speed of following [m/s]
+    length : relaxation length (Pacejka 2012, doi:10.1016/C2010-0-68548-8); 0 for none [m]
+    """
+    return max(speed, speed_floor) / length if length > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def rolling_axle(
+    ground: Ground,
+    strut: Strut,
+    speed: float,
+    omega: float,
+    memory: AxleMemory,
+    scale: float,
+    gain: float,
+    shaft_torque: float,
+    static_load: float,
+    stiffness: float,
+    step: float,
+    instant: Instant,
+    forms: SlotTables | None,
+    chassis: Chassis,
+    tyre: TyreCurve,
+) -> AxlePorts:
+    """Slip, tyre force and torques of one axle.
+
+    Parameters
+    ----------
+    ground, strut : what carries it
+    speed : [m/s]
+    omega : wheel speed [rad/s]
+    memory : what it carries on
+    scale : ABS scale one step before, from which its rate is limited [1]
+    gain : brake torque per pressure [N m/MPa]
+    shaft_torque : of the engine on turning wheels [N m]
+    static_load, stiffness : of the tyre [N, N/m]
+    step : [s]
+    instant : what acts from outside
+    forms : what no effect of the library has
+    chassis, tyre : the values
+    """
+    wheels, effects, theta = chassis.wheels, chassis.effects, chassis.theta
+    slip = signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
+    force_slip = memory.slip if theta[_RELAXATION] > 0.0 else slip
+    load_ratio = ground.load / static_load
+    grip = friction_factor(theta, speed, load_ratio, memory.slip_heat, chassis.wet)
+    pressure = acting_pressure(instant.pressure, speed, memory.disc_rise, theta)
+    if forms is not None:
+        senses = senses_of(speed, load_ratio, strut, memory, instant)
+        grip *= max(1.0 + slot_sum(_FRICTION_FORM, senses, forms.keys, forms.grids, forms.tables), 0.0)
+        pressure *= max(1.0 + slot_sum(_BRAKE_FORM, senses, forms.keys, forms.grids, forms.tables), 0.0)
+    tyre_force = signed_friction(force_slip, stick_share(speed, effects), tyre, effects) * grip * ground.load
+    wanted = abs_command(slip, tyre.target_slip, wheels.release_width) if speed >= effects.abs_cutoff else 1.0
+    abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
+    turning = lock_share(omega, chassis.lock_speed)
+    rubbing = theta[_PAD] / (wheels.front.brake_gain + wheels.rear.brake_gain)
+    brake_torque = gain * (pressure * abs_scale + rubbing) * turning
+    lever = wheels.radius - effects.radius_by_load * (ground.load - static_load) / stiffness
+    rolling = theta[_ROLL] + theta[_ROLL_SPEED] * speed
+    offset = rolling * turning - effects.slope_moment * ground.slope
+    ground_moment = ground.load * lever * offset
+    return AxlePorts(
+        ground, slip, force_slip, tyre_force, abs_scale, gain * pressure, brake_torque, shaft_torque * turning,
+        strut.force, lever, ground_moment,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
+    """The ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
+
+    Parameters
+    ----------
+    ground, strut : what carries it
+    wheels : the values
+    """
+    tyre_force = -ground.load * ground.slope
+    return AxlePorts(
+        ground,
+        0.0,
+        0.0,
+        tyre_force,
+        1.0,
+        0.0,
+        wheels.radius * tyre_force,
+        0.0,
+        strut.force,
+        wheels.radius,
+        0.0,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def with_links(ports: AxlePorts, force: float) -> AxlePorts:
+    """The same ports with a force of the links in parallel to spring and damper.
+
+    Parameters
+    ----------
+    ports : of the axle
+    force : pulls body and wheel together where positive [N]
+    """
+    return AxlePorts(
+        ports.ground, ports.slip, ports.force_slip, ports.tyre_force, ports.abs_scale, ports.full_torque,
+        ports.brake_torque, ports.shaft_torque, ports.suspension_force + force, ports.lever, ports.ground_moment,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def reserve_of(ports: AxlePorts, tyre: TyreCurve) -> float:
+    """Sideways grip that an axle has left; none off the road [1].
+
+    Parameters
+    ----------
+    ports : of the axle
+    tyre : the scaled curve
+    """
+    if ports.ground.load <= 0.0:
+        return 0.0
+    return grip_reserve(ports.tyre_force / ports.ground.load, tyre.peak)

@@ -1,0 +1,189 @@
+"""One step of coupled mode, by a W-method of second order.
+
+The method is ROS2 (Verwer et al. 1999, doi:10.1137/S1064827597326651), which keeps its order for any matrix in
+the place of the Jacobian. Here that matrix holds only the stiff slip that ties speed and wheels: with it the
+wheels stay quiet to standstill; everywhere else (body, axles, road, heat) the method is Heun's.
+"""
+
+from numba import njit
+
+from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, disc_rate
+from tasks.vehicle.effects.ports import INDEX
+from tasks.vehicle.effects.slots import SlotTables
+from tasks.vehicle.half_car import HalfCar, HalfCarState, half_car_rates, moved
+from tasks.vehicle.model.axle_ports import AxlePorts, relaxation_rate
+from tasks.vehicle.model.chassis import Chassis
+from tasks.vehicle.model.ports import Ports, ports_at
+from tasks.vehicle.model.slip_matrix import GAMMA, axle_slope, solve_slip, without_speed
+from tasks.vehicle.model.states import AxleMemory, Instant, Memory, Motion, moved_axle, moved_motion
+from tasks.vehicle.paper.wheels import Axle
+from tasks.vehicle.road import RoadFeature
+from tasks.vehicle.tyres.burckhardt import TyreCurve
+
+_RELAXATION = INDEX["relaxation_length"]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def wheel_rate(ports: AxlePorts, axle: Axle) -> float:
+    """Angular acceleration of an axle's wheels [rad/s2].
+
+    Parameters
+    ----------
+    ports : of the axle
+    axle : its wheels
+    """
+    torque = ports.lever * ports.tyre_force - ports.brake_torque - ports.ground_moment - ports.shaft_torque
+    return torque / axle.inertia
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def memory_rate(
+    memory: AxleMemory, ports: AxlePorts, speed: float, omega: float, disc_capacity: float, chassis: Chassis
+) -> AxleMemory:
+    """Rates of what an axle carries on: slip behind its relaxation length, heat of sliding, discs.
+
+    Parameters
+    ----------
+    memory, ports : of the axle
+    speed : [m/s]
+    omega : wheel speed [rad/s]
+    disc_capacity : heat capacity of its discs [J/K]
+    chassis : the values
+    """
+    following = relaxation_rate(speed, chassis.wheels.speed_floor, chassis.theta[_RELAXATION])
+    return AxleMemory(
+        following * (ports.slip - memory.slip),
+        abs(ports.tyre_force * ports.force_slip) * speed,
+        disc_rate(memory.disc_rise, ports.brake_torque * omega, disc_capacity),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis) -> Motion:
+    """Rates of station, speed and wheel speeds (paper, Eq. app_longitudinal_complete).
+
+    Parameters
+    ----------
+    motion : the state
+    ports : what acts in it
+    standing : the vehicle has come to rest
+    chassis : the values
+    """
+    if standing:
+        return Motion(0.0, 0.0, 0.0, 0.0)
+    wheels = chassis.wheels
+    return Motion(
+        motion.speed,
+        ports.acceleration,
+        wheel_rate(ports.front, wheels.front),
+        wheel_rate(ports.rear, wheels.rear),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: Chassis) -> Memory:
+    """Rates of what tyres and discs carry on.
+
+    Parameters
+    ----------
+    memory, motion : the state
+    ports : what acts in it
+    chassis : the values
+    """
+    front, rear, speed = ports.front, ports.rear, motion.speed
+    return Memory(
+        memory_rate(memory.front, front, speed, motion.omega_f, DISC_CAPACITY_F, chassis),
+        memory_rate(memory.rear, rear, speed, motion.omega_r, DISC_CAPACITY_R, chassis),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def body_rates(x: HalfCarState, ports: Ports, body: HalfCar) -> HalfCarState:
+    """Rate of the half-car state under the ports (paper, Eq. app_half_car_complete).
+
+    Parameters
+    ----------
+    x : half-car state [m, rad, m/s, rad/s]
+    ports : what acts in it
+    body : the half-car
+    """
+    return half_car_rates(
+        x,
+        ports.front.ground.load,
+        ports.rear.ground.load,
+        ports.front.suspension_force,
+        ports.rear.suspension_force,
+        ports.pitch_moment,
+        ports.lift,
+        body,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def coupled_step(
+    motion: Motion,
+    memory: Memory,
+    x: HalfCarState,
+    ports: Ports,
+    instant: Instant,
+    next_instant: Instant,
+    step: float,
+    forms: SlotTables | None,
+    chassis: Chassis,
+    tyre: TyreCurve,
+    road: RoadFeature,
+) -> tuple[Motion, Memory, HalfCarState]:
+    """One ROS2 step from a state whose ports are known.
+
+    Parameters
+    ----------
+    motion, memory, x : longitudinal state, what tyres and discs carry on, half-car state
+    ports : what acts in it
+    instant, next_instant : what acts from outside now and after the step
+    step : [s]
+    forms : what no effect of the library has
+    chassis, tyre, road : the values
+
+    Returns
+    -------
+    The three states after the step.
+    """
+    body, wheels = chassis.body, chassis.wheels
+    front = axle_slope(ports.front, motion, motion.omega_f, step, wheels.front, chassis, tyre)
+    rear = axle_slope(ports.rear, motion, motion.omega_r, step, wheels.rear, chassis, tyre)
+    if instant.held:
+        front, rear = without_speed(front), without_speed(rear)
+    f1 = motion_rates(motion, ports, instant.standing, chassis)
+    k1, m1 = solve_slip(f1, memory_rates(memory, motion, ports, chassis), front, rear, GAMMA * step)
+    h1 = body_rates(x, ports, body)
+    ahead, x_ahead = moved_motion(motion, k1, step), moved(x, h1, step)
+    memory_ahead = Memory(moved_axle(memory.front, m1.front, step), moved_axle(memory.rear, m1.rear, step))
+    later = ports_at(
+        ahead, memory_ahead, x_ahead, next_instant, ports.front.abs_scale, ports.rear.abs_scale, step, forms,
+        chassis, tyre, road,
+    )  # fmt: skip
+    f2 = motion_rates(ahead, later, instant.standing, chassis)
+    g2 = memory_rates(memory_ahead, ahead, later, chassis)
+    k2, m2 = solve_slip(
+        moved_motion(f2, k1, -2.0),
+        Memory(moved_axle(g2.front, m1.front, -2.0), moved_axle(g2.rear, m1.rear, -2.0)),
+        front,
+        rear,
+        GAMMA * step,
+    )
+    h2 = body_rates(x_ahead, later, body)
+    after = Motion(
+        motion.station + step * (1.5 * k1.station + 0.5 * k2.station),
+        motion.speed + step * (1.5 * k1.speed + 0.5 * k2.speed),
+        motion.omega_f + step * (1.5 * k1.omega_f + 0.5 * k2.omega_f),
+        motion.omega_r + step * (1.5 * k1.omega_r + 0.5 * k2.omega_r),
+    )
+    remembered = Memory(
+        _stepped(memory.front, m1.front, m2.front, step), _stepped(memory.rear, m1.rear, m2.rear, step)
+    )
+    return after, remembered, moved(moved(x, h1, 0.5 * step), h2, 0.5 * step)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _stepped(memory: AxleMemory, k1: AxleMemory, k2: AxleMemory, step: float) -> AxleMemory:
+    return moved_axle(moved_axle(memory, k1, 1.5 * step), k2, 0.5 * step)

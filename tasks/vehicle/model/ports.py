@@ -1,0 +1,153 @@
+"""Coupled mode's physics at one instant: every force where it meets the vehicle, each with its own function.
+
+The ports are, in the order they are worked out: road, load, suspension force, slip, friction, tyre force, brake
+torque, drag, pitch moment, lift. An effect that the model lacks acts on exactly one of them.
+"""
+
+from typing import NamedTuple
+
+from numba import njit
+
+from tasks.vehicle.effects.chassis import link_lift, stick_share
+from tasks.vehicle.effects.exact import resistance, slot_sum
+from tasks.vehicle.effects.ports import INDEX, PORTS
+from tasks.vehicle.effects.slots import SlotTables
+from tasks.vehicle.half_car import HalfCarState
+from tasks.vehicle.model.axle_ports import (
+    AxlePorts,
+    reserve_of,
+    rolling_axle,
+    senses_of,
+    standing_axle,
+    with_links,
+)
+from tasks.vehicle.model.chassis import Chassis
+from tasks.vehicle.model.states import Instant, Memory, Motion
+from tasks.vehicle.model.vertical_ports import ground_at, struts_at
+from tasks.vehicle.road import RoadFeature
+from tasks.vehicle.tyres.burckhardt import TyreCurve
+
+_ENGINE, _ENGINE_SPEED, _BIAS, _DIVE, _LIFT, _PITCH, _AERO_PITCH, _AERO_LIFT = (
+    INDEX[name]
+    for name in (
+        "engine_torque", "engine_viscous", "bias_pressure", "anti_dive", "anti_lift", "pitch_gain", "aero_pitch",
+        "aero_lift",
+    )
+)  # fmt: skip
+_FORCE_FORM, _PITCH_FORM, _STRUT_FORM = (
+    PORTS.index(port) for port in ("longitudinal_force", "pitch_moment", "suspension_force")
+)
+
+
+class Ports(NamedTuple):
+    """What acts on the vehicle at one instant.
+
+    Parameters
+    ----------
+    front, rear : the axles
+    road_force : horizontal part of the contact loads on the slope, forward positive [N]
+    drag : of coasting, the air and the snow, rearward positive [N]
+    acceleration : dv/dt [m/s2]
+    pitch_moment : on the body, nose-down positive [N m]
+    lift : of the air, on the body's centre of gravity [N]
+    """
+
+    front: AxlePorts
+    rear: AxlePorts
+    road_force: float
+    drag: float
+    acceleration: float
+    pitch_moment: float
+    lift: float
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float]:
+    """Brake torque per pressure of the front and the rear axle, of which neither is negative [N m/MPa].
+
+    Parameters
+    ----------
+    pressure : at the pads, with which the front's share changes [MPa]
+    chassis : the values
+    """
+    front, rear = chassis.wheels.front.brake_gain, chassis.wheels.rear.brake_gain
+    moved = min(max(chassis.theta[_BIAS] * pressure * (front + rear), -front), rear)
+    return front + moved, rear - moved
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def ports_at(
+    motion: Motion,
+    memory: Memory,
+    x: HalfCarState,
+    instant: Instant,
+    scale_f: float,
+    scale_r: float,
+    step: float,
+    forms: SlotTables | None,
+    chassis: Chassis,
+    tyre: TyreCurve,
+    road: RoadFeature,
+) -> Ports:
+    """All that acts on the vehicle in one state.
+
+    The body's pitch moment follows from the forces at the ground: each axle passes its longitudinal link force
+    on at wheel height, and its brake and shaft torques. With F_x at the ground this is the same as F_x on the
+    height of the body's centre of gravity less the inertia of axles and wheels.
+
+    Parameters
+    ----------
+    motion, memory, x : longitudinal state, what tyres and discs carry on, half-car state
+    instant : what acts from outside
+    scale_f, scale_r : ABS scales one step before [1]
+    step : [s]
+    forms : what no effect of the library has
+    chassis, tyre, road : the values
+    """
+    body, wheels, effects, theta = chassis.body, chassis.wheels, chassis.effects, chassis.theta
+    speed, standing = motion.speed, instant.standing
+    ground_f = ground_at(motion.station, speed, x[2], x[6], body.tyre_f, body.static_f, road, effects)
+    behind = motion.station - wheels.wheelbase
+    ground_r = ground_at(behind, speed, x[3], x[7], body.tyre_r, body.static_r, road, effects)
+    strut_f, strut_r = struts_at(x, chassis)
+    if standing:
+        front, rear = standing_axle(ground_f, strut_f, wheels), standing_axle(ground_r, strut_r, wheels)
+    else:
+        gain_f, gain_r = brake_gains(instant.pressure, chassis)
+        engine = theta[_ENGINE] + theta[_ENGINE_SPEED] * motion.omega_f
+        front = rolling_axle(
+            ground_f, strut_f, speed, motion.omega_f, memory.front, scale_f, gain_f, engine, body.static_f,
+            body.tyre_f, step, instant, forms, chassis, tyre,
+        )  # fmt: skip
+        rear = rolling_axle(
+            ground_r, strut_r, speed, motion.omega_r, memory.rear, scale_r, gain_r, 0.0, body.static_r,
+            body.tyre_r, step, instant, forms, chassis, tyre,
+        )  # fmt: skip
+    share = 0.0 if standing else stick_share(speed, effects)
+    lift_f = link_lift(front.tyre_force, chassis.transfer, theta[_DIVE], effects.stick_anti_dive, share)
+    lift_r = link_lift(rear.tyre_force, chassis.transfer, theta[_LIFT], effects.stick_anti_lift, share)
+    if effects.scrub_stiffness != 0.0 and not standing:
+        scrub = effects.scrub_stiffness * (1.0 - share)
+        lift_f -= scrub * body.spring_f * strut_f.travel * reserve_of(front, tyre)
+        lift_r += scrub * body.spring_r * strut_r.travel * reserve_of(rear, tyre)
+    slope_f, slope_r = ground_f.load * ground_f.slope, ground_r.load * ground_r.slope
+    drag = wheels.mass * wheels.coast + resistance(theta, speed, 1.0, 0.0, chassis.snow_depth_mm)
+    moment = theta[_AERO_PITCH] * speed * speed
+    if forms is not None:
+        senses_f = senses_of(speed, ground_f.load / body.static_f, strut_f, memory.front, instant)
+        senses_r = senses_of(speed, ground_r.load / body.static_r, strut_r, memory.rear, instant)
+        lift_f -= slot_sum(_STRUT_FORM, senses_f, forms.keys, forms.grids, forms.tables)
+        lift_r += slot_sum(_STRUT_FORM, senses_r, forms.keys, forms.grids, forms.tables)
+        drag += slot_sum(_FORCE_FORM, senses_f, forms.keys, forms.grids, forms.tables)
+        moment += slot_sum(_PITCH_FORM, senses_f, forms.keys, forms.grids, forms.tables)
+    front, rear = with_links(front, -lift_f), with_links(rear, lift_r)
+    acceleration = 0.0
+    if not (standing or instant.held):
+        acceleration = -(front.tyre_force + rear.tyre_force + slope_f + slope_r + drag) / wheels.mass
+    link_f = front.tyre_force + slope_f + body.unsprung_f * acceleration
+    link_r = rear.tyre_force + slope_r + body.unsprung_r * acceleration
+    braking = (link_f + link_r) * chassis.lever + front.brake_torque + rear.brake_torque + front.shaft_torque
+    moment += braking * (1.0 + theta[_PITCH])
+    return Ports(
+        front, rear, -slope_f - slope_r, drag, acceleration, moment, theta[_AERO_LIFT] * speed * speed
+    )

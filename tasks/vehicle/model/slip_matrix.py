@@ -1,0 +1,147 @@
+"""The stiff part of coupled mode: how speed and wheel speeds answer to each other through slip."""
+
+from math import sqrt
+from typing import NamedTuple
+
+from numba import njit
+
+from tasks.vehicle.effects.chassis import effective_slope, stick_share
+from tasks.vehicle.effects.ports import INDEX
+from tasks.vehicle.model.axle_ports import AxlePorts, lock_share, relaxation_rate
+from tasks.vehicle.model.chassis import Chassis
+from tasks.vehicle.model.states import AxleMemory, Memory, Motion
+from tasks.vehicle.paper.wheels import Axle
+from tasks.vehicle.tyres.burckhardt import TyreCurve
+
+GAMMA = 1.0 - sqrt(0.5)
+"""Coefficient of ROS2 that makes it damp what is stiff."""
+_RELAXATION = INDEX["relaxation_length"]
+
+
+class AxleSlope(NamedTuple):
+    """How one axle's wheel and the vehicle's speed answer to each other, per wheel speed and per speed [1/s].
+
+    Where the tyre has a relaxation length its slip is a state of its own. It is eliminated: the first four entries
+    hold what is left of its coupling, and the last five what it takes to put it back.
+
+    Parameters
+    ----------
+    speed_by_speed, speed_by_wheel : change of dv/dt
+    wheel_by_speed, wheel_by_wheel : change of domega/dt
+    speed_by_slip, wheel_by_slip : change of both with the rate of the eliminated slip; 0 without one
+    slip_by_speed, slip_by_wheel : change of that rate
+    slip_share : what is left of that rate itself [1]
+    """
+
+    speed_by_speed: float
+    speed_by_wheel: float
+    wheel_by_speed: float
+    wheel_by_wheel: float
+    speed_by_slip: float
+    wheel_by_slip: float
+    slip_by_speed: float
+    slip_by_wheel: float
+    slip_share: float
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def axle_slope(
+    ports: AxlePorts,
+    motion: Motion,
+    omega: float,
+    step: float,
+    axle: Axle,
+    chassis: Chassis,
+    tyre: TyreCurve,
+) -> AxleSlope:
+    """Derivatives of speed and wheel rate through the slip of one axle.
+
+    The brake friction of a standing wheel counts as soon as the wheel can come to stand within the step.
+
+    Parameters
+    ----------
+    ports : of the axle
+    motion : longitudinal state
+    omega : wheel speed of the axle [rad/s]
+    step : [s]
+    axle, chassis, tyre : the values
+    """
+    wheels = chassis.wheels
+    slip_per_wheel = -wheels.radius / max(motion.speed, wheels.speed_floor)
+    slip_per_speed = (
+        (1.0 - ports.slip) / motion.speed if motion.speed > wheels.speed_floor else 1.0 / wheels.speed_floor
+    )
+    following = relaxation_rate(motion.speed, wheels.speed_floor, chassis.theta[_RELAXATION])
+    force, torque, locking = 0.0, 0.0, 0.0
+    if abs(ports.slip) < 1.0:
+        share = stick_share(motion.speed, chassis.effects)
+        force = effective_slope(abs(ports.force_slip), share, tyre, chassis.effects) * ports.ground.load
+        if 0.0 < ports.abs_scale < 1.0:
+            turning = lock_share(omega, chassis.lock_speed)
+            torque = -ports.full_torque * turning / (wheels.release_width * tyre.target_slip)
+    change = step * abs(ports.lever * ports.tyre_force - ports.brake_torque) / axle.inertia
+    if abs(omega) < chassis.lock_speed + change:
+        locking = (ports.full_torque * ports.abs_scale + abs(ports.shaft_torque)) / chassis.lock_speed
+    slip_share, pushed, followed = 0.0, 0.0, 1.0
+    if following > 0.0:
+        slip_share = 1.0 / (1.0 + GAMMA * step * following)
+        pushed = GAMMA * step * slip_share
+        followed = pushed * following
+    felt = force * followed
+    moment = wheels.radius * felt - torque
+    return AxleSlope(
+        -felt * slip_per_speed / wheels.mass,
+        -felt * slip_per_wheel / wheels.mass,
+        moment * slip_per_speed / axle.inertia,
+        (moment * slip_per_wheel - locking) / axle.inertia,
+        -force * pushed / wheels.mass,
+        wheels.radius * force * pushed / axle.inertia,
+        followed * slip_per_speed,
+        followed * slip_per_wheel,
+        slip_share,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def without_speed(slope: AxleSlope) -> AxleSlope:
+    """The same derivatives while the speed is held from outside."""
+    return AxleSlope(
+        0.0, 0.0, slope.wheel_by_speed, slope.wheel_by_wheel, 0.0, slope.wheel_by_slip, slope.slip_by_speed,
+        slope.slip_by_wheel, slope.slip_share,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def solve_slip(
+    rates: Motion, memory: Memory, front: AxleSlope, rear: AxleSlope, g: float
+) -> tuple[Motion, Memory]:
+    """Solve (1 - g J) k = rates, where J couples only speed, wheel speeds and the slip behind a relaxation length.
+
+    Parameters
+    ----------
+    rates, memory : right-hand side
+    front, rear : the entries of J
+    g : step times gamma [s]
+    """
+    pivot_f = 1.0 - g * front.wheel_by_wheel
+    pivot_r = 1.0 - g * rear.wheel_by_wheel
+    to_f, to_r = g * front.speed_by_wheel / pivot_f, g * rear.speed_by_wheel / pivot_r
+    pivot_v = 1.0 - g * (front.speed_by_speed + rear.speed_by_speed)
+    pivot_v -= g * (to_f * front.wheel_by_speed + to_r * rear.wheel_by_speed)
+    omega_f = rates.omega_f + front.wheel_by_slip * memory.front.slip
+    omega_r = rates.omega_r + rear.wheel_by_slip * memory.rear.slip
+    pulled = front.speed_by_slip * memory.front.slip + rear.speed_by_slip * memory.rear.slip
+    speed = (rates.speed + pulled + to_f * omega_f + to_r * omega_r) / pivot_v
+    omega_f = (omega_f + g * front.wheel_by_speed * speed) / pivot_f
+    omega_r = (omega_r + g * rear.wheel_by_speed * speed) / pivot_r
+    return Motion(rates.station, speed, omega_f, omega_r), Memory(
+        _with_slip(memory.front, front, speed, omega_f), _with_slip(memory.rear, rear, speed, omega_r)
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _with_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: float) -> AxleMemory:
+    if slope.slip_share == 0.0:
+        return memory
+    slip = slope.slip_share * memory.slip + slope.slip_by_speed * speed + slope.slip_by_wheel * omega
+    return AxleMemory(slip, memory.slip_heat, memory.disc_rise)

@@ -1,0 +1,75 @@
+"""What carries an axle at one instant: the road under it, its load, and the strut above it."""
+
+from typing import NamedTuple
+
+from numba import njit
+
+from tasks.vehicle.effects.chassis import ChassisEffects, footprint
+from tasks.vehicle.effects.exact import strut_force
+from tasks.vehicle.half_car import HalfCarState, contact_load
+from tasks.vehicle.model.chassis import Chassis
+from tasks.vehicle.road import RoadFeature
+
+
+class Ground(NamedTuple):
+    """Road height [m] and slope [m/m] under an axle, and its contact load, never negative [N]."""
+
+    height: float
+    slope: float
+    load: float
+
+
+class Strut(NamedTuple):
+    """Travel [m] and rate [m/s] of an axle's strut, rebound positive, and its force [N]."""
+
+    travel: float
+    rate: float
+    force: float
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def ground_at(
+    station: float,
+    speed: float,
+    unsprung_height: float,
+    unsprung_rate: float,
+    stiffness: float,
+    static_load: float,
+    road: RoadFeature,
+    effects: ChassisEffects,
+) -> Ground:
+    """Road and load under one axle.
+
+    Parameters
+    ----------
+    station : of the axle [m]
+    speed : of the vehicle [m/s]
+    unsprung_height, unsprung_rate : of the axle [m, m/s]
+    stiffness : of the tyre [N/m]
+    static_load : half-car's load at rest [N]
+    road : the feature
+    effects : the numbers
+    """
+    height, slope = footprint(station, road, effects)
+    load = contact_load(height, unsprung_height, stiffness, static_load)
+    if load > 0.0:
+        load = max(load + effects.tyre_damping * (speed * slope - unsprung_rate), 0.0)
+    return Ground(height, slope, load)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def struts_at(x: HalfCarState, chassis: Chassis) -> tuple[Strut, Strut]:
+    """The struts of the front and the rear axle.
+
+    Parameters
+    ----------
+    x : half-car state [m, rad, m/s, rad/s]
+    chassis : the values
+    """
+    body, theta = chassis.body, chassis.theta
+    travel_f, rate_f = x[0] - x[2] - body.to_front * x[1], x[4] - x[6] - body.to_front * x[5]
+    travel_r, rate_r = x[0] - x[3] + body.to_rear * x[1], x[4] - x[7] + body.to_rear * x[5]
+    return (
+        Strut(travel_f, rate_f, strut_force(theta, body.spring_f, body.damper_f, travel_f, rate_f)),
+        Strut(travel_r, rate_r, strut_force(theta, body.spring_r, body.damper_r, travel_r, rate_r)),
+    )

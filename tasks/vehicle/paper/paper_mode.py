@@ -1,0 +1,172 @@
+"""Paper mode: the published update order, from Appendix B line by line.
+
+A flat road feeds the tyres with analytic load transfer; the half-car follows. On a road feature half-car and
+wheels are passed over the whole time grid in turn. Road and brake response are integrated apart and added.
+"""
+
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.surface.road_profile import RoadHazard, road_elevation
+from tasks.vehicle.brake import PressureProfile
+from tasks.vehicle.half_car import half_car, integrate_half_car
+from tasks.vehicle.history import History
+from tasks.vehicle.paper.low_speed import brake_pitch_input
+from tasks.vehicle.paper.wheels import DRIVE_COLUMNS, drive, wheels_of
+from tasks.vehicle.parameters import SurfaceResponse, Vehicle
+from tasks.vehicle.road import road_feature
+
+FIXED_POINT_PASSES = 5
+ANALYTIC_LOADS = np.empty((0, 2))
+STATE_COLUMNS = (
+    "heave", "pitch", "unsprung_heave_f", "unsprung_heave_r",
+    "heave_rate", "pitch_rate", "unsprung_rate_f", "unsprung_rate_r",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperRun:
+    """A run on the internal grid.
+
+    Parameters
+    ----------
+    log : columns of ``DRIVE_COLUMNS``, shape (n, 17)
+    states : half-car states, shape (n, 8) [m, rad, m/s, rad/s]
+    road : road height under the front and the rear axle, shape (n, 2) [m]
+    loads : contact loads of the half-car, shape (n, 2) [N]
+    onset : brake onset; infinite if there is none [s]
+    stop : sample of the stop; -1 if there is none
+    last_change : largest change of the station in the last fixed-point pass; 0 on a flat road [m]
+    """
+
+    log: NDArray[np.float64]
+    states: NDArray[np.float64]
+    road: NDArray[np.float64]
+    loads: NDArray[np.float64]
+    onset: float
+    stop: int
+    last_change: float
+
+
+def run_paper_mode(
+    vehicle: Vehicle,
+    response: SurfaceResponse,
+    initial_speed: float,
+    hold_speed: bool,
+    profile: PressureProfile,
+    hazard: RoadHazard,
+    *,
+    steps: int,
+    step: float,
+    passes: int = FIXED_POINT_PASSES,
+) -> PaperRun:
+    """Simulate one run (paper, Appendix B).
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    response : its tyres and pitch calibration on the surface
+    initial_speed : [m/s]
+    hold_speed : keep the speed until the brake onset
+    profile : brake command
+    hazard : road feature
+    steps, step : number and length of the internal steps [s]
+    passes : fixed-point passes on a road feature
+    """
+    wheels, road = wheels_of(vehicle), road_feature(hazard)
+    log, onset, stop = drive(
+        initial_speed, hold_speed, steps, step, profile, road, ANALYTIC_LOADS, wheels, response.tyre
+    )
+    if hazard.height_m == 0:
+        states, heights, loads = body_response(vehicle, response, hazard, log, onset, stop, step)
+        return PaperRun(
+            log=log, states=states, road=heights, loads=loads, onset=onset, stop=stop, last_change=0.0
+        )
+    for _ in range(passes):
+        station = log[:, 0]
+        states, heights, loads = body_response(vehicle, response, hazard, log, onset, stop, step)
+        log, onset, stop = drive(
+            initial_speed, hold_speed, steps, step, profile, road, loads, wheels, response.tyre
+        )
+    return PaperRun(
+        log=log,
+        states=states,
+        road=heights,
+        loads=loads,
+        onset=onset,
+        stop=stop,
+        last_change=float(np.abs(log[:, 0] - station).max()),
+    )
+
+
+def body_response(
+    vehicle: Vehicle,
+    response: SurfaceResponse,
+    hazard: RoadHazard,
+    log: NDArray[np.float64],
+    onset: float,
+    stop: int,
+    step: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Half-car states, road heights and contact loads along a drive (paper, Eqs. half_car and app_brake_pitch).
+
+    Parameters
+    ----------
+    vehicle, response, hazard : as in ``run_paper_mode``
+    log : a drive
+    onset : brake onset [s]
+    stop : sample of the stop
+    step : [s]
+    """
+    car = half_car(vehicle)
+    d_theta = brake_pitch_input(
+        log[:, 2],
+        step,
+        onset,
+        stop,
+        hold_s=response.hold_s,
+        release_s=response.release_s,
+        hold_ratio=vehicle.hold_ratio,
+    )
+    gamma = response.pitch_scale * (1.0 if hazard.height_m == 0 else vehicle.coupled_pitch_scale)
+    moment = gamma * vehicle.sprung_mass * vehicle.cg_height * d_theta
+    station = log[:, 0]
+    road_f, road_r = road_elevation(station, hazard), road_elevation(station - vehicle.wheelbase, hazard)
+    nothing = np.zeros_like(station)
+    states = integrate_half_car(nothing, nothing, moment, step, car)
+    if hazard.height_m != 0:
+        states += integrate_half_car(road_f, road_r, nothing, step, car)
+    deflection = np.stack([road_f - states[:, 2], road_r - states[:, 3]], axis=1)
+    static = np.array([car.static_f, car.static_r])
+    loads = static + np.maximum(np.array([car.tyre_f, car.tyre_r]) * deflection, -static)
+    return states, np.stack([road_f, road_r], axis=1), loads
+
+
+def history_of(run: PaperRun, step: float, per_tick: int) -> History:
+    """The run at every ``per_tick``-th sample.
+
+    Parameters
+    ----------
+    run : on the internal grid
+    step : of that grid [s]
+    per_tick : samples per tick
+    """
+    station = run.log[:, 0]
+    onset_station = inf
+    if isfinite(run.onset):
+        onset_station = float(np.interp(run.onset, np.arange(len(station)) * step, station))
+    ticks = slice(None, None, per_tick)
+    columns = dict(zip(DRIVE_COLUMNS, run.log[ticks].T.copy(), strict=True))
+    columns |= dict(zip(STATE_COLUMNS, run.states[ticks].T.copy(), strict=True))
+    for index, axle in enumerate("fr"):
+        columns[f"road_height_{axle}"] = run.road[ticks, index].copy()
+        columns[f"axle_load_{axle}"] = run.loads[ticks, index].copy()
+    return History(
+        columns=columns,
+        onset=run.onset,
+        onset_station=onset_station,
+        stop_time=run.stop * step if run.stop >= 0 else inf,
+    )

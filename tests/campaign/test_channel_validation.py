@@ -1,0 +1,90 @@
+"""The import's checks on many sound runs: no false alarm, and faults put into them are found."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
+from tasks.campaign.channels import CHANNELS_BY_NAME
+from tasks.campaign.signals import Signal
+
+Columns = dict[str, np.ndarray]
+INTERVAL = 0.01
+
+
+def problems_of(columns: Columns) -> list[str]:
+    time = columns["time"]
+    channels = {name: values for name, values in columns.items() if name != "time"}
+    found = plausibility_problems(
+        channels, INTERVAL, {name: CHANNELS_BY_NAME[name].unit for name in channels}
+    )
+    speed = Signal(time=time, values=channels["speed"])
+    for name, values in channels.items():
+        signal = Signal(time=time, values=values)
+        found += signal_problems(signal)
+        frozen = frozen_problem(name, signal, speed)
+        found += [] if frozen is None else [frozen]
+    return found
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[Columns]:
+    from tests.conftest import DATA
+
+    folder = Path(DATA) / "measured" / "campaigns"
+    files = sorted(folder.glob("ex-*/runs/*.parquet"))
+    if not files:
+        pytest.skip(f"no campaigns at {folder}; set MUSYNC_DATA to the folder that holds measured/")
+    tables = [pq.read_table(file) for file in files]
+    return [{name: table.column(name).to_numpy() for name in table.column_names} for table in tables]
+
+
+def test_sound_runs_raise_no_alarm(runs: list[Columns]) -> None:
+    assert len(runs) == 78
+    assert [problem for run in runs for problem in problems_of(run)] == []
+
+
+def scaled(*names: str, factor: float) -> Callable[[Columns], Columns]:
+    return lambda run: run | {name: run[name] * factor for name in names}
+
+
+def held(name: str) -> Callable[[Columns], Columns]:
+    def damage(run: Columns) -> Columns:
+        values = run[name].copy()
+        values[100:180] = values[100]
+        return run | {name: values}
+
+    return damage
+
+
+def shifted(seconds: float) -> Callable[[Columns], Columns]:
+    return lambda run: run | {"time": run["time"] + seconds * (np.arange(len(run["time"])) > 150)}
+
+
+@pytest.mark.parametrize(
+    ("fault", "damage", "share"),
+    [
+        ("pitch turned over", scaled("pitch", factor=-1), 1.0),
+        ("pitch rate turned over", scaled("pitch_rate", factor=-1), 1.0),
+        ("pitch and pitch rate turned over", scaled("pitch", "pitch_rate", factor=-1), 0.8),
+        ("acceleration turned over", scaled("longitudinal_acceleration", factor=-1), 1.0),
+        ("acceleration in g", scaled("longitudinal_acceleration", factor=1 / 9.81), 1.0),
+        ("speed in km/h", scaled("speed", factor=3.6), 1.0),
+        ("pressure in bar", scaled("brake_pressure", factor=10), 0.9),
+        ("pressure a tenth", scaled("brake_pressure", factor=0.1), 1.0),
+        ("pitch in rad", scaled("pitch", factor=np.pi / 180), 1.0),
+        ("frozen pitch", held("pitch"), 1.0),
+        ("frozen speed", held("speed"), 1.0),
+        ("clock jumps on", shifted(0.4), 1.0),
+        ("clock jumps back", shifted(-0.2), 1.0),
+    ],
+)
+def test_a_fault_in_a_braking_run_is_found(
+    runs: list[Columns], fault: str, damage: Callable[[Columns], Columns], share: float
+) -> None:
+    braking = [run for run in runs if run["brake_pressure"].max() > 0.3]
+    found = sum(bool(problems_of(damage(run))) for run in braking)
+    assert found >= share * len(braking), f"{fault}: {found} of {len(braking)}"

@@ -1,0 +1,35 @@
+"""What a vehicle really does beyond the model is no fault of its measurement."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catalogs.effects import load_effects
+from tasks.campaign.campaign import CHANNELS, Run
+from tasks.campaign.run_validation import run_problems
+from tasks.identification.inference.forward import predict, run_model
+from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
+from tests.identification.synthetic import NOISE, SURFACE, VEHICLE, plain_run
+
+EFFECTS = load_effects()
+
+
+def columns_of(run: Run, theta: np.ndarray) -> dict[str, np.ndarray]:
+    """The run as a car with ``theta`` would have been measured."""
+    clean = predict(run_model(run, VEHICLE, SURFACE), theta, substeps=20)
+    response = clean + NOISE * np.random.default_rng(3).standard_normal(clean.shape)
+    columns = dict(zip(CHANNELS, response.T, strict=True))
+    return {"time": run.interval * np.arange(len(response)), "brake_pressure": run.pressure, **columns}
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+@pytest.mark.parametrize("share", [-0.5, 0.5])
+def test_an_effect_that_the_model_lacks_is_no_fault(effect: Effect, share: float) -> None:
+    theta = np.zeros(len(ALL_PARAMETERS))
+    for k, parameter in enumerate(effect.parameters):
+        bound = parameter.upper if share > 0 else parameter.lower
+        theta[parameter.index] = abs(share) * bound if k == 0 else parameter.start
+    for speed, peak in ((6.0, 1.0), (15.0, 1.5), (20.0, 4.0)):
+        run = replace(plain_run(speed, peak), disc_rise=150.0)
+        assert run_problems(columns_of(run, theta), {}, run.interval) == []

@@ -1,0 +1,163 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from catalogs.calibration import FOLDER, load_procedure
+from catalogs.references import read_reference
+from flows.measured.calibration import calibrate, calibration_case
+from flows.studies.vehicle_model import agreement_of
+from tasks.identification.calibration.identifiability import knowledge
+from tasks.identification.calibration.scalars import calibration_scalars, scalar_value, with_scalars
+from tasks.identification.calibration.staged import calibrate as run_stages
+from tasks.identification.calibration.staged import run_stage, smoothness, stage_jacobian
+
+
+def procedure_file(folder: Path, base: str, stages: list[dict], passes: int = 2) -> str:
+    entry = yaml.safe_load((FOLDER / f"{base}.yaml").read_text())
+    entry["stages"] = stages
+    entry["passes"]["value"] = passes
+    path = folder / "procedure.yaml"
+    path.write_text(yaml.safe_dump(entry))
+    return str(path)
+
+
+def stage(groups, responses, kinds=("flat",), phase="braking"):
+    return {
+        "name": " and ".join(groups), "groups": list(groups), "responses": list(responses), "kinds": list(kinds),
+        "phase": phase,
+    }  # fmt: skip
+
+
+def cases_of(folder, vehicle, procedure, interval):
+    reference = read_reference(folder)
+    rows = agreement_of(vehicle, reference, procedure.mode)["cases"]
+    return [
+        calibration_case(
+            case, columns, row["window"], interval, procedure.yardstick.start_s, vehicle.wheelbase
+        )
+        for (case, columns), row in zip(reference, rows, strict=True)
+    ]
+
+
+def test_known_tyre_and_pitch_values_come_back_from_noisy_traces(vehicle, make_traces, changed, tmp_path):
+    truth = dataclasses.replace(vehicle, static_pitch=np.deg2rad(0.3))
+    for group, rain, snow in (
+        ("efficiency", 0.90, 1.03),
+        ("slip_stiffness", 1.4, 1.25),
+        ("pitch_scale", 1.05, 1.2),
+    ):
+        truth = changed(changed(truth, "rain", group, 2, rain), "snow", group, 1, snow)
+    folder = make_traces(truth, "paper")
+    name = procedure_file(
+        tmp_path,
+        "paper-staged",
+        [
+            stage(["efficiency", "slip_stiffness"], ["speed", "slip"]),
+            stage(["static_pitch", "pitch_scale"], ["pitch"]),
+        ],
+    )
+    procedure, interval = load_procedure(name)
+    fitted, records = run_stages(vehicle, cases_of(folder, vehicle, procedure, interval), procedure)
+    assert np.rad2deg(fitted.static_pitch) == pytest.approx(0.3, abs=0.01)
+    for family, knot in (("rain", 2), ("snow", 1)):
+        found, true = fitted.families[family], truth.families[family]
+        assert found.efficiency[knot] == pytest.approx(true.efficiency[knot], abs=0.004)
+        assert found.slip_stiffness[knot] == pytest.approx(true.slip_stiffness[knot], rel=0.04)
+        assert found.pitch_scale[knot] == pytest.approx(true.pitch_scale[knot], abs=0.02)
+    assert all(record.after <= record.before for record in records)
+
+
+def test_effects_of_the_coupled_mode_come_back_from_noisy_traces(vehicle, make_traces, tmp_path):
+    effects = {"rolling_coefficient": 0.02, "slope_moment": 1.5, "anti_dive": 0.3}
+    truth = dataclasses.replace(vehicle, effects=effects)
+    folder = make_traces(truth, "coupled", ("wet", "bump"))
+    every = ("flat", "hump")
+    name = procedure_file(
+        tmp_path, "coupled-grown", [stage(list(effects), ["speed", "pitch", "wheel_load"], every, "event")]
+    )
+    procedure, interval = load_procedure(name)
+    fitted, _ = run_stages(vehicle, cases_of(folder, vehicle, procedure, interval), procedure)
+    assert fitted.effects["rolling_coefficient"] == pytest.approx(0.02, abs=0.002)
+    assert fitted.effects["slope_moment"] == pytest.approx(1.5, abs=0.1)
+    assert fitted.effects["anti_dive"] == pytest.approx(0.3, abs=0.03)
+
+
+def test_a_scalar_to_which_no_run_answers_stays_where_it_was(vehicle, make_traces):
+    procedure, interval = load_procedure("paper-staged")
+    efficiency = next(s for s in procedure.stages if s.groups == ("efficiency",))
+    cases = cases_of(make_traces(vehicle, "paper"), vehicle, procedure, interval)
+    free = {
+        **procedure.bounds,
+        "efficiency": dataclasses.replace(procedure.bounds["efficiency"], smooth=np.inf),
+    }
+    fitted, _ = run_stage(vehicle, cases, efficiency, dataclasses.replace(procedure, bounds=free))
+    assert fitted.families["dry"].efficiency == vehicle.families["dry"].efficiency
+    assert fitted.families["rain"].efficiency[0] == pytest.approx(
+        vehicle.families["rain"].efficiency[0], abs=1e-9
+    )
+
+
+def test_the_sparse_jacobian_is_that_of_differences_of_every_case(vehicle, make_traces):
+    procedure, interval = load_procedure("paper-staged")
+    slip = next(s for s in procedure.stages if s.groups == ("slip_stiffness",))
+    cases = cases_of(make_traces(vehicle, "paper"), vehicle, procedure, interval)
+    scalars = calibration_scalars(vehicle, slip.groups)
+    x = np.array([scalar_value(vehicle, s) for s in scalars])
+    jacobian = stage_jacobian(vehicle, cases, slip, procedure, scalars, x)
+    touched = [
+        name for name, column in zip([s.name for s in scalars], jacobian.T, strict=True) if column.any()
+    ]
+    assert touched == ["slip_stiffness rain 0.43415", "slip_stiffness snow 0.42"]
+    wet = len(jacobian) - np.flatnonzero(jacobian[:, 6])[0]
+    assert 0 < wet < len(jacobian)
+    assert not jacobian[-wet:, 3].any()
+
+
+def test_neighbouring_knots_of_a_family_are_held_together_and_no_others(vehicle):
+    procedure, _ = load_procedure("paper-staged")
+    rows = smoothness(calibration_scalars(vehicle, ("efficiency", "pitch_scale")), procedure)
+    pairs = [tuple(np.flatnonzero(row)) for row in rows]
+    assert pairs == [(1, 2), (2, 3), (3, 4), (5, 6), (6, 7)]
+    assert np.allclose(rows.sum(axis=1), 0)
+
+
+def test_confounded_and_unseen_scalars_are_named():
+    scalars = [
+        dataclasses.replace(s)
+        for s in calibration_scalars(_any_vehicle(), ("hold_ratio", "coupled_pitch_scale", "static_pitch"))
+    ]
+    rng = np.random.Generator(np.random.Philox(key=[3, 0]))
+    a = rng.normal(size=200)
+    jacobian = np.stack([a, a + 1e-3 * rng.normal(size=200), np.zeros(200)], axis=1)
+    report = knowledge(jacobian, scalars, np.zeros(3), ["1", "1", "rad"], np.full(3, np.sqrt(12.0)))
+    assert [pair[:2] for pair in report.confounded] == [("hold_ratio", "coupled_pitch_scale")]
+    assert report.confounded[0][2] < -0.99
+    unseen = report.scalars[2]
+    assert (unseen.determined, unseen.sd) == (False, pytest.approx(1.0))
+    # alone each is known to 1 / |a|
+    assert report.scalars[0].sd_alone == pytest.approx(1 / np.sqrt(1 + a @ a))
+    assert report.scalars[0].sd > 0.5
+
+
+def test_the_same_traces_give_the_same_bytes(vehicle, make_traces, tmp_path):
+    folder = make_traces(vehicle, "paper", ("wet",))
+    name = procedure_file(tmp_path, "paper-staged", [stage(["efficiency"], ["speed"])], passes=1)
+    files = []
+    for run in ("one", "two"):
+        calibrate(str(folder), out=str(tmp_path / run), procedure=name, name="car")
+        files.append([(tmp_path / run / file).read_bytes() for file in ("car.yaml", "calibration.json")])
+    assert files[0][0] == files[1][0]
+    assert files[0][1].replace(b"/one/", b"/two/") == files[1][1]
+
+
+def _any_vehicle():
+    from catalogs.vehicles import load_vehicle
+
+    return load_vehicle("paper-reference")
+
+
+def test_with_scalars_of_nothing_is_the_vehicle(vehicle):
+    assert with_scalars(vehicle, {}) == vehicle

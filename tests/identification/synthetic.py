@@ -1,0 +1,42 @@
+"""Runs made by the model itself at a finer step, with noise: what the tests of attribution start from."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from tasks.campaign.campaign import Run, Tolerances
+from tasks.identification.inference.forward import RunModel, predict, run_model
+
+VEHICLE = load_vehicle("paper-reference")
+SURFACE = load_surface("dense-asphalt")
+NOISE = np.array([0.03, 0.05, 0.1, 0.1, 0.015, 0.1, 0.1])
+TOLERANCES = Tolerances(
+    session=(0.02, 0.01, 0.02, 0.005, 0.04, 0.02, 0.0015),
+    initial_speed=0.05,
+    friction=0.03,
+    acceleration_bias=0.03,
+    pitch_offset=0.03,
+)
+
+
+def plain_run(
+    speed: float, peak: float, *, name: str = "run", direction: int = 1, disc_rise: float = 20.0
+) -> Run:
+    t = np.arange(400) * 0.01
+    response = np.zeros((400, 7))
+    response[:, 0] = speed
+    return Run(
+        name=name, held_out=False, weather="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0,
+        direction=direction, disc_rise=disc_rise, hazard_center=0.0, hazard_length=0.0, hazard_height=0.0,
+        interval=0.01, pressure=np.clip((t - 1.0) / 0.3, 0.0, 1.0) * peak, response=response,
+    )  # fmt: skip
+
+
+def measured(run: Run, theta: np.ndarray, seed: int) -> RunModel:
+    """The run as a car with ``theta`` would have been measured, ready for evidence."""
+    model = run_model(run, VEHICLE, SURFACE)
+    clean = predict(model, theta, substeps=20)
+    noise = NOISE * np.random.default_rng(seed).standard_normal(clean.shape)
+    return run_model(replace(run, response=clean + noise), VEHICLE, SURFACE)

@@ -1,0 +1,143 @@
+"""The generator of known truths, and the interval that its counts are given with."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from catalogs.effects.truths import load_sizes, load_truths
+from catalogs.studies.closing import load_closing_study
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from flows.measured import closing_benchmark
+from flows.measured.closing_benchmark_summary import pair_outcome, summary
+from tasks.campaign.planned_runs import TRAINING
+from tasks.identification.benchmark import exact_interval, synthetic_campaign
+
+VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+
+
+def test_the_same_seed_gives_the_same_campaign_and_another_does_not() -> None:
+    first, again, other = (synthetic_campaign(VEHICLE, SURFACE, {"fade": 0.05}, seed) for seed in (3, 3, 4))
+    assert all(np.array_equal(a.response, b.response) for a, b in zip(first.runs, again.runs, strict=True))
+    assert not np.array_equal(first.runs[0].response, other.runs[0].response)
+    assert len(first.train) == TRAINING and len(first.held_out) == len(first.runs) - TRAINING
+
+
+def test_the_truth_shows_in_the_runs_that_feel_it() -> None:
+    plain, faded = (synthetic_campaign(VEHICLE, SURFACE, truth, 5) for truth in ({}, {"fade": 0.06}))
+    hot = next(i for i, run in enumerate(plain.runs) if run.disc_rise == 350.0)
+    assert faded.runs[hot].response[-1, 0] - plain.runs[hot].response[-1, 0] > 1.0
+    coasting = next(i for i, run in enumerate(plain.runs) if run.pressure.max() == 0.0)
+    assert np.array_equal(faded.runs[coasting].response, plain.runs[coasting].response)
+
+
+def test_the_exact_interval_is_clopper_and_pearsons() -> None:
+    assert exact_interval(0, 100) == pytest.approx((0.0, 1.0 - 0.025**0.01))
+    low, high = exact_interval(3, 40)
+    assert binom.sf(2, 40, low) == pytest.approx(0.025) and binom.cdf(3, 40, high) == pytest.approx(0.025)
+
+
+def test_every_truth_is_of_the_library_or_a_form_outside_it() -> None:
+    truths = load_truths()
+    assert sum(t.in_library for t in truths) >= 20 and sum(not t.in_library for t in truths) >= 6
+    assert all((t.form is None) == t.in_library for t in truths)
+
+
+def answer(name: str) -> SimpleNamespace:
+    effect = SimpleNamespace(name=name, port="brake_torque", variable="pressure", parameters=())
+    verdict = SimpleNamespace(verdict="FOUND", effects=(effect,), rivals=(), tried=(), reasons=())
+    return SimpleNamespace(verdict=verdict)
+
+
+def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_engine(
+    tmp_path, monkeypatch
+) -> None:
+    judged: list[int] = []
+
+    def judge(seed: int, *_: object) -> SimpleNamespace:
+        judged.append(seed)
+        if len(judged) == 20:
+            raise KeyboardInterrupt
+        return answer("brake_fade")
+
+    monkeypatch.setattr(
+        closing_benchmark, "synthetic_campaign", lambda model, road, truth, seed, slots, design: seed
+    )
+    monkeypatch.setattr(closing_benchmark, "attribute", judge)
+    monkeypatch.setattr(closing_benchmark, "covered", lambda *_: None)
+    with pytest.raises(KeyboardInterrupt):
+        closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
+    result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
+    seeds = [row["seed"] for row in result["campaigns"]]
+    assert len(judged) == len(seeds) + 1 and len(set(seeds)) == len(seeds)
+    library = [truth for truth in load_truths() if truth.in_library]
+    harder = 3 * len(library)  # as many pairs as truths, and each truth and a null on the poor design
+    assert len(seeds) == 4 + 2 * len(load_truths()) + 2 * len(load_sizes()) + harder
+    # round by round: no truth has its second campaign before all have their first
+    order = [row["truth"] for row in result["campaigns"] if row["kind"] in ("library", "outside")]
+    assert order[: len(load_truths())] == [t.name for t in load_truths()]
+    tables = (tmp_path / "closing-benchmark.md").read_text()
+    assert "| false discoveries on nulls | at most 2 % | 4 of 4 |" in tables
+    assert "| brake_fade | fade 0.005 | 2 of 2 | 1.00 |" in tables
+    monkeypatch.setattr(closing_benchmark, "engine_hash", lambda: "another")
+    again = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=0, nulls=1, harder=0)
+    assert [row["truth"] for row in again["campaigns"]] == [None]
+
+
+WRONG = {"wrong", "false discovery"}
+
+
+def row(truth: str | None, outcome: str, *, in_library: bool = True, covered: bool | None = None) -> dict:
+    kind = "null" if truth is None else "library" if in_library else "outside"
+    named = [truth] if outcome == "right" and truth else ["brake_dead_time"] if outcome in WRONG else []
+    return {
+        "kind": kind, "truth": truth, "outcome": outcome, "values": {}, "covered": covered, "cpu_s": 1.0,
+        "named": named,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named", "rivals", "expected"),
+    [
+        ("NOTHING", [], [], "refused"),
+        ("FOUND", ["drag", "lag"], [], "both"),
+        ("FOUND", ["lag"], [], "one"),
+        ("FOUND", ["lag", "fade"], [], "wrong"),
+        ("SET", ["fade"], ["lag"], "set with truth"),
+        ("SET", ["fade"], ["push-out"], "set without truth"),
+        ("UNKNOWN_FORM", ["brake_torque ~ const"], [], "form"),
+    ],
+)
+def test_two_effects_at_once_are_counted_by_what_is_named(verdict, named, rivals, expected) -> None:
+    assert pair_outcome(verdict, named, rivals, ["lag", "drag"]) == expected
+
+
+def test_every_truth_is_in_two_pairs_and_no_pair_comes_twice() -> None:
+    library = tuple(truth for truth in load_truths() if truth.in_library)
+    pairs = [frozenset(truth.name for truth in pair) for pair in load_closing_study().pairs(library)]
+    assert len(set(pairs)) == len(pairs) == len(library)
+    assert {name: sum(name in pair for pair in pairs) for name in set().union(*pairs)} == {
+        truth.name: 2 for truth in library
+    }
+
+
+def test_the_summary_counts_each_kind_once() -> None:
+    rows = [
+        row(None, "right"), row(None, "false discovery"), row("brake_lag", "right", covered=True),
+        row("brake_lag", "wrong"), row("brake_fade", "set with truth"), row("hump", "right form", in_library=False),
+        row("brake_lag", "refused") | {"kind": "size"}, row("brake_lag", "refused") | {"kind": "poor"},
+        row("brake_lag + brake_fade", "one") | {"kind": "pair"},
+    ]  # fmt: skip
+    result = summary(rows)
+    assert (result["false_discoveries"]["hits"], result["false_discoveries"]["of"]) == (1, 2)
+    shares = {entry["figure"]: (entry["hits"], entry["of"]) for entry in result["summary"]}
+    assert shares["library effect named exactly"] == (1, 3) and shares["wrong single label"] == (1, 3)
+    assert shares["truth within the 95 % interval"] == (1, 1)
+    assert shares["outside the library: form with right port and variable"] == (1, 1)
+    assert shares["two effects at once: one of them named, nothing else"] == (1, 1)
+    assert shares["poor design: refused"] == (1, 1)
+    # sizes and poor designs have shares of their own
+    assert result["confusion"]["brake_lag"] == {"right": 1, "wrong": 1}
+    assert result["named_instead"] == {"brake_lag": {"brake_dead_time": 1}, "nothing": {"brake_dead_time": 1}}

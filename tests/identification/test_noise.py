@@ -1,0 +1,73 @@
+"""Noise from what precedes the brake: known noise is found, a coarse sensor is no breakdown, no quiet is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.errors import InputError
+from tasks.identification.inference.noise import channel_noise, whiten
+from tests.identification.synthetic import NOISE, TOLERANCES, plain_run
+
+
+def quiet_campaign(step: np.ndarray | float = 0.0, brake_at: float = 1.0, *, noise: float = 1.0) -> Campaign:
+    """Runs at constant speed before the brake, read in steps of ``step``."""
+    rng = np.random.default_rng(1)
+    runs = []
+    for k in range(4):
+        run: Run = plain_run(15.0, 1.5, name=f"run-{k + 1:02d}")
+        response = run.response + noise * NOISE * rng.standard_normal(run.response.shape)
+        steps = np.broadcast_to(step, len(CHANNELS))
+        coarse = np.where(steps > 0, np.round(response / np.where(steps > 0, steps, 1)) * steps, response)
+        shift = round((1.0 - brake_at) / run.interval)
+        pressure = np.concatenate((run.pressure[shift:], np.full(shift, run.pressure[-1])))
+        runs.append(replace(run, response=coarse, pressure=pressure, held_out=k == 3))
+    return Campaign(
+        name="quiet", vehicle="paper-reference", runs=tuple(runs), tolerances=TOLERANCES, content_hash="",
+        split_hash="",
+    )  # fmt: skip
+
+
+def test_white_noise_is_found() -> None:
+    rho, sigma = channel_noise(quiet_campaign())
+    assert sigma == pytest.approx(NOISE, rel=0.25) and (rho < 0.3).all()
+
+
+@pytest.mark.parametrize("coarseness", [3.0, 10.0])
+def test_a_coarse_channel_has_the_noise_of_its_rounding(coarseness: float) -> None:
+    step = coarseness * NOISE
+    campaign = quiet_campaign(step)
+    # one far reading, so that a channel that stands still before the brake has a step at all
+    moved = campaign.runs[0].response.copy()
+    moved[-1] += step
+    campaign = replace(campaign, runs=(replace(campaign.runs[0], response=moved), *campaign.runs[1:]))
+    rho, sigma = channel_noise(campaign)
+    assert (sigma >= 0.999 * step / np.sqrt(12)).all() and (sigma < step).all()
+    assert np.isfinite(whiten(campaign.runs[0].response, rho, sigma)).all()
+
+
+def test_one_coarse_channel_leaves_the_others_as_they_are() -> None:
+    step = np.zeros(len(CHANNELS))
+    step[CHANNELS.index("wheel_speed_rear")] = 0.3
+    rho, sigma = channel_noise(quiet_campaign(step))
+    whole_rho, whole_sigma = channel_noise(quiet_campaign())
+    fine = step == 0
+    assert (rho[fine] == whole_rho[fine]).all() and (sigma[fine] == whole_sigma[fine]).all()
+
+
+def test_braking_from_the_first_sample_is_told_with_what_to_do() -> None:
+    with pytest.raises(InputError, match=r"first 0\.30 s; the longest, run-01, does until 0\.1\d s.*three"):
+        channel_noise(quiet_campaign(brake_at=0.1))
+
+
+def test_a_channel_that_never_changes_is_named_beside_the_missing_quiet() -> None:
+    campaign = quiet_campaign(brake_at=0.1)
+    runs = []
+    for run in campaign.runs:
+        still = run.response.copy()
+        still[:, CHANNELS.index("pitch")] = 0.0
+        runs.append(replace(run, response=still))
+    with pytest.raises(InputError) as caught:
+        channel_noise(replace(campaign, runs=tuple(runs)))
+    assert len(caught.value.problems) == 2 and "channel pitch must change" in str(caught.value)

@@ -1,0 +1,128 @@
+"""What the search stands on: forked runs, numerical doubt, nuisances taken over, experiments, look-alikes."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
+
+from catalogs.effects import load_effects
+from tasks.campaign.campaign import SESSION
+from tasks.campaign.planned_runs import EXPERIMENTS, RICH, planned_run
+from tasks.identification.decision.attribution import ladder
+from tasks.identification.decision.experiment import next_experiment
+from tasks.identification.decision.rivals import detectable
+from tasks.identification.decision.screening import inflation, look_alikes
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.inference.evidence import run_evidence
+from tasks.identification.inference.fit import fall, fit
+from tasks.identification.inference.forward import run_model
+from tasks.identification.inference.hypothesis import library_hypothesis
+from tasks.identification.inference.linearisation import TORN, step_change
+from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
+
+QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
+LIBRARY = {e.name: e for e in load_effects()}
+
+
+def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
+    effects = tuple(LIBRARY[name] for name in names)
+    runs = [(30.0, 0.0, 1, 20.0), (28.0, 1.5, -1, 20.0), (25.0, 1.8, 1, 250.0), (15.0, 0.0, -1, 20.0)]
+    derived = tuple(
+        run_evidence(
+            measured(plain_run(v, p, name=str(i), direction=d, disc_rise=t), theta, i), np.zeros(7), NOISE,
+            np.zeros(len(ALL_PARAMETERS)), effects, TOLERANCES, QUIET,
+        )
+        for i, (v, p, d, t) in enumerate(runs)
+    )  # fmt: skip
+    return Evidence(
+        train=derived, held_out=derived[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET
+    )
+
+
+def test_a_run_that_forks_at_the_abs_threshold_is_told_from_sound_ones() -> None:
+    changes = [
+        step_change(run_model(planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
+        for drive in (RICH[0], RICH[2], RICH[11], RICH[19])
+    ]
+    assert max(changes[:3]) < 0.5 * TORN < 10.0 * TORN < changes[3]
+
+
+def test_a_fall_counts_only_beyond_the_doubt() -> None:
+    before = (np.array([100.0, 100.0, 50.0]), np.array([0.0, 30.0, 0.0]))
+    after = (np.array([90.0, 60.0, 55.0]), np.array([2.0, 20.0, 1.0]))
+    assert fall(before, after) == pytest.approx(8.0 + 0.0 - 4.0)
+
+
+def test_a_free_parameter_takes_its_session_nuisance_over() -> None:
+    evidence = evidence_of(parameter_vector({"pressure_gain": 0.1}), "retuned_pressure_gain")
+    fitted = fit(
+        evidence.train, (library_hypothesis(LIBRARY["retuned_pressure_gain"]),), evidence.session_sigma,
+        iterations=8,
+    )  # fmt: skip
+    assert abs(fitted.session[SESSION.index("pressure_gain")]) < 1e-12
+    assert fitted.values[0] == pytest.approx(0.1, abs=0.01)
+
+
+def test_an_interval_does_not_depend_on_the_unit_of_its_parameter() -> None:
+    evidence = evidence_of(np.zeros(len(ALL_PARAMETERS)), "progressive_spring")
+    spring = library_hypothesis(LIBRARY["progressive_spring"])
+    build = spring.build
+    scaled = replace(
+        spring, build=lambda x: build(1e9 * x), **{
+            key: getattr(spring, key) / 1e9 for key in ("lower", "upper", "step", "start")
+        },
+    )  # fmt: skip
+    sigmas = [
+        np.sqrt(fit(evidence.train, (h,), evidence.session_sigma).covariance[0, 0]) for h in (spring, scaled)
+    ]
+    assert sigmas[0] > 0.0 and sigmas[0] == pytest.approx(1e9 * sigmas[1], rel=1e-3)
+
+
+def test_effects_of_one_shape_are_look_alikes_and_others_are_not() -> None:
+    names = ("rolling_resistance", "pad_drag", "sensor_pitch_scale", "brake_fade")
+    alike = look_alikes(evidence_of(np.zeros(len(ALL_PARAMETERS)), *names), 0)
+    assert alike == [1]
+
+
+def test_the_next_experiment_excites_what_tells_the_two_apart() -> None:
+    evidence = evidence_of(parameter_vector({"fade": 0.06}), "brake_fade", "pressure_nonlinearity")
+    null = fit(evidence.train, (), evidence.session_sigma)
+    faded = fit(evidence.train, (library_hypothesis(LIBRARY["brake_fade"], 0.06),), evidence.session_sigma)
+    plan = next_experiment(evidence, faded, null, VEHICLE, SURFACE)
+    assert plan is not None
+    assert plan.plan in {words for words, _ in EXPERIMENTS} and "hot discs" in plan.plan
+    assert plan.expected_d2 > 20.0
+    assert next_experiment(evidence, faded, faded, VEHICLE, SURFACE) is None
+
+
+def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> None:
+    evidence = evidence_of(parameter_vector({"fade": 0.06}), "brake_fade", "rolling_resistance")
+    null = fit(evidence.train, (), evidence.session_sigma)
+    plain, asked = (
+        {c.hypothesis.name for c in ladder(evidence, null, gated=False, also=also)}
+        for also in (frozenset[str](), frozenset({"rolling_resistance"}))
+    )
+    assert plain == {"brake_fade"} and asked == {"brake_fade", "rolling_resistance"}
+
+
+def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bounds() -> None:
+    evidence = evidence_of(np.zeros(len(ALL_PARAMETERS)), "rolling_resistance", "wet_friction_speed")
+    null = fit(evidence.train, (), evidence.session_sigma)
+    sizes = detectable(evidence, null)
+    assert 0.0 < sizes["rolling_resistance"] < 0.05
+    rolling = LIBRARY["rolling_resistance"]
+    found = fit(evidence.train, (library_hypothesis(rolling),), evidence.session_sigma)
+    one = 2.0 * (25.0 + np.log(evidence.samples)) * inflation(evidence, null, None)
+    assert sizes["rolling_resistance"] == pytest.approx(np.sqrt(one * found.covariance[0, 0]), rel=0.3)
+    (first,) = rolling.parameters
+    tight = replace(rolling, parameters=(replace(first, lower=0.0, upper=0.9 * sizes["rolling_resistance"]),))
+    bounded = replace(evidence, effects=(tight, *evidence.effects[1:]))
+    assert detectable(bounded, null)["rolling_resistance"] == np.inf
+    # stops on a dry road say nothing of wet friction
+    assert sizes["wet_friction_speed"] == np.inf

@@ -1,0 +1,117 @@
+"""Every kind of verdict, from whole campaigns of known truth made unlike the model that judges them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catalogs.effects import load_effects
+from catalogs.effects.truths import load_truths
+from catalogs.studies.closing import load_closing_study
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from tasks.campaign.planned_runs import RICH, Drive, planned_run
+from tasks.errors import InputError
+from tasks.identification.benchmark import synthetic_campaign
+from tasks.identification.decision.answer import Verdict
+from tasks.identification.decision.verdict import attribute
+from tasks.identification.inference.forward import predict, run_model
+from tasks.vehicle.effects.forms import Form
+from tasks.vehicle.effects.library import parameter_vector
+from tasks.vehicle.parameters import Vehicle
+
+VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+OUTSIDE = {truth.name: truth for truth in load_truths() if not truth.in_library}
+
+
+def judged(
+    values: dict[str, float],
+    *,
+    seed: int = 31,
+    vehicle: Vehicle = VEHICLE,
+    outside: str | None = None,
+    design: tuple[Drive, ...] = RICH,
+) -> Verdict:
+    slots = OUTSIDE[outside].slots if outside else ()
+    campaign = synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
+    return attribute(campaign, vehicle, SURFACE, load_effects()).verdict
+
+
+def names(verdict: Verdict) -> list[str]:
+    return [effect.name for effect in verdict.effects]
+
+
+def test_a_number_off_beyond_its_tolerance_is_a_retune() -> None:
+    verdict = judged({"pressure_gain": 0.12})
+    assert (verdict.verdict, names(verdict)) == ("RETUNE", ["retuned_pressure_gain"])
+    (gain,) = verdict.effects[0].parameters
+    assert gain.ci_low < 0.12 < gain.ci_high
+
+
+def test_an_instrument_that_feels_gravity_is_a_sensor_and_no_missing_physics() -> None:
+    verdict = judged({"gravity_leak": 1.0})
+    assert (verdict.verdict, names(verdict)) == ("SENSOR", ["sensor_gravity_leak"])
+    felt = verdict.error["longitudinal_acceleration"]
+    assert felt.after < 0.6 * felt.frozen
+
+
+def test_what_no_library_holds_is_a_form_at_its_port_and_variable() -> None:
+    verdict = judged({}, outside="strut_step")
+    assert verdict.verdict == "UNKNOWN_FORM"
+    assert (verdict.effects[0].port, verdict.effects[0].variable) == ("suspension_force", "suspension_speed")
+
+
+def test_two_effects_at_once_are_both_named() -> None:
+    verdict = judged({"lag": 0.08, "drag_area": 0.7})
+    assert verdict.verdict == "FOUND"
+    assert set(names(verdict)) == {"brake_lag", "aerodynamic_drag"}
+    assert verdict.error["speed"].after < 0.5 * verdict.error["speed"].frozen
+
+
+def test_what_stops_of_one_kind_cannot_tell_apart_is_a_set_with_the_run_that_can() -> None:
+    verdict = judged({"pad_drag": 60.0}, design=load_closing_study().drives())
+    told = {*names(verdict), *(rival.name for _, rival in verdict.rivals)}
+    assert verdict.verdict == "SET" and "pad_drag" in told
+    assert verdict.experiment is not None and verdict.experiment.expected_d2 > 10.0
+    assert set(verdict.experiment.between) <= told
+
+
+class TestACarThatIsGrown:
+    """What a vehicle has under ``effects`` and ``forms`` is part of the model that is judged."""
+
+    GROWN = replace(VEHICLE, name="grown", effects={"lag": 0.08, "drag_area": 0.7})
+    FORM = Form(
+        port="brake_torque",
+        variable="pressure",
+        shape="a + b x",
+        coefficients=(0.0, 0.1),
+        scale=3.6,
+        low=0.0,
+        high=3.6,
+    )
+
+    def test_it_predicts_as_the_plain_car_with_its_effects(self) -> None:
+        run = planned_run(RICH[4], "pulsed")
+        theta = parameter_vector({"lag": 0.08, "drag_area": 0.7})
+        grown = predict(run_model(run, self.GROWN, SURFACE), np.zeros_like(theta))
+        np.testing.assert_array_equal(grown, predict(run_model(run, VEHICLE, SURFACE), theta))
+
+    def test_it_predicts_with_its_forms(self) -> None:
+        run = planned_run(RICH[4], "pulsed")
+        none = parameter_vector({})
+        grown = predict(run_model(run, replace(VEHICLE, forms=(self.FORM,)), SURFACE), none)
+        added = predict(run_model(run, VEHICLE, SURFACE), none, slots=(self.FORM.slot,))
+        np.testing.assert_array_equal(grown, added)
+        assert np.abs(grown - predict(run_model(run, VEHICLE, SURFACE), none)).max() > 0.1
+
+    def test_it_lacks_only_what_it_has_not(self) -> None:
+        verdict = judged({"lag": 0.08, "drag_area": 0.7}, vehicle=replace(self.GROWN, effects={"lag": 0.08}))
+        assert names(verdict) == ["aerodynamic_drag"]
+        assert "grown already has lag: what is named comes on top of that" in verdict.reasons
+
+    def test_it_lacks_nothing_of_what_it_has(self) -> None:
+        assert judged({"lag": 0.08, "drag_area": 0.7}, vehicle=self.GROWN).verdict == "NOTHING"
+
+    def test_what_only_coupled_mode_knows_is_refused(self) -> None:
+        with pytest.raises(InputError, match=r"effects that only coupled mode knows .*abs_cutoff"):
+            run_model(planned_run(RICH[4], "pulsed"), load_vehicle("multibody-grown"), SURFACE)

@@ -1,0 +1,67 @@
+"""The table of docs/vehicle-modes.md is what the code gives, and the modes are as close as it says."""
+
+from math import isnan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.vehicle_modes import HEADER, differences, table
+from tasks.studies.mode_comparison import mode_difference
+from tests.vehicle.conftest import command
+
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "vehicle-modes.md"
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return differences()
+
+
+def numbers(line):
+    cells = [cell.strip() for cell in line.strip("|\n ").split("|")]
+    return cells[0], [float("nan") if cell == "-" else float(cell) for cell in cells[1:]]
+
+
+def test_the_documented_table_is_the_computed_one(rows):
+    """To two units of the last printed digit of a length: the Euler step of paper mode scatters by millimetres."""
+    lines = DOCUMENT.read_text(encoding="utf-8").splitlines()
+    start = lines.index(table({})[0])
+    documented = dict(numbers(line) for line in lines[start + 2 : start + 2 + len(rows)])
+    assert list(documented) == list(rows)
+    tolerance = (0.02, 0.02, 0.005, 0.06, 0.05, 0.02, 0.001, 20.0)
+    for name, line in zip(rows, table(rows)[2:], strict=True):
+        for found, printed, atol, title in zip(
+            numbers(line)[1], documented[name], tolerance, HEADER[1:], strict=True
+        ):
+            np.testing.assert_allclose(found, printed, atol=atol, err_msg=f"{name}, {title}")
+
+
+def test_the_modes_agree_on_every_condition_of_the_paper(rows):
+    for name, row in rows.items():
+        if not isnan(row.stop_paper):
+            assert abs(row.stop_paper - row.stop_coupled) < 0.08, name
+        assert row.speed_rmse < 0.05 and row.pitch_rmse_deg < 0.25 and row.slip_rmse < 0.01, name
+        assert abs(row.peak_pitch_paper_deg - row.peak_pitch_coupled_deg) < 0.1, name
+
+
+def test_the_modes_pitch_alike_until_the_stop_without_a_calibrated_moment(drive):
+    for surface in (("dry", 0.82), ("rain", 0.347126), ("snow", 0.42)):
+        paper, coupled = (drive(*surface, mode=mode, hold=True) for mode in ("paper", "coupled"))
+        braking = slice(1000, int(1000 * paper.stop_time) - 300)
+        apart = np.degrees(paper.columns["pitch"] - coupled.columns["pitch"])[braking]
+        assert np.sqrt(np.mean(apart**2)) < 0.04
+
+
+def test_a_rollout_does_not_differ_from_itself(drive):
+    ride = drive("rain", 0.4)
+    difference = mode_difference(ride, ride)
+    assert difference.speed_rmse == difference.pitch_rmse_deg == difference.slip_rmse == 0
+    assert difference.stop_paper == difference.stop_coupled == ride.stopping_distance
+
+
+def test_a_comparison_without_brake_covers_the_clip(drive):
+    coast = command(0.0, onset=None)
+    paper, coupled = (drive(brake=coast, mode=mode, duration=2.0) for mode in ("paper", "coupled"))
+    difference = mode_difference(paper, coupled)
+    assert isnan(difference.stop_paper) and 0 < difference.speed_rmse < 1e-3
