@@ -8,11 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from catalogs.scenes import write_scene
 from flows.making.generate import generate
 from manifests.provenance import SOURCE_ROOT
-from tests.flows.test_pipeline import GRID
-from tests.toy_street import TOY_CAMERA, toy_street
+from tests.toy_street import write_toy_grid
 
 FLOW = """
 import json, sys
@@ -45,11 +43,7 @@ if __name__ == "__main__":
 def flow_run(tmp_path_factory) -> tuple[Path, dict, str]:
     """A folder, what a process printed that ran three flows in it, and its standard error: a server takes seconds."""
     folder = tmp_path_factory.mktemp("prefect")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    (folder / "grid.yaml").write_text(
-        GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=5)
-    )
+    write_toy_grid(folder, frames=5)
     (folder / "run.py").write_text(FLOW)
     clean = {key: value for key, value in os.environ.items() if not key.startswith("PREFECT")}
     done = subprocess.run(

@@ -14,8 +14,7 @@ from flows.auditing.audit import audit, format_text
 from flows.making.generate import generate
 from flows.store.layout import Layout
 from tasks.errors import InputError
-from tests.flows.test_pipeline import GRID
-from tests.toy_street import TOY_CAMERA, toy_street
+from tests.toy_street import TOY_CAMERA, toy_street, write_toy_grid
 
 
 @pytest.fixture
@@ -27,11 +26,8 @@ def copy(toy_dataset, tmp_path) -> Layout:
 @pytest.fixture
 def own(tmp_path) -> Layout:
     """A dataset whose scene and camera are this test's own."""
-    write_scene(toy_street(), tmp_path / "scene", {})
-    (tmp_path / "camera.yaml").write_text(TOY_CAMERA)
-    grid = GRID.format(scene=tmp_path / "scene", camera=tmp_path / "camera.yaml", frames=2)
-    (tmp_path / "grid.yaml").write_text(grid)
-    return generate(str(tmp_path / "grid.yaml"), str(tmp_path / "data"), runner="threads", workers=1).layout
+    grid = write_toy_grid(tmp_path, frames=2)
+    return generate(grid, str(tmp_path / "data"), runner="threads", workers=1).layout
 
 
 def audited(layout: Layout, **options) -> dict:
