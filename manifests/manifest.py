@@ -14,7 +14,7 @@ from tasks.errors import InputError
 MANIFEST_FORMAT = "musync-manifest/3"
 
 
-def freeze(
+def freeze_manifest(
     plan: Mapping[str, Any],
     clips: Sequence[Mapping[str, Any]],
     artifacts: Mapping[str, str],

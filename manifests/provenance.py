@@ -83,7 +83,7 @@ def library_versions() -> dict[str, str]:
     }
 
 
-def processor() -> dict[str, str]:
+def describe_processor() -> dict[str, str]:
     """Architecture and, where the kernel tells, the model and vector extensions of the processor."""
     facts = {"architecture": platform.machine()}
     cpuinfo = Path("/proc/cpuinfo")

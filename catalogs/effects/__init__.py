@@ -79,10 +79,10 @@ def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
     InputError
         With every rule the file breaks.
     """
-    return tuple(_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
+    return tuple(_make_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
 
 
-def _effect(entry: EffectEntry) -> Effect:
+def _make_effect(entry: EffectEntry) -> Effect:
     return Effect(
         name=entry.name,
         effect_class=entry.effect_class,

@@ -69,7 +69,11 @@ def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> J
     seed = visual_seed(clip.facts["label"])
     for other in (c for c in clips if visual_seed(c.facts["label"]) == seed):
         plain = other.facts["weather"] == "dry" if weather else other.facts["hazard_height_m"] == 0
-        if plain and other is not clip and all(_same(clip.facts.get(k), other.facts.get(k)) for k in held):
+        if (
+            plain
+            and other is not clip
+            and all(_are_equal(clip.facts.get(k), other.facts.get(k)) for k in held)
+        ):
             return None if weather and clip.facts["weather"] == "dry" else other
     return None
 
@@ -91,5 +95,5 @@ def weather_families(clips: list[JudgedClip]) -> Iterator[tuple[str, str, list[J
                 yield kind, f"{kind}: {control.facts['label'].partition('/')[2] or 'all'}", levels
 
 
-def _same(a: Any, b: Any) -> bool:
+def _are_equal(a: Any, b: Any) -> bool:
     return bool(a == b or (a != a and b != b))

@@ -20,7 +20,7 @@ NEEDS_DEPTH = (
 )
 
 
-def judge(
+def judge_video(
     video: str, *, claim: str, camera: str, out: str | None = None, metric: bool = False
 ) -> dict[str, Any]:
     """Hold a video's ego motion, by the essential chain, or a trajectory against the telemetry claimed for it.
@@ -63,7 +63,7 @@ def judge(
     return result
 
 
-def retention(
+def measure_retention(
     source: str,
     source_braking: str,
     edited: str,
@@ -79,7 +79,7 @@ def retention(
     ----------
     source, edited : videos or trajectories of the drive over the road feature, before and after the edit
     source_braking, edited_braking : the same of the drive that brakes on the flat road
-    camera : YAML, as for `judge`
+    camera : YAML, as for `judge_video`
     event : first and last frame of the event; the paper's at 10 frames a second
     out : folder for retention.json
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.documents import read_yaml
-from catalogs.sentences import brief
+from catalogs.sentences import shorten_value
 from flows.judging.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
 from tasks.eval.poses.essential import recover_motion_essential
@@ -204,7 +204,7 @@ def read_camera(path: Path) -> ForeignCamera:
         numbers = {"fx": f, "fy": f} | centre | numbers
     wrong = [
         f"{path}: the camera's {key} must be a number of {least} to {LARGEST_CAMERA:g};"
-        f" it is {brief(numbers.get(key))}."
+        f" it is {shorten_value(numbers.get(key))}."
         for key, least in (("width", 1), ("height", 1), ("fx", 1e-3), ("fy", 1e-3), ("cx", 0.0), ("cy", 0.0))
         if not _is_number(numbers.get(key), least)
     ]
@@ -213,7 +213,7 @@ def read_camera(path: Path) -> ForeignCamera:
         key: numbers.get(key) or 0.0 for key in ("behind_front_axle", "left_of_centre", "height_above_road")
     }
     wrong += [
-        f"{path}: the camera's {key} must be a number within +-{LARGEST_CAMERA:g}; it is {brief(value)}."
+        f"{path}: the camera's {key} must be a number within +-{LARGEST_CAMERA:g}; it is {shorten_value(value)}."
         for key, value in (bends | places).items()
         if not _is_number(value, -LARGEST_CAMERA)
     ]

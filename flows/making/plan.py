@@ -21,7 +21,7 @@ from flows.making.places import remember_place
 from flows.store.layout import Layout
 from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
 from manifests.canonical import content_id, sha256_of
-from manifests.explain import input_differences, shown, value_differences
+from manifests.explain import format_value, input_differences, value_differences
 from manifests.provenance import code_version, library_versions
 from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
@@ -243,7 +243,9 @@ def plan_differences(
     bare = [{**plan, "grid": {}} for plan in (theirs, ours)]
     rows = input_differences(bare[0], bare[1], their_inputs, our_inputs)
     rest = [(f"{row['input']} {row['path']}".strip(), row["a"], row["b"]) for row in rows]
-    return [f"{place} is {shown(a)} there and {shown(b)} here" for place, a, b in (*grid, *rest)]
+    return [
+        f"{place} is {format_value(a)} there and {format_value(b)} here" for place, a, b in (*grid, *rest)
+    ]
 
 
 def _read_behind(grid: Grid) -> tuple[dict[str, bytes], dict[str, str], list[str]]:

@@ -44,7 +44,7 @@ def version_problems(
             if facts.get(name) != version:
                 sentence = f"{name} is {facts.get(name, 'absent')} there and {version} here: install the same"
                 told.setdefault(sentence, []).append(address)
-    return [f"{_some(addresses)}: {sentence}" for sentence, addresses in told.items()]
+    return [f"{_name_some(addresses)}: {sentence}" for sentence, addresses in told.items()]
 
 
 def check_cluster(client: Any, address: str) -> None:
@@ -138,7 +138,7 @@ def warm_cluster(client: Any, warm: Callable[[], Any], address: str) -> None:
                 raise error
 
 
-def _some(addresses: list[str]) -> str:
+def _name_some(addresses: list[str]) -> str:
     shown = ", ".join(addresses[:SHOWN_WORKERS])
     rest = len(addresses) - SHOWN_WORKERS
     return f"workers {shown} and {rest} more" if rest > 0 else f"worker {shown}"

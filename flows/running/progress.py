@@ -13,7 +13,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from flows.running.terminal import open_console, say, visible
+from flows.running.terminal import escape_controls, open_console, print_lines
 
 Advance = Callable[[str], None]
 
@@ -27,7 +27,7 @@ def progress_bar(title: str, total: int) -> Iterator[Advance]:
         def report(name: str) -> None:
             nonlocal done
             done += 1
-            say(f"{title} {done}/{total} {visible(name)}", error=True)
+            print_lines(f"{title} {done}/{total} {escape_controls(name)}", error=True)
 
         yield report
         return
@@ -37,4 +37,4 @@ def progress_bar(title: str, total: int) -> Iterator[Advance]:
     )  # fmt: skip
     with Progress(*columns, console=open_console(error=True)) as bar:
         task = bar.add_task(title, total=total, last="")
-        yield lambda name: bar.update(task, advance=1, last=visible(name))
+        yield lambda name: bar.update(task, advance=1, last=escape_controls(name))

@@ -14,17 +14,17 @@ _UNPRINTABLE = re.compile(
 """Control characters, those that turn the direction of writing, line separators, and halves of characters."""
 
 
-def visible(text: str) -> str:
+def escape_controls(text: str) -> str:
     """One line of text whose control characters are written out: the escape character as ``\\x1b``."""
     return _UNPRINTABLE.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
-def visible_lines(text: str) -> str:
+def escape_lines(text: str) -> str:
     """The same for text of several lines."""
-    return "\n".join(map(visible, text.split("\n")))
+    return "\n".join(map(escape_controls, text.split("\n")))
 
 
-def say(text: str, *, error: bool = False) -> None:
+def print_lines(text: str, *, error: bool = False) -> None:
     """Print lines for people; a reader that has gone (``| head -1``) is no failure.
 
     Parameters
@@ -34,14 +34,14 @@ def say(text: str, *, error: bool = False) -> None:
     """
     stream = sys.stderr if error else sys.stdout
     try:
-        stream.write(visible_lines(text) + "\n")
+        stream.write(escape_lines(text) + "\n")
         stream.flush()
     except BrokenPipeError:
-        _silence(stream)
+        _silence_stream(stream)
 
 
 def open_console(*, error: bool = False, **options: Any) -> "Console":
-    """A Rich console that takes text as it is; strings for it go through `visible` first.
+    """A Rich console that takes text as it is; strings for it go through `escape_controls` first.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ def open_console(*, error: bool = False, **options: Any) -> "Console":
 
     class PlainConsole(Console):
         def on_broken_pipe(self) -> None:
-            _silence(self.file)  # type: ignore[arg-type]
+            _silence_stream(self.file)  # type: ignore[arg-type]
 
     return PlainConsole(stderr=error, markup=False, emoji=False, highlight=False, **options)
 
 
-def _silence(stream: TextIO) -> None:
+def _silence_stream(stream: TextIO) -> None:
     """Let a stream go nowhere, so that what is still to be printed disturbs nobody."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())

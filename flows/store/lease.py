@@ -23,7 +23,7 @@ LOCK = ".staging/lock"
 
 
 @contextmanager
-def leased(objects: Objects) -> Iterator[None]:
+def hold_lease(objects: Objects) -> Iterator[None]:
     """Hold the dataset at an address for writing.
 
     Raises
@@ -31,9 +31,9 @@ def leased(objects: Objects) -> Iterator[None]:
     InputError
         If another run holds it.
     """
-    tag = objects.write(LOCK, _claim(), expected="") or _taken_over(objects)
+    tag = objects.write(LOCK, _make_claim(), expected="") or _taken_over(objects)
     held, ended = [tag], Event()
-    renewer = Thread(target=_keep, args=(objects, held, ended), daemon=True)
+    renewer = Thread(target=_renew_lease, args=(objects, held, ended), daemon=True)
     renewer.start()
     try:
         yield
@@ -44,11 +44,11 @@ def leased(objects: Objects) -> Iterator[None]:
             objects.remove([LOCK])
 
 
-def _keep(objects: Objects, held: list[str], ended: Event) -> None:
+def _renew_lease(objects: Objects, held: list[str], ended: Event) -> None:
     """Renew the lock until the run ends, or somebody else has it."""
     while not ended.wait(RENEW_S):
         try:
-            tag = objects.write(LOCK, _claim(), expected=held[0])
+            tag = objects.write(LOCK, _make_claim(), expected=held[0])
         except InputError:  # no answer now: the next time
             continue
         if tag is None:
@@ -70,7 +70,7 @@ def _taken_over(objects: Objects) -> str:
         if objects.tag(LOCK) != seen:
             raise busy
         time.sleep(WATCH_S)
-    tag = objects.write(LOCK, _claim(), expected=seen or "")
+    tag = objects.write(LOCK, _make_claim(), expected=seen or "")
     if tag is None:
         raise busy
     return tag
@@ -89,7 +89,7 @@ def _owner_of(content: bytes | None) -> dict[str, Any]:
     return owner if known else unknown
 
 
-def _claim() -> bytes:
+def _make_claim() -> bytes:
     claim = {"host": platform.node(), "pid": os.getpid(), "renewal": uuid.uuid4().hex}
     return json.dumps(claim, sort_keys=True).encode()
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from flows.store.layout import Layout
-from flows.store.lease import leased
+from flows.store.lease import hold_lease
 from flows.store.links import refuse_foreign_entries
 from flows.store.objects import Objects
 from tasks.errors import InputError
@@ -28,7 +28,7 @@ def sole_writer(layout: Layout) -> Iterator[None]:
     refuse_foreign_entries(layout.root)
     lock = _locked_file(layout)
     try:
-        with nullcontext() if layout.origin is None else leased(Objects(layout.origin)):
+        with nullcontext() if layout.origin is None else hold_lease(Objects(layout.origin)):
             yield
     finally:
         os.close(lock)

@@ -57,7 +57,7 @@ class Objects:
             parts.netloc,
             prefix=prefix,
             client_options={
-                "allow_http": _server().startswith("http://"),
+                "allow_http": _find_server().startswith("http://"),
                 "connect_timeout": CONNECT_TIMEOUT,
             },
             retry_config={"max_retries": RETRIES, "retry_timeout": RETRY_FOR},
@@ -166,17 +166,17 @@ class Objects:
         named = re.search(r"<Code>(\w+)</Code>", text)
         code = named[1] if named else type(error).__name__
         if code == "NoSuchBucket":
-            return f"the bucket does not exist at {_server()}: create it, or correct the address"
+            return f"the bucket does not exist at {_find_server()}: create it, or correct the address"
         refused = code in CREDENTIALS or code in {"PermissionDeniedError", "UnauthenticatedError"}
         if refused or "169.254.169.254" in text:  # where credentials are asked for when none are given
             return (
-                f"{_server()} refuses the credentials ({code}): set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY to"
+                f"{_find_server()} refuses the credentials ({code}): set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY to"
                 " those of somebody who may read and write there"
             )
         if named is None and "HTTP error" in text:
-            return f"no object store answers at {_server()}: check AWS_ENDPOINT_URL and the network"
-        return f"{_server()} answers {code}: {text.splitlines()[0]}"
+            return f"no object store answers at {_find_server()}: check AWS_ENDPOINT_URL and the network"
+        return f"{_find_server()} answers {code}: {text.splitlines()[0]}"
 
 
-def _server() -> str:
+def _find_server() -> str:
     return os.environ.get("AWS_ENDPOINT_URL") or "Amazon S3"

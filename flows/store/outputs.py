@@ -105,7 +105,7 @@ class Outputs:
             yield
             return
         self.folder.mkdir(parents=True, exist_ok=True)
-        with _held(self.folder, wait=False):
+        with _lock_folder(self.folder, wait=False):
             self._alone = True
             try:
                 self._clear_halves(self.folder)
@@ -122,7 +122,7 @@ class Outputs:
                         half.unlink()
 
     def _locked(self, folder: Path) -> AbstractContextManager[None]:
-        return nullcontext() if self._alone else _held(folder, wait=True)
+        return nullcontext() if self._alone else _lock_folder(folder, wait=True)
 
     def _refuse_strangers(self, folder: Path) -> None:
         problems = [f"{folder}: {problem}" for problem in map(name_problem, self.names) if problem]
@@ -240,7 +240,7 @@ def _write_marker(folder: Path, files: dict[str, str]) -> None:
 
 
 @contextmanager
-def _held(folder: Path, *, wait: bool) -> Iterator[None]:
+def _lock_folder(folder: Path, *, wait: bool) -> Iterator[None]:
     """Lock a folder itself, so that no lock file stays behind."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:

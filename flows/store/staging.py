@@ -23,7 +23,7 @@ _STAGED = re.compile(
 
 def staged_files(layout: Layout) -> list[Path]:
     """Files in the staging folder that muSync wrote, but for the lock."""
-    return sorted(path for path in _entries(layout) if _STAGED.fullmatch(path.name) and path.is_file())
+    return sorted(path for path in _list_entries(layout) if _STAGED.fullmatch(path.name) and path.is_file())
 
 
 def partial_files(layout: Layout) -> list[Path]:
@@ -35,7 +35,7 @@ def abandoned_scratch(layout: Layout) -> list[Path]:
     """Scratch folders of runs that are no more."""
     return sorted(
         path
-        for path in _entries(layout)
+        for path in _list_entries(layout)
         if _SCRATCH.fullmatch(path.name) and path.is_dir() and _is_abandoned(Layout(path))
     )
 
@@ -101,5 +101,5 @@ def _is_abandoned(scratch: Layout) -> bool:
         return False
 
 
-def _entries(layout: Layout) -> list[Path]:
+def _list_entries(layout: Layout) -> list[Path]:
     return list(layout.staging.iterdir()) if layout.staging.is_dir() else []

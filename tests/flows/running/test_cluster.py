@@ -16,7 +16,7 @@ import pytest
 from distributed import Client
 
 from flows.making.clip import warm_up
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from flows.running.cluster import check_cluster, facts_here, gpu_for, version_problems, warm_cluster
 from flows.running.runner import open_executor
 from flows.store.layout import Layout
@@ -115,7 +115,7 @@ def test_the_bytes_made_on_a_cluster_are_those_made_here(toy_dataset, scheduler,
     with Client(scheduler) as client:
         client.wait_for_workers(1, timeout=30)
     grid = str(toy_dataset.root.parent / "grid.yaml")
-    made = generate(grid, str(tmp_path / "data"), scheduler=scheduler)
+    made = generate_dataset(grid, str(tmp_path / "data"), scheduler=scheduler)
     assert made.made == 4
     assert made.layout.manifest.read_bytes() == toy_dataset.manifest.read_bytes()
 
@@ -135,7 +135,9 @@ def test_a_worker_killed_in_the_middle_changes_no_byte(toy_dataset, tmp_path):
             client.wait_for_workers(2, timeout=60)
         watcher = Thread(target=kill_one_when_a_clip_is_there, args=workers[:1], daemon=True)
         watcher.start()
-        made = generate(str(toy_dataset.root.parent / "grid.yaml"), str(layout.root), scheduler=address)
+        made = generate_dataset(
+            str(toy_dataset.root.parent / "grid.yaml"), str(layout.root), scheduler=address
+        )
         assert workers[0].wait(5) == -signal.SIGKILL and workers[1].poll() is None
     assert told["clips"] < made.made == 4
     assert layout.manifest.read_bytes() == toy_dataset.manifest.read_bytes()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from manifests.provenance import SOURCE_ROOT
 from tests.toy_street import write_toy_grid
 
@@ -56,9 +56,9 @@ def flow_run(tmp_path_factory) -> tuple[Path, dict, str]:
 
 def test_as_a_prefect_flow_the_stages_are_tasks_and_the_bytes_are_the_same(flow_run):
     folder, facts, _ = flow_run
-    assert (facts["made"], facts["tasks"]) == (4, ["fan_out", "prepare", "seal"])
+    assert (facts["made"], facts["tasks"]) == (4, ["fan_out", "prepare_dataset", "seal_dataset"])
     assert (folder / ".musync" / "prefect").is_dir(), "Prefect keeps to the project's folder"
-    plain = generate(str(folder / "grid.yaml"), str(folder / "plain"), runner="threads").layout
+    plain = generate_dataset(str(folder / "grid.yaml"), str(folder / "plain"), runner="threads").layout
     assert (folder / "flow" / "manifest.json").read_bytes() == plain.manifest.read_bytes()
 
 
