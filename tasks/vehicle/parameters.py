@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.tyres.burckhardt import TyreCurve, tyre_curve
+from tasks.vehicle.tyres.burckhardt import scale_burckhardt
+from tasks.vehicle.tyres.contract import Tyre
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +128,7 @@ class SurfaceResponse:
 
     Parameters
     ----------
-    tyre : the peak-normalised curve on this surface
+    tyre : on this surface, its curve scaled to the peak
     slip_stiffness : beta_kappa [1]
     pitch_scale : gamma_theta [1]
     hold_s, release_s : tau_h and tau_r [s]
@@ -135,7 +136,7 @@ class SurfaceResponse:
     wet : water lies on the road
     """
 
-    tyre: TyreCurve
+    tyre: Tyre
     slip_stiffness: float
     pitch_scale: float
     hold_s: float
@@ -163,7 +164,7 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
     # The knots are printed with six digits, so a friction within their rounding is on the end knot.
     rounding = 5e-7
     return SurfaceResponse(
-        tyre=tyre_curve(table.burckhardt, at(table.efficiency) * surface_friction, slip_stiffness),
+        tyre=scale_burckhardt(table.burckhardt, at(table.efficiency) * surface_friction, slip_stiffness),
         slip_stiffness=slip_stiffness,
         pitch_scale=at(table.pitch_scale),
         hold_s=at(table.hold_s),

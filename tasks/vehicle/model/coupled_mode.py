@@ -18,7 +18,7 @@ from tasks.vehicle.model.ports import ports_at
 from tasks.vehicle.model.states import AT_REST, Instant, Memory, Motion, without_slip
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 from tasks.vehicle.road import RoadFeature, road_feature
-from tasks.vehicle.tyres.burckhardt import TyreCurve
+from tasks.vehicle.tyres.contract import Tyre
 
 REST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _LAG, _DEAD_TIME = INDEX["lag"], INDEX["dead_time"]
@@ -43,7 +43,7 @@ def drive_coupled(
     road: RoadFeature,
     forms: SlotTables | None,
     chassis: Chassis,
-    tyre: TyreCurve,
+    tyre: Tyre,
 ) -> tuple[NDArray[np.float64], float, float, float]:
     """Drive, brake and stand, logging every ``per_tick``-th sample.
 
