@@ -10,7 +10,7 @@ import pytest
 import flows.auditing.audit
 import manifests.explain
 from catalogs.scenes import load_scene, write_scene
-from flows.auditing.audit import as_text, audit
+from flows.auditing.audit import audit, format_text
 from flows.making.generate import generate
 from flows.store.layout import Layout
 from tasks.errors import InputError
@@ -42,7 +42,7 @@ def test_a_changed_catalogue_value_is_named_with_both_values_and_as_the_reason(c
     (mismatch,) = result["mismatches"]
     assert (mismatch["stage"], mismatch["why"]) == ("vehicle", ["vehicle.yaml"])
     text = (tmp_path / "told" / "audit.txt").read_text()
-    assert text == as_text(result) and "can come from: vehicle.yaml" in text
+    assert text == format_text(result) and "can come from: vehicle.yaml" in text
     assert f"tick {mismatch['tick']}: {mismatch['recorded']!r} recorded, {mismatch['remade']!r}" in text
 
 

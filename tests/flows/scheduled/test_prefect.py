@@ -48,8 +48,8 @@ def plain_flows():
     with get_client(sync_client=True) as client:
         runs = client.read_task_runs()
     tasks = sorted(run.name.rsplit("-", 1)[0] for run in runs if run.state.type == StateType.COMPLETED)
-    facts = {"made": state.result().made, "tasks": tasks, "wrong": end_of("verify", "nowhere", "--prefect")}
-    prefect_flows.verify = prefect_flows.as_flow(broken)
+    facts = {"made": state.result()["made"], "tasks": tasks, "wrong": end_of("verify", "nowhere", "--prefect")}
+    prefect_flows.verify = prefect_flows.make_flow(broken, "verify")
     return facts | {"broken": end_of("verify", "nowhere", "--prefect")}
 
 def scheduled_flows():
