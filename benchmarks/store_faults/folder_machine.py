@@ -18,7 +18,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from benchmarks.store_faults.clips import write_grid
 from benchmarks.store_faults.disk import FAULTS, FaultyDisk, Killed
 from flows.auditing.repair import repair_dataset
-from flows.auditing.verify import remove_left_overs, verify_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
 from flows.reading.describe import describe_dataset
@@ -226,7 +226,7 @@ class FolderMachine(RuleBasedStateMachine):
         make_dataset(self.folder)
 
     def _gc(self) -> None:
-        remove_left_overs(str(self.folder))
+        collect_garbage(str(self.folder))
 
     def _verify(self) -> None:
         verify_dataset(str(self.folder))

@@ -5,13 +5,13 @@ from typing import Any
 
 from flows.auditing.signing import signature_findings
 from flows.running.orchestration import run_as_stage
-from flows.store.address import open_for_writing, remove_files, want_everything, want_record
+from flows.store.address import open_for_writing, want_everything, want_record
 from flows.store.layout import Layout
 from flows.store.links import foreign_entries
 from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
-from flows.store.staging import BEGUN, left_overs, remove_staged, remove_staging
+from flows.store.staging import BEGUN, left_overs, remove_left_overs, remove_staging
 from manifests.manifest import damaged_files, manifest_damage, recorded_files
 from manifests.signing import ENVELOPE
 from tasks.errors import InputError
@@ -79,7 +79,7 @@ def compare_files(layout: Layout) -> dict[str, Any]:
     }
 
 
-def remove_left_overs(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
+def collect_garbage(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
     """Remove what killed runs left: half-written files, scratch folders, and a finished dataset's staged files.
 
     Committed clips of an unfinished dataset stay, and so does a scratch folder that a live run holds. Only what muSync
@@ -114,9 +114,8 @@ def _remove_from(layout: Layout, dry_run: bool) -> dict[str, Any]:
         found = left_overs(layout)
         size = sum(_count_bytes(path) for path in found)
         if not dry_run:
-            remove_files(layout, [path for path in found if path.is_file()])
-            remove_staged(found)
-        if finished:
+            remove_left_overs(layout)
+        elif finished:
             remove_staging(layout)
     return {"removed": sorted(str(path) for path in found), "bytes": size, "dry_run": dry_run}
 

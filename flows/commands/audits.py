@@ -80,7 +80,7 @@ COMMANDS = (
         name="gc",
         group=GROUP,
         sentence="Remove the files that killed runs left in a dataset and beside it; committed clips stay.",
-        function="flows.auditing.verify:remove_left_overs",
+        function="flows.auditing.verify:collect_garbage",
         options=(
             define_argument(
                 "dataset", str, "Folder or s3:// address of a dataset, finished or not.", in_store=True

@@ -17,7 +17,7 @@ from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
 from flows.auditing.repair import repair_dataset
 from flows.auditing.signing import sign_dataset
-from flows.auditing.verify import remove_left_overs, verify_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
 from flows.judging.physics import audit_physics
 from flows.making.generate import generate_dataset
 from flows.reading.describe import describe_dataset
@@ -100,7 +100,7 @@ def _ask(stage: Stage) -> Any:
 
 COMMANDS: dict[str, Callable[[Stage], Any]] = {
     "verify": lambda s: verify_dataset(str(s.dataset.root)),
-    "gc --dry-run": lambda s: remove_left_overs(str(s.dataset.root), dry_run=True),
+    "gc --dry-run": lambda s: collect_garbage(str(s.dataset.root), dry_run=True),
     "describe": lambda s: describe_dataset(str(s.dataset.root)),
     "sql": _ask,
     "open tables": _open_tables,
@@ -118,7 +118,7 @@ COMMANDS: dict[str, Callable[[Stage], Any]] = {
     "repair": lambda s: repair_dataset(str(s.dataset.root), out=s.out("repair"), runner="threads", workers=1),
     "generate": lambda s: generate_dataset(str(s.grid), str(s.dataset.root), runner="threads", workers=1),
     "sign": lambda s: sign_dataset(str(s.dataset.root), key=str(s.world / "key.pem")),
-    "gc": lambda s: remove_left_overs(str(s.dataset.root)),
+    "gc": lambda s: collect_garbage(str(s.dataset.root)),
 }
 """In the order in which they are tried: those that write last."""
 LIGHT = (

@@ -75,6 +75,10 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
             f"vehicle {vehicle.name} has effects that only coupled mode knows ({', '.join(foreign)}): no campaign can"
             " be held against it; use the vehicle that it was grown from"
         )
+    if vehicle.tyre is not None:
+        raise InputError(
+            f"vehicle {vehicle.name} names a tyre: identification knows the families' Burckhardt curves only"
+        )
     weather = Weather(
         kind=run.weather,  # type: ignore[arg-type]
         precipitation_mm_h=run.precipitation_mm_h,
@@ -108,7 +112,7 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
         "release_width": vehicle.abs_release_width,
         "slip_floor": vehicle.slip_speed_floor,
         "friction": response.tyre.peak,
-        "slip_scale": response.tyre.decay / c2,
+        "slip_scale": c2 * response.slip_stiffness / c2,
         "pitch_scale": response.pitch_scale,
         "c1": c1,
         "c2": c2,

@@ -12,8 +12,13 @@ from numba import njit
 from numba.extending import overload
 
 from tasks.vehicle.tyres.burckhardt import BurckhardtTyre, burckhardt_friction, burckhardt_slope
+from tasks.vehicle.tyres.magic_formula_tyre import (
+    MagicFormulaTyre,
+    magic_formula_friction,
+    magic_formula_slope,
+)
 
-Tyre = BurckhardtTyre
+Tyre = BurckhardtTyre | MagicFormulaTyre
 """Every kind of tyre."""
 
 
@@ -30,7 +35,10 @@ class TyreLaw(NamedTuple):
     slope: Callable[[float, float, Any], float]
 
 
-LAWS = {BurckhardtTyre: TyreLaw(burckhardt_friction, burckhardt_slope)}
+LAWS: dict[type[Tyre], TyreLaw] = {
+    BurckhardtTyre: TyreLaw(burckhardt_friction, burckhardt_slope),
+    MagicFormulaTyre: TyreLaw(magic_formula_friction, magic_formula_slope),
+}
 """The law of each kind of tyre."""
 
 

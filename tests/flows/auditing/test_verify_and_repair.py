@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from flows.auditing.repair import repair_dataset
-from flows.auditing.verify import remove_left_overs, verify_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
 from flows.store.layout import PARTIAL, Layout
 from flows.store.lock import sole_writer
 from manifests.canonical import canonical_bytes
@@ -123,9 +123,9 @@ def test_left_overs_of_killed_runs_go_and_nothing_else(toy_dataset, copy, tmp_pa
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     with sole_writer(Layout(copy.staging / "scratch-live")):
-        named = remove_left_overs(str(copy.root), dry_run=True)["removed"]
+        named = collect_garbage(str(copy.root), dry_run=True)["removed"]
         assert (copy.staging / f"{'0' * 16}.json").exists()
-        assert remove_left_overs(str(copy.root))["removed"] == named
+        assert collect_garbage(str(copy.root))["removed"] == named
         assert len(named) == 3
         assert (copy.staging / "scratch-live").exists()
     assert not (copy.staging / "scratch-dead").exists()
@@ -135,10 +135,10 @@ def test_left_overs_of_killed_runs_go_and_nothing_else(toy_dataset, copy, tmp_pa
 def test_of_a_collected_dataset_no_staging_folder_stays(toy_dataset, copy):
     copy.staging.mkdir()
     (copy.staging / f"{'0' * 16}.ticks.parquet").touch()
-    assert len(remove_left_overs(str(copy.root))["removed"]) == 1
+    assert len(collect_garbage(str(copy.root))["removed"]) == 1
     assert files_of(copy) == files_of(toy_dataset) and not copy.staging.exists()
 
 
 def test_a_dataset_that_is_being_written_is_left_alone(copy):
     with sole_writer(copy), pytest.raises(InputError, match="another run is writing"):
-        remove_left_overs(str(copy.root))
+        collect_garbage(str(copy.root))

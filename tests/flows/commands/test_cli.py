@@ -1,27 +1,29 @@
+"""Commands as a user types them: their exit codes, and what stands on the terminal."""
+
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from manifests.provenance import SOURCE_ROOT
+from tests.flows.shell import run_command
 
 
-def musync(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "flows.cli", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120, env=_environment())
+@pytest.fixture
+def musync(tmp_path, monkeypatch, capsys):
+    """Run a command in the test's folder; returns its exit code, output and errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> SimpleNamespace:
+        code = run_command(monkeypatch, *words)
+        return SimpleNamespace(code=code, **capsys.readouterr()._asdict())
+
+    return run
 
 
-def _environment() -> dict[str, str]:
-    return {k: v for k, v in os.environ.items() if k != "PREFECT_API_URL"} | {"PYTHONPATH": str(SOURCE_ROOT)}
-
-
-def test_validate_counts_clips_and_frames(tmp_path):
-    done = musync("validate", "demo", "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    facts = json.loads(done.stdout)
+def test_validate_counts_clips_and_frames(musync):
+    done = musync("validate", "demo", "--json")
+    assert done.code == 0, done.err
+    facts = json.loads(done.out)
     assert (facts["clips"], facts["frames"]) == (15, 15 * 81)
 
 
@@ -42,33 +44,33 @@ def test_validate_counts_clips_and_frames(tmp_path):
         ("{name: t, vehicle: tractor, axes: {a: {b: {}}}}", "tractor: no such"),
     ],
 )
-def test_a_faulty_grid_is_one_clear_sentence_exit_code_2_and_no_traceback(tmp_path, grid, sentence):
+def test_a_faulty_grid_is_one_clear_sentence_exit_code_2_and_no_traceback(musync, tmp_path, grid, sentence):
     (tmp_path / "grid.yaml").write_text(grid)
-    done = musync("generate", "grid.yaml", "--out", "data", cwd=tmp_path)
-    assert done.returncode == 2
-    assert sentence in done.stderr
-    assert "Traceback" not in done.stderr
+    done = musync("generate", "grid.yaml", "--out", "data")
+    assert done.code == 2
+    assert sentence in done.err
+    assert "Traceback" not in done.err
     assert not (tmp_path / "data").exists()
 
 
-def test_a_folder_with_other_files_is_left_alone(tmp_path):
+def test_a_folder_with_other_files_is_left_alone(musync, tmp_path):
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "thesis.tex").write_text("precious")
-    done = musync("generate", "demo", "--out", "data", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "must be an empty or new folder" in done.stderr
+    done = musync("generate", "demo", "--out", "data")
+    assert done.code == 2
+    assert "must be an empty or new folder" in done.err
     assert [p.name for p in (tmp_path / "data").iterdir()] == ["thesis.tex"]
 
 
 @pytest.mark.parametrize("command", ["audit", "describe"])
-def test_a_folder_that_is_no_dataset_is_refused(tmp_path, command):
-    done = musync(command, str(tmp_path), cwd=tmp_path)
-    assert done.returncode == 2
-    assert "manifest.json: no such file" in done.stderr
+def test_a_folder_that_is_no_dataset_is_refused(musync, tmp_path, command):
+    done = musync(command, str(tmp_path))
+    assert done.code == 2
+    assert "manifest.json: no such file" in done.err
 
 
-def test_a_manifest_of_another_version_is_refused(tmp_path):
+def test_a_manifest_of_another_version_is_refused(musync, tmp_path):
     (tmp_path / "manifest.json").write_text('{"format": "musync-manifest/9"}')
-    done = musync("audit", str(tmp_path), cwd=tmp_path)
-    assert done.returncode == 2
-    assert "musync-manifest/9" in done.stderr
+    done = musync("audit", str(tmp_path))
+    assert done.code == 2
+    assert "musync-manifest/9" in done.err

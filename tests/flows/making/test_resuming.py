@@ -9,7 +9,7 @@ import pytest
 
 import flows.making.generate
 from flows.auditing.repair import repair_dataset
-from flows.auditing.verify import remove_left_overs
+from flows.auditing.verify import collect_garbage
 from flows.making.generate import generate_dataset
 from flows.making.places import noted_place, remember_place
 from flows.making.plan import make_plan
@@ -59,6 +59,25 @@ def test_a_disk_that_is_full_before_there_is_a_plan_can_be_freed_and_the_run_goe
     assert files_of(folder) == whole
 
 
+def test_what_a_run_left_that_stopped_after_its_manifest_goes_with_the_next_run_unless_one_is_at_work(
+    grid, whole, tmp_path, monkeypatch
+):
+    def refuse(*args: object, **kwargs: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("flows.making.seal.publish", refuse)
+    with pytest.raises(OSError, match="No space"):
+        make(grid, tmp_path / "data")
+    monkeypatch.undo()
+    stopped = files_of(tmp_path / "data")
+    assert stopped.keys() > whole.keys()
+    with sole_writer(Layout(tmp_path / "data")):
+        make(grid, tmp_path / "data")
+        assert files_of(tmp_path / "data") == stopped
+    make(grid, tmp_path / "data")
+    assert files_of(tmp_path / "data") == whole
+
+
 def test_a_run_that_was_begun_can_be_begun_anew_with_another_grid(grid, tmp_path, monkeypatch):
     """Before there is a plan nothing binds the folder to a grid."""
     other = tmp_path / "other.yaml"
@@ -87,10 +106,10 @@ def test_what_a_run_began_without_a_plan_is_no_dataset_to_collect_in(tmp_path):
     (tmp_path / "data" / ".staging").mkdir(parents=True)
     (tmp_path / "data" / ".staging" / "begun").touch()
     with pytest.raises(InputError, match="goes on with the same musync generate"):
-        remove_left_overs(str(tmp_path / "data"))
+        collect_garbage(str(tmp_path / "data"))
 
 
-@pytest.mark.parametrize("command", [remove_left_overs, repair_dataset])
+@pytest.mark.parametrize("command", [collect_garbage, repair_dataset])
 def test_a_folder_that_is_no_dataset_is_not_touched_nor_made(tmp_path, command):
     (tmp_path / "mine").mkdir()
     for name in ("nowhere", "mine"):

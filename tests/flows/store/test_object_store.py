@@ -13,7 +13,7 @@ import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
 from flows.auditing.repair import repair_dataset
-from flows.auditing.verify import remove_left_overs, verify_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
 from flows.making.clip import make_clip
 from flows.making.generate import generate_dataset, prepare_dataset
 from flows.making.plan import make_plan
@@ -193,7 +193,7 @@ def test_another_grid_does_not_go_into_the_same_dataset(stored, machine, grid, t
 def test_what_a_killed_run_left_in_the_store_is_collected(stored, machine):
     objects = Objects(stored)
     objects.write(f".staging/{'0' * 16}.json", b"{}")
-    assert len(remove_left_overs(stored)["removed"]) == 1
+    assert len(collect_garbage(stored)["removed"]) == 1
     assert not [name for name in objects.sizes() if name.startswith(".staging/")]
 
 
