@@ -1,4 +1,4 @@
-"""What the pipeline costs beyond its work: wall time against the clips' own wall time over the workers."""
+"""Overhead of the pipeline: wall time compared with the clips' own wall time over the workers."""
 
 import tempfile
 import time

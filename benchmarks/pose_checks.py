@@ -80,7 +80,7 @@ def measure_rows() -> list[dict[str, Any]]:
 
 
 def _feature_checks(clip: Clip) -> dict[str, Callable[[], object]]:
-    """What is asked of a clip with a road feature besides: the edit, and the likeness to the flat twin around it."""
+    """Measure the further checks of a clip with a road feature: the edit, and the likeness to its flat twin."""
     targets = _find_targets(clip)
     shown = clip.frames.copy()
     shown[targets] -= np.minimum(shown[targets], SHADE)

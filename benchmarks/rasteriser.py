@@ -86,7 +86,7 @@ def _cpu_ms(work: Callable[[], object], repeats: int = FRAMES) -> float:
 
 
 def _peak_memory_mib() -> float:
-    """What this process has held at most, after drawing the largest cloud [MiB]."""
+    """Return the peak memory of this process after drawing the largest cloud [MiB]."""
     count, width, height, _ = VIEWS[1]
     viewmat, K = driver_view(STATION, width, height)
     prepared = prepare(make_corridor(count))

@@ -5,6 +5,7 @@ that nothing else here produced.
 """
 
 from dataclasses import dataclass
+from typing import TypedDict, Unpack
 
 import numba
 import numpy as np
@@ -85,6 +86,17 @@ def hump_drive(
     return station, heave, pitch
 
 
+class CameraSize(TypedDict):
+    """Size and focal length of a camera, all [px]."""
+
+    width: int
+    height: int
+    focal: float
+
+
+LARGE_CAMERA: CameraSize = {"width": 480, "height": 320, "focal": 400.0}
+
+
 def drive_clip(
     *,
     frames: int = 81,
@@ -93,14 +105,15 @@ def drive_clip(
     deceleration: float = 0.0,
     hump_at: float = 1.2,
     curvature: float = 0.0,
-    width: int = 480,
-    height: int = 320,
-    focal: float = 400.0,
     seed: int = 1,
+    **size: Unpack[CameraSize],
 ) -> Clip:
+    """Return a clip of a drive over a hump; ``size`` is the camera's, `LARGE_CAMERA` where it is not given."""
+    camera = size or LARGE_CAMERA
+    width, height = camera["width"], camera["height"]
     station, heave, pitch = hump_drive(frames, frame_rate, speed, deceleration, hump_at)
     return render_clip(
-        station, heave, pitch, K=camera_matrix(width, height, focal), width=width, height=height,
+        station, heave, pitch, K=camera_matrix(width, height, camera["focal"]), width=width, height=height,
         curvature=curvature, seed=seed,
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""What weather adds to a frame, stage by stage, against the clear frame of the same run."""
+"""Cost that weather adds to a frame, stage by stage, beside the clear frame of the same run."""
 
 import time
 from collections.abc import Callable

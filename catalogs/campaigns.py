@@ -47,7 +47,7 @@ class Split(BaseModel):
 
 
 class MeasuredHeader(CampaignHeader):
-    """campaign.yaml of a campaign that the model is held against."""
+    """campaign.yaml of a campaign with which the model is compared."""
 
     split: Split
     tolerances_1sigma: TolerancesEntry
@@ -134,8 +134,7 @@ def _read_header_and_runs(
 
 def _split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequence[str]) -> list[str]:
     problems = [
-        f"{shorten(name, 60)}: stands in both parts of the split"
-        for name in sorted(set(train) & set(held_out))
+        f"{shorten(name, 60)}: is in both parts of the split" for name in sorted(set(train) & set(held_out))
     ]
     problems += [
         f"{shorten(name, 60)}: is in neither part of the split"

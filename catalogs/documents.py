@@ -1,4 +1,4 @@
-"""YAML and JSON text becomes plain values here and nowhere else: bounded, of one meaning, every fault told at once.
+"""YAML and JSON text becomes plain values here and nowhere else: bounded, unambiguous, all faults reported at once.
 
 What comes out holds text, finite numbers, booleans, nulls, lists, and tables whose keys are distinct text.
 """

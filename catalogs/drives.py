@@ -20,7 +20,7 @@ WEATHER = ("weather", "precipitation_mm_h", "snow_accumulation_h")
 
 @dataclass(frozen=True, kw_only=True)
 class DriveCampaign:
-    """What a protocol needs of a campaign.
+    """The parts of a campaign that a protocol needs.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ FOREIGN_GATES = Path(__file__).with_name("foreign_gates.yaml")
 
 
 class ForeignGateEntry(CatalogueEntry):
-    """What a gate file for any video must hold; the meanings stand at ``PoseThresholds``."""
+    """Content of a gate file for any video; `PoseThresholds` gives the meanings."""
 
     pitch_relative_error: Annotated[Scalar, require_quantity("1", above=0)]
     pitch_correlation: Annotated[Scalar, require_quantity("1", minimum=-1, maximum=1)]
@@ -21,7 +21,7 @@ class ForeignGateEntry(CatalogueEntry):
 
 
 class GateEntry(ForeignGateEntry):
-    """What a gate file for generated clips must hold: with depth, degrees and metres are judged too."""
+    """Content of a gate file for generated clips: with depth, degrees and metres are judged too."""
 
     pitch_rmse_deg: Annotated[Scalar, require_quantity("deg", above=0)]
     progress_rmse_m: Annotated[Scalar, require_quantity("m", above=0)]
@@ -39,7 +39,7 @@ def load_gates(path: Path = GATES) -> PoseThresholds:
 
 
 def load_foreign_gates(path: Path = FOREIGN_GATES) -> PoseThresholds:
-    """Read the limits for any video: what only depth can tell is left unjudged.
+    """Read the limits for any video: figures that need depth are not judged.
 
     Raises
     ------

@@ -38,7 +38,7 @@ class ClipCheckpoint(Checkpoint):
 
 
 class JudgeFile(CatalogueEntry):
-    """What the YAML may hold."""
+    """Content of the YAML file."""
 
     clip: ClipCheckpoint | None = None
     dover: Checkpoint | None = None
@@ -48,7 +48,7 @@ class JudgeFile(CatalogueEntry):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedJudge:
-    """A judge, or why there is none.
+    """A judge, or the reason why it is missing.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class LoadedJudge:
 
 
 def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
-    """Every judge by its name, those that are missing with the reason.
+    """Return every judge by its name; a missing judge has the reason.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What no scenario and no clip may exceed."""
+"""Physical limits that no scenario and no clip may exceed."""
 
 from functools import cache
 from pathlib import Path

@@ -28,7 +28,7 @@ LARGEST_FILE = 2**30
 
 
 def recording_files(source: Path, channel_map: ChannelMap) -> tuple[Path, ...]:
-    """The files that a map asks for: those its runs name, else all in the folder, or the one file.
+    """Return the files that a map reads: those its runs name, otherwise all in the folder, or the one file.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def _mdf_signals(path: Path, recording: Any, names: tuple[str, ...]) -> dict[str
         places = recording.channels_db.get(name, ())
         if len(places) > 1:
             problems.append(
-                f"{path.name}: signal {name} stands in {len(places)} groups; export the group that you mean"
+                f"{path.name}: signal {name} is in {len(places)} groups; export only the group to be read"
             )
         elif places:
             channel = recording.get(name, group=places[0][0], index=places[0][1])
@@ -214,7 +214,7 @@ def _import_asammdf() -> ModuleType:
 def _describe_missing(
     path: Path, names: tuple[str, ...], there: Collection[str], known: Iterable[str]
 ) -> list[str]:
-    """A sentence for each name that is not there, with those of the file that come near."""
+    """Return a sentence for each missing name, with similar names of the file."""
     listed = [str(name) for name in known]
     problems = []
     for name in names:

@@ -102,7 +102,7 @@ class ReferenceCase(BaseModel):
         )
 
     def facts(self, wheelbase: float) -> CaseFacts:
-        """What the judge is told of the case, beside its trace; the wheelbase is the model's [m]."""
+        """Return the facts that the judge gets of the case, beside its trace; the wheelbase is the model's [m]."""
         return CaseFacts(
             case=self.case,
             hazard_height=self.hazard_height_m,

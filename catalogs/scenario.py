@@ -58,7 +58,7 @@ NOT_NEGATIVE = (
     "brake_onset_s", "brake_onset_m", "hold_s",
 )  # fmt: skip
 UNKNOWN_WEATHER = "unknown"
-"""Stands for a weather that could not be read, as NaN does for a number: no rule is held against either."""
+"""Replaces a weather that could not be read, as NaN replaces a number: no rule applies to either."""
 
 
 def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list[str]:

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 Place = tuple[int | str, ...]
 """Keys and numbers that lead to a value of a document."""
 MOST_PROBLEMS = 20
-"""Problems told of one document [1]: more do not fit on a screen, and a mended start often mends the rest."""
+"""Problems reported of one document [1]: more do not fit on a screen, and the first ones often cause the rest."""
 
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60

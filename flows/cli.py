@@ -8,7 +8,7 @@ from flows.running.failures import INTERRUPTED, explain_end
 from flows.running.terminal import print_lines
 
 QUIET = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "ERROR"}
-"""OpenCV writes names and tags of a video to the terminal as they are; what is wrong with it, we say."""
+"""OpenCV would print names and tags of a video unescaped; muSync reports faults of a video itself."""
 
 app = build_parser()
 

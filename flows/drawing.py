@@ -13,7 +13,7 @@ NO_SCRIPTS = (
 
 
 def escape_formulas(text: str) -> str:
-    """Text of users and datasets for a figure, in which no dollar begins a formula."""
+    """Return text of users and datasets for a figure, in which no dollar sign starts a formula."""
     return text.replace("$", r"\$")
 
 

@@ -1,4 +1,4 @@
-"""The installed distributions as a CycloneDX list: what has to be installed to make the bytes again."""
+"""The installed distributions as a CycloneDX list, from which the environment can be installed again."""
 
 import importlib.metadata
 import json

@@ -83,7 +83,7 @@ def tool_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[dict[st
 
 
 def tools_here() -> dict[str, Any]:
-    """What a manifest records of code, libraries and processor, of here and now."""
+    """Return the code, libraries and processor of this machine as a manifest records them."""
     return {
         "made_with": {"code": code_version(), "libraries": library_versions()},
         "processor": describe_processor(),
@@ -104,7 +104,7 @@ def parameter_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[di
 
 
 def as_sentences(differences: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Each row of differences between what made a dataset (a) and what is here (b), in words."""
+    """Return a sentence for each difference between the tools that made a dataset (a) and those at hand (b)."""
     return [
         f"{row['input']} {row['path']}".strip()
         + f": {format_value(row['a'])} made it, {format_value(row['b'])} is here"

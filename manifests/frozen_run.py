@@ -26,7 +26,7 @@ def frozen_names() -> tuple[str, ...]:
 
 
 def frozen_source(name_or_path: str | Path) -> Path:
-    """The file of a frozen run: a path ending in .json is taken as it is, a name is looked up among those that ship.
+    """Return the file of a frozen run: a path ending in .json as it is, a name from those that ship.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def parameters_that_matter(inputs: Mapping[str, Any], pictures: bool) -> dict[st
 def find_differences(
     frozen: Mapping[str, Any], parameters: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]
 ) -> list[str]:
-    """What here is not as it was frozen, value by value; hashes of telemetry are left to the outcome.
+    """List the values at hand that differ from the frozen ones; hashes of telemetry are compared elsewhere.
 
     Parameters
     ----------

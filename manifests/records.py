@@ -1,4 +1,4 @@
-"""The forms of what is recorded: plans, receipts, manifests and frozen runs, checked once, where they are read.
+"""The forms of plans, receipts, manifests and frozen runs, checked once, when they are read.
 
 A dataset may come from a stranger. What passes here needs no second check: an id has the form of an id, and a recorded
 path is one of those that muSync writes, below the dataset's folder.

@@ -1,4 +1,4 @@
-"""Counterfactual pairs: clips of one dataset that differ in exactly one control, and what it changes."""
+"""Counterfactual pairs: clips of one dataset that differ in exactly one control, and the changes it causes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, pairwise

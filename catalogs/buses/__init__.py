@@ -19,7 +19,7 @@ Seconds = Annotated[Table, require_quantity("s", above=0)]
 
 
 class TruthEntry(CatalogueEntry):
-    """The car that drives; the meanings stand at ``DiveModel``."""
+    """The car that drives; the meanings are given by ``DiveModel``."""
 
     brake_gain: Annotated[Scalar, require_quantity("N m MPa-1", above=0)]
     stiffness: Ratio
@@ -27,7 +27,7 @@ class TruthEntry(CatalogueEntry):
 
 
 class EventsEntry(CatalogueEntry):
-    """How it brakes; the meanings stand at ``DriveStyle``."""
+    """How it brakes; the meanings are given by ``DriveStyle``."""
 
     start_speed: Annotated[Table, require_quantity("km h-1", above=0)]
     peak_pressure: Annotated[Table, require_quantity("bar", above=0)]
@@ -49,7 +49,7 @@ class EventsEntry(CatalogueEntry):
 
 
 class SignalEntry(CatalogueEntry):
-    """One signal; the meanings stand at ``BusSignal``."""
+    """One signal; the meanings are given by ``BusSignal``."""
 
     name: Text
     channel: Text
@@ -72,7 +72,7 @@ class SignalEntry(CatalogueEntry):
 
 
 class BusEntry(CatalogueEntry):
-    """What a bus file must hold."""
+    """Content of a bus file."""
 
     truth: TruthEntry
     events: EventsEntry

@@ -21,7 +21,7 @@ Count = Annotated[Scalar, require_quantity("1", minimum=1)]
 
 
 class ScalesEntry(CatalogueEntry):
-    """Size of one unit of each response; the meanings stand at ``Yardstick``."""
+    """Size of one unit of each response; the meanings are given by ``Yardstick``."""
 
     speed: Annotated[Scalar, require_quantity("m s-1", above=0)]
     speed_drop: Annotated[Scalar, require_quantity("m s-1", above=0)]
@@ -32,7 +32,7 @@ class ScalesEntry(CatalogueEntry):
 
 
 class BoundsEntry(CatalogueEntry):
-    """Limits and difference step of a group; the meanings stand at ``Bounds``."""
+    """Limits and difference step of a group; the meanings are given by ``Bounds``."""
 
     unit: Text
     lower: Number
@@ -53,7 +53,7 @@ class BoundsEntry(CatalogueEntry):
 
 
 class StageEntry(CatalogueEntry):
-    """One stage; the meanings stand at ``Stage``."""
+    """One stage; the meanings are given by ``Stage``."""
 
     name: Text
     groups: tuple[Text, ...]
@@ -70,7 +70,7 @@ def _group_units() -> dict[str, str]:
 
 
 class ProcedureEntry(CatalogueEntry):
-    """A whole procedure; the meanings stand at ``Procedure``."""
+    """A whole procedure; the meanings are given by ``Procedure``."""
 
     mode: Literal["paper", "coupled"]
     passes: Count

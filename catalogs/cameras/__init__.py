@@ -26,7 +26,7 @@ LOOKING_FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 
 
 class CameraEntry(CatalogueEntry):
-    """What a camera file must hold."""
+    """Content of a camera file."""
 
     name: Text
     width: Annotated[Scalar, require_quantity("px", minimum=16, maximum=8192)]

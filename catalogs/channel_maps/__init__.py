@@ -33,7 +33,7 @@ class GainEntry(CatalogueEntry):
 
 
 class ChannelEntry(CatalogueEntry):
-    """Where one channel comes from; the meanings stand at ``ChannelRule``."""
+    """Where one channel comes from; the meanings are given by ``ChannelRule``."""
 
     source: Text | Annotated[tuple[Text, ...], Field(min_length=1)]
     unit: Text
@@ -72,7 +72,7 @@ class TimeEntry(CatalogueEntry):
 
 
 class Conditions(CatalogueEntry):
-    """What the logger does not know of a run; the columns of runs.csv."""
+    """Facts of a run that the logger does not know; the columns of runs.csv."""
 
     weather: Literal["dry", "rain", "snow"] = "dry"
     precipitation_mm_h: Number = 0.0
@@ -150,7 +150,7 @@ class CsvEntry(CatalogueEntry):
 
 
 class ChannelMap(CatalogueEntry):
-    """What a map file holds. Without ``runs`` and ``segment`` every file is one run."""
+    """Content of a channel map file. Without ``runs`` and ``segment`` every file is one run."""
 
     campaign: Text
     vehicle: Text

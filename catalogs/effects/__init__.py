@@ -17,7 +17,7 @@ LIBRARY_FILE = Path(__file__).with_name("library.yaml")
 
 
 class ParameterEntry(CatalogueEntry):
-    """One number of an effect; the meanings stand at ``EffectParameter``."""
+    """One number of an effect; the meanings are given by ``EffectParameter``."""
 
     unit: Unit
     lower: Number
@@ -36,7 +36,7 @@ class ParameterEntry(CatalogueEntry):
 
 
 class EffectEntry(CatalogueEntry):
-    """One effect; the meanings stand at ``Effect``."""
+    """One effect; the meanings are given by ``Effect``."""
 
     name: Text
     effect_class: EffectClass = Field(alias="class")
@@ -64,7 +64,7 @@ def _check_names(entries: list[EffectEntry]) -> list[EffectEntry]:
 
 
 LIBRARY = TypeAdapter(Annotated[list[EffectEntry], AfterValidator(_check_names)])
-"""What the file must hold."""
+"""Content of the file."""
 
 
 def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:

@@ -19,7 +19,7 @@ TRUTHS_FILE = Path(__file__).with_name("truths.yaml")
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What a synthetic car has.
+    """Effect that a synthetic car has.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def _library_names() -> dict[str, set[str]]:
 
 
 class TruthFile(CatalogueEntry):
-    """What the file must hold."""
+    """Content of the file."""
 
     library: dict[str, Annotated[dict[str, Number], Field(min_length=1)]]
     outside: dict[str, OutsideEntry]

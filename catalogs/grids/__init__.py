@@ -87,7 +87,7 @@ def load_grid(source: str | Path) -> Grid:
 def expand_grid(settings: GridFile, place: str) -> Grid:
     """The product of the blocks, later ones over earlier ones over ``base``, less what is excluded, each checked."""
     base = fields_set_by(settings.base)
-    # a value that every level overrides is judged all the same: it stands in the file
+    # a value that every level overrides is checked too: it is in the file
     problems: dict[str, list[str]] = {problem: ["base"] for problem in range_problems(Scenario(**base))}
     scenarios, tags, left_out = [], [], 0
     labels: set[str] = set()

@@ -79,7 +79,7 @@ class LatinHypercube(Strict):
 
 
 class Blocks(Strict):
-    """What a grid multiplies; at least one block has to be there."""
+    """Blocks whose product is the grid; there must be at least one."""
 
     axes: Annotated[
         dict[Label, Levels], Field(description="Product: every level of each axis with every other.")

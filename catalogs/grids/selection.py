@@ -59,7 +59,7 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
 
 
 def facts_of(scenario: Scenario) -> dict[str, Any]:
-    """What conditions are held against: the scenario's fields and its place in the calibrated range."""
+    """Return the facts that conditions test: the scenario's fields and its place in the calibrated range."""
     return scenario.as_row() | {CALIBRATION: calibration_tag(scenario, load_calibrated_range())}
 
 

@@ -22,7 +22,7 @@ Reflectance = Annotated[Table, require_quantity("1", minimum=0, maximum=1), Afte
 
 
 class MarkingEntry(CatalogueEntry):
-    """What a marking's file must hold; the meanings stand at ``HazardMarking``."""
+    """Content of a marking's file; `HazardMarking` gives the meanings."""
 
     stripe_width: Annotated[Scalar, require_quantity("m", above=0)]
     paint: Reflectance

@@ -16,7 +16,7 @@ Count = Annotated[Scalar, require_quantity("1", minimum=0)]
 
 
 class RuleEntry(CatalogueEntry):
-    """One selection rule; the meanings stand at ``Rule``."""
+    """One selection rule; the meanings are given by ``Rule``."""
 
     name: Text
     criterion: Text
@@ -41,7 +41,7 @@ class RuleEntry(CatalogueEntry):
 
 
 class ProtocolEntry(CatalogueEntry):
-    """What a protocol file must hold; the meanings stand at ``Protocol``."""
+    """Content of a protocol file; `Protocol` gives the meanings."""
 
     onset_pressure: Annotated[Scalar, require_quantity("MPa", above=0)]
     merge_gap: Annotated[Scalar, require_quantity("s", minimum=0)]

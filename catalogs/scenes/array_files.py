@@ -1,4 +1,4 @@
-"""Arrays of a scene folder: a .npy file has to be what the scene needs before memory is taken for it."""
+"""Arrays of a scene folder: a .npy file is checked before memory is allocated for it."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""What the header of a .ply announces, held against the file before anything is decoded.
+"""Compare the header of a .ply with the file before anything is decoded.
 
 The decoder reads columns and rows where it expects them, without a second look: what a header announces has to be what
 lies there.

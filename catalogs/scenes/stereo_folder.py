@@ -91,7 +91,7 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
 
 
 def _read_matrices(path: Path, problems: list[str]) -> NDArray[np.float64] | None:
-    """3x4 matrices of a text file, one per row; None, and a problem, where there is none to be had."""
+    """Return the 3x4 matrices of a text file, one per row; None, and a problem, where it cannot be read."""
     try:
         content = read_content(path, "table of matrices", LARGEST_PICTURE).decode()
         lines = [line for line in content.splitlines() if line.strip()]
@@ -162,7 +162,7 @@ def _read_pictures(folder: Path, problems: list[str]) -> dict[str, NDArray[np.ui
 
 
 def _read_picture(path: Path, problems: list[str]) -> NDArray[np.uint8] | None:
-    """An RGB picture [H, W, 3]; None, and a problem, where there is none, or one of no camera's size."""
+    """Return an RGB picture [H, W, 3]; None, and a problem, where it is missing or too large or small."""
     try:
         content = read_content(path, "picture", LARGEST_PICTURE)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""The built-in street, generated once, kept in the user's cache, and made anew where it was damaged."""
+"""The built-in street: generated once, kept in the user's cache, and generated again if it is damaged."""
 
 import fcntl
 import hashlib
@@ -60,7 +60,7 @@ def _make_street(folder: Path, seed: int) -> None:
     if not _remove_street(folder):
         raise InputError(
             f"{folder}: must be the built-in street as muSync made it; it is damaged, and is or holds something else:"
-            " move it away, and the street is made anew"
+            " move it away, and the street is generated again"
         )
     own = folder.with_name(f"{folder.name}.{os.getpid()}")
     try:

@@ -15,7 +15,7 @@ FOLDER = Path(__file__).parent
 
 
 class RungEntry(CatalogueEntry):
-    """One step of the ladder; the meanings stand at ``Rung``."""
+    """One step of the ladder; the meanings are given by ``Rung``."""
 
     name: Text
     adds: Text
@@ -49,7 +49,7 @@ class RungEntry(CatalogueEntry):
 
 
 class StopStudy(CatalogueEntry):
-    """What a study file must hold."""
+    """Content of a study file."""
 
     train: Text
     held_out: Text

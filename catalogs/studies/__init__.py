@@ -26,7 +26,7 @@ Count = Annotated[Scalar, require_quantity("1", minimum=0)]
 
 
 class ProtocolEntry(CatalogueEntry):
-    """Braking protocol; the meanings stand at ``StudyProtocol``."""
+    """Braking protocol; the meanings are given by ``StudyProtocol``."""
 
     initial_speed: Annotated[Scalar, require_quantity("km h-1", above=0)]
     peak_pressure_mpa: Annotated[Scalar, require_quantity("MPa", above=0)]
@@ -39,7 +39,7 @@ class ProtocolEntry(CatalogueEntry):
 
 
 class WeatherStudyEntry(CatalogueEntry):
-    """What is varied; the meanings stand at ``WeatherStudy``."""
+    """Values that are varied; `WeatherStudy` gives the meanings."""
 
     seed: Count
     parameters: tuple[Text, ...]
@@ -67,7 +67,7 @@ class SensitivityEntry(CatalogueEntry):
 
 
 class ConditionEntry(PartialScenario):
-    """One condition of the paper's Appendix C as it stands in the file."""
+    """One condition of the paper's Appendix C as the file gives it."""
 
     name: Text
     split: Text

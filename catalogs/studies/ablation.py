@@ -23,14 +23,14 @@ Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class FamilyRates(CatalogueEntry):
-    """The rate that stands for all rates of a kind of weather."""
+    """The rate that represents a kind of weather."""
 
     rain: Rate
     snow: Rate
 
 
 class AblationEntry(CatalogueEntry):
-    """What the file must hold."""
+    """Content of the file."""
 
     family_rates: FamilyRates
     stop_condition: Text
@@ -76,7 +76,7 @@ def load_ablation() -> Ablation:
 
 
 def cut_coupling(scenario: Scenario, variant: Variant) -> Scenario:
-    """The scenario that a variant drives; what is seen stays that of the scenario itself.
+    """Return the scenario that a variant drives; the appearance stays that of the original scenario.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ Exponent = Annotated[Scalar, require_quantity("1")]
 
 
 class SurfaceEntry(CatalogueEntry):
-    """What a surface file must hold; the meanings stand at ``SurfaceParameters``."""
+    """Content of a surface file; `SurfaceParameters` gives the meanings."""
 
     dry_friction: Friction
     flooded_friction: Friction

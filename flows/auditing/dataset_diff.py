@@ -148,7 +148,7 @@ def _read_inputs(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, bytes
 
 
 def _find_largest_changes(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Per label the clip in which it moved furthest."""
+    """Return, for each label, the clip with the largest change."""
     largest: dict[str, dict[str, Any]] = {}
     for row in rows:
         for name, value in row["labels"].items():

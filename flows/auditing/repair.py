@@ -1,4 +1,4 @@
-"""Making again what is broken or missing in a finished dataset, byte for byte, or saying why that cannot be."""
+"""Repair of a finished dataset: damaged and missing files are made again byte for byte, or a sentence says why not."""
 
 import shutil
 from collections.abc import Iterable, Mapping
@@ -95,7 +95,7 @@ def _repair_locked(
 
 
 def _refuse_files_as_folders(layout: Layout, paths: Iterable[str]) -> None:
-    """Raise `InputError` where something else stands in the place of a folder, or a folder in that of a file."""
+    """Raise `InputError` where a folder is expected and something else exists, or a folder exists instead of a file."""
     places = {place for path in paths for place in PurePosixPath(path).parents} - {PurePosixPath(".")}
     wrong = [place for place in places if (layout.root / place).is_file()]
     wrong += [PurePosixPath(path) for path in paths if (layout.root / path).is_dir()]

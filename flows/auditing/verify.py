@@ -50,7 +50,7 @@ def verify_dataset(dataset: str, *, key: str | None = None, out: str | None = No
 
 
 def compare_files(layout: Layout) -> dict[str, Any]:
-    """What `verify_dataset` returns."""
+    """Return the result of `verify_dataset` for files that are at hand."""
     foreign = foreign_entries(layout.root)
     damaged: list[dict[str, str | None]] = [
         {"path": path, "clip_id": None, "damage": "a link, or no file"} for path in foreign

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 Result = dict[str, Any]
 REQUIRED: Any = object()
-"""Default of an option that has to be given."""
+"""Default of a required option."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,7 +44,7 @@ LEAST_PITCH, LEAST_WAY = np.deg2rad(0.05), 0.2
 
 
 def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
-    """Desynchronise a dataset in seven ways and say which metric sees which fault, and from what threshold.
+    """Desynchronise a dataset in seven ways and report which metric detects which fault, and from what threshold.
 
     All are detected only if each could be tried; `undetected` says of the others what kept them.
 
@@ -74,7 +74,7 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
 
 
 def summarise_controls(rows: list[dict[str, Any]], kept: dict[str, str]) -> dict[str, Any]:
-    """What became of every control: who sees it, or why nobody does.
+    """Return the outcome of every control: the metrics that detect it, or why none could.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def summarise_controls(rows: list[dict[str, Any]], kept: dict[str, str]) -> dict
 
 
 def false_claims(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) -> list[dict[str, Claim]]:
-    """The faulty claims of each clip by control; those that say what the true one says are left out.
+    """Return the faulty claims of each clip by control, without those that equal the true claim.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def false_claims(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) -> l
 
 
 def list_untried(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> dict[str, str]:
-    """Controls that no method could be tried on, and why.
+    """Return the controls that no method could be applied to, with the reason.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ SCHEMA = pa.schema(
         *((name, pa.int64()) for name in ("window", "averaged")),
     ]
 )
-"""Columns of the table of figures; those that no figure of a dataset fills keep their type."""
+"""Columns of the table of figures; an empty column keeps its type."""
 
 
 def evaluate_dataset(
@@ -99,7 +99,7 @@ def evaluate_dataset(
 
 
 def pose_rows(clips: list[JudgedClip]) -> Iterator[Row]:
-    """Pitch and progress of each clip by each method, with uncertainty; a failure is told, not scored."""
+    """Yield pitch and progress of each clip by each method, with uncertainty; a failure is reported, not scored."""
     responds = load_gates().response_deg
     for clip, method, motion in _list_recovered(clips):
         claimed = clip.frames["pitch"] - clip.frames["pitch"][0]

@@ -56,7 +56,7 @@ LEAST_SWING_DEG = 0.25
 
 
 def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: str) -> str:
-    """The whole page.
+    """Return the HTML of the whole page.
 
     Parameters
     ----------

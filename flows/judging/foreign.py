@@ -23,7 +23,7 @@ NEEDS_DEPTH = (
 def judge_video(
     video: str, *, claim: str, camera: str, out: str | None = None, metric: bool = False
 ) -> dict[str, Any]:
-    """Hold a video's ego motion, by the essential chain, or a trajectory against the telemetry claimed for it.
+    """Compare a video's ego motion, by the essential chain, or a trajectory with the telemetry claimed for it.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def measure_retention(
     event: tuple[int, int] = (16, 42),
     out: str | None = None,
 ) -> dict[str, Any]:
-    """How much of the road event's pitch an editor kept: its input against its output (paper, Appendix A.5).
+    """Measure how much of the road event's pitch an editor kept, from its input and output (paper, Appendix A.5).
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def measure_retention(
 
 
 def _read_all(*sources: tuple[Callable[[Path], Any], str]) -> list[Any]:
-    """What each reader makes of its file; every faulty one is told at once."""
+    """Return the value that each reader makes of its file; all faulty files are reported at once."""
     parts: list[Any] = []
     problems: list[str] = []
     for read, path in sources:

@@ -1,4 +1,4 @@
-"""What a judge of foreign videos is given: footage and its camera, from files it did not make."""
+"""Footage and its camera, read from files of others, for the judge of foreign videos."""
 
 import os
 from dataclasses import dataclass
@@ -76,7 +76,7 @@ class Footage:
     def motion(
         self, camera: ForeignCamera, rows: NDArray[np.int64] | None = None, *, metric: bool = False
     ) -> RecoveredMotion:
-        """Ego motion: by the essential chain from a video, as it is told from a trajectory.
+        """Return the ego motion: recovered by the essential chain from a video, or read from a trajectory.
 
         Parameters
         ----------
@@ -177,7 +177,7 @@ def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64], tupl
     if not (np.diff(times) > 0).all():
         # a container without time stamps: the rate is all there is
         if not rate > 0:
-            raise InputError(f"{path}: the video tells neither time stamps nor a frame rate.")
+            raise InputError(f"{path}: the video has neither time stamps nor a frame rate.")
         times = np.arange(len(stamps)) / rate
     return frames[: len(stamps)], times - times[0], size
 

@@ -1,4 +1,4 @@
-"""What learned judges say of a dataset's pictures; where their weights are missing, a row that says so."""
+"""Scores of learned judges for a dataset's pictures; where weights are missing, a row that says so."""
 
 from collections.abc import Iterator
 
@@ -62,7 +62,7 @@ def _fast_vqa(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Itera
 
 
 def _temporal_lpips(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
-    """Each clip's own, and what it exceeds that of its dry control by."""
+    """Yield the severity of each clip, and its difference to that of the dry control."""
     names = ("temporal_lpips", "temporal_lpips_excess")
     if loaded.network is None:
         yield from _list_missing(names, loaded.note)

@@ -1,4 +1,4 @@
-"""The physics audit: a dataset's stored telemetry held against the laws that it claims to follow."""
+"""The physics audit: a dataset's stored telemetry compared with the physical laws that it must follow."""
 
 from pathlib import Path
 from typing import Any
@@ -131,7 +131,7 @@ def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
 def _clip_row(root: Path, facts: dict[str, Any], constants: Constants) -> dict[str, Any]:
     ticks, frames = clip_columns(root, "ticks", facts), clip_columns(root, "frames", facts)
     holes = [f"ticks.{c}" for c in finite_rows(ticks)]
-    with np.errstate(all="ignore"):  # what is stored may be anything; a law that infinity enters is broken
+    with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
         verdict = audit_clip(ticks, frames, facts, constants)
     return {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
 

@@ -215,7 +215,7 @@ def render_frames(
     seed: int,
     rig_at: RigAt,
 ) -> dict[str, NDArray[Any]]:
-    """The clip's finished frames, depth and class."""
+    """Render the clip's finished frames, depth and class."""
     hazard = hazard_of(scenario)
     weather = WeatherState(
         kind=scenario.weather,
@@ -249,7 +249,7 @@ def check_poses(
     film_depth_mm: float,
     catalogue: Catalogue,
 ) -> dict[str, Any]:
-    """Motion recovered from the finished frames, held against the telemetry."""
+    """Compare the motion recovered from the finished frames with the telemetry."""
     K, route = catalogue.camera.K - PIXEL_CENTRE, catalogue.scene.route.pose(frames["station"])[:, :3, :3]
     seen = one_shutter(
         undistorted(
@@ -280,7 +280,7 @@ def check_poses(
 
 
 def nothing_to_judge(frames: int) -> dict[str, Any]:
-    """What `check_poses` returns where there is no picture: everything not represented."""
+    """Return the result of `check_poses` where there is no picture: every value is not represented."""
     verdict = {figure.name: None for figure in fields(PoseVerdict)}
     return {
         "recovered_pitch": np.full(frames, np.nan),

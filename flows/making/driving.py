@@ -21,7 +21,7 @@ def simulate_drive(
     mode: Mode,
     duration_s: float,
 ) -> tuple[dict[str, Any], Rollout]:
-    """Weather to surface state to friction to vehicle motion."""
+    """Simulate a scenario: weather to surface state to friction to vehicle motion."""
     weather = weather_of(scenario)
     state = surface_state(weather, surface)
     friction = surface_friction(weather, state, surface)
@@ -64,7 +64,7 @@ def _simulate_vehicle(
 
 
 def weather_of(scenario: Scenario) -> Weather:
-    """What falls on the road in the scenario."""
+    """Return the weather of the scenario."""
     return Weather(
         kind=scenario.weather,
         precipitation_mm_h=scenario.precipitation_mm_h,
@@ -73,7 +73,7 @@ def weather_of(scenario: Scenario) -> Weather:
 
 
 def controls_of(scenario: Scenario) -> Controls:
-    """What the driver does in the scenario."""
+    """Return the driver's controls in the scenario."""
     return Controls(
         initial_speed=scenario.initial_speed_km_h / 3.6,
         brake=BrakeCommand(

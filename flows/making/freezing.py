@@ -1,4 +1,4 @@
-"""Frozen runs: made from a grid, held against what is here, and made again hash for hash."""
+"""Frozen runs: frozen from a grid, compared with the code and catalogue at hand, and made again hash for hash."""
 
 import json
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ SHOWN_DIFFERENCES = 8
 
 
 def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]:
-    """Freeze the run of a grid, or anew those that ship with the project.
+    """Freeze the run of a grid, or freeze again those that ship with the project.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _frozen_before(file: Path, ours: bool) -> FrozenRun | None:
 
 
 def frozen_run(grid: Grid) -> dict[str, Any]:
-    """The frozen run of a grid, with the telemetry that comes out here."""
+    """Return the frozen run of a grid, with the hashes of the telemetry that this machine computes."""
     plan, inputs = _plan_clips(grid)
     ticks = ticks_of(plan, grid.settings)
     return seal_run({

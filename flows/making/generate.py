@@ -35,12 +35,12 @@ from tasks.errors import InputError
 from tasks.render.rasterise.backend import select_backend
 
 SHOWN = 8
-"""Differences told when a folder holds another run."""
+"""Differences reported when a folder holds another run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
-    """What a generating run did.
+    """Result of a generating run.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _clear_up(layout: Layout) -> None:
 
 
 def is_preview(name: str) -> bool:
-    """What is shown of a run when it has ended."""
+    """Whether a file is shown when a run has ended."""
     return name.startswith("previews/")
 
 

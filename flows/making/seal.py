@@ -29,7 +29,7 @@ PREVIEW_CLIPS = 24
 
 
 def seal_dataset(layout: Layout, plan: Plan) -> None:
-    """Gather the staged tables, draw the contact sheet, and freeze the manifest last."""
+    """Collect the staged tables, draw the contact sheet, and freeze the manifest last."""
     receipts = [read_receipt(layout, clip.clip_id) for clip in plan.clips]
     tables = [
         write_part(layout, table, path, clip_ids)
@@ -135,6 +135,6 @@ def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Seque
 
 
 def pick_evenly(items: Sequence[Any], most: int) -> list[Any]:
-    """At most that many of the items, evenly spread from the first to the last."""
+    """Return at most that many of the items, evenly spaced from the first to the last."""
     chosen = np.linspace(0, len(items) - 1, min(len(items), most))
     return [items[i] for i in np.rint(chosen).astype(int)]

@@ -32,7 +32,7 @@ _CLOSED: dict[str, str | bool | int | float | list[str]] = {
 
 
 def connect_views(dataset: str | Path, *, allow_files: bool = False) -> duckdb.DuckDBPyConnection:
-    """A DuckDB connection in memory with the views of a sealed dataset; what is not represented is NULL.
+    """Return a DuckDB connection in memory with the views of a sealed dataset; values not represented are NULL.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is in a dataset, and what a grid would make: for people, without making anything."""
+"""Summaries of a dataset and of the clips that a grid would make; nothing is made."""
 
 from collections import Counter
 from typing import Any

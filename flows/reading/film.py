@@ -35,7 +35,7 @@ def write_film(
 
 
 def through_film(pictures: NDArray[np.uint8], frame_rate_hz: float, crf: int) -> NDArray[np.uint8]:
-    """The pictures as they come back from a film.
+    """Encode pictures as a film and return the decoded pictures.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class Dataset:
         return f"Dataset({self.origin or str(self.root)!r}, {len(self.manifest['clips'])} clips)"
 
     def telemetry(self, table: str = "ticks") -> pyarrow.dataset.Dataset:
-        """A stored table as a pyarrow dataset: clips, ticks, frames or pairs; units stand in its schema.
+        """Return a stored table as a pyarrow dataset: clips, ticks, frames or pairs; its schema has the units.
 
         Raises
         ------
@@ -94,7 +94,7 @@ class Dataset:
             raise refused_query(query, error, "musync.open(..., allow_files=True)") from None
 
     def pandas(self, table: str = "clips", columns: Sequence[str] | None = None) -> "pd.DataFrame":
-        """A view as a pandas frame; what is not represented is NaN.
+        """Return a view as a pandas frame; values not represented are NaN.
 
         Parameters
         ----------
@@ -218,7 +218,7 @@ class Dataset:
         )
 
     def _checked_frames(self) -> Any:
-        """The Zarr store of the frames, once their metadata are found to be those that muSync writes."""
+        """Return the Zarr store of the frames, after checking that muSync wrote its metadata."""
         grid, layout = self.manifest["grid"], self._layout
         if not grid.get("pictures", True):
             raise InputError(f"{layout}: the dataset was made without frames")

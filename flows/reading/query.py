@@ -137,7 +137,7 @@ def refused_query(query: str, error: Exception, option: str) -> InputError:
 
 
 def _last_line(text: str) -> str:
-    """DuckDB's message; of an exception that a file raised, what it says and not where."""
+    """Return DuckDB's message; of an exception that a file raised, its sentence without the traceback."""
     return text.splitlines()[-1] if text.startswith("Traceback") else text
 
 

@@ -88,7 +88,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
 
 
 def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) -> dict[str, Any]:
-    """What the page shows of all clips; telemetry comes clip by clip.
+    """Return the page's data of all clips; telemetry is loaded clip by clip.
 
     Parameters
     ----------

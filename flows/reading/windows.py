@@ -150,7 +150,7 @@ def windows_of(
     )
     rows = [row for row in rows if row["label"] not in left_out]
     if not rows and not problems:
-        problems = [f"{layout}: every clip is in quarantine; quarantined=True takes them all the same"]
+        problems = [f"{layout}: every clip is in quarantine; quarantined=True includes them"]
     if problems:
         raise InputError(problems)
     if left_out:

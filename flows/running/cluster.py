@@ -16,7 +16,7 @@ VISIBLE = "CUDA_VISIBLE_DEVICES"
 
 
 def facts_here() -> dict[str, str]:
-    """What has to be equal on every machine that makes a dataset, because its manifest records one of each."""
+    """Return the facts that must be equal on every machine that makes a dataset: its manifest records one of each."""
     code, libraries = code_version(), library_versions()
     libraries["python"] = libraries["python"].rpartition(".")[0]
     kept = {name: version for name, version in libraries.items() if name not in NOT_ON_WORKERS}
@@ -81,7 +81,7 @@ def share_gpus(client: Any) -> None:
 
 
 def gpu_for(place: int, visible: str | None, present: Sequence[str]) -> str | None:
-    """The GPU of a worker; None where there is none to choose, because Slurm or dask-cuda has given it its one.
+    """Return the GPU of a worker; None where Slurm or dask-cuda has already assigned one.
 
     Parameters
     ----------

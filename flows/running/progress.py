@@ -20,7 +20,7 @@ Advance = Callable[[str], None]
 
 @contextmanager
 def progress_bar(title: str, total: int) -> Iterator[Advance]:
-    """Yield a function that is told the name of each finished piece of work."""
+    """Yield a function to call with the name of each finished piece of work."""
     if not sys.stderr.isatty():
         done = 0
 

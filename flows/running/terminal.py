@@ -1,4 +1,4 @@
-"""What a terminal is given: text of users and datasets as plain text, never as markup, emoji or control sequences."""
+"""Output to a terminal: text of users and datasets stays plain text, never markup, emoji or control sequences."""
 
 import os
 import re
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 _UNPRINTABLE = re.compile(
     "[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""Control characters, those that turn the direction of writing, line separators, and halves of characters."""
+"""Control characters, marks of writing direction, line separators, and unpaired surrogates."""
 
 
 def escape_controls(text: str) -> str:
@@ -25,7 +25,7 @@ def escape_lines(text: str) -> str:
 
 
 def print_lines(text: str, *, error: bool = False) -> None:
-    """Print lines for people; a reader that has gone (``| head -1``) is no failure.
+    """Print lines for people; a closed pipe (``| head -1``) is no failure.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def open_console(*, error: bool = False, **options: Any) -> "Console":
 
 
 def _silence_stream(stream: TextIO) -> None:
-    """Let a stream go nowhere, so that what is still to be printed disturbs nobody."""
+    """Redirect a stream to the null device, so that further output causes no error."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)

@@ -1,4 +1,4 @@
-"""What a scheduled run that failed leaves for people: a report, and word to a command or a webhook."""
+"""Report a scheduled run that failed: in a file, and to a command or a webhook."""
 
 import json
 import shlex
@@ -19,7 +19,7 @@ LOCAL = Path(".musync")
 
 
 def report_failure(grid: str, root: str, at: datetime, error: BaseException, notify: str | None) -> Path:
-    """Write what went wrong for people, and tell the notification hook; returns the report.
+    """Write a report of a failed run, and call the notification hook; return the report's path.
 
     Under an address in an object store the report is an object too, and the file lies under the working folder.
 

@@ -102,7 +102,7 @@ def serve_schedule(every: str, parameters: dict[str, Any]) -> None:
 
 
 def _stop_runs() -> None:
-    """End runs that are still going, while the server can be told; this process would wait for them otherwise."""
+    """Stop runs that are still going while the server still answers; this process would wait for them otherwise."""
     running = active_children()
     for run in running:
         run.terminate()

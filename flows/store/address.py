@@ -1,4 +1,4 @@
-"""A dataset by its address: a folder, or ``s3://bucket/prefix``, which is worked on through a folder here.
+"""A dataset by its address: a folder, or ``s3://bucket/prefix``, which is accessed through a local folder.
 
 What reads a finished dataset gets a folder in the user's cache, named by the hash of the manifest: files come once, and
 only with their recorded bytes. What writes, or asks whether the bytes are right, gets a folder of its own for its time,
@@ -33,32 +33,32 @@ PREPARED = ("inputs/", "frames.zarr/", ".staging/")
 
 
 def want_everything(name: str) -> bool:
-    """All files of a dataset, those of unfinished clips too."""
+    """Whether a file is wanted: every file is, those of unfinished clips too."""
     return True
 
 
 def want_telemetry(name: str) -> bool:
-    """What questions about numbers need, and what frames there are."""
+    """Whether a file is needed to answer questions about numbers, or lists the frames."""
     return name.endswith("zarr.json") or not name.startswith(("frames.zarr/", "previews/"))
 
 
 def want_manifest(name: str) -> bool:
-    """The manifest alone, which always comes."""
+    """Whether a file is wanted beside the manifest, which always is: none."""
     return False
 
 
 def want_plan(name: str) -> bool:
-    """What a worker needs to make a clip."""
+    """Whether a worker needs the file to make a clip."""
     return name == "plan.json" or name.startswith("inputs/") or name.endswith("zarr.json")
 
 
 def want_record(name: str) -> bool:
-    """What says how far a dataset is, and what a killed run staged."""
+    """Whether a file tells how far a dataset is, or was staged by a killed run."""
     return name in {"plan.json", "manifest.json"} or name.startswith(".staging/")
 
 
 def want_progress(name: str) -> bool:
-    """What going on with a run needs: its plan, and which clips are complete."""
+    """Whether a file is needed to continue a run: its plan, and which clips are complete."""
     return (
         want_plan(name)
         or name == "manifest.json"
@@ -67,7 +67,7 @@ def want_progress(name: str) -> bool:
 
 
 def open_for_reading(address: str | Path, wanted: Wanted = want_everything) -> Layout:
-    """A finished dataset to read from, without links in it.
+    """Return a finished dataset to read from; one that contains links is refused.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def open_for_reading(address: str | Path, wanted: Wanted = want_everything) -> L
 
 @contextmanager
 def open_for_writing(address: str, wanted: Wanted) -> Iterator[Layout]:
-    """A dataset to write to or to examine; at an object store's address, the files that it holds now.
+    """Yield a dataset to write to or to examine; of an address in an object store, the files that it holds now.
 
     Parameters
     ----------
@@ -140,12 +140,12 @@ def open_for_writing(address: str, wanted: Wanted) -> Iterator[Layout]:
 
 
 def find_local(layout: Layout) -> Layout:
-    """In a worker: the dataset in a folder of this machine; with a store, no folder need be shared."""
+    """Return the dataset of a worker in a local folder; with an object store, no folder need be shared."""
     return layout if layout.origin is None or layout.root.parent.is_dir() else _open_elsewhere(layout)
 
 
 def fetch_files(layout: Layout, paths: Iterable[Path]) -> None:
-    """Have files here that other machines or earlier runs sent to the store.
+    """Fetch files that other machines or earlier runs sent to the store.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def fetch_files(layout: Layout, paths: Iterable[Path]) -> None:
 
 
 def send_files(layout: Layout, paths: Iterable[Path], last: Path | None = None) -> None:
-    """Send files to the store; ``last`` is sent when the others are there, and tells readers so."""
+    """Send files to the store; ``last`` is sent after the others, and marks them as complete."""
     if layout.origin is not None:
         objects = Objects(layout.origin)
         objects.send({layout.relative(path): path for path in paths})
@@ -171,7 +171,7 @@ def send_files(layout: Layout, paths: Iterable[Path], last: Path | None = None) 
 
 
 def send_first(layout: Layout, path: Path) -> None:
-    """Send a file that must not be there yet.
+    """Send a file that must not exist in the store yet.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def remove_files(layout: Layout, paths: Collection[Path]) -> None:
 
 
 def forget_begun(layout: Layout) -> None:
-    """Remove from the store what a run sent that was stopped before its plan."""
+    """Remove the files that a run sent to the store and that was stopped before its plan."""
     if layout.origin is not None:
         objects = Objects(layout.origin)
         objects.remove([name for name in objects.sizes() if name != LOCK])
@@ -207,7 +207,7 @@ def stored_bytes(layout: Layout) -> int:
 
 
 def frames_store(layout: Layout) -> Any:
-    """The Zarr store of the frames, which are read from where they lie."""
+    """Return the Zarr store of the frames, which are read from the folder or the object store."""
     return (
         layout.frames if layout.origin is None else Objects(f"{layout.origin}/{layout.frames.name}").as_zarr()
     )
@@ -230,7 +230,7 @@ def _find_mirrors() -> Path:
 
 @contextmanager
 def _work_folder() -> Iterator[Path]:
-    """A new folder beside the mirrors that goes with the run; those of killed runs go now."""
+    """Yield a new folder beside the mirrors, removed after the run; those of killed runs are removed now."""
     _find_mirrors().mkdir(parents=True, exist_ok=True)
     for left in _find_mirrors().glob("work-*"):
         with ExitStack() as stack:
@@ -238,7 +238,7 @@ def _work_folder() -> Iterator[Path]:
                 shutil.rmtree(left, ignore_errors=True)
     with ExitStack() as stack:
         folder = Path(mkdtemp(prefix="work-", dir=_find_mirrors()))
-        while not _try_lock(folder, stack):  # another run took it for a left-over just now
+        while not _try_lock(folder, stack):  # another run has just removed it as a left-over
             folder = Path(mkdtemp(prefix="work-", dir=_find_mirrors()))
         try:
             yield folder

@@ -31,7 +31,7 @@ _CODECS = {
 _INDEX_CODECS = ["bytes", "crc32c"]
 
 ReadMetadata = Callable[[str], bytes | None]
-"""The bytes of a file of the frames by its relative path; None where there is none."""
+"""Return the bytes of a file of the frames by its relative path; None where there is no file."""
 
 
 def read_local_metadata(folder: Path) -> ReadMetadata:

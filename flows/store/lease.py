@@ -24,7 +24,7 @@ LOCK = ".staging/lock"
 
 @contextmanager
 def hold_lease(objects: Objects) -> Iterator[None]:
-    """Hold the dataset at an address for writing.
+    """Hold the lease of the dataset at an address for writing.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def hold_lease(objects: Objects) -> Iterator[None]:
 
 
 def _renew_lease(objects: Objects, held: list[str], ended: Event) -> None:
-    """Renew the lock until the run ends, or somebody else has it."""
+    """Renew the lock until the run ends, or another run has taken it."""
     while not ended.wait(RENEW_S):
         try:
             tag = objects.write(LOCK, _make_claim(), expected=held[0])

@@ -58,7 +58,7 @@ def _is_at(lock: int, path: Path) -> bool:
 
 
 def _open_lock(path: Path) -> int:
-    """The lock file, made where there is none; a file that is there is neither followed, nor cut, nor written."""
+    """Open the lock file, and create it where it is missing; an existing file is not followed, truncated or written."""
     with suppress(FileExistsError):
         path.parent.mkdir(parents=True)
     with suppress(IsADirectoryError, NotADirectoryError):

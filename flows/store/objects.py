@@ -75,7 +75,7 @@ class Objects:
         return sorted(PurePosixPath(name).name for name in found)
 
     def read(self, name: str) -> bytes | None:
-        """An object's bytes; None where there is none."""
+        """Return an object's bytes; None where there is no object."""
         with self._explained():
             try:
                 return bytes(self._api.get(self._store, name).bytes())
@@ -108,7 +108,7 @@ class Objects:
         return tag
 
     def tag(self, name: str) -> str | None:
-        """What changes with an object's content; None where there is no object."""
+        """Return the tag of an object, which changes with its content; None where there is no object."""
         with self._explained():
             try:
                 found: str = self._api.head(self._store, name)["e_tag"]
@@ -117,7 +117,7 @@ class Objects:
         return found
 
     def remove(self, names: Collection[str]) -> None:
-        """Remove objects; one that is not there is none the worse."""
+        """Remove objects; a missing object is no error."""
         if names:
             with self._explained():
                 self._api.delete(self._store, sorted(names))

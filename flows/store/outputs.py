@@ -94,7 +94,7 @@ class Outputs:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Keep other calls from writing into the folder, and clear what killed ones left of the command's files.
+        """Lock the folder against other calls, and remove files that killed calls of this command left.
 
         Raises
         ------
@@ -186,7 +186,7 @@ def read_marker(folder: Path) -> dict[str, str]:
 
 
 def refuse_link(path: Path) -> None:
-    """Refuse to write to a file through a link, or to what is no file.
+    """Refuse to write through a link, or to something that is no file.
 
     Raises
     ------
@@ -213,7 +213,7 @@ def _in_the_way(folder: Path, name: str, known: dict[str, str], command: str) ->
 
 
 def _no_folder_above(folder: Path, name: str) -> str | None:
-    """The link or file that lies where a folder between must be; None if there is none."""
+    """Return the link or file at the place of a parent folder; None if there is none."""
     above = [
         folder.joinpath(*PurePosixPath(name).parts[:k]) for k in range(1, len(PurePosixPath(name).parts))
     ]

@@ -64,7 +64,7 @@ def remove_staging(layout: Layout) -> None:
 
 
 def remove_left_overs(layout: Layout) -> list[Path]:
-    """Remove what killed runs left, also from a store, and return what it was; the dataset is held for writing."""
+    """Remove the files that killed runs left, in a store too, and return their paths; needs the writer's lock."""
     found = left_overs(layout)
     remove_files(layout, [path for path in found if path.is_file()])
     remove_staged(found)
@@ -93,7 +93,7 @@ def scratch_dataset(layout: Layout) -> Iterator[Layout]:
         folder = Path(tempfile.mkdtemp(prefix="musync-scratch-"))
     scratch = Layout(folder)
     try:
-        with sole_writer(scratch):  # what holds no lock is a left-over of a killed run
+        with sole_writer(scratch):  # without a lock it is left over from a killed run
             yield scratch
     finally:
         shutil.rmtree(folder, ignore_errors=True)

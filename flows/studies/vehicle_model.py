@@ -35,7 +35,7 @@ def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
 def measure_agreement(
     traces: str, *, vehicle: str = "paper-reference", mode: Mode | None = None, out: str | None = None
 ) -> dict[str, Any]:
-    """Hold the vehicle model against reference traces by the paper's Appendix A.2 protocol.
+    """Compare the vehicle model with reference traces by the paper's Appendix A.2 protocol.
 
     Parameters
     ----------
