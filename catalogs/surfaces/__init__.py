@@ -9,8 +9,6 @@ from catalogs.entries import find_entry
 from catalogs.quantities import Bounded, CatalogueEntry, Scalar, read_entry, require_quantity
 from tasks.surface.state import SurfaceParameters
 
-FOLDER = Path(__file__).parent
-
 Friction = Annotated[Bounded, require_quantity("1", above=0, maximum=2)]
 Depth = Annotated[Bounded, require_quantity("mm", above=0)]
 Exponent = Annotated[Scalar, require_quantity("1")]
@@ -51,22 +49,6 @@ class SurfaceEntry(CatalogueEntry):
         return self
 
 
-def surface_names() -> tuple[str, ...]:
-    """Names of the surfaces in the catalogue."""
-    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.yaml")))
-
-
-def surface_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a surface.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "surface")
-
-
 def load_surface(name_or_path: str | Path) -> SurfaceParameters:
     """Read a surface by its name in the catalogue or from a YAML file.
 
@@ -79,7 +61,7 @@ def load_surface(name_or_path: str | Path) -> SurfaceParameters:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    entry = read_entry(SurfaceEntry, surface_source(name_or_path), "surface")
+    entry = read_entry(SurfaceEntry, find_entry("surface", name_or_path), "surface")
     values = {name: getattr(entry, name).value for name in SurfaceEntry.model_fields}
     bounds = {
         name: quantity.bounds

@@ -16,8 +16,6 @@ from catalogs.vehicles.frozen import Provenance, check_seal
 from tasks.vehicle.effects.numbers import EFFECT_UNITS
 from tasks.vehicle.parameters import TyreFamily, Vehicle
 
-FOLDER = Path(__file__).parent
-
 Mass = Annotated[Scalar, require_quantity("kg", above=0)]
 Length = Annotated[Scalar, require_quantity("m", above=0)]
 Inertia = Annotated[Scalar, require_quantity("kg m2", above=0)]
@@ -127,22 +125,6 @@ class VehicleEntry(CatalogueEntry):
         return {**inside, **knots, **EFFECT_UNITS}
 
 
-def vehicle_names() -> tuple[str, ...]:
-    """Names of the vehicles in the catalogue."""
-    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.yaml")))
-
-
-def vehicle_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a vehicle.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "vehicle")
-
-
 def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
     """Where a vehicle's numbers come from, if it is a frozen one.
 
@@ -151,13 +133,13 @@ def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
     InputError
         As ``load_vehicle``.
     """
-    return _read_entry(vehicle_source(name_or_path)).provenance
+    return _read_entry(find_entry("vehicle", name_or_path)).provenance
 
 
 @cache
 def vehicle_units() -> dict[str, str]:
     """Unit of each number of a vehicle file."""
-    entry = _read_entry(FOLDER / "paper-reference.yaml")
+    entry = _read_entry(find_entry("vehicle", "paper-reference"))
     return {name: quantity.unit for name, quantity in entry if isinstance(quantity, Scalar)}
 
 
@@ -173,7 +155,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    source = vehicle_source(name_or_path)
+    source = find_entry("vehicle", name_or_path)
     entry = _read_entry(source)
     values: dict[str, Any] = {
         name: quantity.value

@@ -6,7 +6,7 @@ from typing import Any
 import yaml
 
 from catalogs.effects import LIBRARY_FILE
-from catalogs.vehicles import vehicle_source
+from catalogs.entries import find_entry
 from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of_file
@@ -49,7 +49,7 @@ def grown_vehicle(
     -------
     The text, or None where nothing was added; and the parameters that could not be.
     """
-    source = vehicle_source(name)
+    source = find_entry("vehicle", name)
     entry: dict[str, Any] = yaml.safe_load(source.read_text(encoding="utf-8"))
     entry.pop("provenance", None)
     bounds: dict[str, dict[str, Any]] = {}

@@ -5,13 +5,14 @@ from math import degrees
 import pytest
 import yaml
 
-from catalogs.vehicles import FOLDER, load_vehicle, vehicle_names
+from catalogs.entries import entry_names, find_entry
+from catalogs.vehicles import load_vehicle
 from tasks.errors import InputError
 
 
 @pytest.fixture
 def entry():
-    return yaml.safe_load((FOLDER / "paper-reference.yaml").read_text())
+    return yaml.safe_load(find_entry("vehicle", "paper-reference").read_text())
 
 
 def saved(tmp_path, entry):
@@ -20,7 +21,7 @@ def saved(tmp_path, entry):
     return path
 
 
-@pytest.mark.parametrize("name", vehicle_names())
+@pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_vehicle_loads(name):
     vehicle = load_vehicle(name)
     assert vehicle.name == name and set(vehicle.families) == {"dry", "rain", "snow"}
