@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Thread
@@ -139,6 +139,20 @@ def test_a_worker_killed_in_the_middle_changes_no_byte(toy_dataset, tmp_path):
         assert workers[0].wait(5) == -signal.SIGKILL and workers[1].poll() is None
     assert told["clips"] < made.made == 4
     assert layout.manifest.read_bytes() == toy_dataset.manifest.read_bytes()
+
+
+def test_a_worker_that_dies_while_it_compiles_is_passed_over(tmp_path):
+    mark = tmp_path / "ended"
+
+    def end_the_first() -> None:
+        with suppress(FileExistsError):
+            mark.mkdir()
+            os._exit(1)
+
+    with cluster(tmp_path / "cluster", 2) as (address, workers), Client(address) as client:
+        client.wait_for_workers(2, timeout=60)
+        warm_cluster(client, end_the_first, address)
+        assert mark.is_dir() and [worker.poll() for worker in workers].count(None) == 1
 
 
 def test_a_cluster_behind_certificates_is_used_with_those_that_dask_is_configured_with(tmp_path):
