@@ -10,7 +10,9 @@ from pydantic import Field, model_validator
 
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.entries import find_entry
+from catalogs.names import Name
 from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, parse_entry
+from catalogs.tyres import load_tyre, tyre_source
 from catalogs.vehicles.added import FormEntry, effect_problems, library_units
 from catalogs.vehicles.frozen import Provenance, check_seal
 from tasks.vehicle.effects.numbers import EFFECT_UNITS
@@ -101,6 +103,7 @@ class VehicleEntry(CatalogueEntry):
     lock_speed: Annotated[Scalar, checked("rad s-1", above=0)]
     gravity: Annotated[Scalar, checked("m s-2", above=0)]
     families: FamiliesEntry
+    tyre: Name | None = None
     effects: dict[str, Scalar] = Field(default_factory=dict)
     forms: tuple[FormEntry, ...] = ()
     provenance: Provenance | None = None
@@ -141,6 +144,27 @@ def vehicle_source(name_or_path: str | Path) -> Path:
         If there is none; the sentence lists those that exist.
     """
     return find_entry(FOLDER, name_or_path, "vehicle")
+
+
+def vehicle_tyre_source(name_or_path: str | Path) -> Path | None:
+    """The property file of the tyre that a vehicle names: beside the vehicle's file, or in the catalogue.
+
+    Parameters
+    ----------
+    name_or_path : of the vehicle
+
+    Returns
+    -------
+    The file; None where the vehicle names none and drives on its families' Burckhardt curves.
+
+    Raises
+    ------
+    InputError
+        As ``load_vehicle``.
+    """
+    source = vehicle_source(name_or_path)
+    name = _read(source).tyre
+    return None if name is None else _find_tyre(name, source)
 
 
 def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
@@ -187,7 +211,13 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     values["static_pitch"] = radians(values["static_pitch"])
     effects = {name: number.value for name, number in entry.effects.items()}
     forms = tuple(form.form for form in entry.forms)
-    return Vehicle(name=source.stem, families=families, effects=effects, forms=forms, **values)
+    tyre = None if entry.tyre is None else load_tyre(_find_tyre(entry.tyre, source))
+    return Vehicle(name=source.stem, families=families, tyre=tyre, effects=effects, forms=forms, **values)
+
+
+def _find_tyre(name: str, vehicle: Path) -> Path:
+    beside = vehicle.with_name(f"{name}.tir")
+    return beside if beside.is_file() else tyre_source(name)
 
 
 def _read(source: Path) -> VehicleEntry:
