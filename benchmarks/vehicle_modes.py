@@ -24,19 +24,21 @@ HEADER = (
 )  # fmt: skip
 
 
-def differences() -> dict[str, ModeDifference]:
+def compute_differences() -> dict[str, ModeDifference]:
     """The modes' difference on each condition, by its name."""
     vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     return {
         condition.name: mode_difference(
-            drive(vehicle, surface, condition.scenario, "paper"),
-            drive(vehicle, surface, condition.scenario, "coupled"),
+            simulate_condition(vehicle, surface, condition.scenario, "paper"),
+            simulate_condition(vehicle, surface, condition.scenario, "coupled"),
         )
         for condition in load_conditions()
     }
 
 
-def drive(vehicle: Vehicle, surface: SurfaceParameters, scenario: Scenario, mode: Mode) -> Rollout:
+def simulate_condition(
+    vehicle: Vehicle, surface: SurfaceParameters, scenario: Scenario, mode: Mode
+) -> Rollout:
     """One condition in one mode; where it brakes, the speed is held until then."""
     weather = Weather(
         kind=scenario.weather,
@@ -70,7 +72,7 @@ def drive(vehicle: Vehicle, surface: SurfaceParameters, scenario: Scenario, mode
     )
 
 
-def table(rows: dict[str, ModeDifference]) -> list[str]:
+def format_table(rows: dict[str, ModeDifference]) -> list[str]:
     """The differences as lines of a Markdown table."""
     digits = (2, 2, 3, 3, 2, 2, 4, 1)
     lines = ["| " + " | ".join(HEADER) + " |", "| --- |" + " ---: |" * len(digits)]
@@ -84,4 +86,4 @@ def table(rows: dict[str, ModeDifference]) -> list[str]:
 
 
 if __name__ == "__main__":
-    print("\n".join(table(differences())))
+    print("\n".join(format_table(compute_differences())))

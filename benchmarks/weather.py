@@ -1,4 +1,4 @@
-"""What weather adds to a frame, stage by stage, against the clear frame of the same run."""
+"""Cost that weather adds to a frame, stage by stage, beside the clear frame of the same run."""
 
 import time
 from collections.abc import Callable
@@ -35,7 +35,7 @@ STATION = 40
 REPEATS = 9
 
 
-def rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> list[dict[str, Any]]:
+def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> list[dict[str, Any]]:
     """Measure a clear frame and the same frame in four weathers.
 
     Returns
@@ -71,20 +71,22 @@ def rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> li
         picture = compose(gbuffer, clear_sky, gaussians.display_encoded)
         raster_ms = _cpu_ms(rasterise, cloud, view, K, *size)
         bare_ms = _cpu_ms(rasterise, clear_cloud, view, K, *size)
-        stages = _stages(weather, picture, gbuffer, shutter)
+        stages = _list_stages(weather, picture, gbuffer, shutter)
         whole_ms = _cpu_ms(apply_weather, weather, picture, gbuffer, shutter)
         added = whole_ms + max(raster_ms - bare_ms, 0)
         for stage, call in stages.items():
-            found.append(_row(f"{name}: {stage}", _cpu_ms(call), clear_ms))
-        found.append(_row(f"{name}: snow layer in the rasteriser", max(raster_ms - bare_ms, 0), clear_ms))
-        found.append(_row(f"{name}: added", added, clear_ms) | {"limit": LIMIT[state.kind]})
+            found.append(_make_row(f"{name}: {stage}", _cpu_ms(call), clear_ms))
+        found.append(
+            _make_row(f"{name}: snow layer in the rasteriser", max(raster_ms - bare_ms, 0), clear_ms)
+        )
+        found.append(_make_row(f"{name}: added", added, clear_ms) | {"limit": LIMIT[state.kind]})
         found.append(
             {"name": f"{name}: once a clip", "value": once_s, "unit": "CPU-s", "peer": None, "ratio": None}
         )
     return found
 
 
-def _stages(
+def _list_stages(
     weather: ClipWeather, picture: np.ndarray, gbuffer: GBuffer, shutter: Shutter
 ) -> dict[str, Callable[[], object]]:
     """The layers of one frame, each to be called alone."""
@@ -106,7 +108,7 @@ def _stages(
     return stages
 
 
-def _row(name: str, value: float, clear_ms: float) -> dict[str, Any]:
+def _make_row(name: str, value: float, clear_ms: float) -> dict[str, Any]:
     return {"name": name, "value": value, "unit": "CPU-ms", "peer": "clear frame", "ratio": value / clear_ms}
 
 
@@ -122,7 +124,7 @@ def _cpu_ms(call: Callable[..., object], *arguments: object) -> float:
 
 
 if __name__ == "__main__":
-    for row in rows():
+    for row in measure_rows():
         ratio = "" if row["ratio"] is None else f"{row['ratio']:6.1%} of {row['peer']}"
         limit = f" (limit {row['limit']:.0%})" if "limit" in row else ""
         print(f"{row['name']:42} {row['value']:9.2f} {row['unit']:7} {ratio}{limit}")

@@ -30,12 +30,12 @@ class DrivenLevels(CatalogueEntry):
         return self
 
     def leaves_range(self, value: float) -> bool:
-        """Whether the value lies beyond everything that was driven."""
+        """Whether the value lies outside every driven value."""
         return self.range is not None and not self.range[0] <= value <= self.range[1]
 
 
 class CalibratedRange(CatalogueEntry):
-    """What the calibration was fitted on."""
+    """Ranges of the data on which the calibration was fitted."""
 
     rain_rate: DrivenLevels
     snow_rate: DrivenLevels

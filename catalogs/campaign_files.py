@@ -18,7 +18,7 @@ from catalogs.channel_maps import HIGHEST_RATE
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.names import name_problem
 from catalogs.quantities import Text
-from catalogs.sentences import brief, shorten
+from catalogs.sentences import shorten, shorten_value
 from tasks.errors import InputError
 
 LARGEST_TABLE = 64 * 2**20
@@ -91,7 +91,7 @@ def parse_rows(content: bytes, needed: Collection[str], numbers: Collection[str]
         raise InputError(f"runs.csv must be CSV; {shorten(error)}") from None
     problems = [f"runs.csv needs the column {name}" for name in needed if name not in names]
     problems += [
-        f"runs.csv must have distinct columns; {brief(name)} stands there twice"
+        f"runs.csv must have distinct columns; {shorten_value(name)} stands there twice"
         for name in dict.fromkeys(names)
         if names.count(name) > 1
     ]
@@ -118,10 +118,10 @@ def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, see
         problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
     seen.add(name)
     if row["weather"] not in WEATHERS:
-        problems.append(f"{name}: weather must be dry, rain or snow; it is {brief(row['weather'])}")
+        problems.append(f"{name}: weather must be dry, rain or snow; it is {shorten_value(row['weather'])}")
     for key in numbers:
         if not _is_number(row[key]):
-            problems.append(f"{name}: {key} must be a finite number; it is {brief(row[key])}")
+            problems.append(f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}")
     return problems
 
 
@@ -157,7 +157,7 @@ def parse_columns(
                 raise InputError(problems)
             table = parquet.read(columns=found)
             columns = {name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in found}
-            units = {name: _unit(schema.field(name)) for name in found}
+            units = {name: _read_unit(schema.field(name)) for name in found}
     except InputError:
         raise
     except (pa.ArrowException, OSError, ValueError, TypeError, KeyError, OverflowError) as error:
@@ -183,6 +183,6 @@ def _column_problems(schema: pa.Schema, found: Sequence[str], count: int, file: 
     return problems
 
 
-def _unit(field: pa.Field) -> str | None:
+def _read_unit(field: pa.Field) -> str | None:
     metadata = field.metadata or {}
     return metadata[b"units"].decode("utf-8", "replace") if b"units" in metadata else None

@@ -15,7 +15,7 @@ class Prompts(CatalogueEntry):
 
 
 class PromptFile(CatalogueEntry):
-    """What the file holds, in the order of the rows of `text_features`."""
+    """Content of the file, in the order of the rows of `text_features`."""
 
     dry: Prompts
     rain: Prompts

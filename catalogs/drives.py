@@ -20,7 +20,7 @@ WEATHER = ("weather", "precipitation_mm_h", "snow_accumulation_h")
 
 @dataclass(frozen=True, kw_only=True)
 class DriveCampaign:
-    """What a protocol needs of a campaign.
+    """The parts of a campaign that a protocol needs.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
         Listing missing files, keys and channels.
     """
     folder = Path(folder)
-    header, rows = _checked(folder)
+    header, rows = _read_header_and_runs(folder)
     interval = 1.0 / header.sample_rate_hz
     problems: list[str] = []
     drives: list[Drive] = []
@@ -85,7 +85,7 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
     return DriveCampaign(name=header.campaign, vehicle=header.vehicle, drives=tuple(drives))
 
 
-def _checked(folder: Path) -> tuple[CampaignHeader, list[dict[str, str]]]:
+def _read_header_and_runs(folder: Path) -> tuple[CampaignHeader, list[dict[str, str]]]:
     """Header and runs, or the problems of both at once."""
     header_bytes, table = read_header_bytes(folder)
     problems: list[str] = []

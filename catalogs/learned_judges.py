@@ -38,7 +38,7 @@ class ClipCheckpoint(Checkpoint):
 
 
 class JudgeFile(CatalogueEntry):
-    """What the YAML may hold."""
+    """Content of the YAML file."""
 
     clip: ClipCheckpoint | None = None
     dover: Checkpoint | None = None
@@ -48,7 +48,7 @@ class JudgeFile(CatalogueEntry):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedJudge:
-    """A judge, or why there is none.
+    """A judge, or the reason why it is missing.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class LoadedJudge:
 
 
 def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
-    """Every judge by its name, those that are missing with the reason.
+    """Return every judge by its name; a missing judge has the reason.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
         The YAML is wrong, or a file that is there is no TorchScript module or holds no such features.
     """
     if path is None:
-        return {name: _missing("not run: checkpoint missing") for name in JUDGES}
+        return {name: _make_missing("not run: checkpoint missing") for name in JUDGES}
     file = read_entry(JudgeFile, Path(path), "list of learned judges")
     judges: dict[str, LoadedJudge] = {}
     problems: list[str] = []
@@ -83,7 +83,9 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
         entry: Checkpoint | None = getattr(file, name)
         try:
             judges[name] = (
-                _missing("not run: checkpoint missing") if entry is None else _load(Path(path), entry)
+                _make_missing("not run: checkpoint missing")
+                if entry is None
+                else _load_judge(Path(path), entry)
             )
         except InputError as error:
             problems += [f"{path}: {name}: {problem}" for problem in error.problems]
@@ -92,7 +94,7 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
     return judges
 
 
-def _load(path: Path, entry: Checkpoint) -> LoadedJudge:
+def _load_judge(path: Path, entry: Checkpoint) -> LoadedJudge:
     try:
         import torch
     except ImportError:
@@ -101,7 +103,7 @@ def _load(path: Path, entry: Checkpoint) -> LoadedJudge:
     needed = [entry.checkpoint, *([entry.text_features] if isinstance(entry, ClipCheckpoint) else [])]
     for name in needed:
         if not os.path.isfile(path.parent / name):
-            return _missing(f"not run: checkpoint missing: {name}")
+            return _make_missing(f"not run: checkpoint missing: {name}")
     try:
         network = torch.jit.load(path.parent / entry.checkpoint, map_location="cpu").eval()
     except (RuntimeError, ValueError, OSError, EOFError) as error:
@@ -126,5 +128,5 @@ def _load(path: Path, entry: Checkpoint) -> LoadedJudge:
     return LoadedJudge(network=network, text_features=features, note=entry.source)
 
 
-def _missing(note: str) -> LoadedJudge:
+def _make_missing(note: str) -> LoadedJudge:
     return LoadedJudge(network=None, text_features=None, note=note)

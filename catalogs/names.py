@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
-from catalogs.sentences import brief, is_encodable
+from catalogs.sentences import is_encodable, shorten_value
 
 LONGEST_NAME = 100
 """Characters of a name [1]: a label of several names still fits a file name of 255 bytes."""
@@ -20,9 +20,9 @@ def name_problem(name: str) -> str | None:
     if not 0 < len(name) <= LONGEST_NAME:
         return f"have 1 to {LONGEST_NAME} characters; it has {len(name)}"
     if not name.isprintable() or not is_encodable(name) or name != name.strip():
-        return f"be printable characters without blanks at its ends; it is {brief(name)}"
+        return f"be printable characters without blanks at its ends; it is {shorten_value(name)}"
     if "/" in name or "\\" in name or name in (".", ".."):
-        return f"be no path; it is {brief(name)}"
+        return f"be no path; it is {shorten_value(name)}"
     return None
 
 

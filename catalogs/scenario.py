@@ -58,7 +58,7 @@ NOT_NEGATIVE = (
     "brake_onset_s", "brake_onset_m", "hold_s",
 )  # fmt: skip
 UNKNOWN_WEATHER = "unknown"
-"""Stands for a weather that could not be read, as NaN does for a number: no rule is held against either."""
+"""Replaces a weather that could not be read, as NaN replaces a number: no rule applies to either."""
 
 
 def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list[str]:
@@ -110,11 +110,11 @@ def range_problems(scenario: Scenario) -> list[str]:
     problems = [f"{name} must not be negative; it is {value:g}" for name, value in given.items() if value < 0]
     if scenario.initial_speed_km_h <= 0:
         problems.append(f"initial_speed_km_h must be positive; it is {scenario.initial_speed_km_h:g}")
-    limited = _limited(scenario, load_physical_limits())
+    limited = _list_limits(scenario, load_physical_limits())
     return problems + [problem for one in limited if (problem := limit_problem(*one)) is not None]
 
 
-def _limited(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
+def _list_limits(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
     """Each number with its name and its limit."""
     by_name = {
         "snow_accumulation_h": limits.snow_accumulation,

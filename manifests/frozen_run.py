@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.documents import read_json_document
-from manifests.explain import REACHES, VEHICLE, kind_of_input, shown, value_differences
+from manifests.explain import REACHES, VEHICLE, format_value, kind_of_input, value_differences
 from manifests.manifest import seal_of
 from manifests.records import FrozenRun, check_record
 from tasks.errors import InputError
@@ -26,7 +26,7 @@ def frozen_names() -> tuple[str, ...]:
 
 
 def frozen_source(name_or_path: str | Path) -> Path:
-    """The file of a frozen run: a path ending in .json is taken as it is, a name is looked up among those that ship.
+    """Return the file of a frozen run: a path ending in .json as it is, a name from those that ship.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def read_frozen(name_or_path: str | Path) -> FrozenRun:
     return check_record(FrozenRun, frozen, path)
 
 
-def sealed(run: Mapping[str, Any]) -> dict[str, Any]:
+def seal_run(run: Mapping[str, Any]) -> dict[str, Any]:
     """A frozen run with its format and seal.
 
     Parameters
@@ -84,16 +84,16 @@ def parameters_that_matter(inputs: Mapping[str, Any], pictures: bool) -> dict[st
     pictures : whether frames are made
     """
     return {
-        name: _deciding(entry)
+        name: _keep_deciding(entry)
         for name, entry in inputs.items()
         if pictures or VEHICLE in REACHES.get(kind_of_input(name), ())
     }
 
 
-def differences(
+def find_differences(
     frozen: Mapping[str, Any], parameters: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]
 ) -> list[str]:
-    """What here is not as it was frozen, value by value; hashes of telemetry are left to the outcome.
+    """List the values at hand that differ from the frozen ones; hashes of telemetry are compared elsewhere.
 
     Parameters
     ----------
@@ -105,7 +105,8 @@ def differences(
     asked = {clip["label"]: _without_hash(clip) for clip in frozen["clips"]}
     rows += value_differences(asked, {clip["label"]: _without_hash(clip) for clip in clips}, "clips")
     return [
-        f"{place} is {shown(there)} in the manifest and {shown(here)} here" for place, there, here in rows
+        f"{place} is {format_value(there)} in the manifest and {format_value(here)} here"
+        for place, there, here in rows
     ]
 
 
@@ -124,7 +125,7 @@ def _without_hash(clip: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in clip.items() if key != "ticks"}
 
 
-def _deciding(entry: Any) -> Any:
+def _keep_deciding(entry: Any) -> Any:
     if isinstance(entry, dict):
-        return {str(key): _deciding(value) for key, value in entry.items() if key not in NEVER_DECIDES}
-    return [_deciding(value) for value in entry] if isinstance(entry, list) else entry
+        return {str(key): _keep_deciding(value) for key, value in entry.items() if key not in NEVER_DECIDES}
+    return [_keep_deciding(value) for value in entry] if isinstance(entry, list) else entry

@@ -28,9 +28,9 @@ def toy_dataset(tmp_path_factory):
 
     Beside it lie its ``grid.yaml``, ``camera.yaml`` and ``scene``.
     """
-    from flows.making.generate import generate
+    from flows.making.generate import generate_dataset
     from tests.toy_street import write_toy_grid
 
     folder = tmp_path_factory.mktemp("toy")
     grid = write_toy_grid(folder, frames=11)
-    return generate(grid, str(folder / "data"), runner="threads", workers=2).layout
+    return generate_dataset(grid, str(folder / "data"), runner="threads", workers=2).layout

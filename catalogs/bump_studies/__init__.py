@@ -28,7 +28,7 @@ class BumpWindow(CatalogueEntry):
 
 
 class BumpStudy(CatalogueEntry):
-    """What a study file must hold; the first window calibrates the car."""
+    """Content of a study file; the first window calibrates the car."""
 
     run: Text
     windows: Annotated[tuple[BumpWindow, ...], Field(min_length=1)]

@@ -17,7 +17,7 @@ LIBRARY_FILE = Path(__file__).with_name("library.yaml")
 
 
 class ParameterEntry(CatalogueEntry):
-    """One number of an effect; the meanings stand at ``EffectParameter``."""
+    """One number of an effect; the meanings are given by ``EffectParameter``."""
 
     unit: Unit
     lower: Number
@@ -36,7 +36,7 @@ class ParameterEntry(CatalogueEntry):
 
 
 class EffectEntry(CatalogueEntry):
-    """One effect; the meanings stand at ``Effect``."""
+    """One effect; the meanings are given by ``Effect``."""
 
     name: Text
     effect_class: EffectClass = Field(alias="class")
@@ -64,7 +64,7 @@ def _check_names(entries: list[EffectEntry]) -> list[EffectEntry]:
 
 
 LIBRARY = TypeAdapter(Annotated[list[EffectEntry], AfterValidator(_check_names)])
-"""What the file must hold."""
+"""Content of the file."""
 
 
 def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
@@ -79,10 +79,10 @@ def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
     InputError
         With every rule the file breaks.
     """
-    return tuple(_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
+    return tuple(_make_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
 
 
-def _effect(entry: EffectEntry) -> Effect:
+def _make_effect(entry: EffectEntry) -> Effect:
     return Effect(
         name=entry.name,
         effect_class=entry.effect_class,

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, read_entry, require_quantity
 from tasks.render.road_paint import HazardMarking
 
 FOLDER = Path(__file__).parent
@@ -18,13 +18,13 @@ def _check_colour(table: Table) -> Table:
     return table
 
 
-Reflectance = Annotated[Table, checked("1", minimum=0, maximum=1), AfterValidator(_check_colour)]
+Reflectance = Annotated[Table, require_quantity("1", minimum=0, maximum=1), AfterValidator(_check_colour)]
 
 
 class MarkingEntry(CatalogueEntry):
-    """What a marking's file must hold; the meanings stand at ``HazardMarking``."""
+    """Content of a marking's file; `HazardMarking` gives the meanings."""
 
-    stripe_width: Annotated[Scalar, checked("m", above=0)]
+    stripe_width: Annotated[Scalar, require_quantity("m", above=0)]
     paint: Reflectance
     gap: Reflectance
 

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
 from catalogs.vehicles.added import library_units
 from tasks.studies.stop_study import Rung
 from tasks.vehicle.effects.library import PARAMETER_INDEX
@@ -15,7 +15,7 @@ FOLDER = Path(__file__).parent
 
 
 class RungEntry(CatalogueEntry):
-    """One step of the ladder; the meanings stand at ``Rung``."""
+    """One step of the ladder; the meanings are given by ``Rung``."""
 
     name: Text
     adds: Text
@@ -49,11 +49,11 @@ class RungEntry(CatalogueEntry):
 
 
 class StopStudy(CatalogueEntry):
-    """What a study file must hold."""
+    """Content of a study file."""
 
     train: Text
     held_out: Text
-    lead_s: Annotated[Scalar, checked("s", above=0)]
+    lead_s: Annotated[Scalar, require_quantity("s", above=0)]
     rungs: Annotated[tuple[RungEntry, ...], Field(min_length=1)]
 
     @property

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
 from catalogs.scenario import Scenario, Weather
 from catalogs.studies import Condition, load_conditions, load_sensitivity_study
 
@@ -19,23 +19,23 @@ VARIANTS: dict[Variant, str] = {
 }
 """What each variant does (paper, Section 4.4)."""
 
-Rate = Annotated[Scalar, checked("mm h-1", above=0)]
+Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class FamilyRates(CatalogueEntry):
-    """The rate that stands for all rates of a kind of weather."""
+    """The rate that represents a kind of weather."""
 
     rain: Rate
     snow: Rate
 
 
 class AblationEntry(CatalogueEntry):
-    """What the file must hold."""
+    """Content of the file."""
 
     family_rates: FamilyRates
     stop_condition: Text
     pitch_condition: Text
-    reference_pitch_rmse: Annotated[Scalar, checked("deg", above=0)]
+    reference_pitch_rmse: Annotated[Scalar, require_quantity("deg", above=0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class Ablation:
 
 def load_ablation() -> Ablation:
     """The study of the paper's Section 4.4."""
-    entry, protocol = _entry(), load_sensitivity_study()[0]
+    entry, protocol = _load_entry(), load_sensitivity_study()[0]
     conditions = {condition.name: condition for condition in load_conditions()}
     dry = conditions[entry.stop_condition].scenario
     stops: dict[Weather, tuple[Scenario, ...]] = {}
@@ -75,8 +75,8 @@ def load_ablation() -> Ablation:
     )
 
 
-def cut(scenario: Scenario, variant: Variant) -> Scenario:
-    """The scenario that a variant drives; what is seen stays that of the scenario itself.
+def cut_coupling(scenario: Scenario, variant: Variant) -> Scenario:
+    """Return the scenario that a variant drives; the appearance stays that of the original scenario.
 
     Parameters
     ----------
@@ -89,11 +89,11 @@ def cut(scenario: Scenario, variant: Variant) -> Scenario:
     if variant == "vertical-only":
         return replace(dry, peak_pressure_mpa=0.0, brake_onset_s=None, brake_onset_m=None)
     if variant == "fixed-mu" and scenario.weather != "dry":
-        rate: Scalar = getattr(_entry().family_rates, scenario.weather)
+        rate: Scalar = getattr(_load_entry().family_rates, scenario.weather)
         hours = load_sensitivity_study()[0].snow_accumulation_h if scenario.weather == "snow" else 0.0
         return replace(scenario, precipitation_mm_h=rate.value, snow_accumulation_h=hours)
     return scenario
 
 
-def _entry() -> AblationEntry:
+def _load_entry() -> AblationEntry:
     return read_entry(AblationEntry, Path(__file__).with_name("ablation.yaml"), "study")

@@ -18,7 +18,7 @@ Positive = Annotated[float, Field(strict=True, gt=0)]
 
 
 class DriveEntry(CatalogueEntry):
-    """One planned run; the meanings stand at ``Drive``."""
+    """One planned run; the meanings are given by ``Drive``."""
 
     weather: Literal["dry", "rain", "snow"] = "dry"
     rate: Annotated[float, Field(strict=True, ge=0)] = 0.0

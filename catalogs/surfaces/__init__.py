@@ -6,34 +6,34 @@ from typing import Annotated
 from pydantic import model_validator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import Bounded, CatalogueEntry, Scalar, checked, read_entry
+from catalogs.quantities import Bounded, CatalogueEntry, Scalar, read_entry, require_quantity
 from tasks.surface.state import SurfaceParameters
 
 FOLDER = Path(__file__).parent
 
-Friction = Annotated[Bounded, checked("1", above=0, maximum=2)]
-Depth = Annotated[Bounded, checked("mm", above=0)]
-Exponent = Annotated[Scalar, checked("1")]
+Friction = Annotated[Bounded, require_quantity("1", above=0, maximum=2)]
+Depth = Annotated[Bounded, require_quantity("mm", above=0)]
+Exponent = Annotated[Scalar, require_quantity("1")]
 
 
 class SurfaceEntry(CatalogueEntry):
-    """What a surface file must hold; the meanings stand at ``SurfaceParameters``."""
+    """Content of a surface file; `SurfaceParameters` gives the meanings."""
 
     dry_friction: Friction
     flooded_friction: Friction
     film_decay_mm: Depth
     texture_depth_mm: Depth
-    drainage_length: Annotated[Bounded, checked("m", above=0)]
-    crossfall: Annotated[Bounded, checked("m m-1", above=0)]
-    film_coefficient: Annotated[Scalar, checked("1", above=0)]
+    drainage_length: Annotated[Bounded, require_quantity("m", above=0)]
+    crossfall: Annotated[Bounded, require_quantity("m m-1", above=0)]
+    film_coefficient: Annotated[Scalar, require_quantity("1", above=0)]
     film_texture_exponent: Exponent
     film_length_exponent: Exponent
-    film_rate_exponent: Annotated[Scalar, checked("1", above=0)]
+    film_rate_exponent: Annotated[Scalar, require_quantity("1", above=0)]
     film_crossfall_exponent: Exponent
     bare_wet_friction: Friction
     snow_friction: Friction
-    fresh_snow_density: Annotated[Bounded, checked("kg m-3", above=0)]
-    water_density: Annotated[Scalar, checked("kg m-3", above=0)]
+    fresh_snow_density: Annotated[Bounded, require_quantity("kg m-3", above=0)]
+    water_density: Annotated[Scalar, require_quantity("kg m-3", above=0)]
     full_cover_depth_mm: Depth
 
     @model_validator(mode="after")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from catalogs.documents import read_content
 from catalogs.entries import find_entry
-from catalogs.sentences import brief, cap_problems, shorten
+from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.errors import InputError
 from tasks.vehicle.tyres.magic_formula import (
     MagicFormula,
@@ -88,14 +88,14 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
     """
     entries, problems = _read_lines(content)
     problems += [
-        f"{unit} must be {names[0]}; it is {brief(value)}"
+        f"{unit} must be {names[0]}; it is {shorten_value(value)}"
         for unit, names in UNITS.items()
         if (value := entries.get(unit, names[0])).lower() not in names
     ]
     version = VERSIONS.get(entries.get("FITTYP", ""))
     if version is None:
         known = "6 or 52 (MF 5.2), 61 or 62 (MF 6.1)"
-        problems.append(f"FITTYP must be {known}; it is {brief(entries.get('FITTYP'))}")
+        problems.append(f"FITTYP must be {known}; it is {shorten_value(entries.get('FITTYP'))}")
     values: dict[str, float] = {}
     if version is not None:
         names = NAMES[version]
@@ -107,7 +107,7 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
         for name in (*names.needed, *names.optional, *names.factors):
             number = _read_number(entries.get(name, "0"))
             if number is None:
-                problems.append(f"{name} must be a finite number; it is {brief(entries[name])}")
+                problems.append(f"{name} must be a finite number; it is {shorten_value(entries[name])}")
             elif name in entries:
                 values[name] = number
         if not problems:
@@ -140,7 +140,9 @@ def _read_lines(content: bytes) -> tuple[dict[str, str], list[str]]:
             continue
         key, equals, value = (part.strip() for part in line.partition("="))
         if not equals or not _KEY.fullmatch(key.upper()):
-            problems.append(f"line {number} must be KEY = value, as all of [{section}]; it is {brief(line)}")
+            problems.append(
+                f"line {number} must be KEY = value, as all of [{section}]; it is {shorten_value(line)}"
+            )
         elif key.upper() in entries:
             problems.append(f"{key.upper()} must stand once; it stands again in line {number}")
         else:

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.entries import find_entry
 from catalogs.names import Name
-from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, parse_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, parse_entry, require_quantity
 from catalogs.tyres import load_tyre, tyre_source
 from catalogs.vehicles.added import FormEntry, effect_problems, library_units
 from catalogs.vehicles.frozen import Provenance, check_seal
@@ -20,22 +20,22 @@ from tasks.vehicle.parameters import TyreFamily, Vehicle
 
 FOLDER = Path(__file__).parent
 
-Mass = Annotated[Scalar, checked("kg", above=0)]
-Length = Annotated[Scalar, checked("m", above=0)]
-Inertia = Annotated[Scalar, checked("kg m2", above=0)]
-Stiffness = Annotated[Scalar, checked("N m-1", above=0)]
-Damping = Annotated[Scalar, checked("N s m-1", minimum=0)]
-Rate = Annotated[Scalar, checked("s-1", above=0)]
-Speed = Annotated[Scalar, checked("m s-1", above=0)]
-Scales = Annotated[Table, checked("1", above=0)]
-Durations = Annotated[Table, checked("s", above=0)]
+Mass = Annotated[Scalar, require_quantity("kg", above=0)]
+Length = Annotated[Scalar, require_quantity("m", above=0)]
+Inertia = Annotated[Scalar, require_quantity("kg m2", above=0)]
+Stiffness = Annotated[Scalar, require_quantity("N m-1", above=0)]
+Damping = Annotated[Scalar, require_quantity("N s m-1", minimum=0)]
+Rate = Annotated[Scalar, require_quantity("s-1", above=0)]
+Speed = Annotated[Scalar, require_quantity("m s-1", above=0)]
+Scales = Annotated[Table, require_quantity("1", above=0)]
+Durations = Annotated[Table, require_quantity("s", above=0)]
 KNOT_TABLES = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release_s")
 
 
 class FamilyEntry(CatalogueEntry):
-    """What a tyre family must hold; the meanings stand at ``TyreFamily``."""
+    """Content of a tyre family; `TyreFamily` gives the meanings."""
 
-    burckhardt: Annotated[Table, checked("1", above=0)]
+    burckhardt: Annotated[Table, require_quantity("1", above=0)]
     surface_friction: Scales
     efficiency: Scales
     slip_stiffness: Scales
@@ -71,7 +71,7 @@ class FamiliesEntry(CatalogueEntry):
 
 
 class VehicleEntry(CatalogueEntry):
-    """What a vehicle file must hold; the meanings stand at ``Vehicle``."""
+    """Content of a vehicle file; `Vehicle` gives the meanings."""
 
     sprung_mass: Mass
     unsprung_mass_f: Mass
@@ -89,19 +89,19 @@ class VehicleEntry(CatalogueEntry):
     wheel_radius: Length
     wheel_inertia_f: Inertia
     wheel_inertia_r: Inertia
-    brake_gain: Annotated[Scalar, checked("N m MPa-1", above=0)]
-    front_brake_share: Annotated[Scalar, checked("1", minimum=0, maximum=1)]
-    abs_release_width: Annotated[Scalar, checked("1", above=0)]
+    brake_gain: Annotated[Scalar, require_quantity("N m MPa-1", above=0)]
+    front_brake_share: Annotated[Scalar, require_quantity("1", minimum=0, maximum=1)]
+    abs_release_width: Annotated[Scalar, require_quantity("1", above=0)]
     abs_build_rate: Rate
     abs_release_rate: Rate
-    coast_deceleration: Annotated[Scalar, checked("m s-2", minimum=0)]
-    hold_ratio: Annotated[Scalar, checked("1", minimum=0)]
-    coupled_pitch_scale: Annotated[Scalar, checked("1", above=0)]
-    static_pitch: Annotated[Scalar, checked("deg", above=-45, below=45)]
+    coast_deceleration: Annotated[Scalar, require_quantity("m s-2", minimum=0)]
+    hold_ratio: Annotated[Scalar, require_quantity("1", minimum=0)]
+    coupled_pitch_scale: Annotated[Scalar, require_quantity("1", above=0)]
+    static_pitch: Annotated[Scalar, require_quantity("deg", above=-45, below=45)]
     slip_speed_floor: Speed
     stop_speed: Speed
-    lock_speed: Annotated[Scalar, checked("rad s-1", above=0)]
-    gravity: Annotated[Scalar, checked("m s-2", above=0)]
+    lock_speed: Annotated[Scalar, require_quantity("rad s-1", above=0)]
+    gravity: Annotated[Scalar, require_quantity("m s-2", above=0)]
     families: FamiliesEntry
     tyre: Name | None = None
     effects: dict[str, Scalar] = Field(default_factory=dict)
@@ -163,7 +163,7 @@ def vehicle_tyre_source(name_or_path: str | Path) -> Path | None:
         As ``load_vehicle``.
     """
     source = vehicle_source(name_or_path)
-    name = _read(source).tyre
+    name = _read_entry(source).tyre
     return None if name is None else _find_tyre(name, source)
 
 
@@ -175,13 +175,13 @@ def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
     InputError
         As ``load_vehicle``.
     """
-    return _read(vehicle_source(name_or_path)).provenance
+    return _read_entry(vehicle_source(name_or_path)).provenance
 
 
 @cache
 def vehicle_units() -> dict[str, str]:
     """Unit of each number of a vehicle file."""
-    entry = _read(FOLDER / "paper-reference.yaml")
+    entry = _read_entry(FOLDER / "paper-reference.yaml")
     return {name: quantity.unit for name, quantity in entry if isinstance(quantity, Scalar)}
 
 
@@ -198,7 +198,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
         Listing every problem of the file, or the names that exist.
     """
     source = vehicle_source(name_or_path)
-    entry = _read(source)
+    entry = _read_entry(source)
     values: dict[str, Any] = {
         name: quantity.value
         for name in VehicleEntry.model_fields
@@ -220,7 +220,7 @@ def _find_tyre(name: str, vehicle: Path) -> Path:
     return beside if beside.is_file() else tyre_source(name)
 
 
-def _read(source: Path) -> VehicleEntry:
+def _read_entry(source: Path) -> VehicleEntry:
     content = read_content(source, "vehicle", LARGEST_YAML)
     check_seal(content, source)
     return parse_entry(VehicleEntry, content, source, "vehicle")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from catalogs.documents import read_yaml
-from catalogs.sentences import brief, cap_problems, shorten
+from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.errors import InputError
 from tasks.render.weather.parameters import WeatherParameters
 
@@ -44,7 +44,7 @@ def load_weather(folder: Path = FOLDER) -> WeatherParameters:
         except InputError as error:
             problems += error.problems
     values: dict[str, Any] = {
-        name: _typed(kind, documents[name], f"{shorten(folder / name)}.yaml", problems)
+        name: _build_parameters(kind, documents[name], f"{shorten(folder / name)}.yaml", problems)
         for name, kind in get_type_hints(WeatherParameters).items()
         if name in documents
     }
@@ -53,10 +53,10 @@ def load_weather(folder: Path = FOLDER) -> WeatherParameters:
     return WeatherParameters(**values)
 
 
-def _typed(kind: Any, entries: object, place: str, problems: list[str]) -> Any:
+def _build_parameters(kind: Any, entries: object, place: str, problems: list[str]) -> Any:
     """Build a parameter class from a mapping of its fields; None, and a problem, where that fails."""
     if not isinstance(entries, Mapping):
-        problems.append(f"{place}: must map names to values; it holds {brief(entries)}")
+        problems.append(f"{place}: must map names to values; it holds {shorten_value(entries)}")
         return None
     hints = get_type_hints(kind)
     for name in sorted(set(entries) - set(hints)):
@@ -69,20 +69,22 @@ def _typed(kind: Any, entries: object, place: str, problems: list[str]) -> Any:
         if name not in entries:
             continue
         where = f"{place}: {name}"
-        read = _typed if is_dataclass(hint) else _leaf
+        read = _build_parameters if is_dataclass(hint) else _read_value
         built[name] = read(hint, entries[name], where, problems)
     return kind(**built) if len(built) == len(hints) and len(problems) == before else None
 
 
-def _leaf(hint: Any, entry: object, where: str, problems: list[str]) -> Any:
+def _read_value(hint: Any, entry: object, where: str, problems: list[str]) -> Any:
     """One value; a problem where it lacks unit or source, or is not of the field's type."""
     if not isinstance(entry, Mapping) or set(entry) != {"value", "unit", "source"}:
-        problems.append(f"{where} must have value, unit and source, and nothing else; it is {brief(entry)}")
+        problems.append(
+            f"{where} must have value, unit and source, and nothing else; it is {shorten_value(entry)}"
+        )
         return None
     value = entry["value"]
     if hint is str:
         if not isinstance(value, str):
-            problems.append(f"{where} must be a word; it is {brief(value)}")
+            problems.append(f"{where} must be a word; it is {shorten_value(value)}")
         return value
     single = hint in (int, float)
     numbers = [value] if single else value if isinstance(value, list) else []
@@ -95,7 +97,7 @@ def _leaf(hint: Any, entry: object, where: str, problems: list[str]) -> Any:
             if single
             else "a list of finite numbers"
         )
-        problems.append(f"{where} must be {rule}; it is {brief(value)}")
+        problems.append(f"{where} must be {rule}; it is {shorten_value(value)}")
         return None
     return hint(value) if single else tuple(float(n) for n in numbers)
 

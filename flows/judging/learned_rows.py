@@ -1,4 +1,4 @@
-"""What learned judges say of a dataset's pictures; where their weights are missing, a row that says so."""
+"""Scores of learned judges for a dataset's pictures; where weights are missing, a row that says so."""
 
 from collections.abc import Iterator
 
@@ -30,45 +30,45 @@ def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJu
     clips : as the other judges saw them
     judges : from `catalogs.learned_judges.load_judges`
     """
-    yield from _dover(view, clips, judges["dover"])
+    yield from _score_with_dover(view, clips, judges["dover"])
     yield from _fast_vqa(view, clips, judges["fast_vqa"])
     yield from _temporal_lpips(view, clips, judges["lpips"])
-    yield from _severity(view, clips, judges["clip"])
+    yield from _score_severity(view, clips, judges["clip"])
 
 
-def _dover(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
+def _score_with_dover(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
     names = ("dover_overall", "dover_technical", "dover_aesthetic")
     if loaded.network is None:
-        yield from _missing(names, loaded.note)
+        yield from _list_missing(names, loaded.note)
         return
     judge = WholeVideo(network=loaded.network)
-    scores = {clip.facts["label"]: dover_scores(judge.numbers(_pictures(view, clip))) for clip in clips}
+    scores = {clip.facts["label"]: dover_scores(judge.numbers(_read_pictures(view, clip))) for clip in clips}
     for name in names:
         given = {label: found[name] for label, found in scores.items() if name in found}
         if not given:
-            yield from _missing((name,), "not run: the checkpoint gives the overall score alone")
+            yield from _list_missing((name,), "not run: the checkpoint gives the overall score alone")
         for label, value in given.items():
             yield figure_row(name, "TorchScript", label, value, "1", note=loaded.note)
 
 
 def _fast_vqa(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
     if loaded.network is None:
-        yield from _missing(("fast_vqa",), loaded.note)
+        yield from _list_missing(("fast_vqa",), loaded.note)
         return
     judge = WholeVideo(network=loaded.network)
     for clip in clips:
-        value = _score(view, clip, judge)
+        value = _score_clip(view, clip, judge)
         yield figure_row("fast_vqa", "TorchScript", clip.facts["label"], value, "1", note=loaded.note)
 
 
 def _temporal_lpips(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
-    """Each clip's own, and what it exceeds that of its dry control by."""
+    """Yield the severity of each clip, and its difference to that of the dry control."""
     names = ("temporal_lpips", "temporal_lpips_excess")
     if loaded.network is None:
-        yield from _missing(names, loaded.note)
+        yield from _list_missing(names, loaded.note)
         return
     judge = FlowAlignedDistance(network=loaded.network)
-    scores = {clip.facts["clip_id"]: _score(view, clip, judge) for clip in clips}
+    scores = {clip.facts["clip_id"]: _score_clip(view, clip, judge) for clip in clips}
     for clip in clips:
         label, value = clip.facts["label"], scores[clip.facts["clip_id"]]
         yield figure_row(names[0], "TorchScript", label, value, "1", note=loaded.note)
@@ -78,15 +78,15 @@ def _temporal_lpips(view: View, clips: list[JudgedClip], loaded: LoadedJudge) ->
             yield figure_row(names[1], "TorchScript", label, excess, "1", note=loaded.note)
 
 
-def _missing(names: tuple[str, ...], note: str) -> Iterator[Row]:
+def _list_missing(names: tuple[str, ...], note: str) -> Iterator[Row]:
     for name in names:
         yield figure_row(name, "-", "-", None, "1", note=note)
 
 
-def _severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> Iterator[Row]:
+def _score_severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> Iterator[Row]:
     names = ("clip_severity_rho", "clip_adjacent_accuracy")
     if clip_judge.network is None or clip_judge.text_features is None:
-        yield from _missing(names, clip_judge.note)
+        yield from _list_missing(names, clip_judge.note)
         return
     network, features = clip_judge.network, clip_judge.text_features
     for kind, condition, levels in weather_families(clips):
@@ -96,7 +96,7 @@ def _severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> I
             dry=features[FEATURES["dry"]],
         )
         rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
-        scores = {c.facts["clip_id"]: _score(view, c, judge) for c in levels}
+        scores = {c.facts["clip_id"]: _score_clip(view, c, judge) for c in levels}
         rho, _ = severity_agreement(rates, scores)
         # the paper counts pairs whose score rises, whatever the correlation's sign
         rising = np.diff([scores[key] for key in sorted(rates, key=lambda key: rates[key])]) > 0
@@ -104,9 +104,9 @@ def _severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> I
             yield figure_row(name, "TorchScript", condition, value, "1", note=clip_judge.note)
 
 
-def _score(view: View, clip: JudgedClip, judge: VideoJudge) -> float:
-    return judge.score(_pictures(view, clip))
+def _score_clip(view: View, clip: JudgedClip, judge: VideoJudge) -> float:
+    return judge.score(_read_pictures(view, clip))
 
 
-def _pictures(view: View, clip: JudgedClip) -> NDArray[np.uint8]:
+def _read_pictures(view: View, clip: JudgedClip) -> NDArray[np.uint8]:
     return view.arrays(clip.facts["index"], "rgb")[0]

@@ -1,4 +1,4 @@
-"""How a dataset's road features show in its pictures, held against their flat twins."""
+"""Visibility of a dataset's road features in its pictures, compared with their flat twins."""
 
 import cv2
 import numpy as np

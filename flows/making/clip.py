@@ -25,10 +25,10 @@ from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
-from flows.making.driving import drive, hazard_of, ranges_of
+from flows.making.driving import hazard_of, ranges_of, simulate_drive
 from flows.making.places import find_scene, remember_place
 from flows.making.plan import TICK_RATE_HZ, ClipPlan, Plan, read_plan
-from flows.store.address import here, publish
+from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_json
 from flows.store.telemetry import columns_hash, labelled_table, write_parquet
@@ -97,14 +97,14 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     """Make and commit clip ``index`` of a dataset whose scene lies at ``scene``; returns its receipt."""
     started = time.process_time(), time.perf_counter()
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
-    layout = here(layout)
+    layout = find_local(layout)
     plan = read_plan(layout.root)
     remember_place(plan.scene["sha256"], scene)
     clip = plan.clips[index]
     catalogue = catalogue_of(layout.root)
 
     mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
-    facts, ride = drive(clip.scenario, catalogue.vehicle, catalogue.surface, mode, duration_s)
+    facts, ride = simulate_drive(clip.scenario, catalogue.vehicle, catalogue.surface, mode, duration_s)
     ranges = ranges_of(
         clip.scenario, facts, catalogue.vehicle, catalogue.surface, catalogue.study, mode, duration_s
     )
@@ -112,8 +112,8 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     buffers: dict[str, NDArray[Any]] = {}
     if plan.settings.pictures:
         rig_at = rig_of(ride, frames, catalogue)
-        buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed), rig_at)
-        frames |= judge(buffers, frames, facts["film_depth_mm"], catalogue)
+        buffers = render_frames(clip.scenario, facts, frames, plan, catalogue, int(clip.seed), rig_at)
+        frames |= check_poses(buffers, frames, facts["film_depth_mm"], catalogue)
     else:
         frames |= nothing_to_judge(len(frames["frame"]))
     verdict = frames.pop("verdict")
@@ -144,7 +144,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     }  # fmt: skip
     write_json(layout.receipt(clip.clip_id), receipt)
     tables = [layout.staged(clip.clip_id, table) for table in STAGED_TABLES]
-    publish(layout, [*shards.values(), *tables], last=layout.receipt(clip.clip_id))
+    send_files(layout, [*shards.values(), *tables], last=layout.receipt(clip.clip_id))
     cost = {
         "cpu_s": time.process_time() - started[0],
         "wall_s": time.perf_counter() - started[1],
@@ -155,20 +155,20 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
 
 def warm_up(layout: Layout, scene: str) -> None:
     """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
-    root = here(layout).root
+    root = find_local(layout).root
     plan = read_plan(root)
     remember_place(plan.scene["sha256"], scene)
     catalogue = catalogue_of(root)
     short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
     for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
-        facts, ride = drive(
+        facts, ride = simulate_drive(
             clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, short.duration_s
         )
         frames = frame_rows(ride, short, catalogue)
         if plan.settings.pictures:
             rig_at = rig_of(ride, frames, catalogue)
-            buffers = picture(clip.scenario, facts, frames, short, catalogue, int(clip.seed), rig_at)
-            judge(buffers, frames, facts["film_depth_mm"], catalogue)
+            buffers = render_frames(clip.scenario, facts, frames, short, catalogue, int(clip.seed), rig_at)
+            check_poses(buffers, frames, facts["film_depth_mm"], catalogue)
 
 
 def relief_of(hazard: RoadHazard, route: Route) -> RoadRelief:
@@ -206,7 +206,7 @@ def rig_of(ride: Rollout, frames: Mapping[str, NDArray[Any]], catalogue: Catalog
     )  # fmt: skip
 
 
-def picture(
+def render_frames(
     scenario: Scenario,
     facts: Mapping[str, Any],
     frames: Mapping[str, NDArray[Any]],
@@ -215,7 +215,7 @@ def picture(
     seed: int,
     rig_at: RigAt,
 ) -> dict[str, NDArray[Any]]:
-    """The clip's finished frames, depth and class."""
+    """Render the clip's finished frames, depth and class."""
     hazard = hazard_of(scenario)
     weather = WeatherState(
         kind=scenario.weather,
@@ -243,13 +243,13 @@ def picture(
     )  # fmt: skip
 
 
-def judge(
+def check_poses(
     buffers: Mapping[str, NDArray[Any]],
     frames: Mapping[str, NDArray[Any]],
     film_depth_mm: float,
     catalogue: Catalogue,
 ) -> dict[str, Any]:
-    """Motion recovered from the finished frames, held against the telemetry."""
+    """Compare the motion recovered from the finished frames with the telemetry."""
     K, route = catalogue.camera.K - PIXEL_CENTRE, catalogue.scene.route.pose(frames["station"])[:, :3, :3]
     seen = one_shutter(
         undistorted(
@@ -280,7 +280,7 @@ def judge(
 
 
 def nothing_to_judge(frames: int) -> dict[str, Any]:
-    """What `judge` returns where there is no picture: everything not represented."""
+    """Return the result of `check_poses` where there is no picture: every value is not represented."""
     verdict = {figure.name: None for figure in fields(PoseVerdict)}
     return {
         "recovered_pitch": np.full(frames, np.nan),

@@ -14,18 +14,18 @@ from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
 
 
-def drive(
+def simulate_drive(
     scenario: Scenario,
     vehicle: Vehicle,
     surface: SurfaceParameters,
     mode: Mode,
     duration_s: float,
 ) -> tuple[dict[str, Any], Rollout]:
-    """Weather to surface state to friction to vehicle motion."""
+    """Simulate a scenario: weather to surface state to friction to vehicle motion."""
     weather = weather_of(scenario)
     state = surface_state(weather, surface)
     friction = surface_friction(weather, state, surface)
-    ride = _ride(scenario, vehicle, friction, state.snow_depth_mm, mode, duration_s)
+    ride = _simulate_vehicle(scenario, vehicle, friction, state.snow_depth_mm, mode, duration_s)
     facts = {
         "film_depth_mm": state.film_depth_mm,
         "snow_depth_mm": state.snow_depth_mm,
@@ -48,13 +48,13 @@ def ranges_of(
     """Percentiles of the clip's labels under the bounds of the surface parameters; the snow's depth stays nominal."""
 
     def again(friction: float) -> tuple[float, float]:
-        ride = _ride(scenario, vehicle, friction, facts["snow_depth_mm"], mode, duration_s)
+        ride = _simulate_vehicle(scenario, vehicle, friction, facts["snow_depth_mm"], mode, duration_s)
         return ride.stopping_distance, float(ride.columns["pitch"].max())
 
     return label_ranges(sampled_friction(weather_of(scenario), surface, study), again)
 
 
-def _ride(
+def _simulate_vehicle(
     scenario: Scenario, vehicle: Vehicle, friction: float, snow_depth_mm: float, mode: Mode, duration_s: float
 ) -> Rollout:
     return rollout(
@@ -64,7 +64,7 @@ def _ride(
 
 
 def weather_of(scenario: Scenario) -> Weather:
-    """What falls on the road in the scenario."""
+    """Return the weather of the scenario."""
     return Weather(
         kind=scenario.weather,
         precipitation_mm_h=scenario.precipitation_mm_h,
@@ -73,7 +73,7 @@ def weather_of(scenario: Scenario) -> Weather:
 
 
 def controls_of(scenario: Scenario) -> Controls:
-    """What the driver does in the scenario."""
+    """Return the driver's controls in the scenario."""
     return Controls(
         initial_speed=scenario.initial_speed_km_h / 3.6,
         brake=BrakeCommand(

@@ -21,7 +21,7 @@ from flows.making.places import remember_place
 from flows.store.layout import Layout
 from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
 from manifests.canonical import content_id, sha256_of
-from manifests.explain import input_differences, shown, value_differences
+from manifests.explain import format_value, input_differences, value_differences
 from manifests.provenance import code_version, library_versions
 from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
@@ -148,7 +148,7 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         "vehicle_mode": settings.vehicle_mode,
         "frames": settings.frames,
         "frame_rate_hz": settings.frame_rate_hz,
-        # what is as it was before there was a choice keeps its ids
+        # a default that was introduced later is left out, so that older clips keep their ids
         **({} if settings.composition == "linear" else {"composition": settings.composition}),
     }
     clips = tuple(_clip_plans(grid, asked))
@@ -200,7 +200,7 @@ def recorded_reference(reference: str) -> str:
 
 
 def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
-    """The catalogue files that a grid stands on: name under ``inputs/`` to what finds it."""
+    """Return the catalogue files that a grid uses: name under ``inputs/`` to the function that finds the file."""
     marking = settings.hazard_marking
     weather = {f"weather/{path.name}": path for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
     return {
@@ -253,11 +253,13 @@ def plan_differences(
     bare = [{**plan, "grid": {}} for plan in (theirs, ours)]
     rows = input_differences(bare[0], bare[1], their_inputs, our_inputs)
     rest = [(f"{row['input']} {row['path']}".strip(), row["a"], row["b"]) for row in rows]
-    return [f"{place} is {shown(a)} there and {shown(b)} here" for place, a, b in (*grid, *rest)]
+    return [
+        f"{place} is {format_value(a)} there and {format_value(b)} here" for place, a, b in (*grid, *rest)
+    ]
 
 
 def _read_behind(grid: Grid) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
-    """The catalogue files and the scene behind a grid, and what is wrong with them or with the grid on them."""
+    """Return the catalogue files and the scene of a grid, and the problems of these and of the grid with them."""
     inputs, scene, problems = _read_entries(grid.settings)
     if scene:
         problems += _route_problems(grid)
@@ -265,7 +267,7 @@ def _read_behind(grid: Grid) -> tuple[dict[str, bytes], dict[str, str], list[str
 
 
 def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
-    """The catalogue files that a grid names, its scene's identity, and what is wrong with them."""
+    """Return the catalogue files that a grid names, its scene's identity, and their problems."""
     inputs: dict[str, bytes] = {}
     scene: dict[str, str] = {}
     problems: list[str] = []
@@ -313,7 +315,7 @@ def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
 
 
 def _camera_problems(settings: GridFile) -> list[str]:
-    """Settings that the camera or the memory of this machine cannot serve; a faulty camera is told elsewhere."""
+    """List settings that exceed the camera or the memory of this machine; a faulty camera is reported elsewhere."""
     try:
         camera = load_camera(settings.camera)
     except InputError:

@@ -20,7 +20,7 @@ from tasks.vehicle.rollout import Mode, rollout
 BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries")
 
 
-def sensitivity(*, out: str | None = None) -> dict[str, Any]:
+def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
     results = Outputs(out, "sensitivity", "sensitivity.json")
     protocol, printed = load_sensitivity_study()
@@ -32,10 +32,10 @@ def sensitivity(*, out: str | None = None) -> dict[str, Any]:
     return result
 
 
-def agreement(
+def measure_agreement(
     traces: str, *, vehicle: str = "paper-reference", mode: Mode | None = None, out: str | None = None
 ) -> dict[str, Any]:
-    """Hold the vehicle model against reference traces by the paper's Appendix A.2 protocol.
+    """Compare the vehicle model with reference traces by the paper's Appendix A.2 protocol.
 
     Parameters
     ----------
@@ -77,15 +77,15 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
         splits.setdefault(case.split, []).append(scored)
         rows.append({"split": case.split} | asdict(scored) | {"window": list(scored.window)})
     groups = [
-        {"split": split, "group": name, "count": group.count, **_plain(group.mean)}
+        {"split": split, "group": name, "count": group.count, **_make_plain(group.mean)}
         for split, cases in splits.items()
         for name, group in aggregate(cases).items()
     ]
     overall = aggregate([case for cases in splits.values() for case in cases])["all"].mean
-    return {"cases": rows, "groups": groups, "mean": _plain(overall)}
+    return {"cases": rows, "groups": groups, "mean": _make_plain(overall)}
 
 
-def bench(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
+def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
     """Run one benchmark, or all of them.
 
     Raises
@@ -99,12 +99,12 @@ def bench(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
     rows = [
         row
         for chosen in ([name] if name else BENCHMARKS)
-        for row in import_module(f"benchmarks.{chosen}").rows()
+        for row in import_module(f"benchmarks.{chosen}").measure_rows()
     ]
     results.write_json("bench.json", {"rows": rows})
     return {"rows": rows}
 
 
-def _plain(figures: dict[str, float]) -> dict[str, float | None]:
+def _make_plain(figures: dict[str, float]) -> dict[str, float | None]:
     """JSON has no NaN: a figure that a group cannot have is null."""
     return {name: None if value != value else value for name, value in figures.items()}

@@ -170,7 +170,7 @@ def test_a_run_in_both_parts_of_the_split_is_refused(folder: Path) -> None:
     header = yaml.safe_load((folder / "campaign.yaml").read_text())
     header["split"]["held_out"].append("run-01")
     (folder / "campaign.yaml").write_text(yaml.safe_dump(header))
-    assert "run-01: stands in both parts" in problems_of(folder)
+    assert "run-01: is in both parts" in problems_of(folder)
 
 
 def changed(folder: Path, change) -> None:  # type: ignore[no-untyped-def]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from benchmarks.synthetic_street import camera_matrix, mount
+from benchmarks.synthetic_street import camera_matrix, make_mount
 from tasks.eval.poses.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
 from tasks.eval.poses.rigid import (
     adjoint,
@@ -56,7 +56,7 @@ def test_the_adjoint_carries_a_twist_to_the_other_frame() -> None:
 
 
 def test_an_advance_is_along_the_rig_s_axis_whatever_the_mount() -> None:
-    T = mount() @ advance_pose(2.0, mount()) @ invert_pose(mount())
+    T = make_mount() @ advance_pose(2.0, make_mount()) @ invert_pose(make_mount())
     np.testing.assert_allclose(T[:3, 3], [2.0, 0.0, 0.0], atol=1e-15)
 
 

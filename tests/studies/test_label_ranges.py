@@ -9,7 +9,7 @@ from catalogs.scenario import Scenario
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.making.driving import controls_of, drive, hazard_of, ranges_of, weather_of
+from flows.making.driving import controls_of, hazard_of, ranges_of, simulate_drive, weather_of
 from tasks.studies.label_ranges import DRIVEN_PERCENTILES, label_ranges, sampled_friction
 from tasks.vehicle.rollout import rollout
 
@@ -25,7 +25,7 @@ def entries():
 
 def ranges(scenario: Scenario, entries, duration_s: float = 8.0) -> dict[str, float]:
     vehicle, surface, study = entries
-    facts, _ = drive(scenario, vehicle, surface, "paper", duration_s)
+    facts, _ = simulate_drive(scenario, vehicle, surface, "paper", duration_s)
     return ranges_of(scenario, facts, vehicle, surface, study, "paper", duration_s)
 
 

@@ -11,7 +11,7 @@ from catalogs.calibration import FOLDER, load_procedure
 from catalogs.vehicles import load_vehicle, vehicle_names, vehicle_provenance, vehicle_source
 from flows.cli import app
 from flows.measured.calibration import calibrate
-from flows.studies.vehicle_model import agreement
+from flows.studies.vehicle_model import measure_agreement
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
 
@@ -67,9 +67,9 @@ def test_an_edited_frozen_file_is_refused(frozen, edit):
 
 def test_agreement_drives_a_frozen_vehicle_in_the_mode_it_was_fitted_in(frozen):
     traces, path = frozen
-    assert agreement(str(traces), vehicle=str(path))["mode"] == "coupled"
-    assert agreement(str(traces), vehicle=str(path), mode="paper")["mode"] == "paper"
-    assert agreement(str(traces))["mode"] == "paper"
+    assert measure_agreement(str(traces), vehicle=str(path))["mode"] == "coupled"
+    assert measure_agreement(str(traces), vehicle=str(path), mode="paper")["mode"] == "paper"
+    assert measure_agreement(str(traces))["mode"] == "paper"
 
 
 def test_every_vehicle_of_the_catalogue_loads_with_its_seal():
@@ -124,24 +124,26 @@ def test_a_split_that_is_none_lists_those_that_exist(vehicle, make_traces, tmp_p
 
 def test_conditions_may_hold_nulls_and_leave_the_onset_to_the_trace(vehicle, make_traces):
     folder = make_traces(vehicle, "paper", ("wet",))
-    told = agreement(str(folder))["cases"]
+    told = measure_agreement(str(folder))["cases"]
     rows = json.loads((folder / "cases.json").read_text())
     rows[0] |= {"brake_onset_s": None, "hazard_center_m": None, "hazard_height_m": None, "note": "unseen"}
     (folder / "cases.json").write_text(json.dumps(rows))
     with pytest.raises(InputError, match="add one of them"):
-        agreement(str(folder))
+        measure_agreement(str(folder))
     path = folder / "development" / "wet.parquet"
     table = pq.read_table(path)
     pressure = np.clip(np.round(table["time"].to_numpy() - 0.3, 6) / 0.5, 0, 1) * 2.3
     pq.write_table(table.append_column("brake_pressure", [pressure]), path)
-    read = agreement(str(folder))["cases"]
+    read = measure_agreement(str(folder))["cases"]
     assert read[0]["window"] == pytest.approx(told[0]["window"], abs=1e-9)
     assert read[0]["speed_rmse_m_s"] == pytest.approx(told[0]["speed_rmse_m_s"], rel=0.01)
 
 
 @pytest.mark.parametrize("mode", ["paper", "coupled"])
 def test_cases_that_coast_and_cases_that_brake_at_a_place_are_driven_as_they_were(vehicle, make_traces, mode):
-    cases = agreement(str(make_traces(vehicle, mode, ("roll", "trigger"), noise=0.0)), mode=mode)["cases"]
+    cases = measure_agreement(str(make_traces(vehicle, mode, ("roll", "trigger"), noise=0.0)), mode=mode)[
+        "cases"
+    ]
     assert [case["event_unit"] for case in cases] == ["km/h", "m"]
     for case in cases:
         assert case["speed_rmse_m_s"] < 1e-9
@@ -151,9 +153,9 @@ def test_cases_that_coast_and_cases_that_brake_at_a_place_are_driven_as_they_wer
 
 def test_traces_may_lie_beside_their_conditions(vehicle, make_traces):
     folder = make_traces(vehicle, "paper", ("wet",))
-    nested = agreement(str(folder))["cases"]
+    nested = measure_agreement(str(folder))["cases"]
     shutil.move(folder / "development" / "wet.parquet", folder / "wet.parquet")
-    assert agreement(str(folder))["cases"] == nested
+    assert measure_agreement(str(folder))["cases"] == nested
 
 
 @pytest.mark.parametrize(
