@@ -11,9 +11,9 @@ from pydantic import Field, model_validator
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, parse_entry
-from catalogs.vehicles.added import FormEntry, effect_problems, library_units
+from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.parameters import TyreFamily, Vehicle
 
 FOLDER = Path(__file__).parent
@@ -113,7 +113,8 @@ class VehicleEntry(CatalogueEntry):
         problems += [
             f"provenance.bounds: unit of {group} must be {units[group]}; it is {limits.unit}"
             for group, limits in bounds.items()
-            if group in units and limits.unit not in (units[group], library_units().get(group))
+            if group in units
+            and limits.unit not in {units[group], *(PARAMETERS[g].unit for g in (group,) if g in PARAMETERS)}
         ]
         if problems:
             raise ValueError("; ".join(problems))

@@ -23,7 +23,7 @@ from tasks.identification.calibration.residual import WHEELS, CalibrationCase
 from tasks.identification.calibration.scalars import calibration_scalars, scalar_value, with_scalars
 from tasks.identification.calibration.staged import Procedure
 from tasks.identification.calibration.staged import calibrate as run_stages
-from tasks.vehicle.effects.numbers import EFFECT_UNITS, NUMBERS_OF_EFFECTS
+from tasks.vehicle.effects.table import EFFECT_UNITS, NUMBERS_OF_EFFECTS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode
 

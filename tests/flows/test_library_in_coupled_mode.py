@@ -23,8 +23,8 @@ from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand, brake_pressure
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.effects.library import parameter_vector
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
+from tasks.vehicle.effects.table import parameter_vector
 from tasks.vehicle.rollout import Controls, rollout
 from tests.flows.findings import found_effect, found_form, grown_file, verdict_of
 

@@ -44,7 +44,7 @@ def tyre_curve(burckhardt: tuple[float, float, float], peak: float, slip_stiffne
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def tyre_friction(braking_slip: float, tyre: TyreCurve) -> float:
     """Braking force over load [1] (paper, Eq. tire_force).
 
@@ -56,7 +56,7 @@ def tyre_friction(braking_slip: float, tyre: TyreCurve) -> float:
     return tyre.rise * (1.0 - exp(-tyre.decay * braking_slip)) - tyre.fall * braking_slip
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def tyre_slope(braking_slip: float, tyre: TyreCurve) -> float:
     """Rise of ``tyre_friction`` with slip, its derivative [1].
 
@@ -68,7 +68,7 @@ def tyre_slope(braking_slip: float, tyre: TyreCurve) -> float:
     return tyre.rise * tyre.decay * exp(-tyre.decay * braking_slip) - tyre.fall
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def braking_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
     """Braking slip kappa, clipped to [0, 1] [1] (paper, Eq. tire_force).
 
