@@ -29,7 +29,7 @@ Change = Callable[[Any], None]
 @pytest.mark.parametrize(
     ("file", "load", "change", "words"),
     [
-        ("effects/library.yaml", load_effects, lambda c: c[7].update(parameters=3), "7.parameters: must be a list"),
+        ("effects/library.yaml", load_effects, lambda c: c[7].update(parameters=3), "7.parameters: must be"),
         ("effects/library.yaml", load_effects, lambda c: c[7].pop("name"), "7.name is missing"),
         ("effects/library.yaml", load_effects, lambda c: c.append(c[0]), "an effect must stand once; twice stand"),
         (
