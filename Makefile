@@ -4,6 +4,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 READY := .venv/.ready
 DEMO ?= datasets/demo
+WORKERS ?= 2
 
 .PHONY: demo test check study study-schedule study-crash study-fuzz study-faults freeze bench lock clean
 
@@ -27,8 +28,9 @@ demo: $(READY)
 	$(BIN)/musync generate demo --out $(DEMO)
 	$(BIN)/musync report $(DEMO)
 
+# A file's tests go to one worker, which makes what they share once.
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist loadfile
 
 check: $(READY)
 	$(BIN)/ruff check .

@@ -1,20 +1,16 @@
-"""The ``musync`` command: reads arguments, calls one function, prints what it returned."""
+"""The ``musync`` command, and how it ends."""
 
 import os
 import sys
 
-import typer
-
-from flows.commands import audits, datasets, judging, measured, scenes, studies
+from flows.parser import build_parser
 from flows.running.failures import INTERRUPTED, explain_end
 from flows.running.terminal import say
 
 QUIET = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "ERROR"}
 """OpenCV writes names and tags of a video to the terminal as they are; what is wrong with it, we say."""
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
-for group in (datasets, audits, judging, studies, measured, scenes):
-    app.add_typer(group.app)
+app = build_parser()
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ from tasks.surface.road_profile import RoadHazard, road_slope
 from tasks.surface.state import SurfaceParameters, Weather, surface_state
 from tasks.vehicle.model.axle_ports import signed_slip
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, surface_response
-from tasks.vehicle.tyres.burckhardt import braking_slip, tyre_friction
+from tasks.vehicle.tyres.contract import braking_slip, tyre_friction
 
 TOLERANCE = 1e-9
 """Largest difference from the stored number, relative to it, that rounding explains [1]."""
@@ -136,7 +136,7 @@ def force_steps(
     for axle, name in (("f", "front"), ("r", "rear")):
         omega, load = float(row[f"wheel_speed_{axle}"]), float(row[f"tyre_load_{axle}"])
         kappa = slip_of(speed, radius * omega, vehicle.slip_speed_floor)
-        mu = copysign(tyre_friction(abs(kappa), response.tyre), kappa)
+        mu = copysign(tyre_friction(abs(kappa), load, response.tyre), kappa)
         forces.append(mu * load)
         steps += [
             Step(quantity=f"{name} braking slip", symbol=f"kappa_{axle}", equation="8", unit="1",

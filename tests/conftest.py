@@ -28,14 +28,9 @@ def toy_dataset(tmp_path_factory):
 
     Beside it lie its ``grid.yaml``, ``camera.yaml`` and ``scene``.
     """
-    from catalogs.scenes import write_scene
     from flows.making.generate import generate
-    from tests.flows.test_pipeline import GRID
-    from tests.toy_street import TOY_CAMERA, toy_street
+    from tests.toy_street import write_toy_grid
 
     folder = tmp_path_factory.mktemp("toy")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    grid = folder / "grid.yaml"
-    grid.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=11))
-    return generate(str(grid), str(folder / "data"), runner="threads", workers=1).layout
+    grid = write_toy_grid(folder, frames=11)
+    return generate(grid, str(folder / "data"), runner="threads", workers=2).layout

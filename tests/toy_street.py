@@ -1,7 +1,10 @@
 """A street of a few thousand Gaussians: enough for every stage of the pipeline to have something to do."""
 
+from pathlib import Path
+
 import numpy as np
 
+from catalogs.scenes import write_scene
 from tasks.conventions import SemanticClass
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
@@ -17,6 +20,29 @@ left_of_centre: {value: 0.0, unit: m, source: as a dashcam}
 height_above_road: {value: 1.4, unit: m, source: as a dashcam}
 exposure: {value: 0.008, unit: s, source: as a dashcam}
 """
+TOY_GRID = """\
+name: toy
+scene: {folder}/scene
+camera: {folder}/camera.yaml
+frames: {frames}
+frame_rate_hz: 10
+axes:
+  weather:
+    dry: {{weather: dry}}
+    snow-3: {{weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1}}
+  road:
+    flat: {{initial_speed_km_h: 40, peak_pressure_mpa: 2.3, brake_onset_s: 0.2}}
+    hump: {{initial_speed_km_h: 40, hazard_center_m: 4, hazard_length_m: 3.7, hazard_height_m: 0.075}}
+"""
+
+
+def write_toy_grid(folder: Path, grid: str = TOY_GRID, *, seed: int = 1, **fields: object) -> str:
+    """Path of a ``grid.yaml`` in a folder, beside the scene and camera that it names."""
+    write_scene(toy_street(seed), folder / "scene", {})
+    (folder / "camera.yaml").write_text(TOY_CAMERA)
+    path = folder / "grid.yaml"
+    path.write_text(grid.format(folder=folder, **fields))
+    return str(path)
 
 
 def toy_street(seed: int = 1) -> Scene:

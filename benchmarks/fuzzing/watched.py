@@ -186,7 +186,7 @@ def read_watched(
                     continue
                 if worker.left:
                     waiting.append((worker.parser, worker.left))
-                if worker.alive and waiting and worker.peak_bytes < RETIRED_BYTES:
+                if worker.alive and waiting and worker.may_read(waiting[-1][0]):
                     worker.give(waiting.pop())
                 else:
                     worker.stop()
@@ -220,6 +220,10 @@ class _Worker:
         self._heard, self._started = time.monotonic(), False
         with contextlib.suppress(BrokenPipeError):
             self.line.send(task)
+
+    def may_read(self, parser: str) -> bool:
+        """Whether it may go on with a parser: what libraries keep of other parsers' inputs counts as no input's."""
+        return parser == self.parser and self.peak_bytes < RETIRED_BYTES
 
     @property
     def is_late(self) -> bool:

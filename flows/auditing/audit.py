@@ -90,11 +90,11 @@ def audit(
         "not_remade": not_remade,
     }
     results.write_json("audit.json", result)
-    results.write("audit.txt", as_text(result))
+    results.write("audit.txt", format_text(result))
     return result
 
 
-def as_text(result: Mapping[str, Any]) -> str:
+def format_text(result: Mapping[str, Any]) -> str:
     """The audit in lines for people.
 
     Parameters

@@ -62,11 +62,11 @@ def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
         },
     }
     results.write_json("diff.json", result)
-    results.write("diff.txt", as_text(result))
+    results.write("diff.txt", format_text(result))
     return result
 
 
-def as_text(result: Mapping[str, Any]) -> str:
+def format_text(result: Mapping[str, Any]) -> str:
     """The comparison in lines for people.
 
     Parameters

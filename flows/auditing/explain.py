@@ -106,11 +106,11 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
         "agrees": all(step.agrees for step in steps),
     }
     results.write_json("explain.json", result)
-    results.write("explain.txt", as_text(result))
+    results.write("explain.txt", format_text(result))
     return result
 
 
-def as_text(result: Mapping[str, Any]) -> str:
+def format_text(result: Mapping[str, Any]) -> str:
     """The chain in lines for people.
 
     Parameters

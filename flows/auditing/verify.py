@@ -5,13 +5,13 @@ from typing import Any
 
 from flows.auditing.signing import signature_findings
 from flows.running.orchestration import stage
-from flows.store.address import everything, stored_record, withdraw, working
+from flows.store.address import everything, stored_record, working
 from flows.store.layout import Layout
 from flows.store.links import foreign_entries
 from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
-from flows.store.staging import BEGUN, left_overs, remove_staged, remove_staging
+from flows.store.staging import BEGUN, left_overs, remove_left_overs, remove_staging
 from manifests.manifest import damaged_files, manifest_damage, recorded_files
 from manifests.signing import ENVELOPE
 from tasks.errors import InputError
@@ -114,9 +114,8 @@ def _collect(layout: Layout, dry_run: bool) -> dict[str, Any]:
         found = left_overs(layout)
         size = sum(_bytes(path) for path in found)
         if not dry_run:
-            withdraw(layout, [path for path in found if path.is_file()])
-            remove_staged(found)
-        if finished:
+            remove_left_overs(layout)
+        elif finished:
             remove_staging(layout)
     return {"removed": sorted(str(path) for path in found), "bytes": size, "dry_run": dry_run}
 

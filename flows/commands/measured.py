@@ -1,174 +1,241 @@
-"""Measured data in, and closing the loop with it."""
+"""Commands that read measured data, calibrate vehicles and find the effects that the model lacks."""
 
-from typing import Annotated, Any
+from typing import Any
 
-import typer
+from flows.commands.command import (
+    CAMPAIGN,
+    CAMPAIGN_VEHICLE,
+    OUT,
+    TRACES,
+    VEHICLE,
+    Command,
+    argument,
+    option,
+    select_keys,
+)
+from flows.commands.studies import MODE
 
-from flows.commands.console import Json, Out, Prefect, call, one_thread, show
-
-app = typer.Typer()
-
-
-@app.command("import-measurements")
-def import_measurements(
-    source: Annotated[str, typer.Argument(help="CSV, Parquet or MDF4 file, or a folder of them.")],
-    map: Annotated[str, typer.Option(help="Channel map: YAML file, or the name of one that ships.")],
-    out: Annotated[str, typer.Option(help="Campaign folder to make.")],
-    prefect: Prefect = False,
-    as_json: Json = False,
-) -> None:
-    """Make a campaign folder of measured recordings, or say what is wrong in which run and channel."""
-    show(call("import_measurements", prefect, source, map=map, out=out), as_json)
+GROUP = "Measured data"
+WIDE_COLUMNS = {
+    "criterion",
+    "fails_only_here",
+    "mean_trajectory",
+    "trained_on",
+    "rate_correlation",
+    "no_dive_rmse",
+}
+BUMP_FIGURES = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
 
 
-@app.command("brake-protocol")
-def brake_protocol(
-    campaign: Annotated[str, typer.Argument(help="Campaign folder with brake pressure and pitch.")],
-    protocol: Annotated[str, typer.Option(help="Protocol: YAML file, or the name of one.")] = "brake-dive",
-    vehicle: Annotated[
-        str | None, typer.Option(help="Vehicle to start from; by default the campaign's.")
-    ] = None,
-    all_events: Annotated[
-        bool, typer.Option("--all-events", help="Use every candidate, whatever rules it breaks.")
-    ] = False,
-    out: Out = None,
-    prefect: Prefect = False,
-    as_json: Json = False,
-) -> None:
-    """Select braking events by the paper's rules and predict each drive from the others (Appendix C.5)."""
-    result = call(
-        "brake_protocol",
-        prefect,
-        campaign,
-        protocol=protocol,
-        vehicle=vehicle,
-        all_events=all_events,
-        out=out,
-    )
-    wide = {
-        "criterion",
-        "fails_only_here",
-        "mean_trajectory",
-        "trained_on",
-        "rate_correlation",
-        "no_dive_rmse",
-    }
+def shorten_brake_protocol(result: dict[str, Any]) -> dict[str, Any]:
+    """Return a brake protocol without its events and the widest columns of its tables."""
     brief = {key: value for key, value in result.items() if key != "events"}
     for table in ("attrition", "folds"):
-        brief[table] = [{k: v for k, v in row.items() if k not in wide} for row in result[table]]
-    show(result if as_json else brief, as_json)
+        brief[table] = [{k: v for k, v in row.items() if k not in WIDE_COLUMNS} for row in result[table]]
+    return brief
 
 
-@app.command("stop-study")
-def stop_study(
-    campaign: Annotated[str, typer.Argument(help="Campaign folder with brake and engine torque.")],
-    study: Annotated[str, typer.Option(help="Stop study: YAML file, or the name of one.")] = "bmw-m8",
-    vehicle: Annotated[
-        str | None, typer.Option(help="Uncalibrated vehicle; by default the campaign's.")
-    ] = None,
-    out: Out = None,
-    prefect: Prefect = False,
-    as_json: Json = False,
-) -> None:
-    """Calibrate on one stop of a car, predict another, and add what the model lacks step by step."""
-    result = call("stop_study", prefect, campaign, study=study, vehicle=vehicle, out=out)
-    rungs = [{"rung": row["rung"], **row["held_out"]} for row in result["rungs"]]
-    show(result if as_json else {**result, "rungs": rungs}, as_json)
+def shorten_stop_study(result: dict[str, Any]) -> dict[str, Any]:
+    """Return a stop study with the held-out figures of each step."""
+    return result | {"rungs": [{"rung": row["rung"], **row["held_out"]} for row in result["rungs"]]}
 
 
-@app.command("bump-study")
-def bump_study(
-    campaign: Annotated[str, typer.Argument(help="Campaign folder with pitch rate and speed.")],
-    study: Annotated[str, typer.Option(help="Bump study: YAML file, or the name of one.")] = "comma2k19",
-    vehicle: Annotated[
-        str | None, typer.Option(help="Vehicle to start from; by default the campaign's.")
-    ] = None,
-    out: Out = None,
-    prefect: Prefect = False,
-    as_json: Json = False,
-) -> None:
-    """Find the road features that a recording's pitch rate gives away, and the car that fits them."""
-    result = call("bump_study", prefect, campaign, study=study, vehicle=vehicle, out=out)
-    figures = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
+def shorten_bump_study(result: dict[str, Any]) -> dict[str, Any]:
+    """Return a bump study with a row for each window and car."""
     rows = [
         {
             "window": row["window"],
             "car": car,
             **row[car]["feature"],
-            **{name: row[car][name] for name in figures},
+            **{name: row[car][name] for name in BUMP_FIGURES},
         }
         for row in result["windows"]
         for car in ("uncalibrated", "calibrated")
     ]
-    show(result if as_json else {**result, "windows": rows}, as_json)
+    return result | {"windows": rows}
 
 
-@app.command("synthetic-drives")
-def synthetic_drives(
-    out: Annotated[str, typer.Option(help="Folder for one bus log a drive.")],
-    drives: Annotated[int, typer.Option(help="How many drives.")] = 3,
-    events: Annotated[int, typer.Option(help="Brake applications in each.")] = 46,
-    seed: Annotated[int, typer.Option(help="Of the whole set.")] = 2020,
-    as_json: Json = False,
-) -> None:
-    """Emit drives as a car's bus logs them, with known truth, to try the brake protocol on."""
-    show(call("synthetic_drives", False, out, drives=drives, events=events, seed=seed), as_json)
+def shorten_agreement(result: dict[str, Any]) -> dict[str, Any]:
+    """Return an agreement with the main columns of each case, and the groups."""
+    hidden = {"window", "note"}
+    cases = [{key: value for key, value in row.items() if key not in hidden} for row in result["cases"]]
+    return {"cases": cases, "groups": result["groups"]}
 
 
-@app.command("close-loop")
-def close_loop(
-    campaign: Annotated[
-        str, typer.Argument(help="Campaign folder: campaign.yaml, runs.csv, runs/*.parquet.")
-    ],
-    out: Annotated[str, typer.Option(help="Folder for verdict, report and grown vehicle.")],
-    vehicle: Annotated[
-        str | None, typer.Option(help="Vehicle name or file; by default the campaign's.")
-    ] = None,
-    prefect: Prefect = False,
-    as_json: Json = False,
-) -> None:
-    """Say what a measured campaign shows that the model lacks, and write the vehicle model with it."""
-    one_thread()
-    result = call("close_loop", prefect, campaign, out=out, vehicle=vehicle)
-    keys = ("verdict", "reasons", "vehicle_file", "report")
-    brief: dict[str, Any] = {
-        "effects": [
-            {
-                "name": e["name"],
-                "class": e["class"],
-                "parameter": name,
-                **{key: p[key] for key in ("value", "ci_low", "ci_high", "unit")},
-            }
-            for e in result["effects"]
-            for name, p in e["parameters"].items()
-        ],
-        "error": [
-            {"channel": channel, **{key: e[key] for key in ("frozen", "retuned", "after", "unit")}}
-            for channel, e in result["error"].items()
-        ],
-    }
-    show(result if as_json else {key: result[key] for key in keys} | brief, as_json)
+def shorten_verdict(result: dict[str, Any]) -> dict[str, Any]:
+    """Return a verdict with a row for each parameter of a named effect, and for the error of each channel."""
+    effects = [
+        {
+            "name": effect["name"],
+            "class": effect["class"],
+            "parameter": name,
+            **{key: parameter[key] for key in ("value", "ci_low", "ci_high", "unit")},
+        }
+        for effect in result["effects"]
+        for name, parameter in effect["parameters"].items()
+    ]
+    error = [
+        {"channel": channel, **{key: entry[key] for key in ("frozen", "retuned", "after", "unit")}}
+        for channel, entry in result["error"].items()
+    ]
+    kept = {key: result[key] for key in ("verdict", "reasons", "vehicle_file", "report")}
+    return kept | {"effects": effects, "error": error}
 
 
-@app.command("close-loop-benchmark")
-def close_loop_benchmark(
-    out: Annotated[
-        str, typer.Option(help="Folder for closing-benchmark.json and campaigns.jsonl; a later call goes on.")
-    ],
-    seeds: Annotated[int, typer.Option(help="Campaigns of each known truth.", min=0)] = 10,
-    nulls: Annotated[int, typer.Option(help="Campaigns of a model that lacks nothing.", min=0)] = 100,
-    harder: Annotated[
-        int,
-        typer.Option(help="Campaigns of each pair of effects, and of each truth on a poor design.", min=0),
-    ] = 1,
-    minutes: Annotated[float, typer.Option(help="Stop after so long, with what is done.")] = 1e9,
-    prefect: Prefect = False,
-    as_json: Json = False,
-) -> None:
-    """Count how often close-loop is right on campaigns whose truth is known."""
-    one_thread()
-    result = call(
-        "close_loop_benchmark", prefect, out=out, seeds=seeds, nulls=nulls, harder=harder, minutes=minutes
-    )
-    keys = ("false_discoveries", "summary", "power", "cpu_s")
-    show(result if as_json else {key: result[key] for key in keys}, as_json)
+COMMANDS = (
+    Command(
+        name="import-measurements",
+        group=GROUP,
+        sentence="Make a campaign folder of measured recordings, or say what is wrong in which run and channel.",
+        function="flows.measured.importing:import_measurements",
+        options=(
+            argument("source", str, "CSV, Parquet or MDF4 file, or a folder of them."),
+            option(
+                "map",
+                str,
+                "Channel map: YAML file, or the name of one that ships.",
+                known="catalogs/channel_maps/*.yaml",
+            ),
+            option("out", str, "Campaign folder to make."),
+        ),
+    ),
+    Command(
+        name="brake-protocol",
+        group=GROUP,
+        sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
+        function="flows.measured.protocol:brake_protocol",
+        options=(
+            argument("campaign", str, "Campaign folder with brake pressure and pitch."),
+            option(
+                "protocol",
+                str,
+                "Protocol: YAML file, or the name of one.",
+                "brake-dive",
+                known="catalogs/protocols/*.yaml",
+            ),
+            CAMPAIGN_VEHICLE,
+            option("all_events", bool, "Use every candidate, whatever rules it breaks.", False),
+            OUT,
+        ),
+        brief=shorten_brake_protocol,
+    ),
+    Command(
+        name="stop-study",
+        group=GROUP,
+        sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
+        function="flows.measured.stop_study:stop_study",
+        options=(
+            argument("campaign", str, "Campaign folder with brake and engine torque."),
+            option(
+                "study",
+                str,
+                "Stop study: YAML file, or the name of one.",
+                "bmw-m8",
+                known="catalogs/stop_studies/*.yaml",
+            ),
+            CAMPAIGN_VEHICLE,
+            OUT,
+        ),
+        brief=shorten_stop_study,
+    ),
+    Command(
+        name="bump-study",
+        group=GROUP,
+        sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
+        function="flows.measured.bump_study:bump_study",
+        options=(
+            argument("campaign", str, "Campaign folder with pitch rate and speed."),
+            option(
+                "study",
+                str,
+                "Bump study: YAML file, or the name of one.",
+                "comma2k19",
+                known="catalogs/bump_studies/*.yaml",
+            ),
+            CAMPAIGN_VEHICLE,
+            OUT,
+        ),
+        brief=shorten_bump_study,
+    ),
+    Command(
+        name="synthetic-drives",
+        group=GROUP,
+        sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
+        function="flows.measured.bus_drives:synthetic_drives",
+        options=(
+            option("out", str, "Folder for one bus log of each drive."),
+            option("drives", int, "Number of drives.", 3),
+            option("events", int, "Brake applications in each drive.", 46),
+            option("seed", int, "Seed of the whole set.", 2020),
+        ),
+    ),
+    Command(
+        name="agreement",
+        group=GROUP,
+        sentence="Compare the vehicle model with reference traces, as the paper's Appendix A.2 does.",
+        function="flows.studies.vehicle_model:agreement",
+        options=(TRACES, VEHICLE, MODE, OUT),
+        brief=shorten_agreement,
+    ),
+    Command(
+        name="calibrate",
+        group=GROUP,
+        sentence="Calibrate a vehicle in stages on reference traces, freeze it, and say how well each scalar is known.",
+        function="flows.measured.calibration:calibrate",
+        options=(
+            TRACES,
+            option("out", str, "Folder for the frozen vehicle and calibration.json."),
+            option(
+                "vehicle", str, "Vehicle name or file to start from.", VEHICLE.default, known=VEHICLE.known
+            ),
+            option(
+                "procedure",
+                str,
+                "Procedure name or file.",
+                "paper-staged",
+                known="catalogs/calibration/*.yaml",
+            ),
+            option("split", str, "The split to fit; no other split is read.", "development"),
+            option("name", str, "Name of the frozen vehicle.", "calibrated"),
+        ),
+        brief=select_keys("vehicle_file", "vehicle_sha256", "stages", "before", "after"),
+    ),
+    Command(
+        name="close-loop",
+        group=GROUP,
+        sentence="Find the effects that the model lacks in a measured campaign, and write the vehicle with them.",
+        function="flows.measured.closing:close_loop",
+        options=(
+            CAMPAIGN,
+            option("out", str, "Folder for verdict, report and grown vehicle."),
+            CAMPAIGN_VEHICLE,
+        ),
+        brief=shorten_verdict,
+        one_thread=True,
+    ),
+    Command(
+        name="close-loop-benchmark",
+        group=GROUP,
+        sentence="Count how often close-loop is right on campaigns whose truth is known.",
+        function="flows.measured.closing_benchmark:close_loop_benchmark",
+        options=(
+            option(
+                "out",
+                str,
+                "Folder for closing-benchmark.json and campaigns.jsonl; a later call continues there.",
+            ),
+            option("seeds", int, "Campaigns of each known truth.", 10, minimum=0),
+            option("nulls", int, "Campaigns of a model that lacks nothing.", 100, minimum=0),
+            option(
+                "harder",
+                int,
+                "Campaigns of each pair of effects, and of each truth with a poor design.",
+                1,
+                minimum=0,
+            ),
+            option("minutes", float, "Stop after this time, with the campaigns done so far [min].", 1e9),
+        ),
+        brief=select_keys("false_discoveries", "summary", "power", "cpu_s"),
+        one_thread=True,
+    ),
+)

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -20,7 +21,7 @@ from flows.store.frames import create_arrays
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
 from flows.store.sealed import is_committed, read_manifest
-from flows.store.staging import BEGUN, left_overs, remove_staged, remove_staging
+from flows.store.staging import BEGUN, left_overs, remove_left_overs
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 from tasks.render.rasterise.backend import select_backend
@@ -79,17 +80,23 @@ def generate(
         _refuse_other_content(layout)
         if layout.manifest.is_file():
             _refuse_other_plan(layout, plan, inputs)
+            _clear_up(layout)
         else:
             with sole_writer(layout):
                 stage(prepare)(layout, plan, inputs)
-                if layout.manifest.is_file():  # another run has ended just now
-                    remove_staging(layout)
-                else:
+                if not layout.manifest.is_file():  # or another run has ended just now
                     missing = [clip.index for clip in plan.clips if not is_committed(layout, clip.clip_id)]
                     cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
                     bring(layout, needed_to_seal(layout, plan))
                     stage(seal)(layout, plan)
     return _report(reading(out, summary), plan, len(missing), cost)
+
+
+def _clear_up(layout: Layout) -> None:
+    """Remove what a run left that was stopped between its manifest and its end; a run that is there does so itself."""
+    if left_overs(layout):
+        with suppress(InputError, OSError), sole_writer(layout):
+            remove_left_overs(layout)
 
 
 def summary(name: str) -> bool:
@@ -122,7 +129,7 @@ def prepare(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
     InputError
         If the folder holds the plan of another run.
     """
-    remove_staged(left_overs(layout))
+    remove_left_overs(layout)
     if layout.plan.is_file():
         _refuse_other_plan(layout, plan, inputs)
         return

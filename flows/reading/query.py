@@ -5,7 +5,7 @@ import re
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import duckdb
 
@@ -139,16 +139,16 @@ def _last_line(text: str) -> str:
     return text.splitlines()[-1] if text.startswith("Traceback") else text
 
 
-def schema(of: Literal["views", "grid"] = "views") -> dict[str, Any]:
+def schema(*, grid: bool = False) -> dict[str, Any]:
     """Every view's columns: name, unit, paper symbol, CF standard name and description, from the one table.
 
     The key ``arrays`` holds those of the frames: type and dimensions too.
 
     Parameters
     ----------
-    of : ``grid`` gives the JSON Schema of a grid file instead
+    grid : whether to return the JSON Schema of a grid file instead
     """
-    if of == "grid":
+    if grid:
         from catalogs.grids.schema import grid_schema
 
         return grid_schema()

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from flows.store.address import withdraw
 from flows.store.layout import PARTIAL, STAGED_TABLES, Layout
 from flows.store.lock import sole_writer
 from manifests.canonical import ID_LENGTH
@@ -60,6 +61,16 @@ def remove_staging(layout: Layout) -> None:
     (layout.staging / "lock").unlink(missing_ok=True)
     with suppress(OSError):
         layout.staging.rmdir()
+
+
+def remove_left_overs(layout: Layout) -> list[Path]:
+    """Remove what killed runs left, also from a store, and return what it was; the dataset is held for writing."""
+    found = left_overs(layout)
+    withdraw(layout, [path for path in found if path.is_file()])
+    remove_staged(found)
+    if layout.manifest.is_file():
+        remove_staging(layout)
+    return found
 
 
 @contextmanager

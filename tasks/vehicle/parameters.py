@@ -6,7 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.tyres.burckhardt import TyreCurve, tyre_curve
+from tasks.vehicle.tyres.burckhardt import scale_burckhardt
+from tasks.vehicle.tyres.contract import Tyre
+from tasks.vehicle.tyres.magic_formula import MagicFormula
+from tasks.vehicle.tyres.magic_formula_tyre import scale_magic_formula
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,8 +66,9 @@ class Vehicle:
     lock_speed : in coupled mode, wheel speed below which brake friction turns proportional to it [rad/s]
     gravity : g [m/s2]
     families : tyre family of each kind of weather
-    effects : numbers of ``tasks.vehicle.effects.numbers`` that coupled mode adds; none in the paper's model
-    forms : what coupled mode adds that no effect of the library has; none in the paper's model
+    tyre : Magic Formula of every wheel; None where the families' Burckhardt curves are the tyre
+    effects : numbers of ``tasks.vehicle.effects.table`` that the model adds; none in the paper's model
+    forms : what the model adds that no effect of the library has; none in the paper's model
     """
 
     name: str
@@ -98,6 +102,7 @@ class Vehicle:
     lock_speed: float
     gravity: float
     families: Mapping[str, TyreFamily]
+    tyre: MagicFormula | None = None
     effects: Mapping[str, float] = field(default_factory=dict)
     forms: tuple[Form, ...] = ()
 
@@ -127,7 +132,7 @@ class SurfaceResponse:
 
     Parameters
     ----------
-    tyre : the peak-normalised curve on this surface
+    tyre : on this surface, its curve scaled to the peak
     slip_stiffness : beta_kappa [1]
     pitch_scale : gamma_theta [1]
     hold_s, release_s : tau_h and tau_r [s]
@@ -135,7 +140,7 @@ class SurfaceResponse:
     wet : water lies on the road
     """
 
-    tyre: TyreCurve
+    tyre: Tyre
     slip_stiffness: float
     pitch_scale: float
     hold_s: float
@@ -159,11 +164,15 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
     def at(values: tuple[float, ...]) -> float:
         return float(np.interp(surface_friction, knots, values))
 
-    slip_stiffness = at(table.slip_stiffness)
+    peak, slip_stiffness = at(table.efficiency) * surface_friction, at(table.slip_stiffness)
+    if vehicle.tyre is None:
+        tyre: Tyre = scale_burckhardt(table.burckhardt, peak, slip_stiffness)
+    else:
+        tyre = scale_magic_formula(vehicle.tyre, peak, slip_stiffness)
     # The knots are printed with six digits, so a friction within their rounding is on the end knot.
     rounding = 5e-7
     return SurfaceResponse(
-        tyre=tyre_curve(table.burckhardt, at(table.efficiency) * surface_friction, slip_stiffness),
+        tyre=tyre,
         slip_stiffness=slip_stiffness,
         pitch_scale=at(table.pitch_scale),
         hold_s=at(table.hold_s),

@@ -11,7 +11,7 @@ from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.effects.table import EFFECT_UNITS
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.rollout import Controls, rollout
-from tasks.vehicle.tyres.burckhardt import tyre_friction
+from tasks.vehicle.tyres.contract import tyre_friction
 from tests.vehicle.conftest import HUMP, command
 
 STOP = command(1.5, onset=0.5)
@@ -66,7 +66,7 @@ def test_the_slip_that_builds_up_force_follows_over_the_relaxation_length(vehicl
     tyre = surface_response(vehicle, "dry", 0.82).tyre
     columns = coupled({"relaxation_length": 0.8}, brake=command(1.0, onset=0.2, ramp_s=0.4), duration=1.2)
     slips = np.linspace(0.0, tyre.target_slip, 2001)
-    curve = np.array([tyre_friction(slip, tyre) for slip in slips])
+    curve = np.array([tyre_friction(slip, 4e3, tyre) for slip in slips])
     felt = np.interp(columns["tyre_force_f"] / columns["tyre_load_f"], curve, slips)
     rate = np.gradient(felt, 1e-3)[250:1150]
     expected = (columns["speed"] * (columns["braking_slip_f"] - felt) / 0.8)[250:1150]
@@ -84,7 +84,7 @@ def test_sliding_heats_the_tyre_and_heat_takes_its_grip(vehicle, coupled):
     columns = coupled({"tyre_heating": 2.0}, surface=WET)
     slip = columns["braking_slip_f"]
     heat = np.cumsum(np.abs(columns["tyre_force_f"] * slip) * columns["speed"]) * 1e-3
-    cold = np.array([tyre_friction(k, tyre) for k in slip]) * columns["tyre_load_f"]
+    cold = np.array([tyre_friction(k, 4e3, tyre) for k in slip]) * columns["tyre_load_f"]
     assert heat[2500] > 8e3
     np.testing.assert_allclose(
         columns["tyre_force_f"][:2500], ((1.0 - 2.0 * heat / 1e5) * cold)[:2500], atol=5.0

@@ -59,12 +59,12 @@ def test_a_sticking_tyre_has_its_own_friction_below_one_speed_and_the_curve_abov
     tyre = surface_response(vehicle, "rain", 0.4).tyre
     shares = [stick_share(v, effects) for v in (0.1, 1.0, 2.0, 3.0, 20.0)]
     assert shares == [1.0, 1.0, pytest.approx(0.5), 0.0, 0.0]
-    assert effective_friction(1.0, 1.0, tyre, effects) == pytest.approx(0.7 * tyre.peak, rel=1e-4)
-    assert effective_friction(tyre.target_slip, 0.0, tyre, effects) == pytest.approx(tyre.peak)
+    assert effective_friction(1.0, 4e3, 1.0, tyre, effects) == pytest.approx(0.7 * tyre.peak, rel=1e-4)
+    assert effective_friction(tyre.target_slip, 4e3, 0.0, tyre, effects) == pytest.approx(tyre.peak)
     for slip in (0.003, 0.02, 0.3):
-        rise = (effective_friction(slip + 1e-6, 0.4, tyre, effects)
-                - effective_friction(slip - 1e-6, 0.4, tyre, effects)) / 2e-6  # fmt: skip
-        assert effective_slope(slip, 0.4, tyre, effects) == pytest.approx(rise, rel=1e-5)
+        rise = (effective_friction(slip + 1e-6, 4e3, 0.4, tyre, effects)
+                - effective_friction(slip - 1e-6, 4e3, 0.4, tyre, effects)) / 2e-6  # fmt: skip
+        assert effective_slope(slip, 4e3, 0.4, tyre, effects) == pytest.approx(rise, rel=1e-5)
 
 
 def test_the_footprint_feels_the_mean_of_the_road(vehicle):

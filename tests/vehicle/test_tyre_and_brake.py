@@ -14,18 +14,19 @@ from tasks.vehicle.brake import BrakeCommand, abs_command, abs_update, brake_pre
 from tasks.vehicle.effects.table import effect_values
 from tasks.vehicle.model.axle_ports import lock_share, signed_friction, signed_slip
 from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.tyres.burckhardt import braking_slip, tyre_friction, tyre_slope
+from tasks.vehicle.tyres.contract import braking_slip, tyre_friction, tyre_slope
 
 SURFACES = [("dry", 0.82), ("rain", 0.347126), ("rain", 0.5), ("snow", 0.24), ("snow", 0.51)]
+LOAD = 8e3
 
 
 @pytest.mark.parametrize(("family", "friction"), SURFACES)
 def test_the_tyre_peaks_at_mu_eff_at_the_target_slip(vehicle, family, friction):
     tyre = surface_response(vehicle, family, friction).tyre
-    assert tyre_friction(tyre.target_slip, tyre) == pytest.approx(tyre.peak, rel=1e-12)
-    assert tyre_slope(tyre.target_slip, tyre) == pytest.approx(0, abs=1e-12 * tyre.rise * tyre.decay)
+    assert tyre_friction(tyre.target_slip, LOAD, tyre) == pytest.approx(tyre.peak, rel=1e-12)
+    assert tyre_slope(tyre.target_slip, LOAD, tyre) == pytest.approx(0, abs=1e-12 * tyre.rise * tyre.decay)
     slips = np.linspace(0, 1, 2001)
-    assert max(tyre_friction(slip, tyre) for slip in slips) <= tyre.peak
+    assert max(tyre_friction(slip, LOAD, tyre) for slip in slips) <= tyre.peak
 
 
 def test_target_slips_are_those_of_the_base_curves_over_the_slip_stiffness(vehicle):
@@ -42,15 +43,15 @@ def test_tyre_agrees_with_its_twin(vehicle, family, friction):
     response = surface_response(vehicle, family, friction)
     slips = np.linspace(-1, 1, 101)
     plain = effect_values({})
-    kernel = [signed_friction(slip, 0.0, response.tyre, plain) for slip in slips]
+    kernel = [signed_friction(slip, LOAD, 0.0, response.tyre, plain) for slip in slips]
     np.testing.assert_allclose(kernel, reference.burckhardt(slips, vehicle, family, response), atol=1e-6)
 
 
 def test_tyre_slope_is_the_derivative(vehicle):
     tyre = surface_response(vehicle, "rain", 0.4).tyre
     for slip in (0.0, 0.01, 0.1, 0.5):
-        numeric = (tyre_friction(slip + 1e-6, tyre) - tyre_friction(slip - 1e-6, tyre)) / 2e-6
-        assert tyre_slope(slip, tyre) == pytest.approx(numeric, rel=1e-5, abs=1e-6)
+        numeric = (tyre_friction(slip + 1e-6, LOAD, tyre) - tyre_friction(slip - 1e-6, LOAD, tyre)) / 2e-6
+        assert tyre_slope(slip, LOAD, tyre) == pytest.approx(numeric, rel=1e-5, abs=1e-6)
 
 
 def test_tables_are_linear_between_knots_and_clamped_and_flagged_outside(vehicle):

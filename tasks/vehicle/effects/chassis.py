@@ -6,7 +6,7 @@ from numba import njit
 
 from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.road import RoadFeature, height_at, slope_at
-from tasks.vehicle.tyres.burckhardt import TyreCurve, tyre_friction, tyre_slope
+from tasks.vehicle.tyres.contract import Tyre, tyre_friction, tyre_slope
 
 STICK_SLIP = 0.01
 """Slip over which a sticking tyre builds up its force; any value well below the curve's peak serves [1]."""
@@ -30,17 +30,18 @@ def stick_share(speed: float, effects: EffectValues) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def effective_friction(slip: float, share: float, tyre: TyreCurve, effects: EffectValues) -> float:
+def effective_friction(slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues) -> float:
     """Friction of a tyre of which a share sticks, for a braking slip [1].
 
     Parameters
     ----------
     slip : braking slip, 0 or more [1]
+    load : of the axle [N]
     share : that sticks [1]
-    tyre : the scaled curve
+    tyre : on the surface
     effects : the values
     """
-    rolling = tyre_friction(slip, tyre)
+    rolling = tyre_friction(slip, load, tyre)
     if share == 0.0:
         return rolling
     u = slip / STICK_SLIP
@@ -48,17 +49,18 @@ def effective_friction(slip: float, share: float, tyre: TyreCurve, effects: Effe
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def effective_slope(slip: float, share: float, tyre: TyreCurve, effects: EffectValues) -> float:
+def effective_slope(slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues) -> float:
     """Rise of ``effective_friction`` with slip [1].
 
     Parameters
     ----------
     slip : braking slip, 0 or more [1]
+    load : of the axle [N]
     share : that sticks [1]
-    tyre : the scaled curve
+    tyre : on the surface
     effects : the values
     """
-    rolling = tyre_slope(slip, tyre)
+    rolling = tyre_slope(slip, load, tyre)
     if share == 0.0:
         return rolling
     u = slip / STICK_SLIP

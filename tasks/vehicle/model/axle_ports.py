@@ -15,7 +15,7 @@ from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Instant
 from tasks.vehicle.model.vertical_ports import Ground, Strut
 from tasks.vehicle.paper.wheels import Wheels
-from tasks.vehicle.tyres.burckhardt import TyreCurve
+from tasks.vehicle.tyres.contract import Tyre
 
 _BRAKE_FORM, _FRICTION_FORM = PORTS.index("brake_torque"), PORTS.index("friction")
 Senses = tuple[float, float, float, float, float, float, float, float, float]
@@ -67,17 +67,18 @@ def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def signed_friction(slip: float, share: float, tyre: TyreCurve, effects: EffectValues) -> float:
+def signed_friction(slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues) -> float:
     """Friction of the tyre, continued oddly to driving slip [1].
 
     Parameters
     ----------
     slip : signed braking slip [1]
+    load : of the axle [N]
     share : of the tyre that sticks [1]
-    tyre : the scaled curve
+    tyre : on the surface
     effects : the values
     """
-    friction = effective_friction(abs(slip), share, tyre, effects)
+    friction = effective_friction(abs(slip), load, share, tyre, effects)
     return friction if slip >= 0.0 else -friction
 
 
@@ -138,7 +139,7 @@ def rolling_axle(
     instant: Instant,
     forms: SlotTables | None,
     chassis: Chassis,
-    tyre: TyreCurve,
+    tyre: Tyre,
 ) -> AxlePorts:
     """Slip, tyre force and torques of one axle.
 
@@ -167,7 +168,8 @@ def rolling_axle(
         senses = senses_of(speed, load_ratio, strut, memory, instant)
         grip *= max(1.0 + slot_sum(_FRICTION_FORM, senses, forms), 0.0)
         pressure *= max(1.0 + slot_sum(_BRAKE_FORM, senses, forms), 0.0)
-    tyre_force = signed_friction(force_slip, stick_share(speed, effects), tyre, effects) * grip * ground.load
+    sticking = stick_share(speed, effects)
+    tyre_force = signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
     wanted = abs_command(slip, tyre.target_slip, wheels.release_width) if speed >= effects.abs_cutoff else 1.0
     abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
     turning = lock_share(omega, chassis.lock_speed)
@@ -224,13 +226,13 @@ def with_links(ports: AxlePorts, force: float) -> AxlePorts:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def reserve_of(ports: AxlePorts, tyre: TyreCurve) -> float:
+def reserve_of(ports: AxlePorts, tyre: Tyre) -> float:
     """Sideways grip that an axle has left; none off the road [1].
 
     Parameters
     ----------
     ports : of the axle
-    tyre : the scaled curve
+    tyre : on the surface
     """
     if ports.ground.load <= 0.0:
         return 0.0

@@ -25,7 +25,7 @@ from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import Instant, Memory, Motion
 from tasks.vehicle.model.vertical_ports import ground_at, struts_at
 from tasks.vehicle.road import RoadFeature
-from tasks.vehicle.tyres.burckhardt import TyreCurve
+from tasks.vehicle.tyres.contract import Tyre
 
 _FORCE_FORM, _PITCH_FORM, _STRUT_FORM = (
     PORTS.index(port) for port in ("longitudinal_force", "pitch_moment", "suspension_force")
@@ -79,7 +79,7 @@ def ports_at(
     step: float,
     forms: SlotTables | None,
     chassis: Chassis,
-    tyre: TyreCurve,
+    tyre: Tyre,
     road: RoadFeature,
 ) -> Ports:
     """All that acts on the vehicle in one state.

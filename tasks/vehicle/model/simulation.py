@@ -32,7 +32,7 @@ from tasks.vehicle.model.states import (
 from tasks.vehicle.model.step import take_step
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 from tasks.vehicle.road import RoadFeature, road_feature
-from tasks.vehicle.tyres.burckhardt import TyreCurve
+from tasks.vehicle.tyres.contract import Tyre
 
 COLUMNS = (
     "station", "speed", "longitudinal_acceleration", "braking_slip_f", "braking_slip_r", "wheel_speed_f",
@@ -141,7 +141,7 @@ def integrate(
     road: RoadFeature,
     slots: SlotTables | None,
     chassis: Chassis,
-    tyre: TyreCurve,
+    tyre: Tyre,
     history: NDArray[np.float64],
     states: NDArray[np.float64],
 ) -> tuple[float, float, float]:

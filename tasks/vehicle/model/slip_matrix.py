@@ -10,7 +10,7 @@ from tasks.vehicle.model.axle_ports import AxlePorts, lock_share, relaxation_rat
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Memory, Motion
 from tasks.vehicle.paper.wheels import Axle
-from tasks.vehicle.tyres.burckhardt import TyreCurve
+from tasks.vehicle.tyres.contract import Tyre
 
 GAMMA = 1.0 - sqrt(0.5)
 """Coefficient of ROS2 that makes it damp what is stiff."""
@@ -50,7 +50,7 @@ def axle_slope(
     step: float,
     axle: Axle,
     chassis: Chassis,
-    tyre: TyreCurve,
+    tyre: Tyre,
 ) -> AxleSlope:
     """Derivatives of speed and wheel rate through the slip of one axle.
 
@@ -73,7 +73,8 @@ def axle_slope(
     force, torque, locking = 0.0, 0.0, 0.0
     if abs(ports.slip) < 1.0:
         share = stick_share(motion.speed, chassis.effects)
-        force = effective_slope(abs(ports.force_slip), share, tyre, chassis.effects) * ports.ground.load
+        load = ports.ground.load
+        force = effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
         if 0.0 < ports.abs_scale < 1.0:
             turning = lock_share(omega, chassis.lock_speed)
             torque = -ports.full_torque * turning / (wheels.release_width * tyre.target_slip)

@@ -17,7 +17,7 @@ from tasks.vehicle.model.slip_matrix import GAMMA, axle_slope, solve_slip, witho
 from tasks.vehicle.model.states import AxleMemory, Instant, Memory, Motion, moved_axle, moved_motion
 from tasks.vehicle.paper.wheels import Axle
 from tasks.vehicle.road import RoadFeature
-from tasks.vehicle.tyres.burckhardt import TyreCurve
+from tasks.vehicle.tyres.contract import Tyre
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -127,7 +127,7 @@ def take_step(
     step: float,
     forms: SlotTables | None,
     chassis: Chassis,
-    tyre: TyreCurve,
+    tyre: Tyre,
     road: RoadFeature,
 ) -> tuple[Motion, Memory, HalfCarState]:
     """One ROS2 step from a state whose ports are known.

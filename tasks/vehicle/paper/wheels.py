@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tasks.vehicle.brake import PressureProfile, abs_command, abs_update, brake_pressure, onset_by_position
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.road import RoadFeature, slope_at
-from tasks.vehicle.tyres.burckhardt import TyreCurve, braking_slip, tyre_friction
+from tasks.vehicle.tyres.contract import Tyre, braking_slip, tyre_friction
 
 
 class Axle(NamedTuple):
@@ -113,7 +113,7 @@ def axle_step(
     step: float,
     axle: Axle,
     wheels: Wheels,
-    tyre: TyreCurve,
+    tyre: Tyre,
 ) -> AxleStep:
     """Slip, ABS, tyre force and wheel acceleration of one axle (paper, Eqs. app_abs_command and on).
 
@@ -130,7 +130,7 @@ def axle_step(
     slip = braking_slip(speed, wheels.radius * omega, wheels.speed_floor)
     wanted = abs_command(slip, tyre.target_slip, wheels.release_width)
     scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
-    force = tyre_friction(slip, tyre) * load
+    force = tyre_friction(slip, load, tyre) * load
     torque = scale * (axle.brake_gain * pressure)
     return AxleStep(slip, force, torque, scale, (wheels.radius * force - torque) * (1.0 / axle.inertia))
 
@@ -150,7 +150,7 @@ def transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float
 
 @njit(cache=True, nogil=True)
 def stopping_run(
-    initial_speed: float, step: float, longest: int, profile: PressureProfile, wheels: Wheels, tyre: TyreCurve
+    initial_speed: float, step: float, longest: int, profile: PressureProfile, wheels: Wheels, tyre: Tyre
 ) -> tuple[float, float]:
     """Brake on a flat road from t = 0 to the stop, keeping nothing on the way.
 
@@ -203,7 +203,7 @@ def drive(
     road: RoadFeature,
     loads: NDArray[np.float64],
     wheels: Wheels,
-    tyre: TyreCurve,
+    tyre: Tyre,
 ) -> tuple[NDArray[np.float64], float, int]:
     """Drive, brake and stand, with every sample logged.
 

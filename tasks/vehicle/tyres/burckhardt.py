@@ -1,4 +1,4 @@
-"""The peak-normalised Burckhardt tyre and its slip."""
+"""The peak-normalised Burckhardt tyre, which does not depend on load."""
 
 from math import exp, log
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 from numba import njit
 
 
-class TyreCurve(NamedTuple):
+class BurckhardtTyre(NamedTuple):
     """A Burckhardt curve scaled to one surface: mu = rise (1 - exp(-decay kappa)) - fall kappa.
 
     Parameters
@@ -23,7 +23,9 @@ class TyreCurve(NamedTuple):
     target_slip: float
 
 
-def tyre_curve(burckhardt: tuple[float, float, float], peak: float, slip_stiffness: float) -> TyreCurve:
+def scale_burckhardt(
+    burckhardt: tuple[float, float, float], peak: float, slip_stiffness: float
+) -> BurckhardtTyre:
     """Scale a base curve to its peak and stiffness on a surface, mu_B(beta kappa; mu_eff) (paper, Appendix B).
 
     Parameters
@@ -35,7 +37,7 @@ def tyre_curve(burckhardt: tuple[float, float, float], peak: float, slip_stiffne
     c1, c2, c3 = burckhardt
     peak_slip = min(log(c1 * c2 / c3) / c2, 1.0)
     scale = peak / (c1 * (1 - exp(-c2 * peak_slip)) - c3 * peak_slip)
-    return TyreCurve(
+    return BurckhardtTyre(
         rise=scale * c1,
         decay=c2 * slip_stiffness,
         fall=scale * c3 * slip_stiffness,
@@ -45,37 +47,26 @@ def tyre_curve(burckhardt: tuple[float, float, float], peak: float, slip_stiffne
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def tyre_friction(braking_slip: float, tyre: TyreCurve) -> float:
-    """Braking force over load [1] (paper, Eq. tire_force).
+def burckhardt_friction(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
+    """Return braking force over load [1] (paper, Eq. tire_force).
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
+    load : of the axle; without influence [N]
     tyre : the scaled curve
     """
     return tyre.rise * (1.0 - exp(-tyre.decay * braking_slip)) - tyre.fall * braking_slip
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def tyre_slope(braking_slip: float, tyre: TyreCurve) -> float:
-    """Rise of ``tyre_friction`` with slip, its derivative [1].
+def burckhardt_slope(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
+    """Return the derivative of ``burckhardt_friction`` by slip [1].
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
+    load : of the axle; without influence [N]
     tyre : the scaled curve
     """
     return tyre.rise * tyre.decay * exp(-tyre.decay * braking_slip) - tyre.fall
-
-
-@njit(cache=True, nogil=True, forceinline=True)
-def braking_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
-    """Braking slip kappa, clipped to [0, 1] [1] (paper, Eq. tire_force).
-
-    Parameters
-    ----------
-    speed : v [m/s]
-    rim_speed : R omega [m/s]
-    speed_floor : v_epsilon [m/s]
-    """
-    return min(max((speed - rim_speed) / max(speed, speed_floor), 0.0), 1.0)

@@ -26,7 +26,7 @@ from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.undistort import undistorted
-from tests.flows.test_trajectories import tum_lines
+from tests.flows.judging.test_trajectories import tum_lines
 
 
 @pytest.fixture(scope="module")

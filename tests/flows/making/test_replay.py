@@ -4,23 +4,16 @@ from dataclasses import replace
 
 import pytest
 
-from catalogs.scenes import write_scene
 from flows.making import replay
 from flows.making.clip import picture
 from flows.making.driving import drive
 from tasks.errors import InputError
-from tests.flows.test_pipeline import GRID
-from tests.toy_street import TOY_CAMERA, toy_street
+from tests.toy_street import write_toy_grid
 
 
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory) -> str:
-    folder = tmp_path_factory.mktemp("replay")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    path = folder / "grid.yaml"
-    path.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=4))
-    return str(path)
+    return write_toy_grid(tmp_path_factory.mktemp("replay"), frames=4)
 
 
 def test_seeds_move_the_snow_and_nothing_in_the_motion(grid, tmp_path):

@@ -9,7 +9,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import flows.making.generate
-from catalogs.scenes import write_scene
 from flows.auditing.audit import audit
 from flows.making.clip import make_clip
 from flows.making.generate import generate
@@ -22,37 +21,16 @@ from manifests.canonical import canonical_bytes, sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.render.labels import MARK_BITS
-from tests.toy_street import TOY_CAMERA, toy_street
-
-GRID = """
-name: toy
-scene: {scene}
-camera: {camera}
-frames: {frames}
-frame_rate_hz: 10
-axes:
-  weather:
-    dry: {{weather: dry}}
-    snow-3: {{weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1}}
-  road:
-    flat: {{initial_speed_km_h: 40, peak_pressure_mpa: 2.3, brake_onset_s: 0.2}}
-    hump: {{initial_speed_km_h: 40, hazard_center_m: 4, hazard_length_m: 3.7, hazard_height_m: 0.075}}
-"""
 
 
-@pytest.fixture(scope="module")
-def grid(tmp_path_factory) -> str:
-    folder = tmp_path_factory.mktemp("inputs")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    path = folder / "grid.yaml"
-    path.write_text(GRID.format(scene=folder / "scene", camera=folder / "camera.yaml", frames=11))
-    return str(path)
+@pytest.fixture
+def grid(toy_dataset) -> str:
+    return str(toy_dataset.root.parent / "grid.yaml")
 
 
-@pytest.fixture(scope="module")
-def dataset(grid, tmp_path_factory) -> Layout:
-    return generate(grid, str(tmp_path_factory.mktemp("data") / "toy"), runner="threads", workers=2).layout
+@pytest.fixture
+def dataset(toy_dataset) -> Layout:
+    return toy_dataset
 
 
 @pytest.fixture

@@ -6,13 +6,12 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from catalogs.scenes import write_scene
 from flows.judging.evaluation import NOT_RUN, evaluate
 from flows.judging.physics import clip_columns, clip_facts
 from flows.making.clip import catalogue_of
 from flows.making.generate import generate
-from tests.flows.test_trajectories import tum_lines
-from tests.toy_street import TOY_CAMERA, toy_street
+from tests.flows.judging.test_trajectories import tum_lines
+from tests.toy_street import write_toy_grid
 
 GRID = """
 name: judged
@@ -34,10 +33,7 @@ axes:
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("judged")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    (folder / "grid.yaml").write_text(GRID.format(folder=folder))
-    generate(str(folder / "grid.yaml"), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    generate(write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu")
     write_true_trajectories(folder / "made", folder / "told" / "truth")
     evaluate(str(folder / "made"), out=str(folder / "out"), trajectories=str(folder / "told"), metric=True)
     return folder / "out"

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from catalogs.scenes import write_scene
 from flows.cli import app
 from flows.drawing import as_svg
 from flows.judging import controls as judging_controls
@@ -32,7 +31,7 @@ from flows.making.plan import read_plan
 from tasks.errors import InputError
 from tasks.eval.negative_controls import Claim
 from tasks.eval.poses.motion import RecoveredMotion
-from tests.toy_street import TOY_CAMERA, toy_street
+from tests.toy_street import write_toy_grid
 
 GRID = """
 name: controls
@@ -53,10 +52,7 @@ axes:
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("controls")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    (folder / "grid.yaml").write_text(GRID.format(folder=folder))
-    generate(str(folder / "grid.yaml"), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    generate(write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu")
     return folder / "made"
 
 

@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from catalogs.effects import load_effects
-from catalogs.scenes import write_scene
 from flows.auditing.dataset_diff import diff
 from flows.making.generate import generate
 from tasks.identification.decision.answer import NamedEffect
-from tests.flows.findings import found_effect, found_form, grown_file
-from tests.toy_street import TOY_CAMERA, toy_street
+from tests.flows.measured.findings import found_effect, found_form, grown_file
+from tests.toy_street import write_toy_grid
 
 GRID = """
 name: toy
@@ -60,9 +59,7 @@ def made_with(folder: Path, name: str, effect: NamedEffect) -> str:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("grown")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    (folder / "grid.yaml").write_text(GRID.format(folder=folder))
+    write_toy_grid(folder, GRID)
     return folder
 
 

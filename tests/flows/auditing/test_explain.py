@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.vehicles import load_vehicle
-from flows.auditing.explain import as_text, explain
+from flows.auditing.explain import explain, format_text
 from flows.making.generate import generate
 from flows.store.layout import Layout
 from flows.store.telemetry import write_parquet
@@ -73,7 +73,7 @@ def test_the_report_is_json_and_text_with_equation_numbers(toy_dataset, tmp_path
     result = explain(str(toy_dataset.root), "snow-3/hump", 5, out=str(tmp_path))
     assert json.loads((tmp_path / "explain.json").read_text()) == result
     text = (tmp_path / "explain.txt").read_text()
-    assert text == as_text(result)
+    assert text == format_text(result)
     assert "snow coverage  [Eq. 3, S23]" in text and text.endswith("all stored numbers follow\n")
 
 

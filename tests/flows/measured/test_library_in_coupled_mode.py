@@ -26,7 +26,7 @@ from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.effects.table import parameter_vector
 from tasks.vehicle.rollout import Controls, rollout
-from tests.flows.findings import found_effect, found_form, grown_file, verdict_of
+from tests.flows.measured.findings import found_effect, found_form, grown_file, verdict_of
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 TIME = np.arange(300) * 0.01

@@ -10,12 +10,11 @@ import pytest
 import flows.auditing.audit
 import manifests.explain
 from catalogs.scenes import load_scene, write_scene
-from flows.auditing.audit import as_text, audit
+from flows.auditing.audit import audit, format_text
 from flows.making.generate import generate
 from flows.store.layout import Layout
 from tasks.errors import InputError
-from tests.flows.test_pipeline import GRID
-from tests.toy_street import TOY_CAMERA, toy_street
+from tests.toy_street import TOY_CAMERA, toy_street, write_toy_grid
 
 
 @pytest.fixture
@@ -27,11 +26,8 @@ def copy(toy_dataset, tmp_path) -> Layout:
 @pytest.fixture
 def own(tmp_path) -> Layout:
     """A dataset whose scene and camera are this test's own."""
-    write_scene(toy_street(), tmp_path / "scene", {})
-    (tmp_path / "camera.yaml").write_text(TOY_CAMERA)
-    grid = GRID.format(scene=tmp_path / "scene", camera=tmp_path / "camera.yaml", frames=2)
-    (tmp_path / "grid.yaml").write_text(grid)
-    return generate(str(tmp_path / "grid.yaml"), str(tmp_path / "data"), runner="threads", workers=1).layout
+    grid = write_toy_grid(tmp_path, frames=2)
+    return generate(grid, str(tmp_path / "data"), runner="threads", workers=1).layout
 
 
 def audited(layout: Layout, **options) -> dict:
@@ -46,7 +42,7 @@ def test_a_changed_catalogue_value_is_named_with_both_values_and_as_the_reason(c
     (mismatch,) = result["mismatches"]
     assert (mismatch["stage"], mismatch["why"]) == ("vehicle", ["vehicle.yaml"])
     text = (tmp_path / "told" / "audit.txt").read_text()
-    assert text == as_text(result) and "can come from: vehicle.yaml" in text
+    assert text == format_text(result) and "can come from: vehicle.yaml" in text
     assert f"tick {mismatch['tick']}: {mismatch['recorded']!r} recorded, {mismatch['remade']!r}" in text
 
 

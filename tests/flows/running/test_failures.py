@@ -15,7 +15,7 @@ from flows.running.failures import ClipsFailed, explain_end, keep_traceback
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
-from tests.flows.commands import run_command
+from tests.flows.shell import run_command
 
 
 @pytest.fixture

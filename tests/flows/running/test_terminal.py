@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from flows.commands.console import show
+from flows.printing import print_json, print_result
 from flows.running.progress import progress_bar
 from flows.running.terminal import open_console, visible, visible_lines
 
@@ -16,7 +16,7 @@ HOSTILE = [
 
 @pytest.mark.parametrize("label", HOSTILE)
 def test_a_label_is_printed_as_it_is_with_its_control_characters_written_out(capsys, label):
-    show({"clips": [{"label": label}], "first": label, "all": [label]}, as_json=False)
+    print_result({"clips": [{"label": label}], "first": label, "all": [label]})
     printed = capsys.readouterr().out
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202e\ud800]", printed)
     lines = printed.splitlines()
@@ -39,7 +39,7 @@ def test_a_label_in_the_progress_is_text(capsys, monkeypatch, label, on_terminal
 
 
 def test_json_is_plain_ascii(capsys):
-    show({"label": "".join(HOSTILE)}, as_json=True)
+    print_json({"label": "".join(HOSTILE)})
     assert capsys.readouterr().out.isascii()
 
 

@@ -9,13 +9,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from catalogs.scenes import write_scene
 from flows.judging.physics import audit_physics, clip_columns, clip_facts, read_constants
 from flows.making.generate import generate
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.physics.audit import audit_clip
-from tests.toy_street import TOY_CAMERA, toy_street
+from tests.toy_street import write_toy_grid
 
 GRID = """
 name: laws
@@ -39,10 +38,7 @@ TRIALS = 300
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("laws")
-    write_scene(toy_street(), folder / "scene", {})
-    (folder / "camera.yaml").write_text(TOY_CAMERA)
-    (folder / "grid.yaml").write_text(GRID.format(folder=folder))
-    generate(str(folder / "grid.yaml"), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    generate(write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu")
     return folder / "made"
 
 

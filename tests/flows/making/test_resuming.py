@@ -59,6 +59,25 @@ def test_a_disk_that_is_full_before_there_is_a_plan_can_be_freed_and_the_run_goe
     assert files_of(folder) == whole
 
 
+def test_what_a_run_left_that_stopped_after_its_manifest_goes_with_the_next_run_unless_one_is_at_work(
+    grid, whole, tmp_path, monkeypatch
+):
+    def refuse(*args: object, **kwargs: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("flows.making.seal.publish", refuse)
+    with pytest.raises(OSError, match="No space"):
+        make(grid, tmp_path / "data")
+    monkeypatch.undo()
+    stopped = files_of(tmp_path / "data")
+    assert stopped.keys() > whole.keys()
+    with sole_writer(Layout(tmp_path / "data")):
+        make(grid, tmp_path / "data")
+        assert files_of(tmp_path / "data") == stopped
+    make(grid, tmp_path / "data")
+    assert files_of(tmp_path / "data") == whole
+
+
 def test_a_run_that_was_begun_can_be_begun_anew_with_another_grid(grid, tmp_path, monkeypatch):
     """Before there is a plan nothing binds the folder to a grid."""
     other = tmp_path / "other.yaml"

@@ -8,7 +8,7 @@ import yaml
 
 from catalogs.scenes import write_scene
 from catalogs.vehicles import FOLDER
-from flows.auditing.dataset_diff import as_text, diff
+from flows.auditing.dataset_diff import diff, format_text
 from flows.making.generate import generate
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
@@ -101,7 +101,7 @@ def test_another_seed_changes_the_picture_and_no_label(datasets: dict[str, str])
 
 
 def test_the_text_says_which_label_moved_how_far_and_why(datasets: dict[str, str]) -> None:
-    text = as_text(diff(datasets["a"], datasets["weak"]))
+    text = format_text(diff(datasets["a"], datasets["weak"]))
     assert "vehicle.yaml brake_gain.value: 1000 -> 800" in text
     assert "can come from: vehicle.yaml" in text and "stopping_distance_change_m: +" in text
 

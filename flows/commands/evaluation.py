@@ -1,0 +1,95 @@
+"""Commands that judge pixels."""
+
+from typing import Any
+
+from flows.commands.command import CAMERA, DATASET, OUT, Command, argument, option, require
+
+GROUP = "Evaluation"
+EVALUATION_COLUMNS = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
+
+
+def shorten_evaluation(result: dict[str, Any]) -> dict[str, Any]:
+    """Return an evaluation without the rows of single windows, and the main columns of the others."""
+    rows = [{key: row[key] for key in EVALUATION_COLUMNS} for row in result["rows"] if not row["window"]]
+    return result | {"rows": rows}
+
+
+def leave_out_roc(result: dict[str, Any]) -> dict[str, Any]:
+    """Return the negative controls without the points of their ROC curves."""
+    rows = [{key: value for key, value in row.items() if key != "roc"} for row in result["rows"]]
+    return result | {"rows": rows}
+
+
+COMMANDS = (
+    Command(
+        name="evaluate",
+        group=GROUP,
+        sentence="Judge a dataset from its pixels: poses, motion, road edits and weather, beside the paper's figures.",
+        function="flows.judging.evaluation:evaluate",
+        options=(
+            DATASET,
+            option("out", str, "Folder for evaluation.json, .parquet and .html."),
+            option(
+                "trajectories",
+                str | None,
+                "Folder with METHOD/CLIP_ID.txt (TUM format), trajectories to score as well.",
+                None,
+            ),
+            option("metric", bool, "The lengths of the trajectories are in metres.", False),
+            option(
+                "learned",
+                str | None,
+                "YAML file of local checkpoints of learned judges (CLIP, DOVER, FAST-VQA, LPIPS).",
+                None,
+            ),
+            option(
+                "crf",
+                int | None,
+                "Encode with H.264 at this constant rate factor first, and judge the decoded frames.",
+                None,
+                minimum=0,
+                maximum=51,
+            ),
+        ),
+        brief=shorten_evaluation,
+    ),
+    Command(
+        name="controls",
+        group=GROUP,
+        sentence="Desynchronise a dataset's claims in seven ways, and say which metric detects which fault.",
+        function="flows.judging.controls:controls",
+        options=(DATASET, OUT),
+        brief=leave_out_roc,
+        passed=require("all_detected"),
+    ),
+    Command(
+        name="judge",
+        group=GROUP,
+        sentence="Judge the motion of any video against the telemetry claimed for it, from pixels and intrinsics"
+        " alone.",
+        function="flows.judging.foreign:judge",
+        options=(
+            argument("video", str, "Any video file, or a trajectory (TUM format, .txt or .tum)."),
+            option("claim", str, "Telemetry Parquet with t_ns or time, pitch and station."),
+            CAMERA,
+            option("metric", bool, "The lengths of the trajectory are in metres.", False),
+            OUT,
+        ),
+        passed=require("passed"),
+    ),
+    Command(
+        name="retention",
+        group=GROUP,
+        sentence="Measure how much of a road event's pitch a video editor kept (the paper's source-motion retention).",
+        function="flows.judging.foreign:retention",
+        options=(
+            argument("source", str, "Input of the editor: the drive over the road feature."),
+            argument("source_braking", str, "Input of the editor: the same drive braking on the flat road."),
+            argument("edited", str, "Output of the editor for the first."),
+            argument("edited_braking", str, "Output of the editor for the second."),
+            CAMERA,
+            option("event", tuple[int, int], "First and last frame of the event.", (16, 42)),
+            OUT,
+        ),
+    ),
+)

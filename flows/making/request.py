@@ -1,0 +1,65 @@
+"""A request for a dataset: of a grid, or of a frozen run that is made again."""
+
+from typing import Any
+
+from flows.making.freezing import reproduce
+from flows.making.generate import RunReport, generate
+from tasks.errors import InputError
+
+
+def make_dataset(
+    grid: str | None,
+    out: str,
+    *,
+    manifest: str | None = None,
+    vehicle: str | None = None,
+    pictures: bool = True,
+    **execution: Any,
+) -> dict[str, Any]:
+    """Make the dataset of a grid, or that of a frozen run again.
+
+    Parameters
+    ----------
+    grid : grid file or name; None with a ``manifest``
+    out : dataset folder, or its address in an object store
+    manifest : name or file of a frozen run, in place of a grid
+    vehicle, pictures : as of `flows.making.generate.generate`; a frozen run has its own
+    execution : ``runner``, ``workers``, ``scheduler`` and ``backend`` of `flows.making.generate.generate`
+
+    Returns
+    -------
+    ``run_id``, ``clips``, ``made``, ``quarantined`` (reasons by label), ``dataset``, ``manifest`` and
+    ``contact_sheet``; of a frozen run also ``reproduced`` and ``telemetry_differs`` (labels)
+
+    Raises
+    ------
+    InputError
+        For neither or both of grid and manifest, and as `generate` and `reproduce` raise it.
+    """
+    if grid is not None and manifest is None:
+        return _list_facts(generate(grid, out, vehicle=vehicle, pictures=pictures, **execution))
+    if manifest is None or grid is not None:
+        raise InputError("generate needs either a GRID or --manifest NAME, and not both")
+    if vehicle is not None or not pictures:
+        raise InputError(
+            "--manifest sets the vehicle and whether frames are rendered: leave out --vehicle and --no-frames"
+        )
+    report, differing = reproduce(manifest, out, **execution)
+    return _list_facts(report) | {
+        "reproduced": report.clips - len(differing),
+        "telemetry_differs": differing,
+    }
+
+
+def _list_facts(report: RunReport) -> dict[str, Any]:
+    layout = report.layout
+    sheet = layout.previews / "contact_sheet.png"
+    return {
+        "run_id": report.run_id,
+        "clips": report.clips,
+        "made": report.made,
+        "quarantined": report.quarantined,
+        "dataset": str(layout),
+        "manifest": str(layout.manifest),
+        "contact_sheet": str(sheet) if sheet.is_file() else None,
+    }

@@ -1,0 +1,171 @@
+"""The parser of ``musync``, built from the registry, and the call of a command's function."""
+
+import os
+import sys
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from inspect import Parameter, Signature
+from typing import Annotated, Any
+
+import typer
+
+from flows.commands.command import REQUIRED, Command, Option
+from flows.printing import print_json, print_result
+from flows.registry import COMMANDS, flow_name, import_function
+from flows.running.failures import CHECK_FAILED
+from flows.running.terminal import say
+from tasks.errors import InputError
+
+SUBCOMMANDS = {"scene": "Build a scene from recordings or from other tools."}
+"""Help of the words that stand before the names of several commands."""
+AS_JSON = Option(name="json", kind=bool, help="Print the whole result as JSON.", default=False)
+AS_FLOW = Option(
+    name="prefect", kind=bool, help="Run as a Prefect flow; implied by PREFECT_API_URL.", default=False
+)
+
+
+def build_parser() -> typer.Typer:
+    """Return the Typer application with every command of the registry, below the heading of its group."""
+    app = typer.Typer(
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        help="Make driving video whose weather, grip, motion and camera agree; audit it, judge it, and learn from"
+        " measured drives.",
+    )
+    app.callback()(_main)
+    words: dict[str, typer.Typer] = {}
+    for command in COMMANDS:
+        word, _, name = command.name.rpartition(" ")
+        if word and word not in words:
+            words[word] = typer.Typer(no_args_is_help=True, help=SUBCOMMANDS[word])
+            app.add_typer(words[word], name=word, rich_help_panel=command.group)
+        parent = words.get(word, app)
+        parent.command(name, help=command.sentence, rich_help_panel=command.group if not word else None)(
+            _make_callback(command)
+        )
+    return app
+
+
+def run_function(command: Command, given: Mapping[str, Any], as_flow: bool) -> Any:
+    """Run the function of a command, as a Prefect flow where this is wanted.
+
+    Parameters
+    ----------
+    command : which
+    given : value of each of its options, by their names
+    as_flow : whether to run as a Prefect flow
+
+    Raises
+    ------
+    InputError
+        If an option that must be a folder is an address in an object store.
+    """
+    _refuse_addresses(command, given)
+    if command.one_thread:
+        # many small linear systems: the threads of a BLAS spend more time waiting for each other than computing
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if as_flow and command.is_flow:
+        from flows import prefect_flows
+
+        function: Callable[..., Any] = getattr(prefect_flows, flow_name(command))
+    else:
+        function = import_function(command)
+    try:
+        return function(**given)
+    except (EOFError, BrokenPipeError) as error:
+        # Typer takes these for the end of its own streams, and ends with the code of a failed check
+        raise RuntimeError(f"{type(error).__name__}: {error}") from error
+
+
+def _refuse_addresses(command: Command, given: Mapping[str, Any]) -> None:
+    problems = [
+        f"{'' if option.positional else f'--{option.keyword} '}{given[option.name]}: must be a folder or file of this"
+        " machine; only datasets may lie in an object store"
+        for option in command.options
+        if not option.in_store and str(given[option.name]).startswith("s3://")
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def _print_version(wanted: bool) -> None:
+    if not wanted:
+        return
+    # imported here: it is not needed by --help
+    from manifests.provenance import git_commit
+
+    checkout = git_commit()
+    changed = ", changed since" if checkout and checkout["changed"] else ""
+    commit = f" (commit {checkout['commit'][:12]}{changed})" if checkout else ""
+    say(f"musync {version('musync')}{commit}")
+    raise typer.Exit
+
+
+def _main(
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_print_version, help="Print the version, and the git commit."
+        ),
+    ] = False,
+) -> None:
+    """Take the options that stand before the name of a command."""
+
+
+def _make_callback(command: Command) -> Callable[..., None]:
+    """Return the function that Typer calls, whose signature carries the command's options."""
+
+    def callback(**words: Any) -> None:
+        given = {option.name: words[option.keyword] for option in command.options}
+        as_flow = words.get(AS_FLOW.keyword, False) or "PREFECT_API_URL" in os.environ
+        result = run_function(command, given, as_flow)
+        as_json = words.get(AS_JSON.keyword, False) or given.get(command.json_with, False)
+        _print_as_asked(command, result, as_json)
+        if not command.passed(result):
+            raise typer.Exit(CHECK_FAILED)
+
+    options = [
+        *command.options,
+        *([AS_FLOW] if command.is_flow else []),
+        *([AS_JSON] if command.output != "nothing" else []),
+    ]
+    parameters = [_make_parameter(option) for option in options]
+    callback.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    callback.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    return callback
+
+
+def _make_parameter(option: Option) -> Parameter:
+    details: dict[str, Any] = {"help": option.help, "min": option.minimum, "max": option.maximum}
+    if option.known:
+        details["autocompletion"] = lambda incomplete: _complete(option, incomplete)
+    if option.positional:
+        declared = typer.Argument(**details)
+    elif option.kind is bool and option.default is False:
+        declared = typer.Option(f"--{option.keyword.replace('_', '-')}", **details)
+    else:
+        declared = typer.Option(**details)
+    default = Parameter.empty if option.default is REQUIRED else option.default
+    kind: Any = Annotated[option.kind, declared]
+    return Parameter(option.keyword, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+
+
+def _complete(option: Option, incomplete: str) -> list[str]:
+    """Return the known values of an option that begin with the text typed so far."""
+    from manifests.provenance import SOURCE_ROOT
+
+    known = option.known
+    values = sorted(path.stem for path in SOURCE_ROOT.glob(known)) if isinstance(known, str) else known
+    return [value for value in values if value.startswith(incomplete)]
+
+
+def _print_as_asked(command: Command, result: Any, as_json: bool) -> None:
+    if command.output == "nothing":
+        return
+    if as_json:
+        print_json(result)
+    elif command.output == "sentences":
+        module = sys.modules[import_function(command).__module__]
+        say(module.format_text(result).removesuffix("\n"))
+    else:
+        print_result(command.brief(result))

@@ -1,0 +1,41 @@
+"""Results of commands as text for people: a line for each value, a table for each list of rows."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from flows.running.terminal import open_console, say, visible
+
+
+def print_json(value: dict[str, Any]) -> None:
+    """Print a result as JSON."""
+    say(json.dumps(value, indent=1))
+
+
+def print_result(value: dict[str, Any]) -> None:
+    """Print a result: a line for each value, a table where the value is a list of rows."""
+    for key, entry in value.items():
+        if isinstance(entry, list) and entry and isinstance(entry[0], dict):
+            _print_table(key, entry)
+        else:
+            say(f"{key}: {_format_value(entry)}")
+
+
+def _print_table(title: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    # its import takes longer than many a command
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for column in rows[0]:
+        table.add_column(visible(column), overflow="fold")
+    for row in rows:
+        table.add_row(*(_format_value(row.get(column)) for column in rows[0]))
+    open_console().print(table)
+
+
+def _format_value(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    if isinstance(value, list):
+        return ", ".join(_format_value(item) for item in value)
+    return "-" if value is None else visible(str(value))

@@ -1,0 +1,29 @@
+"""Every command, registered once: the parser, the Prefect flows and the functions behind them are derived from here."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+from flows.commands import audits, datasets, evaluation, measured, scenes, studies
+from flows.commands.command import Command
+
+COMMANDS: tuple[Command, ...] = (
+    *datasets.COMMANDS,
+    *audits.COMMANDS,
+    *evaluation.COMMANDS,
+    *measured.COMMANDS,
+    *scenes.COMMANDS,
+    *studies.COMMANDS,
+)
+
+
+def import_function(command: Command) -> Callable[..., Any]:
+    """Return the function of a command; its module, and the libraries it needs, are imported now."""
+    module, _, name = command.function.partition(":")
+    function: Callable[..., Any] = getattr(import_module(module), name)
+    return function
+
+
+def flow_name(command: Command) -> str:
+    """Return the name of a command's Prefect flow in `flows.prefect_flows`."""
+    return command.name.replace(" ", "_").replace("-", "_")

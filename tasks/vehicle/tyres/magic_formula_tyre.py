@@ -1,0 +1,123 @@
+"""The Magic Formula as the vehicle takes it: pure longitudinal slip on one surface, for the two tyres of an axle."""
+
+from math import atan, cos, inf, pi, tan
+from typing import NamedTuple
+
+from numba import njit
+
+from tasks.vehicle.tyres.magic_formula import (
+    Longitudinal,
+    MagicFormula,
+    bend_slip,
+    longitudinal_curvature,
+    longitudinal_friction,
+    longitudinal_peak,
+    longitudinal_stiffness,
+    relative_load,
+)
+
+MOST_LOAD_CHANGE = 2.0
+"""df_z from which friction over load stays as it is: no tyre is measured at over three times its nominal load [1]."""
+
+
+class MagicFormulaTyre(NamedTuple):
+    """The longitudinal curve of an axle's tyres on one surface.
+
+    Parameters
+    ----------
+    nominal_load : of both tyres of an axle [N]
+    longitudinal : coefficients, scaled to the surface and without shifts
+    peak : friction at the top of the curve under the nominal load, mu_eff [1]
+    target_slip : braking slip there, kappa* [1]
+    """
+
+    nominal_load: float
+    longitudinal: Longitudinal
+    peak: float
+    target_slip: float
+
+
+def scale_magic_formula(tyre: MagicFormula, peak: float, slip_stiffness: float) -> MagicFormulaTyre:
+    """Scale a tyre to its peak and stiffness on a surface, by the formula's own factors.
+
+    LMUX becomes peak / PDX1, so that the friction under the nominal load peaks at ``peak``; LKX becomes
+    ``slip_stiffness``. The slip at the peak follows: it falls with the friction, since the stiffness does not.
+    Shifts are left out: a wheel that rolls freely has no tyre force here, rolling resistance is an effect of its own.
+
+    Parameters
+    ----------
+    tyre : the file's
+    peak : mu_eff [1]
+    slip_stiffness : beta [1]
+    """
+    c = tyre.longitudinal
+    scaled = c._replace(
+        pdx1=peak,
+        pdx2=c.pdx2 * peak / c.pdx1,
+        pkx1=c.pkx1 * slip_stiffness,
+        pkx2=c.pkx2 * slip_stiffness,
+        phx1=0.0,
+        phx2=0.0,
+        pvx1=0.0,
+        pvx2=0.0,
+    )
+    target_slip = find_peak_slip(scaled)
+    return MagicFormulaTyre(
+        nominal_load=2.0 * tyre.nominal_load,
+        longitudinal=scaled,
+        peak=-longitudinal_friction(-target_slip, 0.0, 0.0, scaled),
+        target_slip=target_slip,
+    )
+
+
+def find_peak_slip(c: Longitudinal) -> float:
+    """Return the braking slip at which friction peaks under the nominal load, by bisection; at most 1 [1].
+
+    Parameters
+    ----------
+    c : coefficients without shifts
+    """
+    stiffness = c.pkx1 / (c.pcx1 * c.pdx1)
+    curvature = longitudinal_curvature(0.0, -1.0, c)
+    top = tan(0.5 * pi / c.pcx1) if c.pcx1 > 1.0 else inf
+    low, high = 0.0, 1.0
+    if bend_slip(stiffness, curvature) <= top:
+        return high
+    while (middle := 0.5 * (low + high)) not in (low, high):
+        low, high = (middle, high) if bend_slip(stiffness * middle, curvature) < top else (low, middle)
+    return middle
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def magic_formula_friction(braking_slip: float, load: float, tyre: MagicFormulaTyre) -> float:
+    """Return braking force over load [1] (Pacejka 2012, 4.E9).
+
+    Parameters
+    ----------
+    braking_slip : kappa, 0 or more; the book's is its negative [1]
+    load : of the axle [N]
+    tyre : on the surface
+    """
+    load_change = min(relative_load(load, tyre.nominal_load), MOST_LOAD_CHANGE)
+    return -longitudinal_friction(-braking_slip, load_change, 0.0, tyre.longitudinal)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def magic_formula_slope(braking_slip: float, load: float, tyre: MagicFormulaTyre) -> float:
+    """Return the derivative of ``magic_formula_friction`` by slip [1].
+
+    Parameters
+    ----------
+    braking_slip : kappa, 0 or more [1]
+    load : of the axle [N]
+    tyre : on the surface
+    """
+    c = tyre.longitudinal
+    load_change = min(relative_load(load, tyre.nominal_load), MOST_LOAD_CHANGE)
+    peak = longitudinal_peak(load_change, 0.0, c)
+    stiffness = longitudinal_stiffness(load_change, c) / (c.pcx1 * peak)
+    curvature = min(longitudinal_curvature(load_change, -1.0, c), 1.0)
+    scaled = stiffness * braking_slip
+    bent = bend_slip(scaled, curvature)
+    bending = stiffness * (1.0 - curvature + curvature / (1.0 + scaled * scaled))
+    return peak * cos(c.pcx1 * atan(bent)) * c.pcx1 / (1.0 + bent * bent) * bending

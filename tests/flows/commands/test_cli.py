@@ -1,0 +1,76 @@
+"""Commands as a user types them: their exit codes, and what stands on the terminal."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from tests.flows.shell import run_command
+
+
+@pytest.fixture
+def musync(tmp_path, monkeypatch, capsys):
+    """Run a command in the test's folder; returns its exit code, output and errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> SimpleNamespace:
+        code = run_command(monkeypatch, *words)
+        return SimpleNamespace(code=code, **capsys.readouterr()._asdict())
+
+    return run
+
+
+def test_validate_counts_clips_and_frames(musync):
+    done = musync("validate", "demo", "--json")
+    assert done.code == 0, done.err
+    facts = json.loads(done.out)
+    assert (facts["clips"], facts["frames"]) == (15, 15 * 81)
+
+
+@pytest.mark.parametrize(
+    ("grid", "sentence"),
+    [
+        ("{name: t, colour: red, axes: {a: {b: {}}}}", "colour: unknown key"),
+        (
+            "{name: t, axes: {a: {b: {weather: rain, precipitation_mm_h: -1}}}}",
+            "must not be negative; it is -1",
+        ),
+        ("{name: t, axes: {a: {b: {weather: snow, precipitation_mm_h: 1}}}}", "needs an accumulation time"),
+        (
+            "{name: t, axes: {a: {b: {hazard_center_m: 50, hazard_length_m: 900, hazard_height_m: 0.1}}}}",
+            "must lie on the route of scene street",
+        ),
+        ("{name: t, scene: nowhere, axes: {a: {b: {}}}}", "nowhere"),
+        ("{name: t, vehicle: tractor, axes: {a: {b: {}}}}", "tractor: no such"),
+    ],
+)
+def test_a_faulty_grid_is_one_clear_sentence_exit_code_2_and_no_traceback(musync, tmp_path, grid, sentence):
+    (tmp_path / "grid.yaml").write_text(grid)
+    done = musync("generate", "grid.yaml", "--out", "data")
+    assert done.code == 2
+    assert sentence in done.err
+    assert "Traceback" not in done.err
+    assert not (tmp_path / "data").exists()
+
+
+def test_a_folder_with_other_files_is_left_alone(musync, tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "thesis.tex").write_text("precious")
+    done = musync("generate", "demo", "--out", "data")
+    assert done.code == 2
+    assert "must be an empty or new folder" in done.err
+    assert [p.name for p in (tmp_path / "data").iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("command", ["audit", "describe"])
+def test_a_folder_that_is_no_dataset_is_refused(musync, tmp_path, command):
+    done = musync(command, str(tmp_path))
+    assert done.code == 2
+    assert "manifest.json: no such file" in done.err
+
+
+def test_a_manifest_of_another_version_is_refused(musync, tmp_path):
+    (tmp_path / "manifest.json").write_text('{"format": "musync-manifest/9"}')
+    done = musync("audit", str(tmp_path))
+    assert done.code == 2
+    assert "musync-manifest/9" in done.err
