@@ -13,9 +13,9 @@ from catalogs.entries import find_entry
 from catalogs.names import Name
 from catalogs.quantities import CatalogueEntry, Scalar, Table, parse_entry, require_quantity
 from catalogs.tyres import load_tyre, tyre_source
-from catalogs.vehicles.added import FormEntry, effect_problems, library_units
+from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.parameters import TyreFamily, Vehicle
 
 FOLDER = Path(__file__).parent
@@ -116,7 +116,8 @@ class VehicleEntry(CatalogueEntry):
         problems += [
             f"provenance.bounds: unit of {group} must be {units[group]}; it is {limits.unit}"
             for group, limits in bounds.items()
-            if group in units and limits.unit not in (units[group], library_units().get(group))
+            if group in units
+            and limits.unit not in {units[group], *(PARAMETERS[g].unit for g in (group,) if g in PARAMETERS)}
         ]
         if problems:
             raise ValueError("; ".join(problems))

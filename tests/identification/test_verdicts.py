@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_truths
@@ -11,13 +10,12 @@ from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.planned_runs import RICH, Drive, planned_run
-from tasks.errors import InputError
 from tasks.identification.benchmark import synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import attribute
 from tasks.identification.inference.forward import predict, run_model
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.effects.library import parameter_vector
+from tasks.vehicle.effects.table import parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
@@ -134,6 +132,9 @@ class TestACarThatIsGrown:
     def test_it_lacks_nothing_of_what_it_has(self) -> None:
         assert judged({"lag": 0.08, "drag_area": 0.7}, vehicle=self.GROWN).verdict == "NOTHING"
 
-    def test_what_only_coupled_mode_knows_is_refused(self) -> None:
-        with pytest.raises(InputError, match=r"effects that only coupled mode knows .*abs_cutoff"):
-            run_model(planned_run(RICH[4], "pulsed"), load_vehicle("multibody-grown"), SURFACE)
+    def test_a_calibrated_vehicle_is_judged_with_all_that_calibration_gave_it(self) -> None:
+        grown = load_vehicle("multibody-grown")
+        assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
+        campaign = synthetic_campaign(grown, SURFACE, {"lag": 0.08}, 31)
+        verdict = attribute(campaign, grown, SURFACE, load_effects()).verdict
+        assert names(verdict) == ["brake_lag"]
