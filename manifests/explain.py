@@ -5,11 +5,13 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from catalogs.documents import parse_yaml_value
+from catalogs.tyres import tyre_entries
 from manifests.provenance import code_version, describe_processor, library_versions
 
 VEHICLE, RENDER, JUDGING = "vehicle", "render", "judging"
 REACHES = {
     "vehicle.yaml": (VEHICLE, RENDER),
+    "tyre": (VEHICLE, RENDER),
     "surface.yaml": (VEHICLE, RENDER),
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
@@ -52,12 +54,12 @@ def input_differences(
     rows: list[dict[str, Any]] = []
     for name in sorted(a["inputs"].keys() | b["inputs"].keys()):
         if a["inputs"].get(name) != b["inputs"].get(name):
-            key = "weather" if PurePosixPath(name).parts[0] == "weather" else name
+            key = kind_of_input(name)
             known = all(
                 name in files or name not in m["inputs"] for m, files in ((a, inputs_a), (b, inputs_b))
             )
             rows += (
-                _list_rows(name, key, _parse_content(inputs_a.get(name)), _parse_content(inputs_b.get(name)))
+                _list_rows(name, key, *(parse_input(name, files.get(name)) for files in (inputs_a, inputs_b)))
                 if known
                 else _list_rows(name, key, a["inputs"].get(name, ABSENT), b["inputs"].get(name, ABSENT))
             )
@@ -156,5 +158,34 @@ def _list_rows(name: str, key: str, a: Any, b: Any) -> list[dict[str, Any]]:
     ]
 
 
-def _parse_content(content: bytes | None) -> Any:
-    return ABSENT if content is None else parse_yaml_value(content, "a recorded input", "catalogue entry")
+def kind_of_input(name: str) -> str:
+    """The key of `REACHES` for a file under ``inputs/``.
+
+    Parameters
+    ----------
+    name : path below ``inputs/``
+    """
+    path = PurePosixPath(name)
+    if path.suffix == ".tir":
+        return "tyre"
+    return "weather" if path.parts[0] == "weather" else name
+
+
+def parse_input(name: str, content: bytes | None) -> Any:
+    """The values of a file under ``inputs/``; `ABSENT` where there is none.
+
+    Parameters
+    ----------
+    name : path below ``inputs/``
+    content : of the file
+
+    Raises
+    ------
+    InputError
+        If it is no YAML.
+    """
+    if content is None:
+        return ABSENT
+    if kind_of_input(name) == "tyre":
+        return tyre_entries(content)
+    return parse_yaml_value(content, name, "catalogue entry")

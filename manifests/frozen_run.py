@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.documents import read_json_document
-from manifests.explain import REACHES, VEHICLE, format_value, value_differences
+from manifests.explain import REACHES, VEHICLE, format_value, kind_of_input, value_differences
 from manifests.manifest import seal_of
 from manifests.records import FrozenRun, check_record
 from tasks.errors import InputError
@@ -86,7 +86,7 @@ def parameters_that_matter(inputs: Mapping[str, Any], pictures: bool) -> dict[st
     return {
         name: _keep_deciding(entry)
         for name, entry in inputs.items()
-        if pictures or VEHICLE in REACHES.get(name, ())
+        if pictures or VEHICLE in REACHES.get(kind_of_input(name), ())
     }
 
 

@@ -27,7 +27,7 @@ def source_hashes() -> dict[str, str]:
         path.relative_to(SOURCE_ROOT).as_posix(): sha256_of_file(path)
         for package in SOURCE_PACKAGES
         for path in sorted((SOURCE_ROOT / package).rglob("*"))
-        if path.suffix in {".py", ".yaml"} and "__pycache__" not in path.parts
+        if path.suffix in {".py", ".yaml", ".tir"} and "__pycache__" not in path.parts
     }
 
 

@@ -133,6 +133,9 @@ def force_steps(
     steps, forces = [], []
     speed, radius = float(row["speed"]), vehicle.wheel_radius
     standing = speed <= 0
+    law = f"mu_B({response.slip_stiffness:.4g} * {{kappa:.4g}})"
+    if vehicle.tyre is not None:
+        law = "mu_MF({kappa:.4g}, {load:.6g})"
     for axle, name in (("f", "front"), ("r", "rear")):
         omega, load = float(row[f"wheel_speed_{axle}"]), float(row[f"tyre_load_{axle}"])
         kappa = slip_of(speed, radius * omega, vehicle.slip_speed_floor)
@@ -144,7 +147,7 @@ def force_steps(
                  f" {vehicle.slip_speed_floor:g}), {lowest}, 1)",
                  recomputed=kappa, stored=float(row[f"braking_slip_{axle}"])),
             Step(quantity=f"{name} tyre force", symbol=f"F_x,{axle}", equation="8, S7", unit="N",
-                 formula=f"mu_B({response.slip_stiffness:.4g} * {kappa:.4g}) * F_z = {mu:.5g} * {load:.6g}",
+                 formula=f"{law.format(kappa=kappa, load=load)} * F_z = {mu:.5g} * {load:.6g}",
                  recomputed=mu * load, stored=float(row[f"tyre_force_{axle}"])),
         ]  # fmt: skip
     station = float(row["station"])

@@ -13,7 +13,7 @@ from catalogs.vehicles import vehicle_units
 from tasks.identification.calibration.residual import Phase, Response, Yardstick
 from tasks.identification.calibration.scalars import KNOT_GROUPS
 from tasks.identification.calibration.staged import Bounds, Procedure, Stage
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.effects.table import EFFECT_UNITS
 
 Count = Annotated[Scalar, require_quantity("1", minimum=1)]
 

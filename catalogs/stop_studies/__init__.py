@@ -7,9 +7,8 @@ from pydantic import Field, field_validator
 
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
-from catalogs.vehicles.added import library_units
 from tasks.studies.stop_study import Rung
-from tasks.vehicle.effects.library import PARAMETER_INDEX
+from tasks.vehicle.effects.table import PARAMETERS
 
 
 class RungEntry(CatalogueEntry):
@@ -27,19 +26,20 @@ class RungEntry(CatalogueEntry):
     def _are_parameters(
         cls, names: dict[str, Scalar] | tuple[str, ...]
     ) -> dict[str, Scalar] | tuple[str, ...]:
-        unknown = [name for name in names if name not in PARAMETER_INDEX]
+        unknown = [name for name in names if name not in PARAMETERS]
         if unknown:
-            raise ValueError(f"no port knows {', '.join(unknown)}; there are: {', '.join(PARAMETER_INDEX)}")
+            raise ValueError(
+                f"the table of effects has no {', '.join(unknown)}; there are: {', '.join(PARAMETERS)}"
+            )
         return names
 
     @field_validator("fixed")
     @classmethod
-    def _units_are_the_librarys(cls, fixed: dict[str, Scalar]) -> dict[str, Scalar]:
-        units = library_units()
+    def _units_are_those_of_the_table(cls, fixed: dict[str, Scalar]) -> dict[str, Scalar]:
         problems = [
-            f"unit of {name} must be {units[name]}; it is {entry.unit}"
+            f"unit of {name} must be {PARAMETERS[name].unit}; it is {entry.unit}"
             for name, entry in fixed.items()
-            if entry.unit != units.get(name, entry.unit)
+            if name in PARAMETERS and entry.unit != PARAMETERS[name].unit
         ]
         if problems:
             raise ValueError("; ".join(problems))

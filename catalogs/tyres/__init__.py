@@ -69,7 +69,7 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
         One sentence for each fault: no SI units, an unknown FITTYP, a value that is no number or stands twice, all
         coefficients that its version needs and that are missing, a curve without grip.
     """
-    entries, problems = _read_entries(content.decode("utf-8-sig", "replace"))
+    entries, problems = _read_lines(content)
     problems += [
         f"{unit} must be {names[0]}; it is {shorten_value(value)}"
         for unit, names in UNITS.items()
@@ -100,12 +100,22 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
     return fold_scaling(values, version)
 
 
-def _read_entries(text: str) -> tuple[dict[str, str], list[str]]:
-    """Keys and values of the known sections, and what is wrong with their lines."""
+def tyre_entries(content: bytes) -> dict[str, str]:
+    """Keys and values of the sections that are read, as text; what is no entry is left out.
+
+    Parameters
+    ----------
+    content : of a property file
+    """
+    return _read_lines(content)[0]
+
+
+def _read_lines(content: bytes) -> tuple[dict[str, str], list[str]]:
+    """Keys and values of the sections that are read, and what is wrong with their lines."""
     entries: dict[str, str] = {}
     problems: list[str] = []
     section = ""
-    for number, whole in enumerate(text.splitlines(), 1):
+    for number, whole in enumerate(content.decode("utf-8-sig", "replace").splitlines(), 1):
         line = _COMMENT.sub(r"\1", whole).strip()
         if line.startswith("["):
             section = line.strip("[]").strip().upper().replace(" ", "_")
@@ -141,6 +151,8 @@ def _shape_problems(values: Mapping[str, float], version: str) -> list[str]:
     c, problems = tyre.longitudinal, []
     if not 1.0 < c.pcx1 <= 2.0:
         problems.append(f"PCX1 LCX must be above 1 and at most 2, for a curve with a peak; it is {c.pcx1:g}")
+    if not 0.0 < tyre.lateral.pcy1 <= 2.0:
+        problems.append(f"PCY1 LCY must be above 0 and at most 2; it is {tyre.lateral.pcy1:g}")
     for load in (0.0, 1.0, 1.0 + MOST_LOAD_CHANGE):
         peak, stiffness = longitudinal_peak(load - 1.0, 0.0, c), longitudinal_stiffness(load - 1.0, c)
         if not (0 < peak < 10 and 0 < stiffness < 1e4):

@@ -10,10 +10,12 @@ from pydantic import Field, model_validator
 
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.entries import find_entry
+from catalogs.names import Name
 from catalogs.quantities import CatalogueEntry, Scalar, Table, parse_entry, require_quantity
-from catalogs.vehicles.added import FormEntry, effect_problems, library_units
+from catalogs.tyres import load_tyre
+from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.parameters import TyreFamily, Vehicle
 
 Mass = Annotated[Scalar, require_quantity("kg", above=0)]
@@ -99,6 +101,7 @@ class VehicleEntry(CatalogueEntry):
     lock_speed: Annotated[Scalar, require_quantity("rad s-1", above=0)]
     gravity: Annotated[Scalar, require_quantity("m s-2", above=0)]
     families: FamiliesEntry
+    tyre: Name | None = None
     effects: dict[str, Scalar] = Field(default_factory=dict)
     forms: tuple[FormEntry, ...] = ()
     provenance: Provenance | None = None
@@ -111,7 +114,8 @@ class VehicleEntry(CatalogueEntry):
         problems += [
             f"provenance.bounds: unit of {group} must be {units[group]}; it is {limits.unit}"
             for group, limits in bounds.items()
-            if group in units and limits.unit not in (units[group], library_units().get(group))
+            if group in units
+            and limits.unit not in {units[group], *(PARAMETERS[g].unit for g in (group,) if g in PARAMETERS)}
         ]
         if problems:
             raise ValueError("; ".join(problems))
@@ -123,6 +127,27 @@ class VehicleEntry(CatalogueEntry):
         knots = {name: getattr(self.families.dry, name).unit for name in KNOT_TABLES}
         inside = {name: "rad" if unit == "deg" else unit for name, unit in fields.items()}
         return {**inside, **knots, **EFFECT_UNITS}
+
+
+def vehicle_tyre_source(name_or_path: str | Path) -> Path | None:
+    """The property file of the tyre that a vehicle names: beside the vehicle's file, or in the catalogue.
+
+    Parameters
+    ----------
+    name_or_path : of the vehicle
+
+    Returns
+    -------
+    The file; None where the vehicle names none and drives on its families' Burckhardt curves.
+
+    Raises
+    ------
+    InputError
+        As ``load_vehicle``.
+    """
+    source = find_entry("vehicle", name_or_path)
+    name = _read_entry(source).tyre
+    return None if name is None else _find_tyre(name, source)
 
 
 def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
@@ -169,7 +194,13 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     values["static_pitch"] = radians(values["static_pitch"])
     effects = {name: number.value for name, number in entry.effects.items()}
     forms = tuple(form.form for form in entry.forms)
-    return Vehicle(name=source.stem, families=families, effects=effects, forms=forms, **values)
+    tyre = None if entry.tyre is None else load_tyre(_find_tyre(entry.tyre, source))
+    return Vehicle(name=source.stem, families=families, tyre=tyre, effects=effects, forms=forms, **values)
+
+
+def _find_tyre(name: str, vehicle: Path) -> Path:
+    beside = vehicle.with_name(f"{name}.tir")
+    return beside if beside.is_file() else find_entry("tyre", name)
 
 
 def _read_entry(source: Path) -> VehicleEntry:

@@ -111,6 +111,10 @@ def read_constants(root: Path) -> Constants:
             f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"
             f"{' with effects' if car.get('effects') else ''}, whose inner steps the stored ticks do not fix."
         )
+    if car.get("tyre"):
+        raise InputError(
+            f"{root}: the physics audit knows Burckhardt's tyre; this dataset's vehicle drives on {car['tyre']}"
+        )
     tyres = {
         family: TyreTables(**{name: tuple(table[name]["value"]) for name in TyreTables.__dataclass_fields__})
         for family, table in car["families"].items()

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from catalogs.documents import parse_yaml
 from catalogs.entries import entry_names
 from catalogs.grids import Grid, GridFile, expand_grid, load_grid
 from catalogs.surfaces import load_surface
@@ -20,7 +19,7 @@ from flows.store.layout import write_atomically
 from flows.store.outputs import refuse_link
 from flows.store.sealed import read_manifest, recorded_grid
 from flows.store.telemetry import columns_hash
-from manifests.explain import as_sentences, tool_differences, tools_here
+from manifests.explain import as_sentences, parse_input, tool_differences, tools_here
 from manifests.frozen_run import (
     FOLDER,
     differing_clips,
@@ -223,7 +222,7 @@ def _plan_clips(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
 
 
 def _read_parameters(plan: Plan, inputs: Mapping[str, bytes]) -> dict[str, Any]:
-    parsed = {name: parse_yaml(content, name, "catalogue entry") for name, content in inputs.items()}
+    parsed = {name: parse_input(name, content) for name, content in inputs.items()}
     return parameters_that_matter(parsed, plan.settings.pictures)
 
 

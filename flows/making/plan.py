@@ -15,7 +15,7 @@ from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
 from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_provenance
+from catalogs.vehicles import load_vehicle, vehicle_provenance, vehicle_tyre_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.making.memory import memory_problems
 from flows.making.places import remember_place
@@ -161,7 +161,8 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
     made_with = {"code": code_version(), "libraries": library_versions()}
     recorded = recorded_settings(settings)
     for name, lookup in input_sources(settings).items():
-        if getattr(settings, Path(name).stem, None) != getattr(recorded, Path(name).stem, None):
+        key = "vehicle" if name.endswith(".tir") else Path(name).stem
+        if getattr(settings, key, None) != getattr(recorded, key, None):
             remember_place(hashes[name], lookup())
     run_id = content_id(
         [asked, recorded.model_dump(mode="json"), [clip.clip_id for clip in clips], made_with]
@@ -213,7 +214,16 @@ def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
         **(
             {} if marking is None else {"hazard_marking.yaml": partial(find_entry, "hazard marking", marking)}
         ),
+        **({} if (tyre := _tyre_behind(settings)) is None else {tyre.name: partial(Path, tyre)}),
     }
+
+
+def _tyre_behind(settings: GridFile) -> Path | None:
+    """The tyre's file; None where there is none, or where the vehicle is faulty, which its own lookup tells."""
+    try:
+        return vehicle_tyre_source(settings.vehicle)
+    except InputError:
+        return None
 
 
 @lru_cache(maxsize=4)

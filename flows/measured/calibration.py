@@ -24,7 +24,7 @@ from tasks.identification.calibration.residual import WHEELS, CalibrationCase
 from tasks.identification.calibration.scalars import calibration_scalars, scalar_value, with_scalars
 from tasks.identification.calibration.staged import Procedure
 from tasks.identification.calibration.staged import calibrate as run_stages
-from tasks.vehicle.effects.numbers import EFFECT_UNITS, NUMBERS_OF_EFFECTS
+from tasks.vehicle.effects.table import EFFECT_UNITS, NUMBERS_OF_EFFECTS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode
 
@@ -163,7 +163,7 @@ def _frozen(
     """The frozen file: the base's entry with the calibrated values in it, and where they come from."""
     source = find_entry("vehicle", base)
     entry = yaml.safe_load(source.read_text(encoding="utf-8"))
-    entry.pop("provenance", None)
+    before = entry.pop("provenance", None) or {"bounds": {}}
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
     for group in procedure.groups:
         if group in EFFECT_UNITS:
@@ -192,7 +192,9 @@ def _frozen(
             {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(stage).items()}
             for stage in procedure.stages
         ],
-        "bounds": {
+        # what the base brought along keeps the bounds that it was found in
+        "bounds": {effect: limits for effect, limits in before["bounds"].items() if effect in fitted.effects}
+        | {
             group: {"unit": bounds.unit, "lower": bounds.lower, "upper": bounds.upper}
             for group, bounds in procedure.bounds.items()
         },

@@ -15,17 +15,15 @@ from tasks.identification.decision.forms import Leftover, curve, form_hypotheses
 from tasks.identification.decision.search import Found
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import CONSTANTS, RunModel, predict, roll
+from tasks.identification.inference.forward import RunModel, predict, simulate_run
 from tasks.identification.inference.hypothesis import compose
-from tasks.vehicle.effects.library import ALL_PARAMETERS
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
+from tasks.vehicle.effects.table import EFFECT_TABLE
 
 FROZEN, AFTER, MEASURED = "#c0392b", "#1f6fb2", "#222222"
 SHOWN = ("speed", "longitudinal_acceleration", "pitch")
 MEAN_OVER = 20
 """Samples averaged into one point of the residual force: its noise falls below what is looked for."""
-DISC_STATE = 13
-"""Column of the front disc's temperature in a run's states."""
 
 
 def picture(figure: Figure) -> str:
@@ -66,19 +64,15 @@ def _force_points(
     theta, slots = (
         compose(state.base.parts, state.base.values, state.base.session)
         if grown
-        else (np.zeros(len(ALL_PARAMETERS)), ())
+        else (np.zeros(len(EFFECT_TABLE)), ())
     )
     channel = CHANNELS.index("longitudinal_acceleration")
     y = predict(model, theta, slots=slots)
-    _, states = roll(model, theta, slots=slots)
-    mass = sum(
-        model.constants[CONSTANTS.index(n)] for n in ("sprung_mass", "unsprung_mass_f", "unsprung_mass_r")
-    )
-    force = mass * (model.measured - y)[:, channel]
+    force = model.vehicle.mass * (model.measured - y)[:, channel]
     x = {
         "speed": y[:, 0],
         "pressure": model.run.pressure[: model.samples],
-        "disc_temperature": states[:, DISC_STATE],
+        "disc_temperature": simulate_run(model, theta, slots=slots).column("disc_rise_f"),
         "deceleration": -y[:, channel],
     }[variable]
     count = model.samples // MEAN_OVER
@@ -165,7 +159,7 @@ def traces(trace: Trace) -> str:
     """Measured, frozen and after on the held-out runs that gained most and least."""
     runs = trace.start.evidence.held_out
     theta, slots = compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
-    plain = np.zeros(len(ALL_PARAMETERS))
+    plain = np.zeros(len(EFFECT_TABLE))
 
     def gain(run: RunEvidence) -> float:
         sigma = run.sigma

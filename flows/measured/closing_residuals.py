@@ -14,7 +14,7 @@ from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.forward import predict
 from tasks.identification.inference.hypothesis import compose
-from tasks.vehicle.effects.library import ALL_PARAMETERS
+from tasks.vehicle.effects.table import EFFECT_TABLE
 
 TITLES = ("frozen", "after")
 
@@ -30,7 +30,7 @@ def residuals(
     runs : of its evidence
     """
     models = (
-        (np.zeros(len(ALL_PARAMETERS)), ()),
+        (np.zeros(len(EFFECT_TABLE)), ()),
         compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session),
     )
     for run in runs:

@@ -1,10 +1,13 @@
 """A Dask cluster that others started: do its workers compute as this machine does, and are their kernels compiled?"""
 
+import asyncio
 import os
 import re
 import socket
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
+
+from distributed.comm import CommClosedError
 
 from manifests.provenance import code_version, library_versions
 from tasks.errors import InputError
@@ -103,7 +106,7 @@ def _take_gpu(places: Mapping[str, int], dask_worker: Any) -> None:
 def _by_host(client: Any) -> dict[str, list[str]]:
     """Workers of each machine, in the order of their addresses."""
     hosts: dict[str, list[str]] = {}
-    for worker, host in sorted(client.run(socket.gethostname).items()):
+    for worker, host in sorted(client.run(socket.gethostname, on_error="ignore").items()):
         hosts.setdefault(host, []).append(worker)
     return hosts
 
@@ -117,6 +120,8 @@ def warm_cluster(client: Any, warm: Callable[[], Any], address: str) -> None:
     warm : compiles and loads what a clip needs
     address : of its scheduler
 
+    A worker that dies meanwhile is passed over: the scheduler gives it no work.
+
     Raises
     ------
     InputError
@@ -126,16 +131,21 @@ def warm_cluster(client: Any, warm: Callable[[], Any], address: str) -> None:
     first = [workers[0] for workers in hosts.values()]
     rest = [worker for workers in hosts.values() for worker in workers[1:]]
     for wave in (first, rest):
-        futures = {worker: client.submit(warm, workers=[worker], pure=False) for worker in wave}
-        for worker, future in futures.items():
-            error = future.exception()
-            if isinstance(error, InputError | OSError):
+        # not as tasks: one that is bound to a worker that dies waits for it for ever
+        answers = client.run(_call_in_thread, warm, workers=wave, on_error="return") if wave else {}
+        for worker, error in answers.items():
+            if isinstance(error, InputError | OSError) and not isinstance(error, CommClosedError):
                 raise InputError(
                     f"--scheduler {address}: worker {worker} cannot begin ({error}): the dataset's folder and the scene"
                     " must be visible on every worker under the same path"
                 )
-            if error is not None:
+            if isinstance(error, Exception) and not isinstance(error, CommClosedError):
                 raise error
+
+
+async def _call_in_thread(function: Callable[[], Any]) -> None:
+    """Call a function beside a worker's event loop, which goes on telling the scheduler that the worker lives."""
+    await asyncio.to_thread(function)
 
 
 def _name_some(addresses: list[str]) -> str:

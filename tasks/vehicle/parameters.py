@@ -67,8 +67,8 @@ class Vehicle:
     gravity : g [m/s2]
     families : tyre family of each kind of weather
     tyre : Magic Formula of every wheel; None where the families' Burckhardt curves are the tyre
-    effects : numbers of ``tasks.vehicle.effects.numbers`` that coupled mode adds; none in the paper's model
-    forms : what coupled mode adds that no effect of the library has; none in the paper's model
+    effects : numbers of ``tasks.vehicle.effects.table`` that the model adds; none in the paper's model
+    forms : what the model adds that no effect of the library has; none in the paper's model
     """
 
     name: str

@@ -11,7 +11,10 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.model.coupled_mode import run_coupled_mode
+from tasks.vehicle.history import History
+from tasks.vehicle.model.brake_input import brake_command
+from tasks.vehicle.model.chassis import Conditions
+from tasks.vehicle.model.simulation import COLUMNS, Simulation, simulate
 from tasks.vehicle.paper.paper_mode import history_of, run_paper_mode
 from tasks.vehicle.parameters import Vehicle, surface_response
 
@@ -112,16 +115,22 @@ def rollout(
     """
     per_tick = _check(vehicle, family, surface_friction, mode, duration_s, step_s)
     response = surface_response(vehicle, family, surface_friction)
-    arguments = (
-        vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile, hazard
-    )  # fmt: skip
-    steps = round(duration_s * 1000) * per_tick
+    ticks = round(duration_s * 1000)
     if mode == "paper":
-        history = history_of(run_paper_mode(*arguments, steps=steps, step=step_s), step_s, per_tick)
+        run = run_paper_mode(
+            vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile,
+            hazard, steps=ticks * per_tick, step=step_s,
+        )  # fmt: skip
+        history = history_of(run, step_s, per_tick)
     else:
-        history = run_coupled_mode(
-            *arguments, snow_depth_mm=snow_depth_mm, steps=steps, step=step_s, per_tick=per_tick
-        )
+        history = _history(
+            simulate(
+                vehicle, response,
+                brake_command(controls.brake.profile, hold_speed=controls.hold_speed_until_brake),
+                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm), samples=ticks + 1, substeps=per_tick,
+                interval=0.001, initial_speed=controls.initial_speed,
+            )
+        )  # fmt: skip
     columns: dict[str, NDArray[Any]] = dict(history.columns)
     columns["t_ns"] = np.arange(len(columns["speed"]), dtype=np.int64) * TICK_NS
     columns["contact_f"] = columns["axle_load_f"] > 0
@@ -144,6 +153,12 @@ def rollout(
         stopping_distance=distance,
         calibration_extrapolated=response.extrapolated,
     )
+
+
+def _history(run: Simulation) -> History:
+    columns = dict(zip(COLUMNS, run.history.T.copy(), strict=True))
+    columns |= {f"axle_load_{axle}": columns[f"tyre_load_{axle}"] for axle in "fr"}
+    return History(columns=columns, onset=run.onset, onset_station=run.onset_station, stop_time=run.stop)
 
 
 def _check(

@@ -15,7 +15,7 @@ from tasks.studies.stop import Stop, stop_errors, stop_of, stopping_distance
 from tasks.studies.stop_findings import rebound, saturation, slip_cycles
 from tasks.studies.stop_study import Rung, _model, climb, uncalibrated
 from tasks.studies.stop_swing import Swing, fit_swing, swing_acceleration, with_swing
-from tasks.vehicle.effects.library import parameter_vector
+from tasks.vehicle.effects.table import parameter_vector
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 INTERVAL = 0.01

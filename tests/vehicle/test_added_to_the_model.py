@@ -7,8 +7,8 @@ import pytest
 
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.vehicle.effects.forms import SHAPES, Form, coefficient_count
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
+from tasks.vehicle.effects.table import EFFECT_UNITS
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.rollout import Controls, rollout
 from tasks.vehicle.tyres.contract import tyre_friction

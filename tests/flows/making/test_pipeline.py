@@ -92,7 +92,7 @@ def test_the_hump_is_both_seen_and_felt(dataset):
     assert clips["dry/hump"]["figures"]["peak_pitch"] > np.deg2rad(0.5)
 
 
-@pytest.mark.parametrize(("runner", "workers"), [("processes", 1), ("dask", 2)])
+@pytest.mark.parametrize(("runner", "workers"), [("processes", 2), ("dask", 1)])
 def test_the_bytes_do_not_depend_on_the_runner(dataset, grid, tmp_path, runner, workers):
     again = generate_dataset(grid, str(tmp_path / "again"), runner=runner, workers=workers).layout
     assert again.manifest.read_bytes() == dataset.manifest.read_bytes()
@@ -106,7 +106,7 @@ def test_a_finished_dataset_is_not_made_again(dataset, grid):
 
 def test_labels_come_where_the_grid_asks_for_them_and_an_audit_makes_them_again(grid, tmp_path):
     labelled = tmp_path / "labelled.yaml"
-    labelled.write_text(Path(grid).read_text() + "labels: true\n")
+    labelled.write_text(Path(grid).read_text().replace("frames: 11", "frames: 4") + "labels: true\n")
     layout = generate_dataset(str(labelled), str(tmp_path / "data"), runner="threads", workers=2).layout
     hump = next(clip for clip in manifest_of(layout)["clips"] if clip["label"] == "snow-3/hump")
     marks, flow, road = (read_clip(layout.frames, hump["index"], name) for name in ("marks", "flow", "road"))
@@ -180,7 +180,7 @@ def test_a_second_writer_is_told(dataset, grid, tmp_path):
 
 
 def test_an_audit_makes_the_same_bytes_again(dataset, tmp_path):
-    result = audit_dataset(str(dataset.root), share=1.0, out=str(tmp_path), runner="processes", workers=2)
+    result = audit_dataset(str(dataset.root), share=1.0, out=str(tmp_path), runner="threads", workers=2)
     assert result["verified"], result
     assert len(result["rerun"]) == 4
     assert result["differences"] == []

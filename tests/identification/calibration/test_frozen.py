@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -8,6 +9,7 @@ import yaml
 from typer.testing import CliRunner
 
 from catalogs.calibration import load_procedure
+from catalogs.effects import load_effects
 from catalogs.entries import entry_names, find_entry
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
@@ -15,6 +17,7 @@ from flows.measured.calibration import calibrate
 from flows.studies.vehicle_model import measure_agreement
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
+from tests.flows.measured.findings import found_effect, found_form, grown_file
 
 
 @pytest.fixture
@@ -179,3 +182,29 @@ def test_a_faulty_procedure_is_told_by_place_and_rule(tmp_path, harm, sentence):
     with pytest.raises(InputError) as failure:
         load_procedure(path)
     assert sentence in str(failure.value)
+
+
+def test_a_vehicle_that_close_loop_grew_is_calibrated_further_and_keeps_what_it_had(make_traces, tmp_path):
+    found = found_form("brake_torque", "pressure", "a + b x", 3.6, 0.0, 0.1)
+    (lag,) = (e for e in load_effects() if e.name == "brake_lag")
+    grown = grown_file(
+        tmp_path / "grown.yaml", found, found_effect(lag, {"lag": 0.08}), reached={"pressure": (0.0, 3.6)}
+    )
+    truth = replace(load_vehicle(grown), effects={"lag": 0.08, "drag_area": 0.6})
+    entry = yaml.safe_load(find_entry("calibration procedure", "coupled-grown").read_text())
+    entry["stages"] = [
+        {"name": "air", "groups": ["drag_area"], "responses": ["speed"], "kinds": ["flat"], "phase": "event"}
+    ]
+    entry["passes"]["value"] = 1
+    (tmp_path / "air.yaml").write_text(yaml.safe_dump(entry))
+    traces = make_traces(truth, "coupled", ("wet",))
+    calibrate(
+        str(traces),
+        out=str(tmp_path / "out"),
+        vehicle=str(grown),
+        procedure=str(tmp_path / "air.yaml"),
+        name="car",
+    )
+    car = load_vehicle(tmp_path / "out" / "car.yaml")
+    assert car.forms == truth.forms and car.effects["lag"] == 0.08
+    assert car.effects["drag_area"] == pytest.approx(0.6, abs=0.1)
