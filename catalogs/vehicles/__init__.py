@@ -1,7 +1,6 @@
 """Vehicles: mechanical values, tyre families and frozen calibration."""
 
 from functools import cache
-from itertools import pairwise
 from math import radians
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,11 +9,15 @@ from pydantic import Field, model_validator
 
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, parse_entry
+from catalogs.names import WeatherName
+from catalogs.quantities import CatalogueEntry, Scalar, checked, parse_entry
+from catalogs.tyre_families import KNOT_TABLES, FamilyEntry
 from catalogs.vehicles.added import FormEntry, effect_problems, library_units
 from catalogs.vehicles.frozen import Provenance, check_seal
+from catalogs.weather.grip import FOLDER as WEATHER
+from catalogs.weather.grip import shared_families
 from tasks.vehicle.effects.numbers import EFFECT_UNITS
-from tasks.vehicle.parameters import TyreFamily, Vehicle
+from tasks.vehicle.parameters import Vehicle
 
 FOLDER = Path(__file__).parent
 
@@ -25,47 +28,6 @@ Stiffness = Annotated[Scalar, checked("N m-1", above=0)]
 Damping = Annotated[Scalar, checked("N s m-1", minimum=0)]
 Rate = Annotated[Scalar, checked("s-1", above=0)]
 Speed = Annotated[Scalar, checked("m s-1", above=0)]
-Scales = Annotated[Table, checked("1", above=0)]
-Durations = Annotated[Table, checked("s", above=0)]
-KNOT_TABLES = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release_s")
-
-
-class FamilyEntry(CatalogueEntry):
-    """What a tyre family must hold; the meanings stand at ``TyreFamily``."""
-
-    burckhardt: Annotated[Table, checked("1", above=0)]
-    surface_friction: Scales
-    efficiency: Scales
-    slip_stiffness: Scales
-    pitch_scale: Scales
-    hold_s: Durations
-    release_s: Durations
-
-    @model_validator(mode="after")
-    def _tables_match_their_knots(self) -> "FamilyEntry":
-        knots = self.surface_friction.value
-        problems = [
-            f"{name} must have one value per surface_friction knot ({len(knots)}); it has {count}"
-            for name in KNOT_TABLES
-            if (count := len(getattr(self, name).value)) != len(knots)
-        ]
-        if any(low >= high for low, high in pairwise(knots)):
-            problems.append(f"surface_friction knots must ascend; they are {list(knots)}")
-        if len(self.burckhardt.value) != 3:
-            problems.append(f"burckhardt must be c1, c2, c3; it has {len(self.burckhardt.value)} values")
-        elif (c := self.burckhardt.value)[0] * c[1] <= c[2]:
-            problems.append(f"burckhardt must rise from zero slip: c1 c2 above c3; it is {list(c)}")
-        if problems:
-            raise ValueError("; ".join(problems))
-        return self
-
-
-class FamiliesEntry(CatalogueEntry):
-    """One tyre family per kind of weather."""
-
-    dry: FamilyEntry
-    rain: FamilyEntry
-    snow: FamilyEntry
 
 
 class VehicleEntry(CatalogueEntry):
@@ -100,7 +62,7 @@ class VehicleEntry(CatalogueEntry):
     stop_speed: Speed
     lock_speed: Annotated[Scalar, checked("rad s-1", above=0)]
     gravity: Annotated[Scalar, checked("m s-2", above=0)]
-    families: FamiliesEntry
+    families: Annotated[dict[WeatherName, FamilyEntry], Field(min_length=1)]
     effects: dict[str, Scalar] = Field(default_factory=dict)
     forms: tuple[FormEntry, ...] = ()
     provenance: Provenance | None = None
@@ -122,7 +84,7 @@ class VehicleEntry(CatalogueEntry):
     def _units_inside(self) -> dict[str, str]:
         """Unit of each group that a calibration may move; angles are in radians there."""
         fields = {name: quantity.unit for name, quantity in self if isinstance(quantity, Scalar)}
-        knots = {name: getattr(self.families.dry, name).unit for name in KNOT_TABLES}
+        knots = {name: getattr(next(iter(self.families.values())), name).unit for name in KNOT_TABLES}
         inside = {name: "rad" if unit == "deg" else unit for name, unit in fields.items()}
         return {**inside, **knots, **EFFECT_UNITS}
 
@@ -161,12 +123,13 @@ def vehicle_units() -> dict[str, str]:
     return {name: quantity.unit for name, quantity in entry if isinstance(quantity, Scalar)}
 
 
-def load_vehicle(name_or_path: str | Path) -> Vehicle:
+def load_vehicle(name_or_path: str | Path, weather: Path = WEATHER) -> Vehicle:
     """Read a vehicle by its name in the catalogue or from a YAML file.
 
     Parameters
     ----------
     name_or_path : name, or path ending in .yaml
+    weather : folder of the weather catalogue, which has tyre families for kinds that the vehicle has none of
 
     Raises
     ------
@@ -180,14 +143,14 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
         for name in VehicleEntry.model_fields
         if isinstance(quantity := getattr(entry, name), Scalar)
     }
-    families = {
-        weather: TyreFamily(**{name: getattr(family, name).value for name in FamilyEntry.model_fields})
-        for weather, family in entry.families
-    }
+    families = {kind: family.family for kind, family in entry.families.items()}
     values["static_pitch"] = radians(values["static_pitch"])
     effects = {name: number.value for name, number in entry.effects.items()}
     forms = tuple(form.form for form in entry.forms)
-    return Vehicle(name=source.stem, families=families, effects=effects, forms=forms, **values)
+    return Vehicle(
+        name=source.stem, families=families, shared_families=shared_families(weather), effects=effects, forms=forms,
+        **values,
+    )  # fmt: skip
 
 
 def _read(source: Path) -> VehicleEntry:

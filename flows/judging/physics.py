@@ -103,19 +103,20 @@ def read_constants(root: Path) -> Constants:
     ]
     if missing:
         raise InputError(missing)
-    load_vehicle(files["vehicle"]), load_surface(files["surface"])  # of the form that they must have
-    car, surface = (read_yaml(path, "catalogue entry") for path in files.values())
+    # of the form that they must have
+    vehicle = load_vehicle(files["vehicle"], layout.inputs / "weather")
+    pavement = load_surface(files["surface"], layout.inputs / "weather")
+    car = read_yaml(files["vehicle"], "catalogue entry")
     mode = recorded_grid(read_plan_record(layout)["grid"], layout.plan).vehicle_mode
     if mode != "paper" or car.get("effects"):
         raise InputError(
             f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"
             f"{' with effects' if car.get('effects') else ''}, whose inner steps the stored ticks do not fix."
         )
-    tyres = {
-        family: TyreTables(**{name: tuple(table[name]["value"]) for name in TyreTables.__dataclass_fields__})
-        for family, table in car["families"].items()
-    }
-    return Constants(car=_numbers(car), surface=_numbers(surface), tyres=tyres, mode=mode)
+    families = {**vehicle.shared_families, **vehicle.families}
+    tyres = {kind: TyreTables(**vars(family)) for kind, family in families.items()}
+    surface = {name: value for name, value in vars(pavement).items() if isinstance(value, float)}
+    return Constants(car=_numbers(car), surface=surface, tyres=tyres, mode=mode)
 
 
 def _numbers(entry: dict[str, Any]) -> dict[str, float]:

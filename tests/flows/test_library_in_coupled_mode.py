@@ -18,9 +18,8 @@ from tasks.campaign.campaign import Run
 from tasks.identification.decision.excitation import reached
 from tasks.identification.decision.forms import PORT_STEP, RANGE, form_in_range
 from tasks.identification.inference.forward import roll, run_model
-from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
-from tasks.surface.state import Weather, surface_state
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand, brake_pressure
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.library import parameter_vector
@@ -68,12 +67,10 @@ def drive(manoeuvre, car, theta, slots=()):
     )  # fmt: skip
     model = run_model(run, VEHICLE, SURFACE)
     there = roll(model, theta, slots=slots, substeps=40)[0]
-    state = surface_state(weather, SURFACE)
     here = rollout(
-        car, weather.kind, surface_friction(weather, state, SURFACE),
+        car, surface_state(weather, SURFACE),
         Controls(initial_speed=speed, brake=brake, hold_speed_until_brake=False),
         RoadHazard(center_m=12.0, length_m=3.7, height_m=height), mode="coupled", duration_s=3.0,
-        snow_depth_mm=state.snow_depth_mm,
     ).columns  # fmt: skip
     names, scale = (
         ("speed", "wheel_speed_f", "wheel_speed_r", "pitch"),

@@ -10,8 +10,8 @@ from tasks.campaign.campaign import CHANNELS, Run
 from tasks.campaign.gauge import at_rest
 from tasks.errors import InputError
 from tasks.identification.inference.rollout import CONSTANTS, N_STATES, OUTPUTS, drive
-from tasks.surface.friction import surface_friction
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, DISC_COOLING
 from tasks.vehicle.effects.library import ALL_PARAMETERS, PARAMETER_INDEX, parameter_vector
 from tasks.vehicle.effects.ports import PARAMETERS
@@ -76,14 +76,13 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
             " be held against it; use the vehicle that it was grown from"
         )
     weather = Weather(
-        kind=run.weather,  # type: ignore[arg-type]
+        kind=run.weather,
         precipitation_mm_h=run.precipitation_mm_h,
         snow_accumulation_h=run.snow_accumulation_h,
     )
     state = surface_state(weather, surface)
-    mu_c = surface_friction(weather, state, surface)
-    response = surface_response(vehicle, run.weather, mu_c)
-    c1, c2, c3 = vehicle.families[run.weather].burckhardt
+    response = surface_response(vehicle, state.kind, state.friction)
+    c1, c2, c3 = vehicle.tyre_family(state.kind).burckhardt
     values = {
         "sprung_mass": vehicle.sprung_mass,
         "unsprung_mass_f": vehicle.unsprung_mass_f,
@@ -122,7 +121,7 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
         "hazard_height": run.hazard_height if run.hazard_length > 0 else 0.0,
         "direction": float(run.direction),
         "snow_depth_mm": state.snow_depth_mm,
-        "wet": float(run.weather == "rain"),
+        "wet": float(response.wet),
     }
     speed = run.response[:, CHANNELS.index("speed")]
     slow = np.flatnonzero(speed < MASKED_SPEED)
