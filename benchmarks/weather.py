@@ -18,14 +18,14 @@ from tasks.render.weather.atmosphere import air_layer, light_layer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import ClipWeather, apply_weather, particle_layer, pixel_rays, weather_scene
-from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.wet.wet_road import wet_layer
+from tasks.surface.state import SurfaceState
 
 STATES = {
-    "rain 10": WeatherState(kind="rain", precipitation_mm_h=10, film_depth_mm=0.489),
-    "rain 50": WeatherState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263),
-    "snow 1": WeatherState(kind="snow", precipitation_mm_h=1, snow_depth_mm=10, snow_coverage=0.5),
-    "snow 3": WeatherState(kind="snow", precipitation_mm_h=3, snow_depth_mm=30, snow_coverage=1.0),
+    "rain 10": SurfaceState(kind="rain", precipitation_mm_h=10, film_depth_mm=0.489),
+    "rain 50": SurfaceState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263),
+    "snow 1": SurfaceState(kind="snow", precipitation_mm_h=1, snow_depth_mm=10, snow_coverage=0.5),
+    "snow 3": SurfaceState(kind="snow", precipitation_mm_h=3, snow_depth_mm=30, snow_coverage=1.0),
 }
 LIMIT = {"rain": 1.2, "snow": 0.6}
 """What a weather may add, as a share of the clear frame's CPU time."""
@@ -90,20 +90,21 @@ def _list_stages(
     weather: ClipWeather, picture: np.ndarray, gbuffer: GBuffer, shutter: Shutter
 ) -> dict[str, Callable[[], object]]:
     """The layers of one frame, each to be called alone."""
-    falling = weather.falling
-    assert falling is not None
+    overcast = weather.overcast
+    assert overcast is not None and overcast.population is not None
+    film, falling = overcast.look.film, overcast.population
     rays = pixel_rays(shutter)
-    cloudy, sky, air = falling.environment, falling.sky, falling.air
+    cloudy, sky, air = overcast.environment, overcast.sky, overcast.air
     lit = recompose(picture, [light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays)])
     stages: dict[str, Callable[[], object]] = {
         "light": lambda: light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays),
         "air": lambda: air_layer(gbuffer, cloudy, air, sky, rays),
-        "particles": lambda: particle_layer(weather, falling, gbuffer.depth, shutter),
+        "particles": lambda: particle_layer(weather, falling, sky, gbuffer.depth, shutter),
     }
-    if weather.state.kind == "rain":
+    if film is not None:
         stages["wet road with reflection"] = lambda: wet_layer(
             lit, gbuffer, cloudy, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
-            weather.state.film_depth_mm, weather.parameters.wet_road, weather.seed,
+            weather.state.film_depth_mm, film, weather.seed,
         )  # fmt: skip
     return stages
 

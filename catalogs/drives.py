@@ -12,7 +12,7 @@ from catalogs.sentences import cap_problems, describe_rules, shorten
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.events import Drive
 from tasks.errors import InputError
-from tasks.surface.state import Weather
+from tasks.surface.weather import Weather
 
 NEEDED = ("brake_pressure", "speed", "pitch", "longitudinal_acceleration")
 WEATHER = ("weather", "precipitation_mm_h", "snow_accumulation_h")
@@ -74,7 +74,7 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
                 interval=interval,
                 columns=columns,
                 weather=Weather(
-                    kind=row["weather"],  # type: ignore[arg-type]
+                    kind=row["weather"],
                     precipitation_mm_h=float(row["precipitation_mm_h"]),
                     snow_accumulation_h=float(row["snow_accumulation_h"]),
                 ),

@@ -14,6 +14,7 @@ from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.eval.state_agreement import CaseAgreement, aggregate, case_agreement
 from tasks.studies.sensitivity import beside_print, sensitivity_study
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, rollout
 
@@ -70,7 +71,7 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
     splits: dict[str, list[CaseAgreement]] = {}
     for case, columns in reference:
         ride = rollout(
-            model, case.weather, case.surface_coefficient, case.controls(), case.hazard(),
+            model, SurfaceState(kind=case.weather, friction=case.surface_coefficient), case.controls(), case.hazard(),
             mode=mode, duration_s=case.duration_s(columns),
         )  # fmt: skip
         scored = case_agreement(columns, ride.columns, case.facts(model.wheelbase), ride.static_pitch)

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.episodes import Episode, pressure_episodes
-from tasks.surface.state import Weather
+from tasks.surface.weather import DRY, Weather
 
 Window = tuple[float, float]
-DRY = Weather(kind="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0)
+DRY_ROAD = Weather(kind=DRY)
 ROUNDING = 1e-6
 """Windows include a sample that misses their edge by less than this [s]."""
 
@@ -79,7 +79,7 @@ class Drive:
     drive: str
     interval: float
     columns: Mapping[str, NDArray[np.float64]]
-    weather: Weather = DRY
+    weather: Weather = DRY_ROAD
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +104,7 @@ class Event:
     time: NDArray[np.float64]
     columns: Mapping[str, NDArray[np.float64]]
     protocol: Protocol
-    weather: Weather = DRY
+    weather: Weather = DRY_ROAD
 
     def within(self, window: Window) -> NDArray[np.bool_]:
         """Mask of the samples in a window about the onset [s]."""

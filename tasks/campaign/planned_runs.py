@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Run
+from tasks.surface.weather import DRY, find_weather
 
 INTERVAL = 0.01
 """Time between samples [s]."""
@@ -24,7 +25,7 @@ class Drive:
     hazard : centre, length, height [m]
     """
 
-    weather: str = "dry"
+    weather: str = DRY
     rate: float = 0.0
     speed: float
     peak: float
@@ -91,9 +92,10 @@ def planned_run(drive: Drive, name: str, direction: int = 1, *, held_out: bool =
         pressure *= np.where((t > 1.5) & (((t - 1.5) % 1.0) < 0.5), 0.3, 1.0)
     response = np.zeros((count, len(CHANNELS)))
     response[:, CHANNELS.index("speed")] = drive.speed
+    hours = 1.0 if find_weather(drive.weather).accumulates else 0.0
     return Run(
         name=name, held_out=held_out, weather=drive.weather, precipitation_mm_h=drive.rate,
-        snow_accumulation_h=1.0 if drive.weather == "snow" else 0.0, direction=direction, disc_rise=drive.disc_rise,
+        snow_accumulation_h=hours, direction=direction, disc_rise=drive.disc_rise,
         hazard_center=drive.hazard[0], hazard_length=drive.hazard[1], hazard_height=drive.hazard[2],
         interval=INTERVAL, pressure=pressure, response=response,
     )  # fmt: skip

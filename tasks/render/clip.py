@@ -18,9 +18,10 @@ from tasks.render.sight import as_drawn, through_sensor
 from tasks.render.weather.attribution import paper_picture
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layers import apply_weather, weather_scene
-from tasks.render.weather.parameters import WeatherParameters, WeatherState
+from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
+from tasks.surface.state import SurfaceState
 
 
 def render_clip(
@@ -31,7 +32,7 @@ def render_clip(
     T_world_rig: NDArray[np.float64],
     *,
     frame_rate_hz: float,
-    weather: WeatherState,
+    weather: SurfaceState,
     looks: WeatherParameters,
     seed: int,
     backend: Backend,

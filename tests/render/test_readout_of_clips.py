@@ -16,9 +16,9 @@ from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import sensor_field
 from tasks.render.sight import row_points
 from tasks.render.weather.attribution import LAYER_BITS
-from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.scene_light import appended
 from tasks.scene.route import route_from_positions
+from tasks.surface.state import SurfaceState
 from tests.render.rolling_cameras import ALL, CAMERA, ROLLING
 from tests.render.weather.scenes import clear_sky, road, surfels
 
@@ -67,7 +67,7 @@ def street():
 def clip(street, camera, parameters, state=None, **more):
     at = rig()
     poses = np.concatenate([at(k, np.zeros(1)) for k in range(3)])
-    state = state or WeatherState(kind="dry")
+    state = state or SurfaceState(kind="dry")
     return render_clip(
         street, clear_sky(), ROUTE, camera, poses, frame_rate_hz=10, weather=state, looks=parameters, seed=1,
         backend=CpuBackend(), rig_at=at, **more,
@@ -92,7 +92,7 @@ def test_with_all_three_off_the_bytes_are_those_of_the_plain_composition(street,
 
 def test_the_paper_s_composition_changes_only_pixels_of_falling_rain(street, parameters):
     """Elsewhere the 8-bit difference is none, and the picture is the linear one; dry weather has no particles."""
-    state = WeatherState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263)
+    state = SurfaceState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263)
     ours, theirs = (
         clip(street, CAMERA, parameters, state, composition=name, labelled=lambda s: 0.0 * s)
         for name in ("linear", "paper")
@@ -135,7 +135,7 @@ def test_rows_and_blur_are_near_the_renders_that_they_stand_for(street, paramete
 def test_blur_of_a_camera_that_stands_leaves_falling_snow_as_it_is(street, parameters):
     """A streak has its exposure already: it is not blurred again, and nothing else moves."""
     pose = ROUTE.pose(np.array((5.0, 5.0)))
-    state = WeatherState(kind="snow", precipitation_mm_h=2, snow_depth_mm=20, snow_coverage=1.0)
+    state = SurfaceState(kind="snow", precipitation_mm_h=2, snow_depth_mm=20, snow_coverage=1.0)
     plain, blurred = (
         render_clip(
             street, clear_sky(), ROUTE, camera, pose, frame_rate_hz=10, weather=state, looks=parameters, seed=1,
@@ -165,5 +165,5 @@ def test_a_camera_that_moves_during_a_frame_needs_poses_between_frames(street, p
     with pytest.raises(InputError, match="needs rig poses between frames"):
         render_clip(
             street, clear_sky(), ROUTE, ALL, np.eye(4)[None].repeat(2, 0), frame_rate_hz=10,
-            weather=WeatherState(kind="dry"), looks=parameters, seed=1, backend=CpuBackend(),
+            weather=SurfaceState(kind="dry"), looks=parameters, seed=1, backend=CpuBackend(),
         )  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import TICK_CHANNELS
-from tasks.eval.physics.constants import Constants, Floats, surface_of
+from tasks.eval.physics.constants import SURFACE_FORMS, Constants, Floats, surface_of
 from tasks.eval.physics.half_step import INNER_STEP, onset_of
 from tasks.eval.physics.laws import Law, law, rounding
 from tasks.eval.poses.rigid import invert_pose
@@ -146,16 +146,11 @@ def surface_laws(facts: Mapping[str, Any], constants: Constants) -> list[Law | N
     expected = surface_of(
         facts["weather"], facts["precipitation_mm_h"], facts["snow_accumulation_h"], constants.surface
     )
-    feeds = {
-        "film_depth_mm": "clips.precipitation_mm_h" if facts["weather"] == "rain" else "",
-        "snow_depth_mm": "clips.precipitation_mm_h clips.snow_accumulation_h" if facts["weather"] == "snow" else "",
-        "snow_coverage": "clips.snow_depth_mm" if facts["weather"] == "snow" else "",
-        "surface_friction": {"rain": "clips.film_depth_mm", "snow": "clips.snow_coverage", "dry": ""}[facts["weather"]],
-    }  # fmt: skip
+    feeds = SURFACE_FORMS[facts["weather"]].feeds
     tyre = constants.tyres[facts["weather"]]
     eta = tyre.at(tyre.efficiency, facts["surface_friction"])
     laws = [
-        law(f"{name} of the precipitation", f"clips.{name} {feeds[name]}",
+        law(f"{name} of the precipitation", f"clips.{name} {feeds.get(name, '')}",
             np.array([facts[name] - value]), ROUND * (1 + abs(value)))
         for name, value in expected.items()
     ]  # fmt: skip

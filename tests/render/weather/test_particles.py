@@ -16,12 +16,12 @@ CALM = np.zeros(3)
 
 @pytest.fixture
 def rain(parameters):
-    return population(parameters.rain, 50.0)
+    return population(parameters.kinds["rain"].particles, 50.0)
 
 
 @pytest.fixture
 def snow(parameters):
-    return population(parameters.snowfall, 2.0)
+    return population(parameters.kinds["snow"].particles, 2.0)
 
 
 def test_one_class_has_as_many_drops_in_view_as_density_times_volume(parameters, rain):
@@ -68,7 +68,9 @@ def test_heavier_rain_keeps_the_drops_of_lighter_rain(parameters):
     light, heavy = (
         {
             tuple(streak["direction"])
-            for streak in visible_streaks(population(parameters.rain, rate), near, shutter(), CALM, 3)
+            for streak in visible_streaks(
+                population(parameters.kinds["rain"].particles, rate), near, shutter(), CALM, 3
+            )
         }
         for rate in (10.0, 25.0)
     )
