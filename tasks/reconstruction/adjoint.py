@@ -56,7 +56,7 @@ def blend_and_derive(
 
     Parameters
     ----------
-    records : float32 [V, 16] splats, from `tasks.render.rasterise.projection.project`
+    records : float32 [V, 16] splats, from `tasks.render.rasterise.projection.project_gaussians`
     target : float32 [H, W, 3] the picture wanted; where negative, blended values above its modulus are as good
     weight : float32 [H, W] of a pixel's squared residual [1]
     sky : float32 [H, W, 3] what is seen where no splat is [1]
@@ -75,7 +75,7 @@ def blend_and_derive(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _opacity(p):  # type: ignore[no-untyped-def]
+def _opacity_of_logarithm(p):  # type: ignore[no-untyped-def]
     """Opacity of logarithm p, 0 where the rasteriser draws nothing: exp as the 64th power of four Taylor terms.
 
     The library's exponential would keep the loops from being vectorised; this one is right to 3e-6.
@@ -159,7 +159,7 @@ def _blend_tile(s, records, splats, start, end, x_tile, y_tile):  # type: ignore
             for x in range(TILE_WIDTH):
                 l = base + np.uint64(x)
                 dx = np.float32(x) - middle
-                w = s[l] * _opacity(row - falloff * dx * dx)
+                w = s[l] * _opacity_of_logarithm(row - falloff * dx * dx)
                 s[l] -= w
                 s[_RED + l] += w * r
                 s[_GREEN + l] += w * g
@@ -190,7 +190,7 @@ def _derive_tile(s, lanes, records, splats, start, end, x_tile, y_tile, sums):  
                 l = base + np.uint64(x)
                 dx = np.float32(x) - middle
                 before = s[l]
-                a = _opacity(row - falloff * dx * dx)
+                a = _opacity_of_logarithm(row - falloff * dx * dx)
                 w = before * a
                 after = before - w
                 s[l] = after

@@ -50,11 +50,13 @@ def fuse_depth(
     for n in range(len(depth)):
         others = [n + o for o in CHECK_OFFSETS if 0 <= n + o < len(depth)]
         relative = np.linalg.inv(T_world_camera[others]) @ T_world_camera[n]
-        _check(n, depth, guessed, np.array(others), relative, intrinsics, disparity_scale, fused, confirmed)
+        _compare_with_neighbours(
+            n, depth, guessed, np.array(others), relative, intrinsics, disparity_scale, fused, confirmed
+        )
     return fused, confirmed
 
 
-def seen_finest(
+def find_finest_view(
     n: int,
     fused: NDArray[np.float32],
     confirmed: NDArray[np.bool_],
@@ -71,7 +73,7 @@ def seen_finest(
 
 
 @numba.njit(cache=True, nogil=True)
-def _check(n, depth, guessed, others, relative, K, bf, fused, confirmed):  # type: ignore[no-untyped-def]
+def _compare_with_neighbours(n, depth, guessed, others, relative, K, bf, fused, confirmed):  # type: ignore[no-untyped-def]
     height, width = depth.shape[1:]
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     for v in range(height):

@@ -144,7 +144,7 @@ def continuous_rig(
     return rig_at
 
 
-def viewmat(T_world_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+def world_to_camera(T_world_camera: NDArray[np.float64]) -> NDArray[np.float64]:
     """World-to-camera matrix [4, 4] of a camera pose [4, 4]."""
     view = np.eye(4)
     view[:3, :3] = T_world_camera[:3, :3].T

@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.render.camera import Camera, RigAt, viewmat
-from tasks.render.composition import compose, encode_8bit, round_depth
+from tasks.render.camera import Camera, RigAt, world_to_camera
+from tasks.render.composition import compose_over_sky, encode_8bit, round_depth
 from tasks.render.environment import environment_view
 from tasks.render.labels import clip_flow, forward_flow, frame_labels, row_flow
 from tasks.render.rasterise.backend import Backend
 from tasks.render.readout import sensor_field
 from tasks.render.road_edit import Profile, RoadRelief
-from tasks.render.sensor import photographed
-from tasks.render.sight import as_drawn, through_sensor
+from tasks.render.sensor import apply_sensor
+from tasks.render.sight import take_drawn_frame, take_frame_through_sensor
 from tasks.render.weather.attribution import paper_picture
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layers import apply_weather, weather_scene
@@ -77,7 +77,7 @@ def render_clip(
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / frame_rate_hz, axis=0)
     frames: list[dict[str, NDArray[np.generic]]] = []
     for frame, pose in enumerate(T_world_camera):
-        view = viewmat(pose)
+        view = world_to_camera(pose)
         gbuffer = backend.rasterise(prepared, view, field.K, field.width, field.height)
         sky = environment_view(environment, view, field.K, field.width, field.height)
         shutter = Shutter(
@@ -89,17 +89,19 @@ def render_clip(
             time_s=frame / frame_rate_hz,
             exposure_s=camera.exposure_s,
         )
-        clear = compose(gbuffer, sky, gaussians.display_encoded)
+        clear = compose_over_sky(gbuffer, sky, gaussians.display_encoded)
         finished = apply_weather(clip_weather, clear, gbuffer, shutter, particles=camera.plain)
         of_frame = (clip_weather, finished, gbuffer, shutter)
         if T_world_rows is None:
-            seen = as_drawn(*of_frame, labelled is not None)
+            seen = take_drawn_frame(*of_frame, labelled is not None)
         else:
-            seen = through_sensor(*of_frame, camera, field, T_world_rows[frame], labelled is not None)
+            seen = take_frame_through_sensor(
+                *of_frame, camera, field, T_world_rows[frame], labelled is not None
+            )
         developed = (
             paper_picture(finished)
             if composition == "paper"
-            else encode_8bit(photographed(seen.picture, camera.sensor, seed, frame))
+            else encode_8bit(apply_sensor(seen.picture, camera.sensor, seed, frame))
         )
         buffers: dict[str, NDArray[np.generic]] = {
             "rgb": developed,

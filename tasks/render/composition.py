@@ -21,7 +21,7 @@ def to_display(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
 
 
-def compose(
+def compose_over_sky(
     gbuffer: GBuffer, environment_rgb: NDArray[np.float32], display_encoded: bool
 ) -> NDArray[np.float32]:
     """The Gaussians over the sky, in linear light.

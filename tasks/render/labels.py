@@ -50,7 +50,7 @@ def forward_flow(
     T = np.linalg.inv(next_T_world_camera) @ T_world_camera
     x, y, z = np.moveaxis((rays * depth[..., None]) @ T[:3, :3].T + T[:3, 3], -1, 0)
     z = np.where(z > 0, z, np.nan)
-    return landing(depth, next_depth, K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2], z)
+    return flow_and_occlusion(depth, next_depth, K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2], z)
 
 
 def row_flow(
@@ -76,10 +76,10 @@ def row_flow(
     """
     points = row_points(directions, depth, T_world_rows)
     there = project_by_rows(points, next_T_world_rows, camera)
-    return landing(depth, next_depth, there[..., 0], there[..., 1], there[..., 2])
+    return flow_and_occlusion(depth, next_depth, there[..., 0], there[..., 1], there[..., 2])
 
 
-def landing(
+def flow_and_occlusion(
     depth: NDArray[np.float32],
     next_depth: NDArray[np.float32],
     there_u: NDArray[np.float64],

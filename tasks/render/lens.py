@@ -38,7 +38,7 @@ class Lens:
 
 
 @numba.njit(cache=True, nogil=True)
-def distorted(x, y, coefficients):  # type: ignore[no-untyped-def]
+def distort_rays(x, y, coefficients):  # type: ignore[no-untyped-def]
     """Where the lens puts the ray (x, y, 1): the same for scalars and for arrays, in kernels and outside.
 
     Parameters
@@ -59,7 +59,7 @@ def distorted(x, y, coefficients):  # type: ignore[no-untyped-def]
     )
 
 
-def undistorted(
+def undistort_points(
     x: NDArray[np.float64], y: NDArray[np.float64], lens: Lens
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The rays that the lens puts at given places, by Newton's method.
@@ -82,9 +82,9 @@ def undistorted(
     step = 1e-6
     found_x, found_y = x.copy(), y.copy()
     for _ in range(NEWTON_STEPS):
-        here_x, here_y = distorted(found_x, found_y, k)
-        right = distorted(found_x + step, found_y, k)
-        below = distorted(found_x, found_y + step, k)
+        here_x, here_y = distort_rays(found_x, found_y, k)
+        right = distort_rays(found_x + step, found_y, k)
+        below = distort_rays(found_x, found_y + step, k)
         a, c = (right[0] - here_x) / step, (right[1] - here_y) / step
         b, d = (below[0] - here_x) / step, (below[1] - here_y) / step
         area = a * d - b * c
@@ -94,7 +94,7 @@ def undistorted(
         if max(np.abs(off_x).max(), np.abs(off_y).max()) < ROUNDING:
             break
         found_x, found_y = found_x + (d * off_x - b * off_y) / area, found_y + (a * off_y - c * off_x) / area
-    here_x, here_y = distorted(found_x, found_y, k)
+    here_x, here_y = distort_rays(found_x, found_y, k)
     miss = np.hypot(here_x - x, here_y - y)
     if not (miss <= CLOSED).all():
         raise InputError(
@@ -128,5 +128,5 @@ def pixel_directions(
         (np.arange(width) + 0.5 - K[0, 2]) / K[0, 0], (np.arange(height) + 0.5 - K[1, 2]) / K[1, 1]
     )
     if lens is not None:
-        x, y = undistorted(x, y, lens)
+        x, y = undistort_points(x, y, lens)
     return np.stack((x, y), axis=-1)

@@ -13,9 +13,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.camera import Camera, viewmat
-from tasks.render.lens import distorted, pixel_directions
-from tasks.render.surface_search import depth_bounds, nearest_surface, parallax_about, place_on
+from tasks.render.camera import Camera, world_to_camera
+from tasks.render.lens import distort_rays, pixel_directions
+from tasks.render.surface_search import depth_bounds, nearest_surface, parallax_range, project_onto_picture
 
 MARGIN = 0.05
 """Share of the picture's larger side by which the wide picture reaches beyond a moving camera's field [1]."""
@@ -115,7 +115,7 @@ def read_out(
         source=np.empty((height, width), np.int64),
     )
     K = np.array((field.K[0, 0], field.K[1, 1], field.K[0, 2], field.K[1, 2]))
-    _read(
+    _read_pixels(
         picture, near, *depth_bounds(near), field.directions, K, middle, end - begin, blurs,
         seen.picture, seen.depth, seen.source,
     )  # fmt: skip
@@ -123,7 +123,7 @@ def read_out(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _cubic(t, weights):  # type: ignore[no-untyped-def]
+def _cubic_weights(t, weights):  # type: ignore[no-untyped-def]
     """Weights of the four neighbours at t between the middle two (R. G. Keys 1981, DOI 10.1109/TASSP.1981.1163711)."""
     weights[0] = np.float32(t * (-0.5 + t * (1 - 0.5 * t)))
     weights[1] = np.float32(1 + t * t * (-2.5 + 1.5 * t))
@@ -138,8 +138,8 @@ def _add_light(picture, u, v, across, down, light):  # type: ignore[no-untyped-d
     x = min(max(u - 0.5, 1.0), width - 2.001)
     y = min(max(v - 0.5, 1.0), height - 2.001)
     c, r = int(x), int(y)
-    _cubic(x - c, across)
-    _cubic(y - r, down)
+    _cubic_weights(x - c, across)
+    _cubic_weights(y - r, down)
     red = green = blue = np.float32(0)
     for i in range(4):
         for j in range(4):
@@ -171,13 +171,13 @@ def project_by_rows(
     """
     places = np.empty(points.shape)
     coefficients = np.zeros(5) if camera.lens is None else camera.lens.coefficients
-    views = np.stack([viewmat(pose)[:3] for pose in T_world_rows])
-    _project(points.reshape(-1, 3), views, camera.K, coefficients, places.reshape(-1, 3))
+    views = np.stack([world_to_camera(pose)[:3] for pose in T_world_rows])
+    _project_rows(points.reshape(-1, 3), views, camera.K, coefficients, places.reshape(-1, 3))
     return places
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _project(points, views, K, coefficients, places):  # type: ignore[no-untyped-def]
+def _project_rows(points, views, K, coefficients, places):  # type: ignore[no-untyped-def]
     rows = len(views)
     camera = np.empty(3)
     for k in range(len(points)):
@@ -195,14 +195,14 @@ def _project(points, views, K, coefficients, places):  # type: ignore[no-untyped
             if not camera[2] > 0:
                 u, v = np.nan, np.nan
                 break
-            x, y = distorted(camera[0] / camera[2], camera[1] / camera[2], coefficients)
+            x, y = distort_rays(camera[0] / camera[2], camera[1] / camera[2], coefficients)
             u, v = K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
         places[k, 0], places[k, 1] = u, v
         places[k, 2] = camera[2] if v == v else np.nan
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _look(pose, span, share, direction, ray, shift):  # type: ignore[no-untyped-def]
+def _interpolate_ray(pose, span, share, direction, ray, shift):  # type: ignore[no-untyped-def]
     """Ray and shift of a pixel at a share of its exposure; rotation is small enough to go along a line."""
     for i in range(3):
         x, y = pose[i, 0] + share * span[i, 0], pose[i, 1] + share * span[i, 1]
@@ -211,7 +211,7 @@ def _look(pose, span, share, direction, ray, shift):  # type: ignore[no-untyped-
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _read(picture, near, farthest, nearest, directions, K, poses, spans, blurs, out, depth, source):  # type: ignore[no-untyped-def]
+def _read_pixels(picture, near, farthest, nearest, directions, K, poses, spans, blurs, out, depth, source):  # type: ignore[no-untyped-def]
     height, width = directions.shape[:2]
     ray, shift, light = np.empty(3), np.empty(3), np.empty(3, dtype=np.float32)
     across, down = np.empty(4, dtype=np.float32), np.empty(4, dtype=np.float32)
@@ -219,7 +219,7 @@ def _read(picture, near, farthest, nearest, directions, K, poses, spans, blurs, 
         pose, span = poses[row], spans[row]
         for column in range(width):
             direction = directions[row, column]
-            _look(pose, span, 0.0, direction, ray, shift)
+            _interpolate_ray(pose, span, 0.0, direction, ray, shift)
             u, v, w = nearest_surface(near, nearest, farthest, K, ray, shift)
             depth[row, column] = 1 / w if w > 0 else np.nan
             r = min(max(int(v), 0), near.shape[0] - 1)
@@ -230,12 +230,12 @@ def _read(picture, near, farthest, nearest, directions, K, poses, spans, blurs, 
                 for i in range(3):
                     out[row, column, i] = light[i]
                 continue
-            _look(pose, span, -0.5, direction, ray, shift)
-            first_u, first_v = place_on(K, ray, shift, w)
-            parallax = parallax_about(near, nearest, farthest, K, ray, shift)
-            _look(pose, span, 0.5, direction, ray, shift)
-            last_u, last_v = place_on(K, ray, shift, w)
-            parallax = max(parallax, parallax_about(near, nearest, farthest, K, ray, shift))
+            _interpolate_ray(pose, span, -0.5, direction, ray, shift)
+            first_u, first_v = project_onto_picture(K, ray, shift, w)
+            parallax = parallax_range(near, nearest, farthest, K, ray, shift)
+            _interpolate_ray(pose, span, 0.5, direction, ray, shift)
+            last_u, last_v = project_onto_picture(K, ray, shift, w)
+            parallax = max(parallax, parallax_range(near, nearest, farthest, K, ray, shift))
             alone = parallax <= ALONE
             way = max(abs(last_u - first_u), abs(last_v - first_v), 0.0 if alone else parallax)
             samples = max(min(int(np.ceil(way + 0.9)), MOST_SAMPLES), 1)
@@ -244,7 +244,7 @@ def _read(picture, near, farthest, nearest, directions, K, poses, spans, blurs, 
                 if samples > 1:
                     u, v = first_u + share * (last_u - first_u), first_v + share * (last_v - first_v)
                     if not alone:
-                        _look(pose, span, share - 0.5, direction, ray, shift)
+                        _interpolate_ray(pose, span, share - 0.5, direction, ray, shift)
                         u, v, _ = nearest_surface(near, nearest, farthest, K, ray, shift)
                 _add_light(picture, u, v, across, down, light)
             for i in range(3):

@@ -37,7 +37,7 @@ class RoadRelief:
     far: float
 
 
-def road_lift(gaussians: Gaussians, relief: RoadRelief) -> NDArray[np.float64]:
+def measure_road_lift(gaussians: Gaussians, relief: RoadRelief) -> NDArray[np.float64]:
     """Height H_g of the feature under every road Gaussian, float64 [N]; 0 for all that is no road [m].
 
     Parameters

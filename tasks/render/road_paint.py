@@ -26,7 +26,7 @@ class HazardMarking:
     gap: tuple[float, float, float]
 
 
-def painted(
+def paint_feature(
     gaussians: Gaussians,
     relief: RoadRelief,
     marking: HazardMarking,

@@ -26,7 +26,7 @@ _MASS = (_PEAK[:, None] ** np.arange(1, 1000) / np.arange(1, 1000) ** 1.5).sum(a
 """Peak opacity of a Gaussian, and its optical depth added up over a line by sqrt(2 pi) standard deviations."""
 
 
-def refined_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
+def refine_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
     """The scene with the road Gaussians about a feature cut into pieces along the road.
 
     A Gaussian of peak opacity o has optical depth -ln(1 - o exp(-u^2 / 2)) at u standard deviations. Its pieces
@@ -56,7 +56,7 @@ def refined_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
     if not len(cut):
         return gaussians
     pieces = [
-        _pieces(gaussians, road[k], axes[k, :, axis[k]], int(axis[k]), float(length[k] / longest))
+        _cut_gaussian(gaussians, road[k], axes[k, :, axis[k]], int(axis[k]), float(length[k] / longest))
         for k in cut
     ]
     joined: dict[str, Any] = {
@@ -68,7 +68,7 @@ def refined_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
     return replace(gaussians, **joined)
 
 
-def _pieces(
+def _cut_gaussian(
     gaussians: Gaussians, k: int, direction: NDArray[np.float64], axis: int, times: float
 ) -> dict[str, NDArray[Any]]:
     """Pieces of Gaussian k, ``times`` shorter along one of its axes, whose world direction is given."""

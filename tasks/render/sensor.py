@@ -24,7 +24,7 @@ class Sensor:
     read_noise: float = 0.0
 
 
-def photographed(picture: NDArray[np.float32], sensor: Sensor, seed: int, frame: int) -> NDArray[np.float32]:
+def apply_sensor(picture: NDArray[np.float32], sensor: Sensor, seed: int, frame: int) -> NDArray[np.float32]:
     """The light that a picture is developed from.
 
     Photons arrive by Poisson's law, here its normal limit, so that a pixel of N electrons has a variance of

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.camera import Camera, viewmat
+from tasks.render.camera import Camera, world_to_camera
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.readout import Field, read_out
 from tasks.render.weather.attribution import attribution, changed
@@ -15,7 +15,7 @@ from tasks.render.weather.layers import ClipWeather, WeatherFrame, particle_laye
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sight:
+class SensorFrame:
     """What a frame's pixels show.
 
     Parameters
@@ -36,9 +36,9 @@ class Sight:
     changes: NDArray[np.uint8] | None
 
 
-def as_drawn(
+def take_drawn_frame(
     weather: ClipWeather, finished: WeatherFrame, gbuffer: GBuffer, shutter: Shutter, labelled: bool
-) -> Sight:
+) -> SensorFrame:
     """The frame of a pinhole whose rows are all exposed at once.
 
     Parameters
@@ -47,7 +47,7 @@ def as_drawn(
     labelled : with `points` and `changes`
     """
     eye = shutter.T_world_camera[:3, 3]
-    return Sight(
+    return SensorFrame(
         picture=finished.picture,
         depth=gbuffer.depth,
         class_id=gbuffer.class_id,
@@ -57,7 +57,7 @@ def as_drawn(
     )
 
 
-def through_sensor(
+def take_frame_through_sensor(
     weather: ClipWeather,
     still: WeatherFrame,
     gbuffer: GBuffer,
@@ -66,7 +66,7 @@ def through_sensor(
     field: Field,
     T_world_rows: NDArray[np.float64],
     labelled: bool,
-) -> Sight:
+) -> SensorFrame:
     """The frame behind a lens, read out row by row and averaged over the exposure, as the camera asks for.
 
     Parameters
@@ -83,7 +83,11 @@ def through_sensor(
         Labels are those of the middle of the exposure, each from one pixel of the wide picture.
     """
     seen = read_out(
-        still.picture, gbuffer.depth, field, viewmat(wide.T_world_camera) @ T_world_rows, camera.motion_blur
+        still.picture,
+        gbuffer.depth,
+        field,
+        world_to_camera(wide.T_world_camera) @ T_world_rows,
+        camera.motion_blur,
     )
     picture = seen.picture
     changes = attribution(weather, still, gbuffer, wide).ravel()[seen.source] if labelled else None
@@ -97,7 +101,7 @@ def through_sensor(
         picture = recompose(seen.picture, (layer,))
         if changes is not None:
             changes |= changed(seen.picture, picture, layer)
-    return Sight(
+    return SensorFrame(
         picture=picture,
         depth=seen.depth,
         class_id=gbuffer.class_id.ravel()[seen.source],

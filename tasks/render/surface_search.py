@@ -49,45 +49,45 @@ def _inverse_depth(near, u, v):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def place_on(K, ray, shift, w):  # type: ignore[no-untyped-def]
+def project_onto_picture(K, ray, shift, w):  # type: ignore[no-untyped-def]
     """Where the wide picture shows the point of inverse depth w on a row's ray [px]."""
     z = ray[2] + w * shift[2]
     return K[0] * (ray[0] + w * shift[0]) / z + K[2], K[1] * (ray[1] + w * shift[1]) / z + K[3]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _on_ray(q, ray, shift):  # type: ignore[no-untyped-def]
+def _row_inverse_depth(q, ray, shift):  # type: ignore[no-untyped-def]
     """Inverse depth in the row's camera of the ray's point whose inverse depth in the wide camera is q [m-1]."""
     return ray[2] * q / max(1 - shift[2] * q, 0.1)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _about(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+def _inverse_depth_range(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
     """Inverse depths in the row's camera of a ray's points at the nearest and the farthest depth hereabouts [m-1]."""
-    u, v = place_on(K, ray, shift, 0.0)
+    u, v = project_onto_picture(K, ray, shift, 0.0)
     row = min(max(int(v), 0), near.shape[0] - 1) // TILE
     column = min(max(int(u), 0), near.shape[1] - 1) // TILE
     return (
-        _on_ray(np.float64(nearest[row, column]), ray, shift),
-        _on_ray(np.float64(farthest[row, column]), ray, shift),
+        _row_inverse_depth(np.float64(nearest[row, column]), ray, shift),
+        _row_inverse_depth(np.float64(farthest[row, column]), ray, shift),
     )
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def parallax_about(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+def parallax_range(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
     """How far apart in the wide picture those two points lie [px]."""
-    w, last = _about(near, nearest, farthest, K, ray, shift)
-    u, v = place_on(K, ray, shift, w)
-    far_u, far_v = place_on(K, ray, shift, last)
+    w, last = _inverse_depth_range(near, nearest, farthest, K, ray, shift)
+    u, v = project_onto_picture(K, ray, shift, w)
+    far_u, far_v = project_onto_picture(K, ray, shift, last)
     return max(abs(far_u - u), abs(far_v - v))
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def nearest_surface(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
     """The nearest surface on a ray: its place in the wide picture [px] and inverse depth in the row's camera [m-1]."""
-    w, last = _about(near, nearest, farthest, K, ray, shift)
-    u, v = place_on(K, ray, shift, w)
-    far_u, far_v = place_on(K, ray, shift, last)
+    w, last = _inverse_depth_range(near, nearest, farthest, K, ray, shift)
+    u, v = project_onto_picture(K, ray, shift, w)
+    far_u, far_v = project_onto_picture(K, ray, shift, last)
     way = max(abs(far_u - u), abs(far_v - v))
     found = w
     if way > 0.05:
@@ -98,8 +98,8 @@ def nearest_surface(near, nearest, farthest, K, ray, shift):  # type: ignore[no-
         hit = False
         for k in range(steps + 1):
             here = w - k * step
-            u, v = place_on(K, ray, shift, here)
-            found = _on_ray(_inverse_depth(near, u, v), ray, shift)
+            u, v = project_onto_picture(K, ray, shift, here)
+            found = _row_inverse_depth(_inverse_depth(near, u, v), ray, shift)
             if found >= here - 1e-9:
                 # far in front of the ray's point is another thing, behind which the ray passes
                 if found <= here + step + SLOPE * found:
@@ -110,10 +110,10 @@ def nearest_surface(near, nearest, farthest, K, ray, shift):  # type: ignore[no-
         if not hit:
             return int(beside_u) + 0.5, int(beside_v) + 0.5, beside
     else:
-        found = _on_ray(_inverse_depth(near, u, v), ray, shift)
+        found = _row_inverse_depth(_inverse_depth(near, u, v), ray, shift)
     for _ in range(2):
-        next_u, next_v = place_on(K, ray, shift, found)
-        again = _on_ray(_inverse_depth(near, next_u, next_v), ray, shift)
+        next_u, next_v = project_onto_picture(K, ray, shift, found)
+        again = _row_inverse_depth(_inverse_depth(near, next_u, next_v), ray, shift)
         if abs(again - found) > KINK * found:
             break
         u, v, found = next_u, next_v, again

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.effects import load_effects
-from tasks.campaign.planned_runs import RICH, planned_run
+from tasks.campaign.planned_runs import RICH, make_planned_run
 from tasks.identification.decision.forms import RIDGE, form_hypotheses, scan, spline_slopes
 from tasks.identification.decision.screening import screen
 from tasks.identification.inference.campaign_evidence import Evidence
@@ -112,7 +112,7 @@ def test_the_screen_sees_an_effect_whose_threshold_is_far_from_its_first_value()
 
 def test_long_steps_are_for_runs_that_they_hardly_change() -> None:
     coasting, cycling = (
-        evidence_of([run_model(planned_run(drive, "run"), VEHICLE, SURFACE)], ()).train[0]
+        evidence_of([run_model(make_planned_run(drive, "run"), VEHICLE, SURFACE)], ()).train[0]
         for drive in (RICH[0], RICH[4])
     )
     assert coasting.substeps == COARSE_SUBSTEPS and cycling.substeps == SUBSTEPS

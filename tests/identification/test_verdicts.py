@@ -10,7 +10,7 @@ from catalogs.effects.truths import load_truths
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from tasks.campaign.planned_runs import RICH, Drive, planned_run
+from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run
 from tasks.errors import InputError
 from tasks.identification.benchmark import synthetic_campaign
 from tasks.identification.decision.answer import Verdict
@@ -30,7 +30,7 @@ def judged(
     seed: int = 31,
     vehicle: Vehicle = VEHICLE,
     outside: str | None = None,
-    design: tuple[Drive, ...] = RICH,
+    design: tuple[RunPlan, ...] = RICH,
 ) -> Verdict:
     slots = OUTSIDE[outside].slots if outside else ()
     campaign = synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
@@ -91,13 +91,13 @@ class TestACarThatIsGrown:
     )
 
     def test_it_predicts_as_the_plain_car_with_its_effects(self) -> None:
-        run = planned_run(RICH[4], "pulsed")
+        run = make_planned_run(RICH[4], "pulsed")
         theta = parameter_vector({"lag": 0.08, "drag_area": 0.7})
         grown = predict(run_model(run, self.GROWN, SURFACE), np.zeros_like(theta))
         np.testing.assert_array_equal(grown, predict(run_model(run, VEHICLE, SURFACE), theta))
 
     def test_it_predicts_with_its_forms(self) -> None:
-        run = planned_run(RICH[4], "pulsed")
+        run = make_planned_run(RICH[4], "pulsed")
         none = parameter_vector({})
         grown = predict(run_model(run, replace(VEHICLE, forms=(self.FORM,)), SURFACE), none)
         added = predict(run_model(run, VEHICLE, SURFACE), none, slots=(self.FORM.slot,))
@@ -114,4 +114,4 @@ class TestACarThatIsGrown:
 
     def test_what_only_coupled_mode_knows_is_refused(self) -> None:
         with pytest.raises(InputError, match=r"effects that only coupled mode knows .*abs_cutoff"):
-            run_model(planned_run(RICH[4], "pulsed"), load_vehicle("multibody-grown"), SURFACE)
+            run_model(make_planned_run(RICH[4], "pulsed"), load_vehicle("multibody-grown"), SURFACE)

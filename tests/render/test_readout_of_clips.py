@@ -8,9 +8,9 @@ import pytest
 from catalogs.weather import load_weather
 from tasks.errors import InputError
 from tasks.eval.image_quality import psnr
-from tasks.render.camera import body_poses, continuous_rig, viewmat
+from tasks.render.camera import body_poses, continuous_rig, world_to_camera
 from tasks.render.clip import render_clip
-from tasks.render.composition import compose, encode_8bit
+from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import sensor_field
@@ -76,9 +76,11 @@ def clip(street, camera, parameters, state=None, **more):
 
 def drawn(street, camera, pose):
     backend = CpuBackend()
-    gbuffer = backend.rasterise(backend.prepare(street), viewmat(pose), camera.K, camera.width, camera.height)
-    sky = environment_view(clear_sky(), viewmat(pose), camera.K, camera.width, camera.height)
-    return compose(gbuffer, sky, street.display_encoded), gbuffer
+    gbuffer = backend.rasterise(
+        backend.prepare(street), world_to_camera(pose), camera.K, camera.width, camera.height
+    )
+    sky = environment_view(clear_sky(), world_to_camera(pose), camera.K, camera.width, camera.height)
+    return compose_over_sky(gbuffer, sky, street.display_encoded), gbuffer
 
 
 def test_with_all_three_off_the_bytes_are_those_of_the_plain_composition(street, parameters):

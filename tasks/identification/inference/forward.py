@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from tasks.campaign.campaign import CHANNELS, Run
-from tasks.campaign.gauge import at_rest
+from tasks.campaign.gauge import zero_pressure_at_rest
 from tasks.errors import InputError
 from tasks.identification.inference.rollout import CONSTANTS, N_STATES, OUTPUTS, drive
 from tasks.surface.friction import surface_friction
@@ -129,7 +129,7 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     pressed = np.flatnonzero(run.pressure > 0.1)
     lead = min(100, int(pressed[0])) if pressed.size else 100
     return RunModel(
-        run=replace(run, pressure=at_rest(run.pressure)),
+        run=replace(run, pressure=zero_pressure_at_rest(run.pressure)),
         constants=np.array([values[name] for name in CONSTANTS]),
         own=parameter_vector({name: v for name, v in vehicle.effects.items() if name in PARAMETER_INDEX}),
         forms=tuple(form.slot for form in vehicle.forms),

@@ -43,7 +43,7 @@ class CpuBackend:
     """`tasks.render.rasterise.rasteriser` as a `Backend`."""
 
     name = "cpu"
-    prepare = staticmethod(rasteriser.prepare)
+    prepare = staticmethod(rasteriser.prepare_gaussians)
     rasterise = staticmethod(rasteriser.rasterise)
 
 
@@ -76,7 +76,7 @@ def select_backend(name: str = "auto") -> Backend:
         from tasks.render.rasterise.gsplat_backend import GsplatBackend
 
         gsplat: Backend = GsplatBackend()
-        problem = probe(gsplat)
+        problem = compare_with_cpu(gsplat)
     except Exception as error:
         problem = f"{type(error).__name__}: {error}"
     if not problem:
@@ -86,7 +86,7 @@ def select_backend(name: str = "auto") -> Backend:
     return CpuBackend()
 
 
-def probe(backend: Backend) -> str:
+def compare_with_cpu(backend: Backend) -> str:
     """Draw a small scene with this backend and with the CPU, and compare.
 
     Parameters
@@ -99,17 +99,17 @@ def probe(backend: Backend) -> str:
     """
     gaussians, viewmat, K = probe_scene()
     covered = np.tile(np.array([2.0, 1.0], np.float32), (len(gaussians), 1))
-    return _difference(backend, gaussians, viewmat, K) or _difference(
+    return _describe_difference(backend, gaussians, viewmat, K) or _describe_difference(
         backend, replace(gaussians, antialiased=True, surroundings=covered), viewmat, K
     )
 
 
-def _difference(
+def _describe_difference(
     backend: Backend, gaussians: Gaussians, viewmat: NDArray[np.float64], K: NDArray[np.float64]
 ) -> str:
     width, height = 64, 48
     drawn = backend.rasterise(backend.prepare(gaussians), viewmat, K, width, height)
-    wanted = rasteriser.rasterise(rasteriser.prepare(gaussians), viewmat, K, width, height)
+    wanted = rasteriser.rasterise(rasteriser.prepare_gaussians(gaussians), viewmat, K, width, height)
     differences = {
         "rgb": drawn.rgb - wanted.rgb,
         "alpha": drawn.alpha - wanted.alpha,

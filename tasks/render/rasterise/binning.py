@@ -30,7 +30,7 @@ def tile_lists(
 
     Parameters
     ----------
-    records : float32 [V, 16] splat records of `tasks.render.rasterise.projection.project`
+    records : float32 [V, 16] splat records of `tasks.render.rasterise.projection.project_gaussians`
     width, height : picture size [px]
 
     Returns

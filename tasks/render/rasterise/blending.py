@@ -76,7 +76,7 @@ class _Strips(NamedTuple):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def absorb(p, before):  # type: ignore[no-untyped-def]
+def absorb_light(p, before):  # type: ignore[no-untyped-def]
     """Blend weight of a splat with logarithmic opacity p, and the transmittance behind it.
 
     Once a pixel's transmittance is down at the stop it stays there, so no splat behind gets a weight.
@@ -173,7 +173,7 @@ def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untype
             l = first + np.uint64(x)
             dx = np.float32(x) - middle
             before = s[l]
-            w, after = absorb(log_alpha - falloff * dx * dx, before)
+            w, after = absorb_light(log_alpha - falloff * dx * dx, before)
             s[l] = after
             s[_FRONT + l] += number if (before >= _HALF) & (after < _HALF) else _ZERO
             s[_ALPHA + l] += w
@@ -199,7 +199,7 @@ def _plane_depth(record, rays, u, v):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def blend(records, rays, starts, splats, rgb, depth, expected_depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
+def blend_tiles(records, rays, starts, splats, rgb, depth, expected_depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
     """Blend every tile and write the finished buffers of `GBuffer`.
 
     Parameters
@@ -283,7 +283,7 @@ def _gather_strips(s, records, splats, listed, strips, weights, sums):  # type: 
         for x in range(TILE_WIDTH):
             l = first + np.uint64(x)
             dx = np.float32(x) - middle
-            weights[x], s[l] = absorb(log_alpha - falloff * dx * dx, s[l])
+            weights[x], s[l] = absorb_light(log_alpha - falloff * dx * dx, s[l])
         for c in range(sums.shape[1]):
             plane = np.uint64((1 + c) * _PLANE) + first
             # Four running sums, which do not wait for one another.

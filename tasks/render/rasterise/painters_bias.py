@@ -35,17 +35,17 @@ MOST_OVERLAP, MOST_RATIO = 30.0, 30.0
 """Largest overlap and size by the neighbours' that the table holds [1]."""
 STEEPEST = 0.1
 """Largest 1 / y for which the first order is taken: a disc nearer the horizon counts as this [1]."""
-FURTHEST = 2.5
+LARGEST_SHIFT = 2.5
 """No lead is longer [1]."""
 
-_SCALE, _INTERVALS, _STEEPEST, _FURTHEST = (
-    np.float32(c) for c in (OVERLAP_SCALE, INTERVALS, STEEPEST, FURTHEST)
+_SCALE, _INTERVALS, _STEEPEST, _LARGEST_SHIFT = (
+    np.float32(c) for c in (OVERLAP_SCALE, INTERVALS, STEEPEST, LARGEST_SHIFT)
 )
 _LAST = np.float32(INTERVALS - 1)
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
-def lead_terms(overlap: float, ratio: float) -> tuple[float, float]:
+def shift_terms(overlap: float, ratio: float) -> tuple[float, float]:
     """Lead on a surface without perspective, and what perspective adds to it by 1 / y.
 
     Parameters
@@ -67,7 +67,7 @@ def lead_terms(overlap: float, ratio: float) -> tuple[float, float]:
     return -mean, variance + 2 * overlap * shading / ratio
 
 
-def _table() -> NDArray[np.float32]:
+def _tabulate_shifts() -> NDArray[np.float32]:
     """Both terms on an even grid of overlap / (overlap + scale) and ratio / (1 + ratio), float32 [33, 33, 2].
 
     Rounded, so that the last bit of a processor's exponential does not reach a picture.
@@ -76,16 +76,16 @@ def _table() -> NDArray[np.float32]:
     with np.errstate(divide="ignore"):
         overlaps = np.minimum(OVERLAP_SCALE * share / (1 - share), MOST_OVERLAP)
         ratios = np.clip(share / (1 - share), 1e-3, MOST_RATIO)
-    terms = [[lead_terms(overlap, ratio) for ratio in ratios] for overlap in overlaps]
+    terms = [[shift_terms(overlap, ratio) for ratio in ratios] for overlap in overlaps]
     return np.array(terms).round(6).astype(np.float32)
 
 
-LEADS = _table()
-"""Both terms of `lead_terms`, float32 [33, 33, 2]."""
+SHIFTS = _tabulate_shifts()
+"""Both terms of `shift_terms`, float32 [33, 33, 2]."""
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def lead(overlap, ratio, closeness):  # type: ignore[no-untyped-def]
+def interpolate_shift(overlap, ratio, closeness):  # type: ignore[no-untyped-def]
     """How many standard deviations nearer a disc must be drawn to be seen in its place, float32.
 
     Parameters
@@ -104,5 +104,5 @@ def lead(overlap, ratio, closeness):  # type: ignore[no-untyped-def]
     for di in range(2):
         for dj in range(2):
             share = (down if di else _ONE - down) * (across if dj else _ONE - across)
-            total += share * (LEADS[row + di, column + dj, 0] + near * LEADS[row + di, column + dj, 1])
-    return min(total, _FURTHEST)
+            total += share * (SHIFTS[row + di, column + dj, 0] + near * SHIFTS[row + di, column + dj, 1])
+    return min(total, _LARGEST_SHIFT)

@@ -108,7 +108,7 @@ def _spread_bits(v: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return v
 
 
-def prepare(gaussians: Gaussians) -> PreparedGaussians:
+def prepare_gaussians(gaussians: Gaussians) -> PreparedGaussians:
     """Check, order and pack a cloud once; every view of it is then rasterised from the result.
 
     Parameters
@@ -134,7 +134,7 @@ def prepare(gaussians: Gaussians) -> PreparedGaussians:
     origins, radii, reach = np.empty((block_count, 3)), np.empty(block_count), np.empty(block_count)
     for first in range(0, block_count, _BLOCKS_AT_ONCE):
         part = slice(first, first + _BLOCKS_AT_ONCE)
-        origins[part], radii[part], reach[part] = _pack(gaussians, members[part], blocks[part])
+        origins[part], radii[part], reach[part] = _pack_blocks(gaussians, members[part], blocks[part])
     if n % BLOCK:
         blocks[-1, LOG_OPACITY, n % BLOCK :] = _NEVER_VISIBLE
     return PreparedGaussians(
@@ -150,7 +150,7 @@ def prepare(gaussians: Gaussians) -> PreparedGaussians:
     )
 
 
-def _pack(
+def _pack_blocks(
     gaussians: Gaussians, members: NDArray[np.int64], blocks: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Fill the blocks [B, P, 64] with the members [B, 64]; returns their origins, radii and reach."""

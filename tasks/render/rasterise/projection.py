@@ -15,7 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.rasterise.painters_bias import FURTHEST, lead
+from tasks.render.rasterise.painters_bias import LARGEST_SHIFT, interpolate_shift
 from tasks.render.rasterise.preparation import (
     AXES,
     BLOCK,
@@ -68,7 +68,7 @@ def visible_blocks(prepared: PreparedGaussians, view: View) -> NDArray[np.int64]
     """
     x, y, z = view.to_camera(prepared.origins).T
     keep = z + prepared.radii >= NEAR
-    extent = np.sqrt(-2 * LOG_CUT) + (FURTHEST if prepared.level else 0.0)
+    extent = np.sqrt(-2 * LOG_CUT) + (LARGEST_SHIFT if prepared.level else 0.0)
     blur = extent * np.sqrt(low_pass(prepared.antialiased)) + 1.0
     limits = view.ray_limits
     for p, f, c, size, ray in ((x, 0, 0, view.width, limits[:2]), (y, 1, 1, view.height, limits[2:])):
@@ -80,7 +80,9 @@ def visible_blocks(prepared: PreparedGaussians, view: View) -> NDArray[np.int64]
     return np.flatnonzero(keep)
 
 
-def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def project_gaussians(
+    prepared: PreparedGaussians, view: View
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Splat records of the Gaussians that touch the picture, along the Morton curve.
 
     Parameters
@@ -236,7 +238,9 @@ def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def
         size = s[(SURROUNDINGS + 1) * BLOCK + l]
         neighbours = max(size * size * (own - pixel) + pixel, _FACING)
         closeness = np.sqrt(own) / max(abs(slant), _FACING) * (_ONE - pixel / own)
-        way = lead(s[SURROUNDINGS * BLOCK + l], np.sqrt(own / neighbours), closeness) / np.sqrt(own)
+        way = interpolate_shift(s[SURROUNDINGS * BLOCK + l], np.sqrt(own / neighbours), closeness) / np.sqrt(
+            own
+        )
         way = way if slant > _ZERO else -way
         s[_RECORD + X * BLOCK + l] = u + way * along_x
         s[_RECORD + Y * BLOCK + l] = v + way * along_y

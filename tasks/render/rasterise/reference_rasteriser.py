@@ -75,7 +75,7 @@ def blend_steps(
             opacity *= np.sqrt(max(np.linalg.det(M @ M.T) / np.linalg.det(covariance), 1e-12))
         centre = f * ray + c
         if gaussians.surroundings is not None:
-            centre = centre + _way_nearer(gaussians, int(i), R, f, c, centre, covariance, low_pass)
+            centre = centre + _shift_nearer(gaussians, int(i), R, f, c, centre, covariance, low_pass)
         half = np.sqrt(2 * max(np.log(opacity / MIN_ALPHA), 0) * np.diag(covariance))
         first = np.clip(np.floor(centre - half), 0, size).astype(int)
         last = np.clip(np.ceil(centre + half), 0, size).astype(int)
@@ -101,7 +101,7 @@ def blend_steps(
         )
 
 
-def _way_nearer(
+def _shift_nearer(
     gaussians: Gaussians,
     i: int,
     R: NDArray[np.float64],

@@ -7,7 +7,7 @@ from tasks.errors import InputError
 from tasks.render.rasterise.binning import tile_lists
 from tasks.render.rasterise.blending import blend_transposed
 from tasks.render.rasterise.preparation import PreparedGaussians
-from tasks.render.rasterise.projection import project
+from tasks.render.rasterise.projection import project_gaussians
 from tasks.render.rasterise.view import view_of
 
 
@@ -48,7 +48,7 @@ def splat_back(
         raise InputError(
             f"splat_back: residual must have shape ({height}, {width}, channels); it has {residual.shape}"
         )
-    records, slots = project(prepared, view)
+    records, slots = project_gaussians(prepared, view)
     starts, splats = tile_lists(records, width, height)
     # A channel of ones carries the weight's own sum.
     channels = np.concatenate((residual, np.ones((height, width, 1), dtype=np.float32)), axis=2)

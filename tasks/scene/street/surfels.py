@@ -46,14 +46,14 @@ class Surfels:
         return len(self.centre)
 
 
-def join(parts: Sequence[Surfels]) -> Surfels:
+def join_surfels(parts: Sequence[Surfels]) -> Surfels:
     """All surfels of the parts, in order; none where there are no parts."""
     nothing = np.empty((0, 3))
-    parts = parts or [tiles(nothing, nothing, nothing, SemanticClass.OTHER, nothing)]
+    parts = parts or [tile_surface(nothing, nothing, nothing, SemanticClass.OTHER, nothing)]
     return Surfels(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Surfels)})
 
 
-def tiles(
+def tile_surface(
     centre: ArrayLike,
     edge_u: ArrayLike,
     edge_v: ArrayLike,
@@ -143,14 +143,14 @@ def graded_cells(
             inner = np.arange(1, int(np.ceil(length / (1.25 * largest)))) * largest
             inner *= length / (largest * (len(inner) + 1))
         else:
-            inner = np.array(_graded(length, largest, share))
+            inner = np.array(_halve_interval(length, largest, share))
         cuts += [edges[k] + inner, edges[k + 1 : k + 2]]
         interval += [k] * (len(inner) + 1)
     cut = np.concatenate(cuts)
     return (cut[1:] + cut[:-1]) / 2, np.diff(cut), np.array(interval, dtype=np.int64)
 
 
-def _graded(length: float, largest: float, share: float) -> list[float]:
+def _halve_interval(length: float, largest: float, share: float) -> list[float]:
     """Inner cuts of an interval [m]: halved until no cell is too large for its distance from the ends."""
     cuts, pending = [], [(0.0, length)]
     while pending:
@@ -162,7 +162,7 @@ def _graded(length: float, largest: float, share: float) -> list[float]:
     return sorted(cuts)
 
 
-def tube(
+def build_tube(
     path: ArrayLike,
     radius: ArrayLike,
     around: int,
@@ -191,10 +191,10 @@ def tube(
     angle = 2 * np.pi * np.arange(around + 1)[:, None, None] / around
     thickness = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(axis))[:, None]
     corners = axis + thickness * (np.cos(angle) * side + np.sin(angle) * other)
-    return tiles(*sheet_cells(corners), class_id, albedo, glow=glow)
+    return tile_surface(*sheet_cells(corners), class_id, albedo, glow=glow)
 
 
-def panel(
+def build_panel(
     origin: ArrayLike,
     edge_u: ArrayLike,
     edge_v: ArrayLike,
@@ -222,7 +222,7 @@ def panel(
     nu, nv = (max(int(np.ceil(np.linalg.norm(edge) / cell)), 1) for edge in (u, v))
     a, b = np.meshgrid((np.arange(nu) + 0.5) / nu, (np.arange(nv) + 0.5) / nv, indexing="ij")
     tone = np.ones((nu, nv, 1)) if rng is None else 1 + grain * rng.standard_normal((nu, nv, 1))
-    return tiles(
+    return tile_surface(
         corner + a[..., None] * u + b[..., None] * v,
         u / nu,
         v / nv,
@@ -232,10 +232,10 @@ def panel(
     )
 
 
-def box(
+def build_box(
     low: ArrayLike, high: ArrayLike, cell: float, class_id: SemanticClass, albedo: ArrayLike, **grain: Any
 ) -> Surfels:
-    """The four walls and the top of an upright box; parameters as `panel`, between two corners [3] [m]."""
+    """The four walls and the top of an upright box; parameters as `build_panel`, between two corners [3] [m]."""
     a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     x, y, z = np.diag(b - a)
     sides = (
@@ -245,4 +245,6 @@ def box(
         (a + y, -y, z),
         (a + z, x, y),
     )
-    return join([panel(origin, u, v, cell, class_id, albedo, **grain) for origin, u, v in sides])
+    return join_surfels(
+        [build_panel(origin, u, v, cell, class_id, albedo, **grain) for origin, u, v in sides]
+    )
