@@ -39,7 +39,7 @@ from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdic
 from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
 from tasks.eval.poses.undistort import undistort_frames
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
-from tasks.render.clip import render_clip
+from tasks.render.clip import ClipConditions, RigMotion, render_clip
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
 from tasks.render.road_paint import HazardMarking, paint_feature
@@ -233,12 +233,19 @@ def picture(
             gaussians = paint_feature(gaussians, relief, catalogue.marking, *carriageway, albedo)
         gaussians, _ = apply_road_profile(gaussians, relief, *carriageway)
     return render_clip(
-        gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
-        frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
-        backend=select_backend(plan.backend), relief=relief, to_sun=scene.to_sun,
-        labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
-        rig_at=rig_at, composition=plan.settings.composition,
-    )  # fmt: skip
+        replace(scene, gaussians=gaussians),
+        catalogue.camera,
+        RigMotion(
+            T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
+            frame_rate_hz=plan.settings.frame_rate_hz,
+            rig_at=rig_at,
+        ),
+        ClipConditions(state=weather, parameters=catalogue.looks, seed=seed),
+        select_backend(plan.backend),
+        relief=relief,
+        labels=plan.settings.labels,
+        composition=plan.settings.composition,
+    )
 
 
 def judge_motion(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numba
@@ -83,6 +84,13 @@ class TrainingView:
     sky: NDArray[np.float32]
 
 
+class _Camera(NamedTuple):
+    """A view's camera as the kernel takes it: rotation [3, 3] [1], focal lengths and principal point [4] [px]."""
+
+    rotation: NDArray[np.float32]
+    lens: NDArray[np.float32]
+
+
 def refine_gaussians(
     gaussians: Gaussians,
     rays: NDArray[np.floating],
@@ -133,15 +141,16 @@ def _correct_by_view(
     weight = _display_response(view) ** 2
     target = np.where(view.clipped[..., None], -view.radiance, view.radiance)
     _, sums = blend_and_derive(records, target, weight, view.sky)
-    camera = np.array((view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2]), dtype=np.float32)
-    rotation = view.viewmat[:3, :3].astype(np.float32)
+    lens = np.array((view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2]), dtype=np.float32)
+    camera = _Camera(view.viewmat[:3, :3].astype(np.float32), lens)
     floor = np.float32(COLOUR_DAMPING * weight.mean())
-    _step_gaussians(prepared.blocks, slots, records, sums, along, fixed, rotation, camera, floor)
+    _step_gaussians(prepared.blocks, slots, records, sums, along, fixed, camera, floor)
 
 
 @numba.njit(cache=True, nogil=True)
-def _step_gaussians(blocks, slots, records, sums, along, fixed, rotation, camera, floor):  # type: ignore[no-untyped-def]
-    fx, fy, cx, cy = camera
+def _step_gaussians(blocks, slots, records, sums, along, fixed, camera, floor):  # type: ignore[no-untyped-def]
+    rotation = camera.rotation
+    fx, fy, cx, cy = camera.lens
     for i in range(len(slots)):
         block, lane = slots[i] // BLOCK, slots[i] % BLOCK
         evidence = max(sums[i, WEIGHT], floor)

@@ -1,4 +1,4 @@
-"""A contact sheet: a row a clip, a column a moment, with the speed and pitch curves beside the pictures."""
+"""A contact sheet: one row per clip, one column per time, with speed and pitch curves beside the pictures."""
 
 from collections.abc import Mapping, Sequence
 
@@ -55,7 +55,7 @@ def draw_contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz
 
 
 def draw_picture_sheet(rows: Sequence[Sequence[tuple[str, NDArray[np.uint8]]]]) -> NDArray[np.uint8]:
-    """Captioned pictures in rows.
+    """Draw captioned pictures in rows.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def draw_picture_sheet(rows: Sequence[Sequence[tuple[str, NDArray[np.uint8]]]]) 
 
 
 def encode_png(picture: NDArray[np.uint8]) -> bytes:
-    """PNG bytes of an RGB picture."""
+    """Return the PNG bytes of an RGB picture."""
     done, content = cv2.imencode(".png", picture[..., ::-1])
     assert done
     return content.tobytes()

@@ -1,4 +1,4 @@
-"""Lens distortion by Brown and Conrady, in OpenCV's convention: where the glass puts what a pinhole would see."""
+"""Lens distortion by Brown and Conrady, in OpenCV's convention."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from tasks.errors import InputError
 
 NEWTON_STEPS = 20
 ROUNDING = 1e-14
-"""Distance from the distorted place at which further steps are rounding [1]."""
+"""Distance from the distorted point below which further steps only change rounding [1]."""
 CLOSED = 1e-9
 """Largest distance from its distorted place at which an undistorted point counts as found [1]."""
 
@@ -39,7 +39,7 @@ class Lens:
 
 @numba.njit(cache=True, nogil=True)
 def distort_rays(x, y, coefficients):  # type: ignore[no-untyped-def]
-    """Where the lens puts the ray (x, y, 1): the same for scalars and for arrays, in kernels and outside.
+    """Return the distorted place of the ray (x, y, 1), for scalars and arrays, in kernels and outside.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def distort_rays(x, y, coefficients):  # type: ignore[no-untyped-def]
 def undistort_points(
     x: NDArray[np.float64], y: NDArray[np.float64], lens: Lens
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The rays that the lens puts at given places, by Newton's method.
+    """Return the rays that the lens maps to given places, by Newton's method.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def undistort_points(
     Raises
     ------
     InputError
-        Some place has no ray: the polynomial turns back inside the picture.
+        Some place has no ray: the polynomial is not monotonic inside the picture.
     """
     k = lens.coefficients
     step = 1e-6
@@ -107,7 +107,7 @@ def undistort_points(
 def pixel_directions(
     K: NDArray[np.float64], width: int, height: int, lens: Lens | None
 ) -> NDArray[np.float64]:
-    """Directions that a camera's pixels look in.
+    """Return the directions of a camera's pixels.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def pixel_directions(
     Raises
     ------
     InputError
-        The lens does not spread the whole picture.
+        The lens model is not monotonic over the whole picture.
     """
     x, y = np.meshgrid(
         (np.arange(width) + 0.5 - K[0, 2]) / K[0, 0], (np.arange(height) + 0.5 - K[1, 2]) / K[1, 1]

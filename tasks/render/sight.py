@@ -1,4 +1,4 @@
-"""One frame as the sensor has it, and the ground truth of the same pixels: drawn as it is, or read out row by row."""
+"""One frame of the sensor and the ground truth of its pixels: as drawn, or read out row by row."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from tasks.render.weather.layers import ClipWeather, WeatherFrame, particle_laye
 
 @dataclass(frozen=True, kw_only=True)
 class SensorFrame:
-    """What a frame's pixels show.
+    """Light and ground truth of a frame's pixels.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class SensorFrame:
     depth : float32 [H, W] z in the camera at the pixel's own time; NaN where nothing is seen [m]
     class_id : uint8 [H, W] `SemanticClass`
     normal : float32 [H, W, 3] world normal [1]
-    points : [H, W, 3] what is seen, world frame; NaN where nothing is. None without labels [m]
+    points : [H, W, 3] points that the pixels show, world frame; NaN where there are none. None without labels [m]
     changes : uint8 [H, W] bits of the layers that changed the pixel; None without labels
     """
 
@@ -39,7 +39,7 @@ class SensorFrame:
 def take_drawn_frame(
     weather: ClipWeather, finished: WeatherFrame, gbuffer: GBuffer, shutter: Shutter, labelled: bool
 ) -> SensorFrame:
-    """The frame of a pinhole whose rows are all exposed at once.
+    """Return the frame of a pinhole whose rows are all exposed at once.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def take_frame_through_sensor(
     T_world_rows: NDArray[np.float64],
     labelled: bool,
 ) -> SensorFrame:
-    """The frame behind a lens, read out row by row and averaged over the exposure, as the camera asks for.
+    """Return the frame behind a lens, read out row by row and averaged over the exposure, as the camera defines.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def take_frame_through_sensor(
 def row_points(
     directions: NDArray[np.float64], depth: NDArray[np.float32], T_world_rows: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What the pixels of a sensor read row by row see, in the world.
+    """Return the world points that the pixels of a sensor show when it is read row by row.
 
     Parameters
     ----------

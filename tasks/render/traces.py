@@ -1,4 +1,4 @@
-"""A frame with the vehicle's traces below it: what the car does at the moment that the picture shows."""
+"""A frame with traces of the vehicle's telemetry below it, up to the time of the frame."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ TRACES = (
 def add_traces(
     picture: NDArray[np.uint8], columns: Mapping[str, NDArray[np.float64]], frame: int
 ) -> NDArray[np.uint8]:
-    """The picture over a strip with one small plot a trace, up to this frame bright and after it faint.
+    """Return the picture over a strip with one small plot per trace, bright up to this frame and faint after it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Centres moved against the painter's bias, for a rasteriser that is given means and not splats.
+"""Correction of the painter's bias by moved centres, for a rasteriser that takes means instead of splats.
 
 The rules of `tasks.render.rasterise.projection`, on tensors.
 """
@@ -21,7 +21,7 @@ def means_nearer(
     view: View,
     low_pass: float,
 ) -> torch.Tensor:
-    """World centres whose projection is where the splats belong; camera z, and so the order, stays but for rounding.
+    """Return world centres that project to the corrected splats; camera z, and so the order, stays but for rounding.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def means_nearer(
 
     Returns
     -------
-    float32 [N, 3]; what is nearer than the near plane or behind it stays where it is [m]
+    float32 [N, 3]; centres nearer than the near plane or behind it are not moved [m]
     """
     R, t = means.new_tensor(view.viewmat[:3, :3]), means.new_tensor(view.viewmat[:3, 3])
     focal = means.new_tensor((view.K[0, 0], view.K[1, 1]))
@@ -78,7 +78,7 @@ def _interpolate_shift(overlap: torch.Tensor, ratio: torch.Tensor, closeness: to
 
 
 def _rotation_matrices(quats_wxyz: torch.Tensor) -> torch.Tensor:
-    """Rotation matrices of unit quaternions, [N, 3, 3]."""
+    """Return the rotation matrices of unit quaternions, [N, 3, 3]."""
     w, x, y, z = quats_wxyz.T
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.rasterise.binning import tile_lists
-from tasks.render.rasterise.blending import blend_tiles
+from tasks.render.rasterise.blending import Buffers, blend_tiles
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.preparation import PreparedGaussians, prepare_gaussians
 from tasks.render.rasterise.projection import project_gaussians
@@ -42,7 +42,7 @@ def rasterise(
     view = view_of(viewmat, K, width, height)
     records, _ = project_gaussians(prepared, view)
     starts, splats = tile_lists(records, width, height)
-    buffers = GBuffer(
+    buffers = Buffers(
         rgb=np.empty((height, width, 3), dtype=np.float32),
         depth=np.empty((height, width), dtype=np.float32),
         expected_depth=np.empty((height, width), dtype=np.float32),
@@ -50,8 +50,5 @@ def rasterise(
         normal=np.empty((height, width, 3), dtype=np.float32),
         class_id=np.empty((height, width), dtype=np.uint8),
     )
-    blend_tiles(
-        records, view.rays.astype(np.float32), starts, splats,
-        buffers.rgb, buffers.depth, buffers.expected_depth, buffers.alpha, buffers.normal, buffers.class_id
-    )  # fmt: skip
-    return buffers
+    blend_tiles(records, view.rays.astype(np.float32), starts, splats, buffers)
+    return GBuffer(**buffers._asdict())

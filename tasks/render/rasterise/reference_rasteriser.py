@@ -18,7 +18,7 @@ NEAR, RAY_MARGIN, MIN_ALPHA, MAX_ALPHA, STOP = 0.05, 0.3, 1 / 255, 0.999, 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Contribution:
-    """What one Gaussian adds to a window of the picture.
+    """Contribution of one Gaussian to a window of the picture.
 
     Parameters
     ----------
@@ -111,9 +111,9 @@ def _shift_nearer(
     covariance: NDArray[np.float64],
     low_pass: float,
 ) -> NDArray[np.float64]:
-    """By how much a disc is drawn towards where its surface comes nearer, against the painter's bias [px].
+    """Return the shift of a disc towards the nearer side of its surface, against the painter's bias [px].
 
-    `painters_bias` in double precision: no table, the integrals themselves, by the trapezoidal rule.
+    It is `painters_bias` in double precision: without a table, by the trapezoidal rule.
     """
     normal = R @ gaussians.normals[i].astype(np.float64)
     gradient = normal[:2] / f
@@ -139,7 +139,7 @@ def _shift_nearer(
 def rasterise_reference(
     gaussians: Gaussians, viewmat: NDArray[np.floating], K: NDArray[np.floating], width: int, height: int
 ) -> GBuffer:
-    """What `tasks.render.rasterise.rasteriser.rasterise` returns, slowly.
+    """Return the result of `tasks.render.rasterise.rasteriser.rasterise` by slow, readable code.
 
     Parameters
     ----------

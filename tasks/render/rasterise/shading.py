@@ -25,7 +25,7 @@ def _store_vector(planes, l, values):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _add_basis_share(rgb, block, k, l, value):  # type: ignore[no-untyped-def]
-    """Add basis function k's share in lane l."""
+    """Add the contribution of basis function k in lane l."""
     plane = SH + 3 * k
     red = rgb[0] + value * block[plane, l]
     green = rgb[1] + value * block[plane + 1, l]
@@ -35,7 +35,7 @@ def _add_basis_share(rgb, block, k, l, value):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def shade_lanes(directions, block, colours):  # type: ignore[no-untyped-def]
-    """Colours max(SH + 1/2, 0) of one block of Gaussians: `sh_basis`, one vector lane each.
+    """Compute the colours max(SH + 1/2, 0) of one block of Gaussians as `sh_basis` does, one vector lane each.
 
     Parameters
     ----------

@@ -9,12 +9,12 @@ from tasks.conventions import SemanticClass
 from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
 from tasks.scene.street.layout import EYE_HEIGHT, PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import named_generator
-from tasks.scene.street.surfels import Surfels, graded_cells, join_surfels, tile_surface
+from tasks.scene.street.surfels import Cover, Surfels, graded_cells, join_surfels, tile_surface
 
 CELL = 6.3
 """Width of an asphalt cell where it is seen closest [px]."""
-_OVERLAP, _OPACITY = 0.8, 0.94
-"""Standard deviation over cell size and peak opacity: wide and a little clear. Where cells are smaller than a
+_COVER = Cover(0.8, 0.94)
+"""Wide and slightly transparent cells. Where cells are smaller than a
 pixel, opaque ones hide all behind them and the road seems to slide under a moving camera."""
 _STONES = 32.0
 """Single light or dark stones where the road is seen closest [m-2]."""
@@ -53,8 +53,7 @@ def build_road(layout: StreetLayout, seed: int) -> Surfels:
         np.where(
             marked[:, None], paint_albedo(seed, s, d, grain), asphalt_albedo(layout, seed, s, d, width, grain)
         ),
-        overlap=_OVERLAP,
-        opacity=_OPACITY,
+        cover=_COVER,
     )
     return join_surfels([surface, _build_stones(layout, seed)])
 
@@ -78,7 +77,7 @@ def _build_stones(layout: StreetLayout, seed: int) -> Surfels:
         np.stack([zero, _STONE[1] * size, zero], axis=1),
         SemanticClass.ROAD,
         albedo,
-        overlap=0.5,
+        cover=Cover(0.5),
     )
 
 

@@ -10,7 +10,15 @@ from tasks.scene.street import palette
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import Building, Tree
-from tasks.scene.street.surfels import Surfels, build_panel, build_tube, join_surfels, tile_surface
+from tasks.scene.street.surfels import (
+    Cover,
+    Grain,
+    Surfels,
+    build_panel,
+    build_tube,
+    join_surfels,
+    tile_surface,
+)
 
 Floats = NDArray[np.float64]
 
@@ -82,8 +90,7 @@ def build_leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Gene
         SemanticClass.VEGETATION,
         np.clip(colour * tone * tint, 0.004, 0.6),
         openness=np.clip(0.30 + 0.35 * (out[:, 2] + 0.5) + 0.3 * np.minimum(spread, 1.2) * rise, 0.18, 1.0),
-        opacity=0.93,
-        overlap=0.42,
+        cover=Cover(0.42, 0.93),
     )
 
 
@@ -135,13 +142,13 @@ def _build_garden(layout: StreetLayout, seed: int, side: int, start: float, stop
 
     other, green = SemanticClass.OTHER, SemanticClass.TERRAIN
     wall = [
-        build_panel(corner(0.1, 0), along, [0, 0, 1.0], size, other, brick, rng=rng, grain=0.12),
+        build_panel(corner(0.1, 0), along, [0, 0, 1.0], size, other, brick, grain=Grain(rng, 0.12)),
         build_panel(
-            corner(0.05, 1.0), along, [0, side * 0.3, 0], 0.25, other, palette.TRIM[1], rng=rng, grain=0.04
+            corner(0.05, 1.0), along, [0, side * 0.3, 0], 0.25, other, palette.TRIM[1], grain=Grain(rng, 0.04)
         ),
     ]
     lawn_u, lawn_v = (along, np.array([0, side * 12.0, 0]))
-    lawn = build_panel(corner(0.3, 0.05), lawn_u, lawn_v, 0.5, green, palette.GRASS, rng=rng, grain=0.15)
+    lawn = build_panel(corner(0.3, 0.05), lawn_u, lawn_v, 0.5, green, palette.GRASS, grain=Grain(rng, 0.15))
     n = int(width / 0.45)
     hedge = np.column_stack(
         [

@@ -10,7 +10,7 @@ from tasks.scene.street.houses.openings import Part
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Building
-from tasks.scene.street.surfels import Surfels, build_box, build_panel, join_surfels
+from tasks.scene.street.surfels import Grain, Surfels, build_box, build_panel, join_surfels
 
 Floats = NDArray[np.float64]
 
@@ -51,24 +51,28 @@ def _close_house(layout: StreetLayout, house: Building, seed: int) -> list[Surfe
     overhang, parapet = np.array([0, out * 0.4, 0]), np.array([0, 0, 0.7])
     parts = [
         build_panel(
-            corner(-0.28, eaves - 0.1), along, np.array([0, 0, 0.3]), cell, kind, trim, rng=rng, grain=0.02
+            corner(-0.28, eaves - 0.1), along, np.array([0, 0, 0.3]), cell, kind, trim, grain=Grain(rng, 0.02)
         ),
-        build_panel(corner(-0.28, eaves + 0.2), along, overhang, cell, kind, 0.8 * trim, rng=rng, grain=0.02),
+        build_panel(
+            corner(-0.28, eaves + 0.2), along, overhang, cell, kind, 0.8 * trim, grain=Grain(rng, 0.02)
+        ),
         build_panel(corner(0.0, eaves - 0.1), along, np.array([0, -out * 0.28, 0]), cell, kind, 0.5 * trim),
     ]
     run, rise = _PITCH[house.roof]
     if house.roof == "flat":
         parts.append(
-            build_panel(corner(0.1, eaves + 0.1), along, parapet, cell, kind, wall, rng=rng, grain=look.grain)
+            build_panel(
+                corner(0.1, eaves + 0.1), along, parapet, cell, kind, wall, grain=Grain(rng, look.grain)
+            )
         )
     else:
         slope = np.array([0, out * run, rise])
         parts.append(
-            build_panel(corner(0.0, eaves + 0.2), along, slope, cell, kind, tile, rng=rng, grain=0.09)
+            build_panel(corner(0.0, eaves + 0.2), along, slope, cell, kind, tile, grain=Grain(rng, 0.09))
         )
     ends = ((house.start, -1.0), (house.start + house.width, 1.0))
     for (end, outward), neighbour in zip(ends, house.beside, strict=True):
-        blank = {"cell": 1.6 * cell, "class_id": kind, "albedo": 0.8 * wall, "rng": rng, "grain": 0.05}
+        blank = {"cell": 1.6 * cell, "class_id": kind, "albedo": 0.8 * wall, "grain": Grain(rng, 0.05)}
         # where two fronts do not line up, the end wall shows for a hand's breadth
         near, far = sorted((front, front + out * 0.35), reverse=outward < 0)
         parts.append(
@@ -87,7 +91,7 @@ def _close_house(layout: StreetLayout, house: Building, seed: int) -> list[Surfe
             half = np.array([0.3, 0.5, 0.0])
             brick = palette.BRICK[rng.integers(len(palette.BRICK))]
             parts.append(
-                build_box(foot - half, foot + half + [0, 0, 1.7], 0.4, kind, brick, rng=rng, grain=0.1)
+                build_box(foot - half, foot + half + [0, 0, 1.7], 0.4, kind, brick, grain=Grain(rng, 0.1))
             )
     return parts
 
