@@ -9,11 +9,11 @@ import numpy as np
 from catalogs.cameras import load_camera
 from catalogs.scenes import load_scene
 from catalogs.weather import load_weather
-from tasks.render.camera import viewmat
-from tasks.render.composition import compose
+from tasks.render.camera import world_to_camera
+from tasks.render.composition import compose_over_sky
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.atmosphere import air_layer, light_layer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import recompose
@@ -46,17 +46,17 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
     scene, camera, parameters = load_scene(scene_name), load_camera(camera_name), load_weather()
     pose = scene.route.T_world_rig[STATION] @ camera.T_rig_camera
     K = np.asarray(camera.K, dtype=np.float64)
-    view = viewmat(pose)
+    view = world_to_camera(pose)
     size = (camera.width, camera.height)
     shutter = Shutter(
         T_world_camera=pose, K=K, width=camera.width, height=camera.height, velocity=SPEED * pose[:3, 2],
         time_s=2.0, exposure_s=camera.exposure_s,
     )  # fmt: skip
-    clear_cloud = prepare(scene.gaussians)
+    clear_cloud = prepare_gaussians(scene.gaussians)
     clear_sky = environment_view(scene.environment, view, K, *size)
 
     def clear() -> None:
-        compose(rasterise(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded)
+        compose_over_sky(rasterise(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded)
 
     clear_ms = _cpu_ms(clear)
     found = [{"name": "clear frame", "value": clear_ms, "unit": "CPU-ms", "peer": None, "ratio": None}]
@@ -66,9 +66,9 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
             scene.gaussians, scene.environment, state, parameters, float(K[0, 0]), 1, scene.route
         )
         once_s = time.process_time() - started
-        cloud = prepare(gaussians)
+        cloud = prepare_gaussians(gaussians)
         gbuffer = rasterise(cloud, view, K, *size)
-        picture = compose(gbuffer, clear_sky, gaussians.display_encoded)
+        picture = compose_over_sky(gbuffer, clear_sky, gaussians.display_encoded)
         raster_ms = _cpu_ms(rasterise, cloud, view, K, *size)
         bare_ms = _cpu_ms(rasterise, clear_cloud, view, K, *size)
         stages = _list_stages(weather, picture, gbuffer, shutter)

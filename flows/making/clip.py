@@ -36,16 +36,14 @@ from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
-from tasks.eval.poses.pnp import recover_motion_pnp
-from tasks.eval.poses.undistort import undistorted
-from tasks.eval.poses.unroll import one_shutter
-from tasks.eval.poses.unusable import unusable_pixels
+from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
+from tasks.eval.poses.undistort import undistort_frames
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
-from tasks.render.clip import render_clip
+from tasks.render.clip import ClipConditions, RigMotion, render_clip
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
-from tasks.render.road_paint import HazardMarking, painted
-from tasks.render.road_refinement import refined_road
+from tasks.render.road_paint import HazardMarking, paint_feature
+from tasks.render.road_refinement import refine_road
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene
@@ -124,7 +122,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     if plan.settings.pictures:
         rig_at = rig_of(ride, frames, catalogue)
         buffers = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)
-        frames |= check_poses(buffers, frames, state.film_depth_mm, catalogue)
+        frames |= judge_motion(buffers, frames, state.film_depth_mm, catalogue)
     else:
         frames |= nothing_to_judge(len(frames["frame"]))
     verdict = frames.pop("verdict")
@@ -179,7 +177,7 @@ def warm_up(layout: Layout, scene: str) -> None:
         if plan.settings.pictures:
             rig_at = rig_of(ride, frames, catalogue)
             buffers = render_frames(clip.scenario, state, frames, short, catalogue, int(clip.seed), rig_at)
-            check_poses(buffers, frames, state.film_depth_mm, catalogue)
+            judge_motion(buffers, frames, state.film_depth_mm, catalogue)
 
 
 def relief_of(hazard: RoadHazard, route: Route) -> RoadRelief:
@@ -233,48 +231,38 @@ def render_frames(
     if hazard.height_m != 0:
         relief = relief_of(hazard, scene.route)
         carriageway = scene.carriageway_left, scene.carriageway_right
-        gaussians = refined_road(gaussians, relief)
+        gaussians = refine_road(gaussians, relief)
         if catalogue.marking is not None and hazard.height_m > 0:
             albedo = catalogue.looks.sky.asphalt_albedo
-            gaussians = painted(gaussians, relief, catalogue.marking, *carriageway, albedo)
+            gaussians = paint_feature(gaussians, relief, catalogue.marking, *carriageway, albedo)
         gaussians, _ = apply_road_profile(gaussians, relief, *carriageway)
     return render_clip(
-        gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
-        frame_rate_hz=plan.settings.frame_rate_hz, weather=state, looks=catalogue.looks, seed=seed,
-        backend=select_backend(plan.backend), relief=relief, to_sun=scene.to_sun,
-        labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
-        rig_at=rig_at, composition=plan.settings.composition,
-    )  # fmt: skip
+        replace(scene, gaussians=gaussians),
+        catalogue.camera,
+        RigMotion(
+            T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
+            frame_rate_hz=plan.settings.frame_rate_hz,
+            rig_at=rig_at,
+        ),
+        ClipConditions(state=state, parameters=catalogue.looks, seed=seed),
+        select_backend(plan.backend),
+        relief=relief,
+        labels=plan.settings.labels,
+        composition=plan.settings.composition,
+    )
 
 
-def check_poses(
+def judge_motion(
     buffers: Mapping[str, NDArray[Any]],
     frames: Mapping[str, NDArray[Any]],
     film_depth_mm: float,
     catalogue: Catalogue,
 ) -> dict[str, Any]:
-    """Compare the motion recovered from the finished frames with the telemetry."""
-    K, route = catalogue.camera.K - PIXEL_CENTRE, catalogue.scene.route.pose(frames["station"])[:, :3, :3]
-    seen = one_shutter(
-        undistorted(
-            {name: buffers[name] for name in ("rgb", "depth", "class")}, K, catalogue.camera.distortion
-        ),
-        K,
-        catalogue.camera.T_rig_camera,
-        distortion=catalogue.camera.distortion,
-        line_delay_s=catalogue.camera.line_delay_s,
-        frame_interval_s=float(frames["t_ns"][1] - frames["t_ns"][0]) * 1e-9,
-        film_depth_mm=film_depth_mm,
-        route_rotations=route,
-    )
-    recovered = recover_motion_pnp(
-        seen["rgb"],
-        seen["depth"],
-        K,
-        catalogue.camera.T_rig_camera,
-        unusable=unusable_pixels(seen["class"], film_depth_mm),
-        route_rotations=route,
-    )
+    """Motion that the gate's pose check recovers from the finished frames, compared with the telemetry."""
+    camera = catalogue.camera
+    shown = {name: buffers[name] for name in ("rgb", "depth", "class")}
+    pinhole = undistort_frames(shown, camera.K - PIXEL_CENTRE, camera.distortion)
+    recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue))
     verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)
     return {
         "recovered_pitch": recovered.pitch,
@@ -283,8 +271,30 @@ def check_poses(
     }
 
 
+def prepare_for_checks(
+    pinhole: Mapping[str, NDArray[Any]],
+    frames: Mapping[str, NDArray[Any]],
+    film_depth_mm: float,
+    catalogue: Catalogue,
+) -> CheckedClip:
+    """Return a clip's undistorted ``rgb``, ``depth`` and ``class`` as every pose check takes them."""
+    camera = catalogue.camera
+    return prepare_clip(
+        pinhole,
+        JudgeCamera(
+            K=camera.K - PIXEL_CENTRE,
+            T_rig_camera=camera.T_rig_camera,
+            distortion=camera.distortion,
+            line_delay_s=camera.line_delay_s,
+        ),
+        frame_interval_s=float(frames["t_ns"][1] - frames["t_ns"][0]) * 1e-9,
+        film_depth_mm=film_depth_mm,
+        route_rotations=catalogue.scene.route.pose(frames["station"])[:, :3, :3],
+    )
+
+
 def nothing_to_judge(frames: int) -> dict[str, Any]:
-    """Return the result of `check_poses` where there is no picture: every value is not represented."""
+    """Return the result of `judge_motion` where there is no picture: every value is not represented."""
     verdict = {figure.name: None for figure in fields(PoseVerdict)}
     return {
         "recovered_pitch": np.full(frames, np.nan),

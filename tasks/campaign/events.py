@@ -63,7 +63,7 @@ class Protocol:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class RecordedRun:
     """One run with the drive that it belongs to.
 
     Parameters
@@ -135,7 +135,7 @@ class Event:
         return float(self.columns["speed"][int(np.argmin(np.abs(self.time)))])
 
 
-def drive_events(drive: Drive, protocol: Protocol) -> tuple[int, list[Event]]:
+def find_events(drive: RecordedRun, protocol: Protocol) -> tuple[int, list[Event]]:
     """Number of pressure episodes of a run, and those whose analysis window it covers.
 
     Parameters
@@ -148,11 +148,13 @@ def drive_events(drive: Drive, protocol: Protocol) -> tuple[int, list[Event]]:
     episodes = pressure_episodes(
         time, pressure, threshold=protocol.onset_pressure, merge_gap=protocol.merge_gap
     )
-    cut = [_cut(drive, time, episode, protocol) for episode in episodes]
+    cut = [_cut_event(drive, time, episode, protocol) for episode in episodes]
     return len(episodes), [event for event in cut if event is not None]
 
 
-def _cut(drive: Drive, time: NDArray[np.float64], episode: Episode, protocol: Protocol) -> Event | None:
+def _cut_event(
+    drive: RecordedRun, time: NDArray[np.float64], episode: Episode, protocol: Protocol
+) -> Event | None:
     about = time - episode.onset_time
     start, end = protocol.analysis
     if about[0] > start + ROUNDING or about[-1] < end - ROUNDING:

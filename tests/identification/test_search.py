@@ -12,7 +12,7 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
-from tasks.campaign.planned_runs import EXPERIMENTS, RICH, planned_run
+from tasks.campaign.planned_runs import EXPERIMENTS, RICH, make_planned_run
 from tasks.identification.decision.attribution import ladder
 from tasks.identification.decision.experiment import next_experiment
 from tasks.identification.decision.rivals import detectable
@@ -47,7 +47,7 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
 
 def test_a_run_that_forks_at_the_abs_threshold_is_told_from_sound_ones() -> None:
     changes = [
-        step_change(run_model(planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
+        step_change(run_model(make_planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
         for drive in (RICH[0], RICH[2], RICH[11], RICH[19], replace(RICH[19], peak=3.0))
     ]
     assert max(changes[:4]) < 0.5 * TORN < 10.0 * TORN < changes[4]

@@ -1,4 +1,4 @@
-"""What the auditor must be told of the car and the pavement, and the closed forms that it checks columns by.
+""" "Constants of the car and the pavement that the auditor takes as given, and the closed forms of its laws.
 
 Written from the paper's appendices alone: nothing here is shared with the model that made the telemetry.
 """
@@ -142,7 +142,7 @@ def pressure_at(since_onset: Floats, peak: float, ramp: float, hold: float, rele
     return np.interp(since_onset, corners, heights)
 
 
-def surface_of(weather: str, rate: float, hours: float, surface: Mapping[str, float]) -> dict[str, float]:
+def derive_surface(weather: str, rate: float, hours: float, surface: Mapping[str, float]) -> dict[str, float]:
     """Film, snow, coverage and mu_c from the precipitation (paper, Appendix E).
 
     Parameters

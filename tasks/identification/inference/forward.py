@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from tasks.campaign.campaign import CHANNELS, Run
-from tasks.campaign.gauge import at_rest
+from tasks.campaign.gauge import zero_pressure_at_rest
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, surface_state
@@ -77,7 +77,7 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     pressed = np.flatnonzero(run.pressure > 0.1)
     lead = min(100, int(pressed[0])) if pressed.size else 100
     return RunModel(
-        run=replace(run, pressure=at_rest(run.pressure)),
+        run=replace(run, pressure=zero_pressure_at_rest(run.pressure)),
         vehicle=vehicle,
         surface_friction=state.friction,
         conditions=Conditions(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.road_edit import RoadRelief, road_lift
+from tasks.render.road_edit import RoadRelief, measure_road_lift
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
 from tasks.render.weather.falling.particles import Shutter, visible_streaks
 from tasks.render.weather.falling.precipitation import Population, population
@@ -161,7 +161,7 @@ def weather_scene(
     if cover is not None:
         field = snow_field(gaussians, cover.patches, cover.tracks, cover.anchors, route, seed)
         amount = (state.snow_coverage, state.snow_depth_mm, cover)
-        lift = None if relief is None else road_lift(scene, relief)
+        lift = None if relief is None else measure_road_lift(scene, relief)
         snow = snow_layer(scene, field, white, *amount, lift)
         scene = snowed_over(whitened(scene, field, white, *amount), snow)
     overcast = Overcast(

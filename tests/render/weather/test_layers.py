@@ -8,7 +8,7 @@ import pytest
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.render.composition import encode_8bit, to_linear
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.attribution import LAYER_BITS, attribution, paper_picture, snow_on
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import apply_weather, weather_scene
@@ -48,7 +48,9 @@ def street():
 def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005):
     view = shutter(time_s=time_s, exposure_s=exposure_s, speed=speed, **SIZE)
     scene, weather = weather_scene(street, SKY, state, parameters, SIZE["focal"], seed)
-    gbuffer = rasterise(prepare(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height)
+    gbuffer = rasterise(
+        prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height
+    )
     picture = gbuffer.rgb + (1 - gbuffer.alpha[..., None]) * np.float32((0.2, 0.4, 0.8))
     return weather, apply_weather(weather, picture, gbuffer, view), gbuffer, view
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.render.lens import Lens, distorted
+from tasks.render.lens import Lens, distort_rays
 from tasks.render.weather.falling.particles import visible_streaks
 from tasks.render.weather.falling.precipitation import drawn_optical_depth, drawn_reach, population
 from tasks.render.weather.falling.streaks import draw_streaks
@@ -190,7 +190,7 @@ def test_a_lens_bends_the_way_of_every_particle(parameters, rain):
         other = bent[by_size[round(float(streak["diameter"]), 12)]]
         for end in ("begin", "end"):
             x, y = (streak[end] - (240, 160)) / 400
-            expected = np.array(distorted(x, y, lens.coefficients)) * 400 + (240, 160)
+            expected = np.array(distort_rays(x, y, lens.coefficients)) * 400 + (240, 160)
             if np.abs(streak[end] - (240, 160)).max() < 240:
                 np.testing.assert_allclose(other[end], expected, atol=1e-6)
 

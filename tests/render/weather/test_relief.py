@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.render.road_edit import RoadRelief, apply_road_profile, road_lift
+from tasks.render.road_edit import RoadRelief, apply_road_profile, measure_road_lift
 from tasks.render.weather.layers import weather_scene
 from tasks.render.weather.relief import ReliefLight, clear_light, relief_ratios, relit, sun_in
 from tasks.render.weather.snow.road_anchors import road_anchors
@@ -194,4 +194,4 @@ def test_the_crest_of_a_short_hump_carries_snow_like_the_road_about_it(parameter
     limits = parameters.kinds["snow"].snow_cover.anchors
     crest = np.flatnonzero(np.abs(shaped.means[:, 0] - 8.0) < 0.1)
     assert not np.isin(crest, road_anchors(shaped, limits).index).any()
-    assert np.isin(crest, road_anchors(shaped, limits, road_lift(shaped, relief)).index).all()
+    assert np.isin(crest, road_anchors(shaped, limits, measure_road_lift(shaped, relief)).index).all()

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.scene_light import appended, mean_colours, without
@@ -16,7 +16,7 @@ from tasks.render.weather.snow.field import coverage_rank, local_depth_mm, snow_
 from tasks.render.weather.snow.layer import hidden_share, snow_layer, snowed_over, whitened
 from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.scene.route import Route
-from tasks.scene.surroundings import with_surroundings
+from tasks.scene.surroundings import add_surroundings
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import ASPHALT, road, surfels
 
@@ -153,7 +153,7 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
         amount = (coverage, 20.0 * coverage, parameters.kinds["snow"].snow_cover)
         snow = snow_layer(street, field, WHITE, *amount)
         scene = appended(without(whitened(street, field, WHITE, *amount), snow.buried), snow.gaussians)
-        gbuffer = rasterise(prepare(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
+        gbuffer = rasterise(prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
         inside = gbuffer.alpha > 0.9
         place = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
         expected.append(float((rank_at(field, place[inside, 0], place[inside, 1]) <= coverage).mean()))
@@ -229,11 +229,11 @@ def test_scenes_that_blend_display_colours_get_the_same_snow(street, parameters)
 @pytest.mark.parametrize(("coverage", "depth_mm"), [(1.0, 30.0), (1.0, 1.0), (0.6, 12.0)])
 def test_snow_and_ground_know_how_densely_both_together_cover(street, parameters, coverage, depth_mm):
     """Against a count of the joined cloud: thick snow alone, thin snow among the discs of the ground."""
-    ground = with_surroundings(replace(street, antialiased=True))
+    ground = add_surroundings(replace(street, antialiased=True))
     snow = layer_at(ground, parameters, coverage, depth_mm)
     joined = snowed_over(ground, snow)
     assert len(joined.surroundings) == len(joined) == len(ground) - len(snow.buried) + len(snow.anchors)
-    counted = with_surroundings(joined).surroundings
+    counted = add_surroundings(joined).surroundings
     ratio = joined.surroundings / counted
     layer = np.arange(len(joined)) >= len(joined) - len(snow.anchors)
     assert np.median(ratio[layer, 0]) == pytest.approx(1, abs=0.15)
