@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from catalogs.campaign_files import (
     LARGEST_RUN,
@@ -15,9 +15,9 @@ from catalogs.campaign_files import (
     read_header_bytes,
 )
 from catalogs.channel_maps import Tolerances as TolerancesEntry
-from catalogs.documents import parse_yaml, read_content
-from catalogs.quantities import Text
-from catalogs.sentences import cap_problems, describe_rules, shorten
+from catalogs.documents import read_content
+from catalogs.quantities import Text, parse_entry
+from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign, Run, Tolerances
 from tasks.campaign.run_validation import COLUMN_UNITS, run_problems
 from tasks.errors import InputError
@@ -112,10 +112,7 @@ def _read_header_and_runs(
     problems: list[str] = []
     checked, rows = None, []
     try:
-        content = parse_yaml(header, folder / "campaign.yaml", "campaign's header", finite=False)
-        checked = MeasuredHeader.model_validate(content)
-    except ValidationError as error:
-        problems += describe_rules(error, "campaign.yaml")
+        checked = parse_entry(MeasuredHeader, header, "campaign.yaml", "campaign's header")
     except InputError as error:
         problems += error.problems
     try:

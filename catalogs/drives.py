@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydantic import ValidationError
 
 from catalogs.campaign_files import LARGEST_RUN, CampaignHeader, parse_columns, parse_rows, read_header_bytes
-from catalogs.documents import parse_yaml, read_content
-from catalogs.sentences import cap_problems, describe_rules, shorten
+from catalogs.documents import read_content
+from catalogs.quantities import parse_entry
+from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.events import RecordedRun
 from tasks.errors import InputError
@@ -92,11 +92,7 @@ def _read_header_and_runs(folder: Path) -> tuple[CampaignHeader, list[dict[str, 
     checked, rows = None, []
     path = folder / "campaign.yaml"
     try:
-        checked = CampaignHeader.model_validate(
-            parse_yaml(header_bytes, path, "campaign's header", finite=False)
-        )
-    except ValidationError as error:
-        problems += describe_rules(error, path)
+        checked = parse_entry(CampaignHeader, header_bytes, path, "campaign's header")
     except InputError as error:
         problems += error.problems
     try:

@@ -42,7 +42,7 @@ class Table(CatalogueEntry):
     source: Text
 
 
-Entry = TypeVar("Entry", bound=CatalogueEntry)
+Entry = TypeVar("Entry", bound=BaseModel)
 Form = TypeVar("Form")
 Value = TypeVar("Value", Scalar, Bounded, Table)
 

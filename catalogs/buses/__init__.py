@@ -11,7 +11,6 @@ from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
 from tasks.studies.brake_dive import DiveModel
 from tasks.studies.bus_drive import Bus, BusSignal, DriveStyle
 
-FOLDER = Path(__file__).parent
 Positive = Annotated[float, Field(strict=True, gt=0)]
 Share = Annotated[Scalar, require_quantity("1", minimum=0, maximum=1)]
 Ratio = Annotated[Scalar, require_quantity("1", above=0)]
@@ -87,7 +86,7 @@ def load_bus(name_or_path: str | Path = "a2d2-like") -> Bus:
     InputError
         Listing every problem of the file, or the buses that exist.
     """
-    entry = read_entry(BusEntry, find_entry(FOLDER, name_or_path, "bus"), "bus")
+    entry = read_entry(BusEntry, find_entry("bus", name_or_path), "bus")
     events = entry.events
 
     def pair(table: Table, factor: float = 1.0) -> tuple[float, float]:

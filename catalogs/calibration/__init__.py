@@ -15,8 +15,6 @@ from tasks.identification.calibration.scalars import KNOT_GROUPS
 from tasks.identification.calibration.staged import Bounds, Procedure, Stage
 from tasks.vehicle.effects.table import EFFECT_UNITS
 
-FOLDER = Path(__file__).parent
-
 Count = Annotated[Scalar, require_quantity("1", minimum=1)]
 
 
@@ -106,17 +104,6 @@ class ProcedureEntry(CatalogueEntry):
         return self
 
 
-def procedure_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a procedure.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "calibration procedure")
-
-
 def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
     """Read a procedure, and the spacing of the samples that count [s].
 
@@ -129,7 +116,9 @@ def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
     InputError
         Listing every problem of the file.
     """
-    entry = read_entry(ProcedureEntry, procedure_source(name_or_path), "calibration procedure")
+    entry = read_entry(
+        ProcedureEntry, find_entry("calibration procedure", name_or_path), "calibration procedure"
+    )
     procedure = Procedure(
         mode=entry.mode,
         stages=tuple(Stage(**dict(stage)) for stage in entry.stages),

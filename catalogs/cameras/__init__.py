@@ -14,8 +14,6 @@ from tasks.render.lens import Lens
 from tasks.render.readout import sensor_field
 from tasks.render.sensor import Sensor
 
-FOLDER = Path(__file__).parent
-
 Pixels = Annotated[Scalar, require_quantity("px", above=0)]
 Metres = Annotated[Scalar, require_quantity("m")]
 Distortion = Annotated[Scalar, require_quantity("1", minimum=-2, maximum=2)]
@@ -57,17 +55,6 @@ class CameraEntry(CatalogueEntry):
     motion_blur: bool = False
 
 
-def camera_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a camera.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "camera")
-
-
 def load_camera(name_or_path: str | Path) -> Camera:
     """Read a camera by its name in the catalogue or from a YAML file.
 
@@ -80,7 +67,7 @@ def load_camera(name_or_path: str | Path) -> Camera:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    entry = read_entry(CameraEntry, camera_source(name_or_path), "camera")
+    entry = read_entry(CameraEntry, find_entry("camera", name_or_path), "camera")
     width, height, f = int(entry.width.value), int(entry.height.value), entry.focal_length.value
     mount = np.eye(4)
     mount[:3, :3] = (

@@ -16,7 +16,6 @@ from tasks.campaign.signals import ChannelRule, Gain
 from tasks.errors import InputError
 from tasks.surface.weather import DRY
 
-FOLDER = Path(__file__).parent
 HIGHEST_RATE = 1_000_000.0
 """Of a campaign [Hz]: a thousand times what a vehicle's bus gives."""
 Part = Literal["train", "held_out"]
@@ -257,7 +256,7 @@ def load_channel_map(name_or_path: str | Path) -> tuple[ChannelMap, Path]:
     FaultyMap
         Listing every problem of the file.
     """
-    path = find_entry(FOLDER, name_or_path, "channel map")
+    path = find_entry("channel map", name_or_path)
     content = read_yaml(path, "channel map", finite=False)
     try:
         return ChannelMap.model_validate(content), path

@@ -15,11 +15,10 @@ from catalogs.scenario import UNKNOWN_WEATHER, Scenario, range_problems, scenari
 from catalogs.sentences import cap_problems, shorten
 from tasks.errors import InputError
 
-__all__ = ["GRID_FOLDER", "FaultyGrid", "Grid", "GridFile", "expand_grid", "grid_names", "load_grid"]
+__all__ = ["FaultyGrid", "Grid", "GridFile", "expand_grid", "load_grid"]
 
 LONGEST_LABEL = 200
 """Bytes of a label [1]: with a suffix it is still a file name, of 255 bytes at most."""
-GRID_FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,11 +53,6 @@ class FaultyGrid(InputError):
         self.grid = grid
 
 
-def grid_names() -> list[str]:
-    """Names of the grids that ship with the project."""
-    return sorted(path.stem for path in GRID_FOLDER.glob("*.yaml"))
-
-
 def load_grid(source: str | Path) -> Grid:
     """Read and check a grid by catalogue name or file.
 
@@ -69,7 +63,7 @@ def load_grid(source: str | Path) -> Grid:
     FaultyGrid
         Listing every problem of the file at once.
     """
-    path = find_entry(GRID_FOLDER, source, "grid")
+    path = find_entry("grid", source)
     form = read_form(read_yaml(path, "grid", finite=False), path)
     problems = cap_problems(form.problems)
     grid = None if form.settings is None else Grid(settings=form.settings, scenarios=(), tags=())

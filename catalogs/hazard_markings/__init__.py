@@ -9,8 +9,6 @@ from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Scalar, Table, read_entry, require_quantity
 from tasks.render.road_paint import HazardMarking
 
-FOLDER = Path(__file__).parent
-
 
 def _check_colour(table: Table) -> Table:
     if len(table.value) != 3:
@@ -29,17 +27,6 @@ class MarkingEntry(CatalogueEntry):
     gap: Reflectance
 
 
-def marking_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a marking.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "hazard marking")
-
-
 def load_marking(name_or_path: str | Path) -> HazardMarking:
     """Read a marking by its name in the catalogue or from a YAML file.
 
@@ -52,7 +39,7 @@ def load_marking(name_or_path: str | Path) -> HazardMarking:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    entry = read_entry(MarkingEntry, marking_source(name_or_path), "hazard marking")
+    entry = read_entry(MarkingEntry, find_entry("hazard marking", name_or_path), "hazard marking")
     red, green, blue = entry.paint.value
     dark_red, dark_green, dark_blue = entry.gap.value
     return HazardMarking(

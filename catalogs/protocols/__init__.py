@@ -10,7 +10,6 @@ from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, rea
 from tasks.campaign.events import Protocol, Rule
 from tasks.campaign.selection import QUANTITIES
 
-FOLDER = Path(__file__).parent
 Window = Annotated[Table, require_quantity("s")]
 Count = Annotated[Scalar, require_quantity("1", minimum=0)]
 
@@ -74,7 +73,7 @@ def load_protocol(name_or_path: str | Path = "brake-dive") -> Protocol:
     InputError
         Listing every problem of the file, or the protocols that exist.
     """
-    path = find_entry(FOLDER, name_or_path, "protocol")
+    path = find_entry("protocol", name_or_path)
     entry = read_entry(ProtocolEntry, path, "protocol")
 
     def pair(window: Table) -> tuple[float, float]:

@@ -10,8 +10,6 @@ from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, requir
 from tasks.studies.stop_study import Rung
 from tasks.vehicle.effects.table import PARAMETERS
 
-FOLDER = Path(__file__).parent
-
 
 class RungEntry(CatalogueEntry):
     """One step of the ladder; the meanings are given by ``Rung``."""
@@ -80,4 +78,4 @@ def load_stop_study(name_or_path: str | Path) -> StopStudy:
     InputError
         Listing every problem of the file, or the studies that exist.
     """
-    return read_entry(StopStudy, find_entry(FOLDER, name_or_path, "stop study"), "stop study")
+    return read_entry(StopStudy, find_entry("stop study", name_or_path), "stop study")

@@ -14,8 +14,6 @@ from catalogs.weather.grip import weather_numbers
 from tasks.errors import InputError
 from tasks.surface.state import SurfaceParameters
 
-FOLDER = Path(__file__).parent
-
 Friction = Annotated[Bounded, require_quantity("1", above=0, maximum=2)]
 Depth = Annotated[Bounded, require_quantity("mm", above=0)]
 Exponent = Annotated[Scalar, require_quantity("1")]
@@ -56,22 +54,6 @@ class SurfaceEntry(CatalogueEntry):
         return self
 
 
-def surface_names() -> tuple[str, ...]:
-    """Names of the surfaces in the catalogue."""
-    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.yaml")))
-
-
-def surface_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a surface.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "surface")
-
-
 def load_surface(name_or_path: str | Path, weather: Path = WEATHER) -> SurfaceParameters:
     """Read a surface by its name in the catalogue or from a YAML file.
 
@@ -85,7 +67,7 @@ def load_surface(name_or_path: str | Path, weather: Path = WEATHER) -> SurfacePa
     InputError
         Listing every problem of the files, or the names that exist.
     """
-    entry = read_entry(SurfaceEntry, surface_source(name_or_path), "surface")
+    entry = read_entry(SurfaceEntry, find_entry("surface", name_or_path), "surface")
     brought = weather_numbers(weather)
     known = {field.name for field in fields(SurfaceParameters)} - set(SurfaceEntry.model_fields) - {"bounds"}
     if unknown := sorted(set(brought) - known):

@@ -19,7 +19,6 @@ from tasks.vehicle.tyres.magic_formula import (
 from tasks.vehicle.tyres.magic_formula_tyre import MOST_LOAD_CHANGE
 from tasks.vehicle.tyres.scaling import NAMES, fold_scaling
 
-FOLDER = Path(__file__).parent
 LARGEST_TIR = 2**20
 """Bytes of a tyre property file [1]: those of MF-Tool have 20 kB."""
 VERSIONS = {"6": "MF 5.2", "52": "MF 5.2", "61": "MF 6.1", "62": "MF 6.1"}
@@ -40,22 +39,6 @@ _KEY = re.compile(r"[A-Z][A-Z0-9_]*")
 _COMMENT = re.compile(r"""^((?:[^'"$!]|'[^']*'|"[^"]*")*)[$!].*$""")
 
 
-def tyre_names() -> tuple[str, ...]:
-    """Names of the tyres in the catalogue."""
-    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.tir")))
-
-
-def tyre_source(name_or_path: str | Path) -> Path:
-    """The property file of a tyre.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "tyre", suffixes=(".tir",))
-
-
 def load_tyre(name_or_path: str | Path) -> MagicFormula:
     """Read a tyre by its name in the catalogue or from a property file.
 
@@ -68,7 +51,7 @@ def load_tyre(name_or_path: str | Path) -> MagicFormula:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    source = tyre_source(name_or_path)
+    source = find_entry("tyre", name_or_path)
     return parse_tyre(read_content(source, "tyre", LARGEST_TIR), source)
 
 

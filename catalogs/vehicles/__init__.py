@@ -12,15 +12,13 @@ from catalogs.entries import find_entry
 from catalogs.names import Name, WeatherName
 from catalogs.quantities import CatalogueEntry, Scalar, parse_entry, require_quantity
 from catalogs.tyre_families import KNOT_TABLES, FamilyEntry
-from catalogs.tyres import load_tyre, tyre_source
+from catalogs.tyres import load_tyre
 from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
 from catalogs.weather.grip import FOLDER as WEATHER
 from catalogs.weather.grip import shared_families
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.parameters import Vehicle
-
-FOLDER = Path(__file__).parent
 
 Mass = Annotated[Scalar, require_quantity("kg", above=0)]
 Length = Annotated[Scalar, require_quantity("m", above=0)]
@@ -92,22 +90,6 @@ class VehicleEntry(CatalogueEntry):
         return {**inside, **knots, **EFFECT_UNITS}
 
 
-def vehicle_names() -> tuple[str, ...]:
-    """Names of the vehicles in the catalogue."""
-    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.yaml")))
-
-
-def vehicle_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a vehicle.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "vehicle")
-
-
 def vehicle_tyre_source(name_or_path: str | Path) -> Path | None:
     """The property file of the tyre that a vehicle names: beside the vehicle's file, or in the catalogue.
 
@@ -124,7 +106,7 @@ def vehicle_tyre_source(name_or_path: str | Path) -> Path | None:
     InputError
         As ``load_vehicle``.
     """
-    source = vehicle_source(name_or_path)
+    source = find_entry("vehicle", name_or_path)
     name = _read_entry(source).tyre
     return None if name is None else _find_tyre(name, source)
 
@@ -137,13 +119,13 @@ def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
     InputError
         As ``load_vehicle``.
     """
-    return _read_entry(vehicle_source(name_or_path)).provenance
+    return _read_entry(find_entry("vehicle", name_or_path)).provenance
 
 
 @cache
 def vehicle_units() -> dict[str, str]:
     """Unit of each number of a vehicle file."""
-    entry = _read_entry(FOLDER / "paper-reference.yaml")
+    entry = _read_entry(find_entry("vehicle", "paper-reference"))
     return {name: quantity.unit for name, quantity in entry if isinstance(quantity, Scalar)}
 
 
@@ -160,7 +142,7 @@ def load_vehicle(name_or_path: str | Path, weather: Path = WEATHER) -> Vehicle:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    source = vehicle_source(name_or_path)
+    source = find_entry("vehicle", name_or_path)
     entry = _read_entry(source)
     values: dict[str, Any] = {
         name: quantity.value
@@ -180,7 +162,7 @@ def load_vehicle(name_or_path: str | Path, weather: Path = WEATHER) -> Vehicle:
 
 def _find_tyre(name: str, vehicle: Path) -> Path:
     beside = vehicle.with_name(f"{name}.tir")
-    return beside if beside.is_file() else tyre_source(name)
+    return beside if beside.is_file() else find_entry("tyre", name)
 
 
 def _read_entry(source: Path) -> VehicleEntry:

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from catalogs.grids import Grid, GridFile, expand_grid, grid_names, load_grid
+from catalogs.entries import entry_names
+from catalogs.grids import Grid, GridFile, expand_grid, load_grid
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import simulate_drive
@@ -59,7 +60,7 @@ def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, 
         raise InputError("--out FILE: name the grid whose run is to be frozen in it")
     if out is not None and Path(out).suffix != ".json":
         raise InputError(f"--out {out}: the file of a frozen run must end in .json; it does not")
-    if out is None and (strange := [name for name in names if name not in grid_names()]):
+    if out is None and (strange := [name for name in names if name not in entry_names("grid")]):
         raise InputError(
             [f"{name}: is no grid of the project: say with --out FILE where to freeze it" for name in strange]
         )

@@ -6,15 +6,16 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from catalogs.cameras import camera_source, load_camera
+from catalogs.cameras import load_camera
+from catalogs.entries import find_entry
 from catalogs.gates import GATES
 from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
-from catalogs.hazard_markings import load_marking, marking_source
+from catalogs.hazard_markings import load_marking
 from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
-from catalogs.surfaces import load_surface, surface_source
-from catalogs.vehicles import load_vehicle, vehicle_provenance, vehicle_source, vehicle_tyre_source
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle, vehicle_provenance, vehicle_tyre_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.making.memory import memory_problems
 from flows.making.places import remember_place
@@ -206,13 +207,15 @@ def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
     marking = settings.hazard_marking
     weather = {f"weather/{path.name}": path for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
     return {
-        "vehicle.yaml": partial(vehicle_source, settings.vehicle),
-        "surface.yaml": partial(surface_source, settings.surface),
-        "camera.yaml": partial(camera_source, settings.camera),
+        "vehicle.yaml": partial(find_entry, "vehicle", settings.vehicle),
+        "surface.yaml": partial(find_entry, "surface", settings.surface),
+        "camera.yaml": partial(find_entry, "camera", settings.camera),
         "gates.yaml": lambda: GATES,
         "study.yaml": lambda: SENSITIVITY,
         **{name: partial(Path, path) for name, path in weather.items()},
-        **({} if marking is None else {"hazard_marking.yaml": partial(marking_source, marking)}),
+        **(
+            {} if marking is None else {"hazard_marking.yaml": partial(find_entry, "hazard marking", marking)}
+        ),
         **({} if (tyre := _tyre_behind(settings)) is None else {tyre.name: partial(Path, tyre)}),
     }
 

@@ -6,7 +6,8 @@ from typing import Any
 import yaml
 
 from catalogs.effects import LIBRARY_FILE
-from catalogs.vehicles import load_vehicle, vehicle_source
+from catalogs.entries import find_entry
+from catalogs.vehicles import load_vehicle
 from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of_file
@@ -38,7 +39,7 @@ def grown_vehicle(
     -------
     The text, or None where nothing was added; and the parameters that could not be.
     """
-    source = vehicle_source(name)
+    source = find_entry("vehicle", name)
     entry: dict[str, Any] = yaml.safe_load(source.read_text(encoding="utf-8"))
     before = entry.pop("provenance", None) or {"bounds": {}}
     base = load_vehicle(name)

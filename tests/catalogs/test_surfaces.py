@@ -5,13 +5,14 @@ import shutil
 import pytest
 import yaml
 
-from catalogs.surfaces import FOLDER, load_surface, surface_names
+from catalogs.entries import entry_names, find_entry
+from catalogs.surfaces import load_surface
 from catalogs.weather.grip import FOLDER as WEATHER
 from tasks.errors import InputError
 
 
 def broken(tmp_path, **changes):
-    content = yaml.safe_load((FOLDER / "dense-asphalt.yaml").read_text())
+    content = yaml.safe_load(find_entry("surface", "dense-asphalt").read_text())
     for name, change in changes.items():
         content[name] = content.get(name, {}) | change if isinstance(change, dict) else change
     path = tmp_path / "broken.yaml"
@@ -19,7 +20,7 @@ def broken(tmp_path, **changes):
     return path
 
 
-@pytest.mark.parametrize("name", surface_names())
+@pytest.mark.parametrize("name", entry_names("surface"))
 def test_every_surface_loads_with_bounds_around_its_values(name):
     surface = load_surface(name)
     for field, (low, high) in surface.bounds.items():

@@ -6,7 +6,8 @@ from math import degrees
 import pytest
 import yaml
 
-from catalogs.vehicles import FOLDER, load_vehicle, vehicle_names
+from catalogs.entries import entry_names, find_entry
+from catalogs.vehicles import load_vehicle
 from catalogs.weather.grip import FOLDER as WEATHER
 from tasks.errors import InputError
 from tasks.surface.weather import WEATHERS
@@ -14,7 +15,7 @@ from tasks.surface.weather import WEATHERS
 
 @pytest.fixture
 def entry():
-    return yaml.safe_load((FOLDER / "paper-reference.yaml").read_text())
+    return yaml.safe_load(find_entry("vehicle", "paper-reference").read_text())
 
 
 def saved(tmp_path, entry):
@@ -23,7 +24,7 @@ def saved(tmp_path, entry):
     return path
 
 
-@pytest.mark.parametrize("name", vehicle_names())
+@pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_vehicle_loads(name):
     vehicle = load_vehicle(name)
     assert vehicle.name == name and all(vehicle.tyre_family(kind) for kind in WEATHERS)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.cameras import camera_source, load_camera
+from catalogs.cameras import load_camera
+from catalogs.entries import find_entry
 from tasks.errors import InputError
 from tasks.eval.poses.undistort import undistort_frames as seen_by_pinhole
 from tasks.render.lens import Lens, distort_rays, pixel_directions, undistort_points
@@ -39,7 +40,7 @@ def test_a_lens_of_zeros_is_a_pinhole():
 def test_a_polynomial_that_turns_back_inside_the_picture_is_refused(tmp_path):
     with pytest.raises(InputError, match="must spread the whole picture"):
         pixel_directions(K, 480, 320, Lens(k1=-0.9))
-    entry = yaml.safe_load(camera_source("dashcam-480x320").read_text())
+    entry = yaml.safe_load(find_entry("camera", "dashcam-480x320").read_text())
     entry["k1"] = {"value": -0.9, "unit": "1", "source": "none"}
     (tmp_path / "bent.yaml").write_text(yaml.safe_dump(entry))
     with pytest.raises(InputError, match="must spread the whole picture"):

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from catalogs.entries import find_entry
 from catalogs.scenes import write_scene
-from catalogs.vehicles import FOLDER
 from flows.auditing.dataset_diff import compare_datasets, format_text
 from flows.making.generate import generate_dataset
 from tasks.errors import InputError
@@ -36,7 +36,7 @@ def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("diff")
     write_scene(toy_street(), folder / "scene", {})
     (folder / "camera.yaml").write_text(TOY_CAMERA)
-    car = yaml.safe_load((FOLDER / "paper-reference.yaml").read_text())
+    car = yaml.safe_load(find_entry("vehicle", "paper-reference").read_text())
     (folder / "plain.yaml").write_text(yaml.safe_dump(car))
     car["brake_gain"]["value"] = 800
     (folder / "weak.yaml").write_text(yaml.safe_dump(car))

@@ -8,9 +8,10 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from catalogs.calibration import FOLDER, load_procedure
+from catalogs.calibration import load_procedure
 from catalogs.effects import load_effects
-from catalogs.vehicles import load_vehicle, vehicle_names, vehicle_provenance, vehicle_source
+from catalogs.entries import entry_names, find_entry
+from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
 from flows.measured.calibration import calibrate
 from flows.studies.vehicle_model import measure_agreement
@@ -22,7 +23,7 @@ from tests.flows.measured.findings import found_effect, found_form, grown_file
 @pytest.fixture
 def frozen(vehicle, make_traces, tmp_path):
     traces = make_traces(vehicle, "coupled", ("wet",))
-    entry = yaml.safe_load((FOLDER / "coupled-grown.yaml").read_text())
+    entry = yaml.safe_load(find_entry("calibration procedure", "coupled-grown").read_text())
     entry["stages"] = [
         {"name": "air", "groups": ["drag_area", "cg_to_front_axle", "static_pitch", "efficiency"],
          "responses": ["speed"], "kinds": ["flat"], "phase": "braking"}
@@ -43,7 +44,7 @@ def test_a_frozen_file_says_where_its_numbers_come_from(frozen):
         "paper-reference",
         "development",
     )
-    assert provenance.base_sha256 == sha256_of_file(vehicle_source("paper-reference"))
+    assert provenance.base_sha256 == sha256_of_file(find_entry("vehicle", "paper-reference"))
     assert provenance.data_sha256 == {"wet": sha256_of_file(traces / "development" / "wet.parquet")}
     assert provenance.bounds["drag_area"].upper == 2
     assert [s.name for s in provenance.stages] == ["air"]
@@ -76,8 +77,8 @@ def test_agreement_drives_a_frozen_vehicle_in_the_mode_it_was_fitted_in(frozen):
 
 
 def test_every_vehicle_of_the_catalogue_loads_with_its_seal():
-    assert "paper-reference" in vehicle_names()
-    for name in vehicle_names():
+    assert "paper-reference" in entry_names("vehicle")
+    for name in entry_names("vehicle"):
         load_vehicle(name)
 
 
@@ -174,7 +175,7 @@ def test_traces_may_lie_beside_their_conditions(vehicle, make_traces):
     ],
 )
 def test_a_faulty_procedure_is_told_by_place_and_rule(tmp_path, harm, sentence):
-    entry = yaml.safe_load((FOLDER / "paper-staged.yaml").read_text())
+    entry = yaml.safe_load(find_entry("calibration procedure", "paper-staged").read_text())
     harm(entry)
     path = tmp_path / "faulty.yaml"
     path.write_text(yaml.safe_dump(entry))
@@ -190,7 +191,7 @@ def test_a_vehicle_that_close_loop_grew_is_calibrated_further_and_keeps_what_it_
         tmp_path / "grown.yaml", found, found_effect(lag, {"lag": 0.08}), reached={"pressure": (0.0, 3.6)}
     )
     truth = replace(load_vehicle(grown), effects={"lag": 0.08, "drag_area": 0.6})
-    entry = yaml.safe_load((FOLDER / "coupled-grown.yaml").read_text())
+    entry = yaml.safe_load(find_entry("calibration procedure", "coupled-grown").read_text())
     entry["stages"] = [
         {"name": "air", "groups": ["drag_area"], "responses": ["speed"], "kinds": ["flat"], "phase": "event"}
     ]
