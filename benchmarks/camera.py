@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from catalogs.cameras import load_camera
 from catalogs.scenes import load_scene
 from tasks.eval.image_quality import psnr
-from tasks.render.camera import Camera, continuous_rig, viewmat
-from tasks.render.composition import compose, encode_8bit
+from tasks.render.camera import Camera, continuous_rig, world_to_camera
+from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import Field, read_out, sensor_field
@@ -49,13 +49,13 @@ def measure_rows(scene_name: str = "street") -> list[dict[str, Any]]:
     one = sensor_field(replace(pinhole, line_delay_s=0.0, motion_blur=False))
 
     def draw(pose: NDArray[np.float64], field: Field = one) -> tuple[Light, Light]:
-        view = viewmat(pose)
+        view = world_to_camera(pose)
         gbuffer = backend.rasterise(prepared, view, field.K, field.width, field.height)
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
-        return compose(gbuffer, sky, scene.gaussians.display_encoded), gbuffer.depth
+        return compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded), gbuffer.depth
 
     def sensed(camera: Camera, field: Field) -> Light:
-        to_rows = viewmat(here) @ poses(camera.row_times)
+        to_rows = world_to_camera(here) @ poses(camera.row_times)
         return read_out(*draw(here, field), field, to_rows, camera.motion_blur).picture
 
     def mean_of(count: int) -> Light:

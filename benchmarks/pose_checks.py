@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.synthetic_street import Clip, drive_clip
 from tasks.conventions import SemanticClass
-from tasks.eval.flip import flip
+from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim
 from tasks.eval.no_reference import piqe, temporal_error
 from tasks.eval.poses.essential import recover_motion_essential
@@ -96,7 +96,7 @@ def _feature_checks(clip: Clip) -> dict[str, Callable[[], object]]:
     return {
         "road edit": lambda: score_road_edit(list(shown), list(clip.frames), list(targets)),
         "twin SSIM": lambda: twins(ssim),
-        "twin FLIP": lambda: twins(flip),
+        "twin FLIP": lambda: twins(flip_error),
     }
 
 

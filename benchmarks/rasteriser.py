@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.corridor import driver_view, make_corridor
-from tasks.render.rasterise.rasteriser import prepare, rasterise, splat_back
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise, splat_back
 from tasks.render.rasterise.reference_rasteriser import rasterise_reference
 
 STATION = 5.0
@@ -47,14 +47,14 @@ def measure_rows() -> list[dict[str, Any]]:
 def _view_rows(count: int, width: int, height: int, limit_ms: float | None) -> list[dict[str, Any]]:
     """Rows of one view; with its limit also those of what surrounds a frame."""
     gaussians, (viewmat, K) = make_corridor(count), driver_view(STATION, width, height)
-    prepared = prepare(gaussians)
+    prepared = prepare_gaussians(gaussians)
     label = f"{count // 1000}k Gaussians, {width}x{height}"
     frame_ms = _cpu_ms(lambda: rasterise(prepared, viewmat, K, width, height))
     if limit_ms is None:
         return [_make_row(f"frame, {label}", frame_ms, "CPU-ms", None, None)]
     residual = np.ones((height, width, 3), dtype=np.float32)
     back_ms = _cpu_ms(lambda: splat_back(prepared, viewmat, K, width, height, residual))
-    prepare_ms = _cpu_ms(lambda: prepare(gaussians), repeats=3)
+    prepare_ms = _cpu_ms(lambda: prepare_gaussians(gaussians), repeats=3)
     result = [
         _make_row(f"frame, {label}", frame_ms, "CPU-ms", f"limit {limit_ms:g}", limit_ms),
         _make_row(f"transpose, {label}", back_ms, "CPU-ms", "frame", frame_ms),
@@ -89,7 +89,7 @@ def _peak_memory_mib() -> float:
     """Return the peak memory of this process after drawing the largest cloud [MiB]."""
     count, width, height, _ = VIEWS[1]
     viewmat, K = driver_view(STATION, width, height)
-    prepared = prepare(make_corridor(count))
+    prepared = prepare_gaussians(make_corridor(count))
     for _ in range(3):
         rasterise(prepared, viewmat, K, width, height)
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -64,12 +64,12 @@ def _measure_clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, d
         catalogue = load_catalogue(Path(folder), scene)
     rates, values = {}, {}
     for clip in plan.clips:
-        facts, ride = simulate_drive(
+        state, ride = simulate_drive(
             clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
         )
         frames = frame_rows(ride, plan, catalogue)
         rig_at = rig_of(ride, frames, catalogue)
-        shown = render_frames(clip.scenario, facts, frames, plan, catalogue, int(clip.seed), rig_at)
+        shown = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)
         rates[clip.label] = clip.scenario.precipitation_mm_h
         values[clip.label] = image_statistics(shown["rgb"], np.isin(shown["class"], ROAD_CLASSES))
     return rates, values

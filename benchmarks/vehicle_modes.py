@@ -10,9 +10,9 @@ from catalogs.studies import load_conditions
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.studies.mode_comparison import ModeDifference, mode_difference
-from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
@@ -55,8 +55,7 @@ def simulate_condition(
     )
     return rollout(
         vehicle,
-        scenario.weather,
-        surface_friction(weather, surface_state(weather, surface), surface),
+        surface_state(weather, surface),
         Controls(
             initial_speed=scenario.initial_speed_km_h / 3.6,
             brake=brake,

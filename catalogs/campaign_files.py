@@ -20,6 +20,7 @@ from catalogs.names import name_problem
 from catalogs.quantities import Text
 from catalogs.sentences import shorten, shorten_value
 from tasks.errors import InputError
+from tasks.surface.weather import weather_problem
 
 LARGEST_TABLE = 64 * 2**20
 """Bytes of runs.csv [1]: a line of 200 bytes for each of 300,000 runs."""
@@ -27,7 +28,6 @@ LARGEST_RUN = 2**31
 """Bytes of a run's Parquet [1]."""
 MOST_SAMPLES = 20_000_000
 """Samples of a run [1]: five hours at 1 kHz; a few bytes of Parquet can claim billions."""
-WEATHERS = ("dry", "rain", "snow")
 
 
 class CampaignHeader(BaseModel):
@@ -117,8 +117,8 @@ def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, see
     if name in seen:
         problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
     seen.add(name)
-    if row["weather"] not in WEATHERS:
-        problems.append(f"{name}: weather must be dry, rain or snow; it is {shorten_value(row['weather'])}")
+    if problem := weather_problem(row["weather"]):
+        problems.append(f"{name}: weather {problem}")
     for key in numbers:
         if not _is_number(row[key]):
             problems.append(f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}")

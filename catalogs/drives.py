@@ -10,9 +10,9 @@ from catalogs.documents import read_content
 from catalogs.quantities import parse_entry
 from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.channels import CHANNELS_BY_NAME
-from tasks.campaign.events import Drive
+from tasks.campaign.events import RecordedRun
 from tasks.errors import InputError
-from tasks.surface.state import Weather
+from tasks.surface.weather import Weather
 
 NEEDED = ("brake_pressure", "speed", "pitch", "longitudinal_acceleration")
 WEATHER = ("weather", "precipitation_mm_h", "snow_accumulation_h")
@@ -30,7 +30,7 @@ class DriveCampaign:
 
     name: str
     vehicle: str
-    drives: tuple[Drive, ...]
+    drives: tuple[RecordedRun, ...]
 
 
 def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> DriveCampaign:
@@ -50,7 +50,7 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
     header, rows = _read_header_and_runs(folder)
     interval = 1.0 / header.sample_rate_hz
     problems: list[str] = []
-    drives: list[Drive] = []
+    drives: list[RecordedRun] = []
     for row in rows:
         path = folder / "runs" / f"{row['run']}.parquet"
         if not path.is_file():
@@ -68,13 +68,13 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
             if not np.isfinite(values).all()
         ]
         drives.append(
-            Drive(
+            RecordedRun(
                 name=row["run"],
                 drive=row.get("drive") or row["run"],
                 interval=interval,
                 columns=columns,
                 weather=Weather(
-                    kind=row["weather"],  # type: ignore[arg-type]
+                    kind=row["weather"],
                     precipitation_mm_h=float(row["precipitation_mm_h"]),
                     snow_accumulation_h=float(row["snow_accumulation_h"]),
                 ),

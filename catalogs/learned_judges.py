@@ -5,7 +5,8 @@
     clip: {checkpoint: ViT-B-32.pt, text_features: prompts.npy, source: openai/CLIP}
     dover: {checkpoint: dover.pt, source: VQAssessment/DOVER}
 
-`text_features` is float [3, D]: the mean features of the paper's prompts (Appendix D) for dry, rain and snow.
+`text_features` is float [N, D]: the mean features of the prompts in clip_prompts.yaml (paper, Appendix D: dry, rain and
+snow), a row a kind of weather in the file's order.
 """
 
 import os
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.clip_prompts import load_prompts
 from catalogs.quantities import CatalogueEntry, Text, read_entry
 from catalogs.sentences import shorten
 from tasks.errors import InputError
@@ -120,10 +122,11 @@ def _load_judge(path: Path, entry: Checkpoint) -> LoadedJudge:
             ) from None
         if not isinstance(features, np.ndarray) or not np.issubdtype(features.dtype, np.floating):
             raise InputError(f"{shorten(entry.text_features)} must be one array of floats; it is not")
-        if features.ndim != 2 or len(features) != 3 or not np.isfinite(features).all():
+        kinds = list(load_prompts())
+        if features.ndim != 2 or len(features) != len(kinds) or not np.isfinite(features).all():
             raise InputError(
-                f"{shorten(entry.text_features)} must hold finite features [3, D] of dry, rain and snow; it is"
-                f" {features.shape}"
+                f"{shorten(entry.text_features)} must hold finite features [{len(kinds)}, D] of"
+                f" {', '.join(kinds[:-1])} and {kinds[-1]}; it is {features.shape}"
             )
     return LoadedJudge(network=network, text_features=features, note=entry.source)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
 
 from catalogs.campaign_files import parse_columns
 from catalogs.documents import LARGEST_YAML, parse_json, read_content
-from catalogs.names import Name
+from catalogs.names import Name, WeatherName
 from catalogs.physical_limits import limit_problem, load_physical_limits
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from tasks.errors import InputError
@@ -38,7 +38,7 @@ class ReferenceCase(BaseModel):
 
     case: Name
     split: str = "all"
-    weather: Literal["dry", "rain", "snow"]
+    weather: WeatherName
     surface_coefficient: Annotated[float, Field(gt=0, le=2)]
     initial_speed_km_h: Annotated[float, Field(gt=0)]
     peak_pressure_mpa: Annotated[float, Field(ge=0)] | None = None

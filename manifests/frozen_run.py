@@ -5,10 +5,11 @@ every input. A frozen run says what has to come out again; the code's state is r
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from catalogs.documents import read_json_document
+from catalogs.weather.grip import GRIP_SECTIONS
 from manifests.explain import REACHES, VEHICLE, format_value, kind_of_input, value_differences
 from manifests.manifest import seal_of
 from manifests.records import FrozenRun, check_record
@@ -83,11 +84,8 @@ def parameters_that_matter(inputs: Mapping[str, Any], pictures: bool) -> dict[st
     inputs : parsed entries by their name under ``inputs/``
     pictures : whether frames are made
     """
-    return {
-        name: _keep_deciding(entry)
-        for name, entry in inputs.items()
-        if pictures or VEHICLE in REACHES.get(kind_of_input(name), ())
-    }
+    kept = inputs if pictures else {name: _keep_motion(name, entry) for name, entry in inputs.items()}
+    return {name: _keep_deciding(entry) for name, entry in kept.items() if entry is not None}
 
 
 def find_differences(
@@ -123,6 +121,13 @@ def differing_clips(frozen: Mapping[str, Any], ticks: Mapping[str, str]) -> list
 
 def _without_hash(clip: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in clip.items() if key != "ticks"}
+
+
+def _keep_motion(name: str, entry: Any) -> Any:
+    """Return what of an entry reaches the vehicle's motion: of a kind of weather its grip alone."""
+    if PurePosixPath(name).parts[0] == "weather":
+        return {section: entry[section] for section in GRIP_SECTIONS if section in entry} or None
+    return entry if VEHICLE in REACHES.get(kind_of_input(name), ()) else None
 
 
 def _keep_deciding(entry: Any) -> Any:

@@ -52,7 +52,9 @@ if TYPE_CHECKING:  # their keys follow from what they record
     FiguresRecord = dict[str, Any]
     VerdictRecord = dict[str, Any]
 else:
-    ScenarioRecord = with_config(STRICT)(TypedDict("ScenarioRecord", get_type_hints(Scenario)))
+    ScenarioRecord = with_config(STRICT)(
+        TypedDict("ScenarioRecord", get_type_hints(Scenario, include_extras=True))
+    )
     _figures = {c.name: float | None for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
     FiguresRecord = with_config(STRICT)(
         TypedDict("FiguresRecord", {**_figures, "calibration_extrapolated": bool})

@@ -11,7 +11,7 @@ from flows.cli import app
 from flows.registry import COMMANDS
 from manifests.provenance import SOURCE_ROOT
 
-DOCUMENTS = sorted([*SOURCE_ROOT.glob("*.md"), *(SOURCE_ROOT / "docs").glob("*.md")])
+DOCUMENTS = sorted([*SOURCE_ROOT.glob("*.md"), *(SOURCE_ROOT / "docs").rglob("*.md")])
 NAMED = sorted(
     {
         match

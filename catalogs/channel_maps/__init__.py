@@ -8,12 +8,13 @@ from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, fie
 
 from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
-from catalogs.names import LONGEST_NAME
+from catalogs.names import LONGEST_NAME, WeatherName
 from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
 from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
 from tasks.campaign.signals import ChannelRule, Gain
 from tasks.errors import InputError
+from tasks.surface.weather import DRY
 
 HIGHEST_RATE = 1_000_000.0
 """Of a campaign [Hz]: a thousand times what a vehicle's bus gives."""
@@ -73,7 +74,7 @@ class TimeEntry(CatalogueEntry):
 class Conditions(CatalogueEntry):
     """Facts of a run that the logger does not know; the columns of runs.csv."""
 
-    weather: Literal["dry", "rain", "snow"] = "dry"
+    weather: WeatherName = DRY
     precipitation_mm_h: Number = 0.0
     snow_accumulation_h: Number = 0.0
     direction: Literal[1, -1] = 1

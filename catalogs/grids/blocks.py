@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Mapping
 from itertools import product
 from math import prod
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from catalogs.names import Label
+from catalogs.names import Label, WeatherName
 from catalogs.scenario import NUMBERS
 from catalogs.sentences import shorten
 
@@ -33,7 +33,7 @@ Whole = Annotated[int, BeforeValidator(_refuse_boolean)]
 class PartialScenario(Strict):
     """The scenario fields that one level of an axis sets; the rest keep their defaults."""
 
-    weather: Literal["dry", "rain", "snow"] | None = None
+    weather: WeatherName | None = None
     precipitation_mm_h: Number | None = None
     snow_accumulation_h: Number | None = None
     initial_speed_km_h: Number | None = None

@@ -110,8 +110,10 @@ def load_sensitivity_study(path: Path = SENSITIVITY) -> tuple[StudyProtocol, tup
     values["samples"] = int(values["samples"])
     protocol = StudyProtocol(
         **values,
-        rain=WeatherStudy(kind="rain", **_make_study(entry.rain)),
-        snow=WeatherStudy(kind="snow", **_make_study(entry.snow)),
+        weathers={
+            kind: WeatherStudy(kind=kind, **_make_study(varied))
+            for kind, varied in (("rain", entry.rain), ("snow", entry.snow))
+        },
     )
     return protocol, tuple(PrintedFigure(**figure.model_dump()) for figure in entry.printed)
 

@@ -1,7 +1,6 @@
 """Vehicles: mechanical values, tyre families and frozen calibration."""
 
 from functools import cache
-from itertools import pairwise
 from math import radians
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,13 +9,16 @@ from pydantic import Field, model_validator
 
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.entries import find_entry
-from catalogs.names import Name
-from catalogs.quantities import CatalogueEntry, Scalar, Table, parse_entry, require_quantity
+from catalogs.names import Name, WeatherName
+from catalogs.quantities import CatalogueEntry, Scalar, parse_entry, require_quantity
+from catalogs.tyre_families import KNOT_TABLES, FamilyEntry
 from catalogs.tyres import load_tyre
 from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
+from catalogs.weather.grip import FOLDER as WEATHER
+from catalogs.weather.grip import shared_families
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
-from tasks.vehicle.parameters import TyreFamily, Vehicle
+from tasks.vehicle.parameters import Vehicle
 
 Mass = Annotated[Scalar, require_quantity("kg", above=0)]
 Length = Annotated[Scalar, require_quantity("m", above=0)]
@@ -25,47 +27,6 @@ Stiffness = Annotated[Scalar, require_quantity("N m-1", above=0)]
 Damping = Annotated[Scalar, require_quantity("N s m-1", minimum=0)]
 Rate = Annotated[Scalar, require_quantity("s-1", above=0)]
 Speed = Annotated[Scalar, require_quantity("m s-1", above=0)]
-Scales = Annotated[Table, require_quantity("1", above=0)]
-Durations = Annotated[Table, require_quantity("s", above=0)]
-KNOT_TABLES = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release_s")
-
-
-class FamilyEntry(CatalogueEntry):
-    """Content of a tyre family; `TyreFamily` gives the meanings."""
-
-    burckhardt: Annotated[Table, require_quantity("1", above=0)]
-    surface_friction: Scales
-    efficiency: Scales
-    slip_stiffness: Scales
-    pitch_scale: Scales
-    hold_s: Durations
-    release_s: Durations
-
-    @model_validator(mode="after")
-    def _tables_match_their_knots(self) -> "FamilyEntry":
-        knots = self.surface_friction.value
-        problems = [
-            f"{name} must have one value per surface_friction knot ({len(knots)}); it has {count}"
-            for name in KNOT_TABLES
-            if (count := len(getattr(self, name).value)) != len(knots)
-        ]
-        if any(low >= high for low, high in pairwise(knots)):
-            problems.append(f"surface_friction knots must ascend; they are {list(knots)}")
-        if len(self.burckhardt.value) != 3:
-            problems.append(f"burckhardt must be c1, c2, c3; it has {len(self.burckhardt.value)} values")
-        elif (c := self.burckhardt.value)[0] * c[1] <= c[2]:
-            problems.append(f"burckhardt must rise from zero slip: c1 c2 above c3; it is {list(c)}")
-        if problems:
-            raise ValueError("; ".join(problems))
-        return self
-
-
-class FamiliesEntry(CatalogueEntry):
-    """One tyre family per kind of weather."""
-
-    dry: FamilyEntry
-    rain: FamilyEntry
-    snow: FamilyEntry
 
 
 class VehicleEntry(CatalogueEntry):
@@ -100,7 +61,7 @@ class VehicleEntry(CatalogueEntry):
     stop_speed: Speed
     lock_speed: Annotated[Scalar, require_quantity("rad s-1", above=0)]
     gravity: Annotated[Scalar, require_quantity("m s-2", above=0)]
-    families: FamiliesEntry
+    families: Annotated[dict[WeatherName, FamilyEntry], Field(min_length=1)]
     tyre: Name | None = None
     effects: dict[str, Scalar] = Field(default_factory=dict)
     forms: tuple[FormEntry, ...] = ()
@@ -124,7 +85,7 @@ class VehicleEntry(CatalogueEntry):
     def _units_inside(self) -> dict[str, str]:
         """Unit of each group that a calibration may move; angles are in radians there."""
         fields = {name: quantity.unit for name, quantity in self if isinstance(quantity, Scalar)}
-        knots = {name: getattr(self.families.dry, name).unit for name in KNOT_TABLES}
+        knots = {name: getattr(next(iter(self.families.values())), name).unit for name in KNOT_TABLES}
         inside = {name: "rad" if unit == "deg" else unit for name, unit in fields.items()}
         return {**inside, **knots, **EFFECT_UNITS}
 
@@ -168,12 +129,13 @@ def vehicle_units() -> dict[str, str]:
     return {name: quantity.unit for name, quantity in entry if isinstance(quantity, Scalar)}
 
 
-def load_vehicle(name_or_path: str | Path) -> Vehicle:
+def load_vehicle(name_or_path: str | Path, weather: Path = WEATHER) -> Vehicle:
     """Read a vehicle by its name in the catalogue or from a YAML file.
 
     Parameters
     ----------
     name_or_path : name, or path ending in .yaml
+    weather : folder of the weather catalogue, which has tyre families for kinds that the vehicle has none of
 
     Raises
     ------
@@ -187,15 +149,15 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
         for name in VehicleEntry.model_fields
         if isinstance(quantity := getattr(entry, name), Scalar)
     }
-    families = {
-        weather: TyreFamily(**{name: getattr(family, name).value for name in FamilyEntry.model_fields})
-        for weather, family in entry.families
-    }
+    families = {kind: family.family for kind, family in entry.families.items()}
     values["static_pitch"] = radians(values["static_pitch"])
     effects = {name: number.value for name, number in entry.effects.items()}
     forms = tuple(form.form for form in entry.forms)
     tyre = None if entry.tyre is None else load_tyre(_find_tyre(entry.tyre, source))
-    return Vehicle(name=source.stem, families=families, tyre=tyre, effects=effects, forms=forms, **values)
+    return Vehicle(
+        name=source.stem, families=families, shared_families=shared_families(weather), tyre=tyre, effects=effects,
+        forms=forms, **values,
+    )  # fmt: skip
 
 
 def _find_tyre(name: str, vehicle: Path) -> Path:

@@ -17,7 +17,7 @@ from manifests.compare import first_row_difference
 from manifests.explain import find_reasons, input_differences
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.label_moves import figure_moves, tick_moves
+from tasks.eval.label_moves import compare_figures, compare_ticks
 
 
 def compare_datasets(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
@@ -108,10 +108,10 @@ def _clip_row(
         "first": None,
         "picture": None,
     }
-    moves = figure_moves(a["figures"], b["figures"])
+    moves = compare_figures(a["figures"], b["figures"])
     if "ticks" in changed:
         ours, theirs = _read_ticks(old, a), _read_ticks(new, b)
-        moves |= tick_moves(ours, theirs)
+        moves |= compare_ticks(ours, theirs)
         first = first_row_difference(ours, theirs, [channel.name for channel in TICK_CHANNELS])
         row["first"] = first and {
             "channel": first["channel"], "tick": first["tick"], "a": first["recorded"], "b": first["remade"]

@@ -24,6 +24,7 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, surface_steps
 from tasks.scene.route import Route
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.rollout import rollout
 
@@ -77,15 +78,17 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
             f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"
             f" {', '.join(dict.fromkeys(empty))}: musync repair makes the table again"
         )
-    vehicle = load_vehicle(layout.inputs / "vehicle.yaml")
+    vehicle = load_vehicle(layout.inputs / "vehicle.yaml", layout.inputs / "weather")
     mode = plan.settings.vehicle_mode
     hazard = hazard_of(scenario)
-    surface = load_surface(layout.inputs / "surface.yaml")
-    ride = rollout(
-        vehicle, scenario.weather, float(row["surface_friction"]), controls_of(scenario), hazard,
-        mode=mode, duration_s=plan.duration_s, snow_depth_mm=float(row["snow_depth_mm"]),
-    )  # fmt: skip
-    response = surface_response(vehicle, scenario.weather, float(row["surface_friction"]))
+    surface = load_surface(layout.inputs / "surface.yaml", layout.inputs / "weather")
+    state = SurfaceState(
+        kind=scenario.weather,
+        friction=float(row["surface_friction"]),
+        snow_depth_mm=float(row["snow_depth_mm"]),
+    )
+    ride = rollout(vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s)
+    response = surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(scenario), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row),

@@ -19,7 +19,14 @@ from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
-from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
+from tasks.eval.negative_controls import (
+    Claim,
+    claims_differ,
+    compute_separation,
+    delay_claim,
+    scale_claimed_pitch,
+    score_claim,
+)
 from tasks.eval.video_motion import path_error, weather_error
 
 CUTS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu")
@@ -165,7 +172,7 @@ def score_controls(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> It
                 bad = [scored[metric] for scored in faulty if metric in scored]
                 if not good:
                     continue
-                found = separate(good, bad)
+                found = compute_separation(good, bad)
                 yield {
                     "control": name,
                     "metric": metric,
@@ -213,7 +220,7 @@ def _score_claim(
 ) -> dict[str, float]:
     """Scores of a claim on its clip and, where both were tracked, on the clip and its dry sibling."""
     motion = clip.motions[method]
-    scores = claim_scores(motion, claim, response, clip.times, clip.opening)
+    scores = score_claim(motion, claim, response, clip.times, clip.opening)
     if dry is None or not _is_whole(dry, method) or not claim.station[-1] > claim.station[0]:
         return scores
     seen, control = motion.normalised_path, dry.motions[method].normalised_path
@@ -230,8 +237,8 @@ def _make_faulty_claims(
 ) -> Iterator[tuple[str, Claim]]:
     """Faulty claims of one clip that differ from its true one."""
     scenario = next(c.scenario for c in plan.clips if c.clip_id == clips[k].facts["clip_id"])
-    made = {"one-frame-delay": delayed(true[k], 1), "amplitude-0.8": scaled(true[k], 0.8),
-            "sign-flip": scaled(true[k], -1.0), "other-clip": true[(k + 1) % len(true)]}  # fmt: skip
+    made = {"one-frame-delay": delay_claim(true[k], 1), "amplitude-0.8": scale_claimed_pitch(true[k], 0.8),
+            "sign-flip": scale_claimed_pitch(true[k], -1.0), "other-clip": true[(k + 1) % len(true)]}  # fmt: skip
     ticks = np.rint(np.arange(plan.settings.frames) * TICK_RATE_HZ / plan.settings.frame_rate_hz).astype(int)
     for variant in CUTS:
         _, ride = simulate_drive(
@@ -243,5 +250,5 @@ def _make_faulty_claims(
         )
         made[variant] = Claim(pitch=ride.columns["pitch"][ticks], station=ride.columns["station"][ticks])
     for name, claim in made.items():
-        if differs(claim, true[k], LEAST_PITCH, LEAST_WAY):
+        if claims_differ(claim, true[k], LEAST_PITCH, LEAST_WAY):
             yield name, claim

@@ -8,6 +8,7 @@ import numpy as np
 
 from catalogs.scenario import SCENARIO_FIELDS
 from flows.judging.judged_clip import JudgedClip, Row
+from tasks.surface.weather import DRY, WEATHERS
 
 
 class FigureDetails(TypedDict, total=False):
@@ -89,13 +90,13 @@ def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> J
     held = set(SCENARIO_FIELDS) - free
     seed = visual_seed(clip.facts["label"])
     for other in (c for c in clips if visual_seed(c.facts["label"]) == seed):
-        plain = other.facts["weather"] == "dry" if weather else other.facts["hazard_height_m"] == 0
+        plain = other.facts["weather"] == DRY if weather else other.facts["hazard_height_m"] == 0
         if (
             plain
             and other is not clip
             and all(_are_equal(clip.facts.get(k), other.facts.get(k)) for k in held)
         ):
-            return None if weather and clip.facts["weather"] == "dry" else other
+            return None if weather and clip.facts["weather"] == DRY else other
     return None
 
 
@@ -106,8 +107,8 @@ def weather_families(clips: list[JudgedClip]) -> Iterator[tuple[str, str, list[J
     ----------
     clips : of the dataset
     """
-    for control in (c for c in clips if c.facts["weather"] == "dry"):
-        for kind in ("rain", "snow"):
+    for control in (c for c in clips if c.facts["weather"] == DRY):
+        for kind in WEATHERS:
             family = [
                 c for c in clips if c.facts["weather"] == kind and control_of(c, [control], weather=True) is control
             ]  # fmt: skip

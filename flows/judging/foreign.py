@@ -9,7 +9,7 @@ from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
-from tasks.eval.foreign_video import claim_at, judge_motion
+from tasks.eval.foreign_video import judge_motion, sample_claim
 from tasks.eval.video_motion import motion_retention
 
 NEEDS_DEPTH = (
@@ -41,7 +41,7 @@ def judge_video(
     """
     results = Outputs(out, "judge", "judgement.json")
     footage, told, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
-    at = claim_at(told, footage.times)
+    at = sample_claim(told, footage.times)
     recovered = footage.motion(lens, at.rows, metric=metric)
     verdict = judge_motion(recovered, at, load_foreign_gates())
     times, is_video = footage.times, footage.frames is not None

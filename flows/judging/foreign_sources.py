@@ -16,7 +16,7 @@ from tasks.errors import InputError
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.outside_trajectory import motion_from_trajectory
-from tasks.eval.poses.undistort import COEFFICIENTS, undistorted
+from tasks.eval.poses.undistort import COEFFICIENTS, undistort_frames
 
 MOST_FRAMES, LEAST_FRAMES = 3000, 5
 MOST_PIXELS = 960 * 540
@@ -103,7 +103,7 @@ class Footage:
             bent, seen = seen, np.empty_like(seen)
             for first in range(0, len(bent), CHUNK):
                 part = slice(first, first + CHUNK)
-                seen[part] = undistorted({"rgb": bent[part]}, K, camera.distortion)["rgb"]
+                seen[part] = undistort_frames({"rgb": bent[part]}, K, camera.distortion)["rgb"]
         return recover_motion_essential(seen, K, camera.mount)
 
 

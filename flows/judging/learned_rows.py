@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.clip_prompts import load_prompts
 from catalogs.learned_judges import LoadedJudge
 from flows.judging.evaluation_rows import control_of, figure_row, weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View
@@ -16,9 +17,7 @@ from tasks.eval.learned_scores import (
     dover_scores,
 )
 from tasks.eval.severity import severity_agreement
-
-FEATURES = {"dry": 0, "rain": 1, "snow": 2}
-"""Rows of CLIP's text features."""
+from tasks.surface.weather import DRY
 
 
 def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJudge]) -> Iterator[Row]:
@@ -88,12 +87,18 @@ def _score_severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge
     if clip_judge.network is None or clip_judge.text_features is None:
         yield from _list_missing(names, clip_judge.note)
         return
-    network, features = clip_judge.network, clip_judge.text_features
+    network = clip_judge.network
+    features = dict(zip(load_prompts(), clip_judge.text_features, strict=True))
     for kind, condition, levels in weather_families(clips):
+        if kind not in features:
+            for name in names:
+                note = f"not run: the catalogue has no CLIP prompts of {kind}"
+                yield figure_row(name, "TorchScript", condition, None, "1", note=note)
+            continue
         judge = ClipWeather(
             encode_image=getattr(network, "encode_image", network),
-            weather=features[FEATURES[kind]],
-            dry=features[FEATURES["dry"]],
+            weather=features[kind],
+            dry=features[DRY],
         )
         rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
         scores = {c.facts["clip_id"]: _score_clip(view, c, judge) for c in levels}

@@ -103,8 +103,10 @@ def read_constants(root: Path) -> Constants:
     ]
     if missing:
         raise InputError(missing)
-    load_vehicle(files["vehicle"]), load_surface(files["surface"])  # of the form that they must have
-    car, surface = (read_yaml(path, "catalogue entry") for path in files.values())
+    # of the form that they must have
+    vehicle = load_vehicle(files["vehicle"], layout.inputs / "weather")
+    pavement = load_surface(files["surface"], layout.inputs / "weather")
+    car = read_yaml(files["vehicle"], "catalogue entry")
     mode = recorded_grid(read_plan_record(layout)["grid"], layout.plan).vehicle_mode
     if mode != "paper" or car.get("effects"):
         raise InputError(
@@ -115,11 +117,10 @@ def read_constants(root: Path) -> Constants:
         raise InputError(
             f"{root}: the physics audit knows Burckhardt's tyre; this dataset's vehicle drives on {car['tyre']}"
         )
-    tyres = {
-        family: TyreTables(**{name: tuple(table[name]["value"]) for name in TyreTables.__dataclass_fields__})
-        for family, table in car["families"].items()
-    }
-    return Constants(car=_convert_numbers(car), surface=_convert_numbers(surface), tyres=tyres, mode=mode)
+    families = {**vehicle.shared_families, **vehicle.families}
+    tyres = {kind: TyreTables(**vars(family)) for kind, family in families.items()}
+    surface = {name: value for name, value in vars(pavement).items() if isinstance(value, float)}
+    return Constants(car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode)
 
 
 def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:

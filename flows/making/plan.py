@@ -1,6 +1,6 @@
 """From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Set
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -27,6 +27,7 @@ from manifests.provenance import code_version, library_versions
 from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
+from tasks.surface.weather import WEATHERS
 
 TICK_RATE_HZ = 1000
 LOADERS: Mapping[str, Callable[[Path], Any]] = {
@@ -201,7 +202,8 @@ def recorded_reference(reference: str) -> str:
 
 
 def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
-    """Return the catalogue files that a grid uses: name under ``inputs/`` to the function that finds the file."""
+    """Return the catalogue files that a grid can use, every kind of weather among them: name under ``inputs/`` to the
+    function that finds it."""
     marking = settings.hazard_marking
     weather = {f"weather/{path.name}": path for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
     return {
@@ -262,19 +264,27 @@ def plan_differences(
 
 
 def _read_behind(grid: Grid) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
-    """Return the catalogue files and the scene of a grid, and the problems of these and of the grid with them."""
-    inputs, scene, problems = _read_entries(grid.settings)
+    """Return the catalogue files and the scene behind a grid, and the problems of these and of the grid with them."""
+    weathers = {scenario.weather for _, scenario in grid.scenarios}
+    inputs, scene, problems = _read_entries(grid.settings, weathers)
+    if not problems:
+        problems += _weather_problems(grid.settings, weathers)
     if scene:
         problems += _route_problems(grid)
     return inputs, scene, problems + _camera_problems(grid.settings)
 
 
-def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
-    """Return the catalogue files that a grid names, its scene's identity, and their problems."""
+def _read_entries(
+    settings: GridFile, weathers: Collection[str]
+) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
+    """Return the catalogue files that a grid names or whose weather it has, its scene, and their problems."""
     inputs: dict[str, bytes] = {}
     scene: dict[str, str] = {}
     problems: list[str] = []
+    unasked = {f"weather/{kind}.yaml" for kind in WEATHERS if kind not in weathers}
     for name, lookup in input_sources(settings).items():
+        if name in unasked:
+            continue
         try:
             source = lookup()
             LOADERS.get(name, Path.stat)(source)
@@ -287,6 +297,18 @@ def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str],
     except InputError as error:
         problems += error.problems
     return inputs, scene, problems
+
+
+def _weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
+    """Kinds of weather in which the vehicle has no tyres."""
+    vehicle = load_vehicle(settings.vehicle)
+    problems: list[str] = []
+    for kind in sorted(weathers & WEATHERS.keys()):
+        try:
+            vehicle.tyre_family(kind)
+        except InputError as error:
+            problems += error.problems
+    return problems
 
 
 def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:

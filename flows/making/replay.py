@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from catalogs.grids import load_grid
 from flows.making.clip import Catalogue, frame_rows, load_catalogue, render_frames, rig_of
-from flows.making.driving import simulate_drive
+from flows.making.driving import simulate_drive, surface_figures
 from flows.making.plan import ClipPlan, Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.store.frames import buffer_hash
@@ -19,6 +19,7 @@ from flows.store.outputs import Outputs
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.render.rasterise.backend import select_backend
+from tasks.surface.weather import DRY
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +86,7 @@ def replay_audit(
     problems = [
         f"{channel} differs by up to {size:g} between seeds" for channel, size in differences.items() if size
     ]
-    dry = {label for label, scenario in checked.scenarios if scenario.weather == "dry"}
+    dry = {label for label, scenario in checked.scenarios if scenario.weather == DRY}
     for k, (label, _) in enumerate(checked.scenarios):
         pictures = {run.frames_sha256 for run in replays[k::count]}
         if len(pictures) != (1 if label in dry else seeds):
@@ -105,15 +106,15 @@ def replay_audit(
 
 
 def _run_clip(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Replay:
-    facts, ride = simulate_drive(
+    state, ride = simulate_drive(
         clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
     )
     rows = frame_rows(ride, plan, catalogue)
     shown = {name: column[:frames] for name, column in rows.items()}
     rig_at = rig_of(ride, shown, catalogue)
-    buffers = render_frames(clip.scenario, facts, shown, plan, catalogue, int(clip.seed), rig_at)
+    buffers = render_frames(clip.scenario, state, shown, plan, catalogue, int(clip.seed), rig_at)
     columns = {channel.name: ride.columns[channel.name] for channel in TICK_CHANNELS}
-    columns |= {name: np.array([value]) for name, value in facts.items()} | {
+    columns |= {name: np.array([value]) for name, value in surface_figures(state, ride).items()} | {
         "T_world_rig": rows["T_world_rig"]
     }
     return Replay(

@@ -21,7 +21,7 @@ from manifests.provenance import describe_processor, git_commit
 from manifests.records import Receipt
 from manifests.siblings import sibling_pairs
 from tasks.conventions import PAIR_CHANNELS
-from tasks.render.contact_sheet import contact_sheet, encode_png
+from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
 PREVIEW_FRAMES = (0, 20, 40, 80)
@@ -131,7 +131,7 @@ def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Seque
         label = receipt["label"] + (" (quarantined)" if is_quarantined(receipt) else "")
         rows.append((label, [pictures[frame] for frame in frames],
                      {"speed": columns["speed"], "pitch": columns["pitch"]}))  # fmt: skip
-    return encode_png(contact_sheet(rows, frames, plan.settings.frame_rate_hz))
+    return encode_png(draw_contact_sheet(rows, frames, plan.settings.frame_rate_hz))
 
 
 def pick_evenly(items: Sequence[Any], most: int) -> list[Any]:

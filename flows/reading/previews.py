@@ -19,7 +19,7 @@ from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
-from tasks.render.traces import TRACES, with_traces
+from tasks.render.traces import TRACES, add_traces
 
 NAME_BYTES = 150
 """Of a label that a film's name keeps [B]."""
@@ -113,4 +113,4 @@ def _draw_pictures(layout: Layout, row: Mapping[str, Any], traces: bool) -> list
     if not traces:
         return pictures
     columns = read_columns(layout.telemetry / "frames", row["clip_id"], [trace.column for trace in TRACES])
-    return [with_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]
+    return [add_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]

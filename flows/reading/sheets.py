@@ -14,7 +14,7 @@ from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
-from tasks.render.contact_sheet import encode_png, picture_sheet
+from tasks.render.contact_sheet import draw_picture_sheet, encode_png
 
 WEATHER_FIELDS = ("weather", "precipitation_mm_h", "snow_accumulation_h")
 BEFORE_M, AFTER_M = 5.0, 1.0
@@ -57,7 +57,7 @@ def draw_sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, A
     for name, rows in drawn.items():
         if rows:
             file = f"{name}.png"
-            results.write(file, encode_png(picture_sheet(rows)))
+            results.write(file, encode_png(draw_picture_sheet(rows)))
             written[name] = str(results.path(file))
     return written
 

@@ -12,8 +12,9 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
-from tasks.eval.state_agreement import CaseAgreement, aggregate, case_agreement
+from tasks.eval.state_agreement import CaseAgreement, case_agreement, summarise_groups
 from tasks.studies.sensitivity import beside_print, sensitivity_study
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, rollout
 
@@ -70,7 +71,7 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
     splits: dict[str, list[CaseAgreement]] = {}
     for case, columns in reference:
         ride = rollout(
-            model, case.weather, case.surface_coefficient, case.controls(), case.hazard(),
+            model, SurfaceState(kind=case.weather, friction=case.surface_coefficient), case.controls(), case.hazard(),
             mode=mode, duration_s=case.duration_s(columns),
         )  # fmt: skip
         scored = case_agreement(columns, ride.columns, case.facts(model.wheelbase), ride.static_pitch)
@@ -79,9 +80,9 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
     groups = [
         {"split": split, "group": name, "count": group.count, **_make_plain(group.mean)}
         for split, cases in splits.items()
-        for name, group in aggregate(cases).items()
+        for name, group in summarise_groups(cases).items()
     ]
-    overall = aggregate([case for cases in splits.values() for case in cases])["all"].mean
+    overall = summarise_groups([case for cases in splits.values() for case in cases])["all"].mean
     return {"cases": rows, "groups": groups, "mean": _make_plain(overall)}
 
 

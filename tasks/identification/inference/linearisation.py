@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from tasks.campaign.campaign import Campaign, Tolerances
-from tasks.campaign.gauge import braking_pressure
+from tasks.campaign.gauge import denoise_pressure
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance, prior_precision
 from tasks.identification.inference.evidence import RunEvidence, run_evidence, with_disturbance
@@ -27,7 +27,7 @@ FREED = 20.0
 """Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
 
 
-def prepare(
+def prepare_evidence(
     campaign: Campaign, vehicle: Vehicle, surface: SurfaceParameters, effects: tuple[Effect, ...]
 ) -> Evidence:
     """Noise and derivatives about the model as it stands, under the first guess of the disturbances.
@@ -41,7 +41,7 @@ def prepare(
     rho, sigma = channel_noise(campaign)
     plain = np.zeros(len(EFFECT_TABLE))
     guess = Disturbance()
-    runs = [replace(run, pressure=braking_pressure(run.pressure)) for run in campaign.runs]
+    runs = [replace(run, pressure=denoise_pressure(run.pressure)) for run in campaign.runs]
     models = [run_model(run, vehicle, surface) for run in runs]
     used: list[str] = []
 
@@ -76,7 +76,7 @@ def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.flo
     return float(np.sum(whiten(change, rho, sigma) ** 2))
 
 
-def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
+def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     """The same runs with derivatives taken about a fit.
 
     Parameters
@@ -103,7 +103,7 @@ def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     )
 
 
-def rescaled(evidence: Evidence, disturbance: Disturbance) -> Evidence:
+def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Evidence:
     """The same runs under other scales of the disturbances.
 
     Parameters

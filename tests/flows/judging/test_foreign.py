@@ -23,9 +23,9 @@ from flows.judging.foreign_sources import (
     read_video,
 )
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
+from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.poses.undistort import undistorted
+from tasks.eval.poses.undistort import undistort_frames
 from tests.flows.judging.test_trajectories import tum_lines
 
 
@@ -137,7 +137,7 @@ def test_undistortion_in_parts_is_that_of_the_whole(street: Clip, monkeypatch: p
     camera = ForeignCamera(K=street.K, width=width, height=height, mount=LEVEL, distortion=bent)
     film = foreign_sources.Footage(name="v", times=np.arange(24) / 16, frames=street.frames, poses=None)
     film.motion(camera, np.arange(2, 20))
-    whole = undistorted({"rgb": street.frames[2:20]}, street.K, bent)["rgb"]
+    whole = undistort_frames({"rgb": street.frames[2:20]}, street.K, bent)["rgb"]
     assert (seen[0] == whole).all()
 
 
@@ -185,10 +185,10 @@ def test_a_short_wrong_swing_is_not_hidden_by_a_long_quiet_clip() -> None:
     )  # fmt: skip
     for factor, good in ((1.0, True), (0.7, False), (-1.0, False)):
         claim = VideoClaim(time=times, pitch=factor * swing, station=10 * times)
-        verdict = judge_motion(drifting, claim_at(claim, times), load_foreign_gates())
+        verdict = judge_motion(drifting, sample_claim(claim, times), load_foreign_gates())
         assert verdict["pitch_judged"] and verdict["passed"] == good
     quiet = VideoClaim(time=times, pitch=nothing, station=10 * times)
-    assert not judge_motion(drifting, claim_at(quiet, times), load_foreign_gates())["pitch_judged"]
+    assert not judge_motion(drifting, sample_claim(quiet, times), load_foreign_gates())["pitch_judged"]
 
 
 def test_retention_sees_what_an_editor_kept_and_what_it_lost(tmp_path: Path) -> None:

@@ -29,10 +29,10 @@ def test_a_seed_that_reaches_the_motion_is_named_by_channel(grid, monkeypatch):
     calls = []
 
     def leaking(*args):
-        facts, ride = simulate_drive(*args)
+        state, ride = simulate_drive(*args)
         calls.append(1)
         columns = ride.columns | {"heave": ride.columns["heave"] + 1e-9 * len(calls)}
-        return facts, replace(ride, columns=columns)
+        return state, replace(ride, columns=columns)
 
     monkeypatch.setattr(replay, "simulate_drive", leaking)
     result = replay.replay_audit(grid, seeds=2)
