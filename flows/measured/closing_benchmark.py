@@ -17,9 +17,9 @@ from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
 from tasks.campaign.planned_runs import RICH, RunPlan
-from tasks.identification.benchmark import interval_holds_truth, classify_outcome, synthetic_campaign
+from tasks.identification.benchmark import covered, outcome, synthetic_campaign
 from tasks.identification.decision.answer import Verdict
-from tasks.identification.decision.verdict import find_missing_effects
+from tasks.identification.decision.verdict import attribute
 
 FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
 RATES = "closing_error_rates.json"
@@ -103,7 +103,7 @@ def close_loop_benchmark(
             slots=tuple(slot for truth in planned.truths for slot in truth.slots), design=planned.design,
         )  # fmt: skip
         made = time.process_time()
-        verdict = find_missing_effects(
+        verdict = attribute(
             campaign, model, surface, tuple(e for e in effects if e.name not in left_out)
         ).verdict
         row = {
@@ -117,7 +117,7 @@ def close_loop_benchmark(
             "rivals": [rival.name for _, rival in verdict.rivals],
             "ports": [[effect.port, effect.variable] for effect in verdict.effects],
             "tried": [[effect.name, effect.score, effect.held_out_gain] for effect in verdict.tried[:3]],
-            "covered": interval_holds_truth(verdict, planned.name, planned.values) if planned.name else None,
+            "covered": covered(verdict, planned.name, planned.values) if planned.name else None,
             "reasons": list(verdict.reasons),
             "cpu_s": time.process_time() - made,
             "made_cpu_s": made - before,
@@ -140,7 +140,7 @@ def engine_hash() -> str:
 
 def _outcome(verdict: Verdict, truths: tuple[Truth, ...]) -> str:
     if len(truths) < 2:
-        return classify_outcome(verdict, truths[0].name if truths else None, truths[0].form if truths else None)
+        return outcome(verdict, truths[0].name if truths else None, truths[0].form if truths else None)
     named, rivals = [e.name for e in verdict.effects], [rival.name for _, rival in verdict.rivals]
     return pair_outcome(verdict.verdict, named, rivals, [truth.name for truth in truths])
 

@@ -56,7 +56,7 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
 ) -> None:
     judged: list[int] = []
 
-    def judge_hypothesis(seed: int, *_: object) -> SimpleNamespace:
+    def judge(seed: int, *_: object) -> SimpleNamespace:
         judged.append(seed)
         if len(judged) == 20:
             raise KeyboardInterrupt

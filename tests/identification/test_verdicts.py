@@ -12,7 +12,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.identification.benchmark import synthetic_campaign
 from tasks.identification.decision.answer import Verdict
-from tasks.identification.decision.verdict import find_missing_effects
+from tasks.identification.decision.verdict import attribute
 from tasks.identification.inference.forward import predict, run_model
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.table import parameter_vector
@@ -54,7 +54,7 @@ def judged(
     campaign = synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
     last = 3 * len(design) // 4
     runs = tuple(replace(run, held_out=number >= last) for number, run in enumerate(campaign.runs))
-    return find_missing_effects(replace(campaign, runs=runs), vehicle, SURFACE, LIBRARY).verdict
+    return attribute(replace(campaign, runs=runs), vehicle, SURFACE, LIBRARY).verdict
 
 
 def names(verdict: Verdict) -> list[str]:
@@ -136,5 +136,5 @@ class TestACarThatIsGrown:
         grown = load_vehicle("multibody-grown")
         assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
         campaign = synthetic_campaign(grown, SURFACE, {"lag": 0.08}, 31)
-        verdict = find_missing_effects(campaign, grown, SURFACE, load_effects()).verdict
+        verdict = attribute(campaign, grown, SURFACE, load_effects()).verdict
         assert names(verdict) == ["brake_lag"]

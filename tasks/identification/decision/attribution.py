@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.screening import inflation, look_alikes, screen
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, sum_misfit_falls, fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, fall, fit, misfit_by_run
 from tasks.identification.inference.hypothesis import Hypothesis, library_hypothesis
 
 ACCEPT_SCORE = 25.0
@@ -58,7 +58,7 @@ class Candidate:
         return self.score > ACCEPT_SCORE and self.held_out_gain > HELD_OUT_GAIN and not self.fitted.at_bound
 
 
-def judge_hypothesis(
+def judge(
     evidence: Evidence,
     base: Fit,
     base_held_out: Misfits | None,
@@ -104,10 +104,10 @@ def judge_hypothesis(
         if gain > min(enough, LARGE_GAIN) or max(gain, foreseen) < 0.3 * ACCEPT_SCORE:
             break
     fitted = min(trials, key=lambda trial: trial.objective)
-    return assess_fit(evidence, base, base_held_out, hypothesis, fitted)
+    return assess(evidence, base, base_held_out, hypothesis, fitted)
 
 
-def assess_fit(
+def assess(
     evidence: Evidence,
     base: Fit,
     base_held_out: Misfits | None,
@@ -130,18 +130,18 @@ def assess_fit(
     penalty = float(len(hypothesis.names) * np.log(evidence.samples))
     if gain / factor - penalty > ACCEPT_SCORE and base_held_out is not None:
         # what the base reaches from here as well is no merit of the hypothesis
-        gain = min(gain, 0.5 * (_refit_base(evidence, base, hypothesis, fitted).objective - fitted.objective))
+        gain = min(gain, 0.5 * (_back(evidence, base, hypothesis, fitted).objective - fitted.objective))
     score = gain / factor - penalty
     held_out = 0.0
     if score > ACCEPT_SCORE and base_held_out is not None:
-        held_out = sum_misfit_falls(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
+        held_out = fall(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
     return Candidate(
         hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
         informed=len(own) or len(evidence.train),
     )  # fmt: skip
 
 
-def _refit_base(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
+def _back(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
     """The base fitted again from where a fit that extends it ended."""
     session = fitted.session.copy()
     k = len(hypothesis.names)
@@ -168,7 +168,7 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
     return np.array(scores)
 
 
-def refine_candidates(
+def ladder(
     evidence: Evidence,
     base: Fit,
     count: int = REFINED,
@@ -192,7 +192,7 @@ def refine_candidates(
 
     def judged(j: int) -> Candidate:
         hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
-        return judge_hypothesis(evidence, base, held_out, hypothesis, float(gains[j]))
+        return judge(evidence, base, held_out, hypothesis, float(gains[j]))
 
     candidates: list[Candidate] = []
     refined: list[int] = []
@@ -213,7 +213,7 @@ def refine_candidates(
     return sorted(candidates, key=lambda c: -c.score)
 
 
-def bootstrap_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
+def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     """Share of bootstrap resamples of the runs in which the first candidate keeps the best score.
 
     Parameters
@@ -234,12 +234,12 @@ def bootstrap_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -
     return float(np.mean((winner == 0) & (scores[0] > 0.0)))
 
 
-def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
+def nested(small: Hypothesis, large: Hypothesis) -> bool:
     """Whether every parameter of ``small`` is also one of ``large``."""
     return set(small.names) < set(large.names)
 
 
-def refit_without(base: Fit, index: int, evidence: Evidence) -> Fit:
+def without(base: Fit, index: int, evidence: Evidence) -> Fit:
     """Refit with one accepted part left out.
 
     Parameters

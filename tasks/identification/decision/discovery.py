@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.identification.decision.attribution import ACCEPT_SCORE, RIVAL_SPAN, Candidate, judge_hypothesis
-from tasks.identification.decision.forms import form_hypotheses, is_constant, scan_leftovers, spline_slopes
+from tasks.identification.decision.attribution import ACCEPT_SCORE, RIVAL_SPAN, Candidate, judge
+from tasks.identification.decision.forms import form_hypotheses, is_constant, scan, spline_slopes
 from tasks.identification.decision.screening import inflation
 from tasks.identification.decision.search import (
     MAX_EFFECTS,
     Found,
     Round,
-    find_retune,
+    retuned,
     scale_disturbances,
-    search_library,
-    relinearise_candidate,
+    search,
+    settle,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit, misfit_by_run
-from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
+from tasks.identification.inference.linearisation import rederived, rescaled
 
 FAR_PULL = 2.5
 """Pull, in prior sigmas, from which the model without effects has its derivatives taken anew at its session."""
@@ -29,7 +29,7 @@ WORTHY = 0.3
 """Share of the gain of what is named that a form alone must have, linearly, to be held against it."""
 
 
-def search_forms(
+def forms(
     start: Found,
     null: Found,
     reasons: list[str],
@@ -108,14 +108,14 @@ def best_form(
     """
     level = inflation(evidence, base, None)
     enough = max(ACCEPT_SCORE + float(np.log(evidence.samples)), least / level)
-    leftovers = [x for x in scan_leftovers(evidence, base, splines)[:2] if x.gain > enough]
+    leftovers = [x for x in scan(evidence, base, splines)[:2] if x.gain > enough]
     if not leftovers:
         return None
     held_out = misfit_by_run(evidence.held_out, base)
     judged = [
-        judge_hypothesis(evidence, base, held_out, h) for x in leftovers for h in form_hypotheses(x, evidence.samples)
+        judge(evidence, base, held_out, h) for x in leftovers for h in form_hypotheses(x, evidence.samples)
     ]
-    return relinearise_candidate(evidence, base, max(judged, key=lambda c: c.score))[1]
+    return settle(evidence, base, max(judged, key=lambda c: c.score))[1]
 
 
 def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found, Found, Candidate | None]:
@@ -132,19 +132,19 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
     The start without effects, what was found, and a form alone that cannot be told from the first effect.
     """
     if np.any(np.abs(null.session) > FAR_PULL * evidence.session_sigma):
-        evidence = differentiate_at(evidence, null, library=True)
+        evidence = rederived(evidence, null, library=True)
         null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
-    explored = search_library(Found(evidence=evidence, base=null), gated=False)
+    explored = search(Found(evidence=evidence, base=null), gated=False)
     splines = spline_slopes(explored.evidence, explored.base)
     scales = scale_disturbances(explored, splines)
-    evidence = rescale_disturbances(evidence, scales)
+    evidence = rescaled(evidence, scales)
     explored = replace(
-        explored, rounds=tuple(replace(r, evidence=rescale_disturbances(r.evidence, scales)) for r in explored.rounds)
+        explored, rounds=tuple(replace(r, evidence=rescaled(r.evidence, scales)) for r in explored.rounds)
     )
     null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     start = Found(evidence=evidence, base=null)
-    found = search_library(start, gated=True, explored=explored)
+    found = search(start, gated=True, explored=explored)
     if not found.rounds:
-        found = replace(find_retune(start, reasons), tried=found.tried)
-    found, near = search_forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
+        found = replace(retuned(start, reasons), tried=found.tried)
+    found, near = forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
     return start, found, near

@@ -9,7 +9,7 @@ from tasks.identification.inference.forward import RunModel, simulate_run
 from tasks.vehicle.effects.slots import Slot
 
 
-def find_reached_range(
+def reached(
     models: Iterable[RunModel], theta: NDArray[np.float64], slots: tuple[Slot, ...], variable: str
 ) -> tuple[float, float]:
     """Lowest and highest value of a variable over runs, by the model with what was found [unit of the variable].

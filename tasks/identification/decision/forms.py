@@ -70,7 +70,7 @@ RIDGE = np.repeat([(20.0 * PORT_STEP[port]) ** -2 for port, _ in KEYS], KNOTS)
 """Precision of the broad priors of all knots, in the order of `KEYS`."""
 
 
-def scan_leftovers(
+def scan(
     evidence: Evidence, at: Fit, splines: tuple[NDArray[np.float64], ...] | None = None
 ) -> list[Leftover]:
     """Fit a spline at every scanned port and variable to the residuals of ``at``; best first.

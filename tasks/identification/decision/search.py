@@ -13,17 +13,17 @@ from tasks.identification.decision.attribution import (
     REFINED,
     RIVAL_SPAN,
     Candidate,
-    assess_fit,
-    judge_hypothesis,
-    refine_candidates,
-    is_nested,
+    assess,
+    judge,
+    ladder,
+    nested,
 )
 from tasks.identification.decision.forms import RIDGE
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.fit import Fit, sum_misfit_falls, fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, fall, fit, misfit_by_run
 from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import fit_disturbance, differentiate_at, whitened_residuals
+from tasks.identification.inference.linearisation import fit_disturbance, rederived, whitened_residuals
 
 MAX_EFFECTS = 3
 RETUNE_PULL = 4.0
@@ -67,7 +67,7 @@ class Found:
     tried: tuple[Candidate, ...] = ()
 
 
-def relinearise_candidate(
+def settle(
     evidence: Evidence, base: Fit, candidate: Candidate, *, gated: bool = True, known: Evidence | None = None
 ) -> tuple[Evidence, Candidate]:
     """Take derivatives anew at a candidate whose gain is large, refit it and judge it there.
@@ -88,7 +88,7 @@ def relinearise_candidate(
         return evidence, candidate
     here, fitted = evidence, candidate.fitted
     for _ in range(2):
-        here = known or differentiate_at(here, fitted, library=True)
+        here = known or rederived(here, fitted, library=True)
         known = None
         again = fit(
             here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
@@ -98,10 +98,10 @@ def relinearise_candidate(
         if np.all(shift < NEAR):
             break
     base_held_out = misfit_by_run(evidence.held_out, base) if gated else None
-    return here, assess_fit(here, base, base_held_out, candidate.hypothesis, fitted)
+    return here, assess(here, base, base_held_out, candidate.hypothesis, fitted)
 
 
-def search_library(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
+def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
     """Add library effects one by one, the best first.
 
     Parameters
@@ -114,14 +114,14 @@ def search_library(start: Found, *, gated: bool, explored: Found | None = None) 
     met = frozenset(r.accepted.hypothesis.name for r in explored.rounds) if explored else frozenset()
     for _ in range(MAX_EFFECTS):
         count = REFINED if gated else EXPLORED
-        tried = refine_candidates(state.evidence, state.base, count, gated=gated, also=met)
+        tried = ladder(state.evidence, state.base, count, gated=gated, also=met)
         places: dict[str, Evidence] = {}
         for i, candidate in enumerate(tried[:SETTLED] if gated else tried[:1]):
             if candidate.score > max(ACCEPT_SCORE, 0.3 * tried[0].score):
                 near, known = candidate, None
                 if explored and candidate.gain >= LARGE_GAIN:
-                    near, known = _recall_candidate(explored, candidate)
-                places[candidate.hypothesis.name], tried[i] = relinearise_candidate(
+                    near, known = _met_before(explored, candidate)
+                places[candidate.hypothesis.name], tried[i] = settle(
                     state.evidence, state.base, near, gated=gated, known=known
                 )
         tried.sort(key=lambda c: -c.score)
@@ -130,7 +130,7 @@ def search_library(start: Found, *, gated: bool, explored: Found | None = None) 
             return replace(state, tried=tuple(tried))
         best = passing[0]
         simpler = [
-            c for c in passing if is_nested(c.hypothesis, best.hypothesis) and c.score > best.score - RIVAL_SPAN
+            c for c in passing if nested(c.hypothesis, best.hypothesis) and c.score > best.score - RIVAL_SPAN
         ]
         best = simpler[0] if simpler else best
         here = places.get(best.hypothesis.name, state.evidence)
@@ -138,7 +138,7 @@ def search_library(start: Found, *, gated: bool, explored: Found | None = None) 
             held_out = misfit_by_run(state.evidence.held_out, state.base)
             tried = [
                 c if c.score < 0.3 * best.score or c.hypothesis.name in places
-                else judge_hypothesis(here, state.base, held_out, c.hypothesis)
+                else judge(here, state.base, held_out, c.hypothesis)
                 for c in tried
             ]  # fmt: skip
         state = Found(
@@ -149,7 +149,7 @@ def search_library(start: Found, *, gated: bool, explored: Found | None = None) 
     return state
 
 
-def _recall_candidate(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
+def _met_before(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
     """The candidate at the values that an earlier search settled it at, and its derivatives there."""
     k = len(candidate.hypothesis.names)
     for earlier in explored.rounds:
@@ -181,7 +181,7 @@ def scale_disturbances(explored: Found, splines: tuple[NDArray[np.float64], ...]
     )
 
 
-def find_retune(start: Found, reasons: list[str]) -> Found:
+def retuned(start: Found, reasons: list[str]) -> Found:
     """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session.
 
     Parameters
@@ -200,8 +200,8 @@ def find_retune(start: Found, reasons: list[str]) -> Found:
         frozen = null.session.copy()
         frozen[place] = 0.0
         held_out = misfit_by_run(evidence.held_out, replace(null, session=frozen))
-        found = judge_hypothesis(evidence, null, held_out, library_hypothesis(effect, float(null.session[place])))
-        gained = sum_misfit_falls(held_out, misfit_by_run(evidence.held_out, found.fitted))
+        found = judge(evidence, null, held_out, library_hypothesis(effect, float(null.session[place])))
+        gained = fall(held_out, misfit_by_run(evidence.held_out, found.fitted))
         judged.append(replace(found, held_out_gain=gained / found.inflation))
     accepted = [c for c in judged if c.held_out_gain > HELD_OUT_GAIN and c.gain > 0.0]
     if not accepted:

@@ -12,12 +12,12 @@ from tasks.identification.decision.correlation import residual_input_correlation
 from tasks.identification.decision.discovery import search_all
 from tasks.identification.decision.experiment import next_experiment
 from tasks.identification.decision.held_out import held_out_error
-from tasks.identification.decision.intervals import curvature_interval, profile_interval, refit_named
-from tasks.identification.decision.rivals import Compared, compare_with_rivals, find_detectable_sizes
+from tasks.identification.decision.intervals import curvature_interval, profile_interval, refitted
+from tasks.identification.decision.rivals import Compared, compare, detectable
 from tasks.identification.decision.search import Found
 from tasks.identification.inference.fit import Fit, fit
 from tasks.identification.inference.hypothesis import compose
-from tasks.identification.inference.linearisation import prepare_evidence
+from tasks.identification.inference.linearisation import prepare
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
@@ -43,7 +43,7 @@ class Trace:
     compared: tuple[Compared, ...]
 
 
-def find_missing_effects(
+def attribute(
     campaign: Campaign,
     vehicle: Vehicle,
     surface: SurfaceParameters,
@@ -65,17 +65,17 @@ def find_missing_effects(
     The verdict and what it stands on; nothing in it has been fitted to a held-out run.
     """
     progress("derivatives")
-    evidence = prepare_evidence(campaign, vehicle, surface, tuple(e for e in effects if not _is_fixed(e, vehicle)))
+    evidence = prepare(campaign, vehicle, surface, tuple(e for e in effects if not _fixed(e, vehicle)))
     reasons: list[str] = []
     progress("search")
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
     start, found, near_form = search_all(evidence, null, reasons)
     progress("rivals")
-    compared = compare_with_rivals(found.evidence, found.base, found.rounds)
+    compared = compare(found.evidence, found.base, found.rounds)
     progress("held-out error")
     error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     tried = list(found.tried)
-    while compared and (worse := _worse_channels(error)):
+    while compared and (worse := _worse(error)):
         # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
         reasons.append(
             f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
@@ -87,11 +87,11 @@ def find_missing_effects(
             start, base=last.base, rounds=found.rounds[:-1],
             evidence=found.rounds[-2].evidence if found.rounds[1:] else start.evidence,
         )  # fmt: skip
-        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
+        compared = compare(found.evidence, found.base, found.rounds)
         error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     progress("intervals")
     if compared:
-        here, settled, again = refit_named(found.evidence, found.base, [c.own for c in compared])
+        here, settled, again = refitted(found.evidence, found.base, [c.own for c in compared])
         found = replace(found, evidence=here, base=settled)
         compared = [replace(c, own=own) for c, own in zip(compared, again, strict=True)]
         error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
@@ -105,7 +105,7 @@ def find_missing_effects(
         near.append(
             (named[0].name, named_effect(near_form, 0.0, profile_interval(near_form, start.evidence)))
         )
-    kind = _verdict_name(named, near)
+    kind = _kind(named, near)
     if kind == "SET":
         reasons.append(
             f"{len(near)} other explanation(s) lie within {RIVAL_SPAN:g} units or win too many resamples"
@@ -134,7 +134,7 @@ def find_missing_effects(
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
         noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
         disturbance=start.evidence.disturbance,
-        detectable=find_detectable_sizes(start.evidence, start.base),
+        detectable=detectable(start.evidence, start.base),
         campaign=campaign.name,
         content_hash=campaign.content_hash,
         split_hash=campaign.split_hash,
@@ -147,11 +147,11 @@ def find_missing_effects(
     return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
 
 
-def _worse_channels(error: Mapping[str, ChannelError]) -> list[str]:
+def _worse(error: Mapping[str, ChannelError]) -> list[str]:
     return [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
 
 
-def _is_fixed(effect: Effect, vehicle: Vehicle) -> bool:
+def _fixed(effect: Effect, vehicle: Vehicle) -> bool:
     """Whether the vehicle has an effect of several parameters already: those cannot be found as a change of it."""
     return len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
 
@@ -171,7 +171,7 @@ def _to_tell_apart(
     return own.fitted, other.fitted
 
 
-def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
+def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
     if not named:
         return "NOTHING"
     classes = {effect.effect_class for effect in named}

@@ -9,11 +9,11 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.inference.evidence import SESSION_INDEX, RunEvidence
 from tasks.identification.inference.hypothesis import Hypothesis, compose
 from tasks.identification.inference.linearisation_points import (
-    LinearisedRun,
+    Place,
     misfits,
-    linearise_at,
-    move_linearisation_points,
-    linearise_runs,
+    places_at,
+    relinearised,
+    settled,
 )
 
 HELD = 1e18
@@ -99,8 +99,8 @@ def fit(
     taken = [SESSION.index(name) for part in parts for name in part.names if name in SESSION]
     s[taken], prior[taken] = 0.0, HELD
     k = len(x)
-    places = linearise_runs(evidence, parts, x, s) if offsets is None else linearise_at(evidence, parts, x, s, offsets)
-    objective = _total_misfit(places, prior, s)
+    places = settled(evidence, parts, x, s) if offsets is None else places_at(evidence, parts, x, s, offsets)
+    objective = _objective(places, prior, s)
     slopes: list[Slopes] = []
     normal = np.eye(k + len(s))
     blind, fell, foreseen = False, np.inf, np.inf
@@ -119,7 +119,7 @@ def fit(
         right = np.concatenate((np.zeros(k), -prior * s))
         for place, (columns, q) in zip(places, slopes, strict=True):
             right += columns.T @ place.residual - q.T @ place.projected
-        move = _gauss_newton_step(normal, right, x, lower, upper)
+        move = _move(normal, right, x, lower, upper)
         foreseen = float(move @ right)
         if foreseen < 0.1 and abs(fell) < 3.0:
             break
@@ -135,15 +135,15 @@ def fit(
                 place.offsets + share * together * (d - place.offsets)
                 for place, d in zip(places, ahead, strict=True)
             )
-            trial = linearise_at(evidence, parts, x_try, s_try, own)
-            better = _total_misfit(trial, prior, s_try) < objective
+            trial = places_at(evidence, parts, x_try, s_try, own)
+            better = _objective(trial, prior, s_try) < objective
             if better or foreseen < 0.1:
                 break
         if not better:
             break
         x, s = x_try, s_try
-        places = trial if together else move_linearisation_points(evidence, parts, x, s, trial)
-        objective = _total_misfit(places, prior, s)
+        places = trial if together else relinearised(evidence, parts, x, s, trial)
+        objective = _objective(places, prior, s)
         fell = before - objective
         if abs(fell) < 0.3 and foreseen < 0.5:
             break
@@ -185,7 +185,7 @@ def _slopes(
     return slopes
 
 
-def _gauss_newton_step(
+def _move(
     normal: NDArray[np.float64],
     right: NDArray[np.float64],
     x: NDArray[np.float64],
@@ -211,11 +211,11 @@ def misfit_by_run(
     evidence: tuple[RunEvidence, ...], fitted: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Marginalised misfit of runs under a fit made on other runs, and how far it is from settled; float64 [R]."""
-    places = linearise_runs(evidence, fitted.parts, fitted.values, fitted.session)
-    return misfits(places), np.array([place.linearisation_error for place in places])
+    places = settled(evidence, fitted.parts, fitted.values, fitted.session)
+    return misfits(places), np.array([place.doubt for place in places])
 
 
-def sum_misfit_falls(
+def fall(
     before: tuple[NDArray[np.float64], NDArray[np.float64]],
     after: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> float:
@@ -229,5 +229,5 @@ def sum_misfit_falls(
     return float(np.sum(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0)))
 
 
-def _total_misfit(places: tuple[LinearisedRun, ...], prior: NDArray[np.float64], session: NDArray[np.float64]) -> float:
+def _objective(places: tuple[Place, ...], prior: NDArray[np.float64], session: NDArray[np.float64]) -> float:
     return float(misfits(places).sum() + np.sum(prior * session**2))

@@ -27,7 +27,7 @@ FREED = 20.0
 """Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
 
 
-def prepare_evidence(
+def prepare(
     campaign: Campaign, vehicle: Vehicle, surface: SurfaceParameters, effects: tuple[Effect, ...]
 ) -> Evidence:
     """Noise and derivatives about the model as it stands, under the first guess of the disturbances.
@@ -76,7 +76,7 @@ def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.flo
     return float(np.sum(whiten(change, rho, sigma) ** 2))
 
 
-def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
+def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     """The same runs with derivatives taken about a fit.
 
     Parameters
@@ -103,7 +103,7 @@ def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     )
 
 
-def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Evidence:
+def rescaled(evidence: Evidence, disturbance: Disturbance) -> Evidence:
     """The same runs under other scales of the disturbances.
 
     Parameters

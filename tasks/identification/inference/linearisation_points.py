@@ -18,7 +18,7 @@ SETTLED = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinearisedRun:
+class Place:
     """A run at some parameters, linearised about its own offsets.
 
     Parameters
@@ -34,15 +34,15 @@ class LinearisedRun:
     residual: NDArray[np.float64]
     projected: NDArray[np.float64]
     misfit: float
-    linearisation_error: float = np.inf
+    doubt: float = np.inf
 
 
-def linearise_runs(
+def settled(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
-) -> tuple[LinearisedRun, ...]:
+) -> tuple[Place, ...]:
     """Every run linearised about its posterior, from offsets of 0.
 
     Parameters
@@ -52,19 +52,19 @@ def linearise_runs(
     x : float64 [K] their parameters
     s : float64 [7] session nuisances
     """
-    places = linearise_at(evidence, parts, x, s, (None,) * len(evidence))
+    places = places_at(evidence, parts, x, s, (None,) * len(evidence))
     for _ in range(SETTLING):
-        places = move_linearisation_points(evidence, parts, x, s, places)
+        places = relinearised(evidence, parts, x, s, places)
     return places
 
 
-def move_linearisation_points(
+def relinearised(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
-    places: tuple[LinearisedRun, ...],
-) -> tuple[LinearisedRun, ...]:
+    places: tuple[Place, ...],
+) -> tuple[Place, ...]:
     """Move every run's point of linearisation towards its posterior, as far as the run does not fit worse.
 
     Parameters
@@ -78,28 +78,28 @@ def move_linearisation_points(
     theta, slots = compose(parts, x, s)
     after = list(places)
     for i, (run, place) in enumerate(zip(evidence, places, strict=True)):
-        if place.linearisation_error < SETTLED:
+        if place.doubt < SETTLED:
             continue
         move = run.offsets(place.projected) - place.offsets
-        linearisation_error = np.inf
+        doubt = np.inf
         for share in (1.0, 0.4):
-            trial = _linearise_run(run, theta, slots, place.offsets + share * move)
+            trial = _place(run, theta, slots, place.offsets + share * move)
             if share == 1.0:
-                linearisation_error = abs(trial.misfit - place.misfit)
-            after[i] = replace(place, linearisation_error=linearisation_error)
+                doubt = abs(trial.misfit - place.misfit)
+            after[i] = replace(place, doubt=doubt)
             if trial.misfit <= place.misfit + SLACK:
-                after[i] = replace(trial, linearisation_error=linearisation_error)
+                after[i] = replace(trial, doubt=doubt)
                 break
     return tuple(after)
 
 
-def linearise_at(
+def places_at(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
     offsets: tuple[NDArray[np.float64] | None, ...],
-) -> tuple[LinearisedRun, ...]:
+) -> tuple[Place, ...]:
     """Every run linearised about given offsets.
 
     Parameters
@@ -111,20 +111,20 @@ def linearise_at(
     offsets : float64 [D] of each run; None is 0 everywhere
     """
     theta, slots = compose(parts, x, s)
-    return tuple(_linearise_run(run, theta, slots, d) for run, d in zip(evidence, offsets, strict=True))
+    return tuple(_place(run, theta, slots, d) for run, d in zip(evidence, offsets, strict=True))
 
 
-def _linearise_run(
+def _place(
     run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64] | None
-) -> LinearisedRun:
+) -> Place:
     residual = run.residual(theta, slots, offsets)
     projected = run.project(residual)
-    return LinearisedRun(
+    return Place(
         offsets=np.zeros(run.nuisance.shape[1]) if offsets is None else offsets, residual=residual,
         projected=projected, misfit=float(residual @ residual - projected @ projected),
     )  # fmt: skip
 
 
-def misfits(places: tuple[LinearisedRun, ...]) -> NDArray[np.float64]:
+def misfits(places: tuple[Place, ...]) -> NDArray[np.float64]:
     """Marginalised misfit of each run, float64 [R]."""
     return np.array([place.misfit for place in places])
