@@ -1,11 +1,13 @@
 """Ground truth of pixels: flow from depth and poses, road coordinates, and what changed a pixel."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.render.labels import HAZARD, clip_flow, forward_flow, hazard_mark, road_coordinates
-from tasks.render.weather.layers import pixel_rays
+from tasks.render.sight import as_drawn
 from tasks.scene.route import Route
 from tests.render.weather.scenes import flat_gbuffer
 from tests.render.weather.test_wet_road import VIEW
@@ -70,18 +72,21 @@ def test_two_steps_of_flow_lead_where_one_long_step_does():
     np.testing.assert_allclose(first[..., 0] + second_u, both[..., 0], atol=1e-3)
 
 
-def test_road_pixels_know_their_station_and_side():
+def test_road_pixels_know_their_station_and_side(monkeypatch):
     view = VIEW
     _, gbuffer = flat_gbuffer(view, wall_x=15.0)
     station = np.linspace(-50, 300, 351)
     poses = np.tile(np.eye(4), (351, 1, 1))
     poses[:, 0, 3] = station
     route = Route(station=station + 50, T_world_rig=poses)
-    points = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
+    monkeypatch.setattr("tasks.render.sight.attribution", lambda *drawn: None)
+    points = as_drawn(None, SimpleNamespace(picture=None), gbuffer, view, True).points
     place = road_coordinates(gbuffer.class_id, points, route)
     road = gbuffer.class_id == SemanticClass.ROAD
     assert np.isfinite(place[road]).all() and np.isnan(place[~road]).all()
     np.testing.assert_allclose(place[road], points[road][:, :2] + (50, 0), atol=2e-3)
+    np.testing.assert_allclose(points[road][:, 2], 0, atol=1e-4)
+    np.testing.assert_allclose(points[~road & np.isfinite(gbuffer.depth)][:, 0], 15, atol=1e-4)
 
 
 @pytest.mark.parametrize(("low", "high"), [(5.0, 8.0), (20.0, 22.0)])
