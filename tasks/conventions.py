@@ -122,7 +122,7 @@ IDENTITY_CHANNELS: tuple[Channel, ...] = (
     Channel(name="seed", unit="", symbol="", description="visual seed, 64 bit, as text"),
     Channel(name="split", unit="", symbol="", description="the grid's split that the clip belongs to; empty where it names none"),
     Channel(name="calibration", unit="", symbol="", description="in-grid, interpolated, off-grid or beyond-calibration, as the paper's Appendix C says it"),
-    Channel(name="weather", unit="", symbol="w", description="dry, rain or snow; also the tyre family"),
+    Channel(name="weather", unit="", symbol="w", description="kind of weather; also the name of the tyre family"),
     Channel(name="calibration_extrapolated", unit="", symbol="", description="mu_c lies outside the calibrated knots, whose end values hold"),
 )  # fmt: skip
 
