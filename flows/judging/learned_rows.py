@@ -42,7 +42,9 @@ def _dover(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator
         yield from _missing(names, loaded.note)
         return
     judge = WholeVideo(network=loaded.network)
-    scores = {clip.facts["label"]: dover_scores(judge.numbers(_pictures(view, clip))) for clip in clips}
+    scores = {
+        clip.facts["label"]: dover_scores(judge.evaluate_network(_pictures(view, clip))) for clip in clips
+    }
     for name in names:
         given = {label: found[name] for label, found in scores.items() if name in found}
         if not given:

@@ -40,11 +40,11 @@ def piqe(picture: NDArray[np.uint8]) -> float:
 def _normalise_contrast(luma: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean-subtracted, contrast-normalised luma (7 x 7 Gaussian, one unit of stabilisation)."""
 
-    def blurred(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def blur_luma(values: NDArray[np.float64]) -> NDArray[np.float64]:
         return cv2.GaussianBlur(values, (7, 7), 7 / 6, borderType=cv2.BORDER_REPLICATE)
 
-    mean = blurred(luma)
-    spread = np.sqrt(np.abs(blurred(luma * luma) - mean * mean))
+    mean = blur_luma(luma)
+    spread = np.sqrt(np.abs(blur_luma(luma * luma) - mean * mean))
     return (luma - mean) / (spread + 1.0)
 
 

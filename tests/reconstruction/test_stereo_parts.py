@@ -268,8 +268,8 @@ def test_gains_and_lens_shading_are_found_together() -> None:
     exposure = estimate_exposure(np.array(pictures), disparity, K, SCALE, poses, np.arange(4))
     np.testing.assert_allclose(exposure.gains / exposure.gains[0], gains, rtol=0.05)
     assert exposure.falloff[5, 5] == pytest.approx(falloff[5, 5], abs=0.03)
-    light = exposure.radiance(np.repeat(pictures[1][..., None], 3, axis=2), 1)
-    np.testing.assert_allclose(exposure.picture(light, 1)[..., 0], pictures[1] / 255, atol=2e-3)
+    light = exposure.to_radiance(np.repeat(pictures[1][..., None], 3, axis=2), 1)
+    np.testing.assert_allclose(exposure.to_picture(light, 1)[..., 0], pictures[1] / 255, atol=2e-3)
 
 
 CAMERA_TO_WORLD = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.5], [0, 0, 0, 1]])

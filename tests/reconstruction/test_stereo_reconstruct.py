@@ -152,7 +152,7 @@ def test_poses_that_jitter_are_put_right_by_the_pictures(built: Reconstruction, 
 
 
 def test_figures_are_plain_numbers_with_a_row_per_frame(built: Reconstruction) -> None:
-    figures = built.figures()
+    figures = built.summarise()
     assert figures["held_out_psnr_db"] == built.held_out[0].psnr_db
     assert [row["frame"] for row in figures["held_out_frames"]] == [HELD_OUT]
     assert all(isinstance(value, int | float) for value in figures["held_out_frames"][0].values())

@@ -130,15 +130,15 @@ def recover_motion_pnp(
         lambda k: _prepare_frame(frames[k], depth[k], None if unusable is None else unusable[k])
     )
 
-    def place(earlier: _Frame, later: _Frame, guess: Floats, levels: int) -> Attempt:
+    def attempt_step(earlier: _Frame, later: _Frame, guess: Floats, levels: int) -> Attempt:
         step = _place_frame(earlier, later, guess, K, levels, chosen)
         return Attempt(step=step, quality=step.inliers)
 
     placements = place_frames_by_depth(
         len(frames),
         prepared,
-        track=partial(place, levels=chosen.track_levels),
-        search=partial(place, levels=chosen.search_levels),
+        track=partial(attempt_step, levels=chosen.track_levels),
+        search=partial(attempt_step, levels=chosen.search_levels),
         guesses=[advance_pose(way, T_rig_camera) for way in chosen.search_advances],
     )
     poses, links = chained_poses(placements), []
