@@ -46,7 +46,7 @@ class PnpSettings:
     crowded_contrast : difference of grey levels, of 255, to the warped earlier frame that shows such a thing [1]
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
-    noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
+    noise_floor, noise_ceiling : smallest assumed tracking error, and largest error of a valid track [px]
     depth_error : relative standard error of the rendered depth [1]
     link_span : frames that the longer steps beside the chain span [1]
     link_stride : frames between their starts [1]

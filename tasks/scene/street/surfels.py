@@ -18,7 +18,7 @@ THICKNESS = 0.002
 
 
 class Cover(NamedTuple):
-    """How the Gaussians of cells cover a surface: standard deviation over cell size [1], and peak opacity [1]."""
+    """Coverage of a surface by the Gaussians of its cells: standard deviation over cell size and peak opacity [1]."""
 
     overlap: float = OVERLAP
     opacity: float = OPACITY
