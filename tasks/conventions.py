@@ -10,7 +10,7 @@ from enum import IntEnum
 
 
 class SemanticClass(IntEnum):
-    """What a Gaussian, and so a pixel, belongs to. 0 is a pixel that no Gaussian covers."""
+    """Class of a Gaussian, and so of a pixel. 0 is a pixel that no Gaussian covers."""
 
     SKY = 0
     ROAD = 1
@@ -26,7 +26,7 @@ class SemanticClass(IntEnum):
 
 
 ROAD_CLASSES = (SemanticClass.ROAD, SemanticClass.MARKING)
-"""Classes that carry the water film and the snow cover, and that follow the road profile."""
+"""Classes that hold the water film and the snow cover, and that follow the road profile."""
 
 
 @dataclass(frozen=True, kw_only=True)
