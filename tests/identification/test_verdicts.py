@@ -66,6 +66,8 @@ def test_a_number_off_beyond_its_tolerance_is_a_retune() -> None:
     assert (verdict.verdict, names(verdict)) == ("RETUNE", ["retuned_pressure_gain"])
     (gain,) = verdict.effects[0].parameters
     assert gain.ci_low < 0.12 < gain.ci_high
+    speed = verdict.error["speed"]
+    assert speed.retuned < 0.5 * speed.frozen, "six tolerances away is within reach of a re-tuned session"
 
 
 def test_an_instrument_that_feels_gravity_is_a_sensor_and_no_missing_physics() -> None:

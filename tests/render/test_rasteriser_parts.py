@@ -12,7 +12,7 @@ from scipy.special import sph_harm_y
 from tasks.errors import InputError
 from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH, depth_order, tile_lists
 from tasks.render.rasterise.blending import absorb_light
-from tasks.render.rasterise.preparation import morton_order, prepare_gaussians
+from tasks.render.rasterise.preparation import BLOCK, SH, morton_order, prepare_gaussians
 from tasks.render.rasterise.projection import (
     COLUMN_FALLOFF,
     DEPTH,
@@ -26,9 +26,10 @@ from tasks.render.rasterise.projection import (
 )
 from tasks.render.rasterise.rasteriser import rasterise, splat_back
 from tasks.render.rasterise.reference_rasteriser import blend_steps
+from tasks.render.rasterise.shading import shade_lanes
 from tasks.render.rasterise.view import view_of
 from tasks.scene.spherical_harmonics import sh_basis
-from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
+from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
 
 
 def test_sh_basis_is_scipys_real_harmonics_with_the_condon_shortley_sign() -> None:
@@ -42,6 +43,20 @@ def test_sh_basis_is_scipys_real_harmonics_with_the_condon_shortley_sign() -> No
             part = y.imag if order < 0 else y.real
             wanted.append(part * (np.sqrt(2) if order else 1))
     np.testing.assert_allclose(sh_basis(v, 16), np.column_stack(wanted), atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 4, 9, 16])
+def test_a_block_is_shaded_by_the_harmonics_it_has_and_no_more(count: int) -> None:
+    rng = np.random.default_rng(count)
+    v = rng.normal(size=(BLOCK, 3))
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    planes = np.full((SH + 3 * 16, BLOCK), 1e3, np.float32)  # what lies behind the block must not be read
+    sh = rng.normal(size=(count, 3, BLOCK)).astype(np.float32)
+    planes[SH : SH + 3 * count] = sh.reshape(-1, BLOCK)
+    colours = np.empty(3 * BLOCK, np.float32)
+    shade_lanes(v.T.astype(np.float32).ravel(), planes[: SH + 3 * count], colours)
+    wanted = np.maximum(np.einsum("kcl,lk->cl", sh, sh_basis(v, count)) + 0.5, 0)
+    np.testing.assert_allclose(colours.reshape(3, BLOCK), wanted, atol=2e-6)
 
 
 def test_polynomial_exponential_keeps_its_stated_error() -> None:
@@ -78,7 +93,7 @@ def test_morton_neighbours_are_near_and_equal_points_keep_their_order() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_culling_blocks_never_loses_a_splat(seed: int) -> None:
     prepared = prepare_gaussians(random_cloud(4000, sh_count=1, seed=seed))
-    viewmat = camera_at(np.random.default_rng(seed).uniform(-4, 4, 3), rotation(seed))
+    viewmat = camera_at(np.random.default_rng(seed).uniform(-4, 4, 3), rotation_matrix(seed))
     view = view_of(viewmat, K, WIDTH, HEIGHT)
     everything = replace(prepared, radii=np.full_like(prepared.radii, 1e6))
     records, slots = project_gaussians(prepared, view)

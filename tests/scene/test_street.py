@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from catalogs.scenes import load_scene
 from catalogs.scenes.street import load_street_layout
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.rasterise.gbuffer import GBuffer
@@ -25,7 +26,7 @@ SHORT = StreetLayout(route_length=12.0, behind=5.0, beyond=20.0, crossing_statio
 
 @pytest.fixture(scope="module")
 def street() -> Scene:
-    return build_street()
+    return load_scene("street")
 
 
 @pytest.fixture(scope="module")

@@ -117,7 +117,7 @@ def test_one_flipped_bit_is_named_and_repaired_and_no_reader_gets_it(stored, mac
 
 
 def test_a_killed_run_goes_on_from_what_the_store_holds_on_another_machine(
-    server, machine, grid, toy_dataset, tmp_path
+    machine, grid, toy_dataset, tmp_path, monkeypatch
 ):
     address = "s3://data/sets/killed"
     command = ["generate", grid, "--out", address, "--runner", "threads", "--workers", "1"]
@@ -134,11 +134,8 @@ def test_a_killed_run_goes_on_from_what_the_store_holds_on_another_machine(
     assert 1 <= len(receipts) < 4
     with pytest.raises(InputError, match="must be finished"):
         query_dataset(address, "SELECT 1")
-    resumed = start(command, environment(server, tmp_path / "other machine"))
-    out, errors = resumed.communicate(timeout=120)
-    assert resumed.returncode == 0, errors
-    made = int(out.split("made: ")[1].split()[0])
-    assert 0 < made < 4
+    monkeypatch.setenv("MUSYNC_CACHE", str(tmp_path / "other machine"))
+    assert 0 < generate_dataset(grid, address, runner="threads", workers=1).made < 4
     assert objects_of(address) == files_of(toy_dataset)
 
 
@@ -153,16 +150,18 @@ def test_workers_on_other_machines_share_no_folder_with_the_run(machine, grid, t
     assert objects_of(address) == files_of(toy_dataset)
 
 
-def test_a_second_run_on_another_machine_is_told_while_the_first_goes_on(server, machine, grid, tmp_path):
+def test_a_second_run_on_another_machine_is_told_while_the_first_goes_on(
+    machine, grid, tmp_path, monkeypatch
+):
     address = "s3://data/sets/busy"
     with open_for_writing(address, want_progress) as layout:
         prepare_dataset(layout, *make_plan(grid, "cpu"))
-    with hold_lease(Objects(address)):
-        run = start(
-            ["generate", grid, "--out", address, "--runner", "threads"], environment(server, tmp_path / "b")
-        )
-        _, errors = run.communicate(timeout=120)
-    assert run.returncode == 2 and f"{address}: another run is writing this dataset (on " in errors
+    monkeypatch.setenv("MUSYNC_CACHE", str(tmp_path / "other machine"))
+    with (
+        hold_lease(Objects(address)),
+        pytest.raises(InputError, match=rf"{address}: another run is writing this dataset \(on "),
+    ):
+        generate_dataset(grid, address, runner="threads")
 
 
 def test_the_second_writer_is_told_and_the_lock_of_a_dead_one_is_taken(stored, machine, monkeypatch):

@@ -86,6 +86,17 @@ def test_effects_of_the_coupled_mode_come_back_from_noisy_traces(vehicle, make_t
     assert fitted.effects["anti_dive"] == pytest.approx(0.3, abs=0.03)
 
 
+@pytest.mark.parametrize(("upper_deg", "named"), [(0.2, ("static_pitch",)), (2.0, ())])
+def test_a_scalar_that_rests_on_a_bound_is_named(vehicle, make_traces, tmp_path, upper_deg, named):
+    folder = make_traces(dataclasses.replace(vehicle, static_pitch=np.deg2rad(0.3)), "paper")
+    name = procedure_file(tmp_path, "paper-staged", [stage(["static_pitch"], ["pitch"])])
+    procedure, interval = load_procedure(name)
+    bound = dataclasses.replace(procedure.bounds["static_pitch"], upper=np.deg2rad(upper_deg))
+    bounded = dataclasses.replace(procedure, bounds=procedure.bounds | {"static_pitch": bound})
+    _, record = run_stage(vehicle, cases_of(folder, vehicle, bounded, interval), bounded.stages[0], bounded)
+    assert record.at_bounds == named
+
+
 def test_a_scalar_to_which_no_run_answers_stays_where_it_was(vehicle, make_traces):
     procedure, interval = load_procedure("paper-staged")
     efficiency = next(s for s in procedure.stages if s.groups == ("efficiency",))
