@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from tasks.campaign.make_planned_runs import RICH, RunPlan, make_planned_run
 
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_truths
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run
 from tasks.identification.benchmark import synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import attribute

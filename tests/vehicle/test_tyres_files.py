@@ -8,14 +8,15 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catalogs.tyres import FOLDER, LARGEST_TIR, load_tyre, parse_tyre, tyre_names
-from catalogs.vehicles import load_vehicle, vehicle_source
+from catalogs.entries import entry_folder, entry_names, find_entry
+from catalogs.tyres import LARGEST_TIR, load_tyre, parse_tyre
+from catalogs.vehicles import load_vehicle
 from flows.making.plan import make_plan
 from manifests.explain import input_differences
 from tasks.errors import InputError
 from tasks.vehicle.tyres.magic_formula import MagicFormula, tyre_forces
 
-BOOK = (FOLDER / "pacejka-205-60r15.tir").read_text()
+BOOK = (entry_folder("tyre") / "pacejka-205-60r15.tir").read_text()
 
 
 def changed(*changes: tuple[str, str]) -> bytes:
@@ -34,8 +35,8 @@ def problems(content: bytes) -> list[str]:
 
 
 def test_every_tyre_of_the_catalogue_is_read_and_a_wrong_name_lists_them():
-    assert "pacejka-205-60r15" in tyre_names()
-    assert all(isinstance(load_tyre(name), MagicFormula) for name in tyre_names())
+    assert "pacejka-205-60r15" in entry_names("tyre")
+    assert all(isinstance(load_tyre(name), MagicFormula) for name in entry_names("tyre"))
     with pytest.raises(
         InputError, match=r"slick: no such tyre; give a .tir file or one of: .*pacejka-205-60r15"
     ):
@@ -44,7 +45,7 @@ def test_every_tyre_of_the_catalogue_is_read_and_a_wrong_name_lists_them():
 
 def test_coefficients_stand_in_their_places():
     """Table A3.1: PKX1 21.51, PKY1 -14.95, RVY6 -10.71 at 4000 N."""
-    tyre = load_tyre(FOLDER / "pacejka-205-60r15.tir")
+    tyre = load_tyre(entry_folder("tyre") / "pacejka-205-60r15.tir")
     assert (tyre.nominal_load, tyre.longitudinal.pkx1, tyre.lateral.pky1) == (4000.0, 21.51, -14.95)
     assert tyre.combined.rvy6 == -10.71 and tyre.lateral.pky4 == 2.0
 
@@ -127,7 +128,7 @@ def test_damaged_files_are_read_or_refused_in_sentences(noise, at, lost):
 
 
 def own_vehicle(folder: Path, tyre: object) -> Path:
-    entry = yaml.safe_load(vehicle_source("paper-reference").read_text())
+    entry = yaml.safe_load(find_entry("vehicle", "paper-reference").read_text())
     path = folder / "car.yaml"
     path.write_text(yaml.safe_dump(entry | {"tyre": tyre}, sort_keys=False))
     return path
