@@ -95,7 +95,7 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="hazard_center_m", unit="m", symbol="s_g", description="route coordinate of the road feature's centre"),
     Channel(name="hazard_length_m", unit="m", symbol="L_g", description="length of the road feature"),
     Channel(name="hazard_height_m", unit="m", symbol="A_g", description="height of the road feature; negative is a depression"),
-    Channel(name="film_depth_mm", unit="mm", symbol="h_t", description="total water-film depth"),
+    Channel(name="film_depth_mm", unit="mm", symbol="h_t", description="total depth of the film of water or ice"),
     Channel(name="snow_depth_mm", unit="mm", symbol="h_s", description="snow depth"),
     Channel(name="snow_coverage", unit="1", symbol="c_s", description="snow coverage of the road"),
     Channel(name="surface_friction", unit="1", symbol="mu_c", description="reference surface coefficient"),

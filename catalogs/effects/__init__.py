@@ -1,59 +1,34 @@
 """The library of effects that a vehicle model may lack."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import AfterValidator, Field, TypeAdapter, model_validator
+from pydantic import AfterValidator, Field, TypeAdapter, field_validator
 
-from catalogs.quantities import CatalogueEntry, Number, Text, read_entries
-from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect, EffectClass, EffectParameter
+from catalogs.quantities import CatalogueEntry, Text, read_entries
+from tasks.vehicle.effects.library import Effect, EffectClass
+from tasks.vehicle.effects.table import PARAMETERS
 
-Unit = Literal[
-    "1", "1/(100 K)", "1/(100 kJ)", "1/MPa", "MPa", "N", "N m", "N m s/rad", "N m s^2/m^2", "N s^2/m^2", "N/m",
-    "N/m^3", "N/mm", "kg m^2", "m", "m/s", "m^2", "rad", "s", "s/m",
-]  # fmt: skip
-"""Units that the ports take."""
 LIBRARY_FILE = Path(__file__).with_name("library.yaml")
 
 
-class ParameterEntry(CatalogueEntry):
-    """One number of an effect; the meanings stand at ``EffectParameter``."""
-
-    unit: Unit
-    lower: Number
-    upper: Number
-    step: Number
-    start: Number
-
-    @model_validator(mode="after")
-    def _bounds_leave_room(self) -> "ParameterEntry":
-        if not (self.lower <= self.start <= self.upper and 0 < self.step < self.upper - self.lower):
-            raise ValueError(
-                "lower <= start <= upper must hold, and a step above 0 and below the distance of the bounds; they are"
-                f" {self.lower:g}, {self.start:g}, {self.upper:g} and {self.step:g}"
-            )
-        return self
-
-
 class EffectEntry(CatalogueEntry):
-    """One effect; the meanings stand at ``Effect``."""
+    """One effect; the meanings are given by ``Effect``."""
 
     name: Text
     effect_class: EffectClass = Field(alias="class")
-    port: Text
     variable: Text
     enters: Text
-    source: Text
-    parameters: Annotated[dict[str, ParameterEntry], Field(min_length=1, max_length=2)]
+    parameters: Annotated[tuple[Text, ...], Field(min_length=1, max_length=2)]
 
-    @model_validator(mode="after")
-    def _ports_know_the_parameters(self) -> "EffectEntry":
-        unknown = [name for name in self.parameters if name not in PARAMETER_INDEX]
-        if unknown:
+    @field_validator("parameters")
+    @classmethod
+    def _the_table_has_them(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if unknown := [name for name in names if name not in PARAMETERS]:
             raise ValueError(
-                f"no port knows the parameter {', '.join(unknown)}; there are: {', '.join(PARAMETER_INDEX)}"
+                f"the table of effects has no parameter {', '.join(unknown)}; there are: {', '.join(PARAMETERS)}"
             )
-        return self
+        return names
 
 
 def _check_names(entries: list[EffectEntry]) -> list[EffectEntry]:
@@ -64,7 +39,7 @@ def _check_names(entries: list[EffectEntry]) -> list[EffectEntry]:
 
 
 LIBRARY = TypeAdapter(Annotated[list[EffectEntry], AfterValidator(_check_names)])
-"""What the file must hold."""
+"""Content of the file."""
 
 
 def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
@@ -79,19 +54,11 @@ def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
     InputError
         With every rule the file breaks.
     """
-    return tuple(_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
+    return tuple(_make_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
 
 
-def _effect(entry: EffectEntry) -> Effect:
+def _make_effect(entry: EffectEntry) -> Effect:
     return Effect(
-        name=entry.name,
-        effect_class=entry.effect_class,
-        port=entry.port,
-        variable=entry.variable,
-        enters=entry.enters,
-        source=entry.source,
-        parameters=tuple(
-            EffectParameter(name=name, **parameter.model_dump())
-            for name, parameter in entry.parameters.items()
-        ),
-    )
+        name=entry.name, effect_class=entry.effect_class, variable=entry.variable, enters=entry.enters,
+        parameters=tuple(PARAMETERS[name] for name in entry.parameters),
+    )  # fmt: skip

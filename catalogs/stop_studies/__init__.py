@@ -6,16 +6,13 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
-from catalogs.vehicles.added import library_units
+from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
 from tasks.studies.stop_study import Rung
-from tasks.vehicle.effects.library import PARAMETER_INDEX
-
-FOLDER = Path(__file__).parent
+from tasks.vehicle.effects.table import PARAMETERS
 
 
 class RungEntry(CatalogueEntry):
-    """One step of the ladder; the meanings stand at ``Rung``."""
+    """One step of the ladder; the meanings are given by ``Rung``."""
 
     name: Text
     adds: Text
@@ -29,19 +26,20 @@ class RungEntry(CatalogueEntry):
     def _are_parameters(
         cls, names: dict[str, Scalar] | tuple[str, ...]
     ) -> dict[str, Scalar] | tuple[str, ...]:
-        unknown = [name for name in names if name not in PARAMETER_INDEX]
+        unknown = [name for name in names if name not in PARAMETERS]
         if unknown:
-            raise ValueError(f"no port knows {', '.join(unknown)}; there are: {', '.join(PARAMETER_INDEX)}")
+            raise ValueError(
+                f"the table of effects has no {', '.join(unknown)}; there are: {', '.join(PARAMETERS)}"
+            )
         return names
 
     @field_validator("fixed")
     @classmethod
-    def _units_are_the_librarys(cls, fixed: dict[str, Scalar]) -> dict[str, Scalar]:
-        units = library_units()
+    def _units_are_those_of_the_table(cls, fixed: dict[str, Scalar]) -> dict[str, Scalar]:
         problems = [
-            f"unit of {name} must be {units[name]}; it is {entry.unit}"
+            f"unit of {name} must be {PARAMETERS[name].unit}; it is {entry.unit}"
             for name, entry in fixed.items()
-            if entry.unit != units.get(name, entry.unit)
+            if name in PARAMETERS and entry.unit != PARAMETERS[name].unit
         ]
         if problems:
             raise ValueError("; ".join(problems))
@@ -49,11 +47,11 @@ class RungEntry(CatalogueEntry):
 
 
 class StopStudy(CatalogueEntry):
-    """What a study file must hold."""
+    """Content of a study file."""
 
     train: Text
     held_out: Text
-    lead_s: Annotated[Scalar, checked("s", above=0)]
+    lead_s: Annotated[Scalar, require_quantity("s", above=0)]
     rungs: Annotated[tuple[RungEntry, ...], Field(min_length=1)]
 
     @property
@@ -80,4 +78,4 @@ def load_stop_study(name_or_path: str | Path) -> StopStudy:
     InputError
         Listing every problem of the file, or the studies that exist.
     """
-    return read_entry(StopStudy, find_entry(FOLDER, name_or_path, "stop study"), "stop study")
+    return read_entry(StopStudy, find_entry("stop study", name_or_path), "stop study")

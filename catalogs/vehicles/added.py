@@ -1,17 +1,15 @@
-"""What a vehicle file may add to the plain model: numbers of effects, and forms that no effect of the library has."""
+"""Additions of a vehicle file to the plain model: numbers of effects, and forms that no effect of the library has."""
 
 from collections.abc import Mapping
-from functools import cache
 from itertools import pairwise
 
 from pydantic import model_validator
 
-from catalogs.effects import load_effects
 from catalogs.quantities import CatalogueEntry, Scalar, Table, Text
 from catalogs.vehicles.frozen import Limits
 from tasks.vehicle.effects.forms import SHAPES, Form, coefficient_count
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLES
+from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 
 VARIABLE_UNITS = dict(
     zip(VARIABLES, ("s", "m s-1", "MPa", "K", "MPa s-1", "1", "m", "m s-1", "m s-2"), strict=True)
@@ -20,7 +18,7 @@ VARIABLE_UNITS = dict(
 
 
 class FormEntry(CatalogueEntry):
-    """What a form must hold; the meanings stand at ``Form``. ``range`` is where it was seen: two values."""
+    """Content of a form; `Form` gives the meanings. ``range``: start and end of the identified interval."""
 
     port: Text
     variable: Text
@@ -81,7 +79,7 @@ def effect_problems(effects: Mapping[str, Scalar], bounds: Mapping[str, Limits])
     Parameters
     ----------
     effects : numbers of a vehicle file
-    bounds : of the procedure that found them; the library's hold for any other, and 0 is always allowed
+    bounds : of the procedure that found them; the table's hold for any other, and 0 is always allowed
     """
     known = ", ".join(EFFECT_UNITS)
     problems = [
@@ -92,20 +90,10 @@ def effect_problems(effects: Mapping[str, Scalar], bounds: Mapping[str, Limits])
     for name, number in effects.items():
         if name in EFFECT_UNITS and number.unit != EFFECT_UNITS[name]:
             problems.append(f"effects.{name}: unit must be {EFFECT_UNITS[name]}; it is {number.unit}")
-        limits = bounds.get(name)
-        low, high = (limits.lower, limits.upper) if limits else _library_bounds().get(name, (None, None))
-        if low is None or high is None or number.value == 0.0 or low <= number.value <= high:
+        if name not in EFFECT_UNITS or number.value == 0.0:
             continue
-        problems.append(f"effects.{name} must lie within {low:g} to {high:g}; it is {number.value:g}")
+        limits = bounds.get(name) or PARAMETERS[name]
+        low, high = limits.lower, limits.upper
+        if not low <= number.value <= high:
+            problems.append(f"effects.{name} must lie within {low:g} to {high:g}; it is {number.value:g}")
     return problems
-
-
-@cache
-def library_units() -> dict[str, str]:
-    """Unit of each parameter as the library of effects writes it, which grown vehicles take over for their bounds."""
-    return {p.name: p.unit for effect in load_effects() for p in effect.parameters}
-
-
-@cache
-def _library_bounds() -> dict[str, tuple[float, float]]:
-    return {p.name: (p.lower, p.upper) for effect in load_effects() for p in effect.parameters}

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from catalogs.calibration import load_procedure, procedure_source
+from catalogs.calibration import load_procedure
+from catalogs.entries import find_entry
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
-from catalogs.vehicles import load_vehicle, vehicle_source
+from catalogs.vehicles import load_vehicle
 from catalogs.vehicles.frozen import frozen_text
 from flows.store.outputs import Outputs
 from flows.studies.vehicle_model import agreement_of
@@ -23,7 +24,7 @@ from tasks.identification.calibration.residual import WHEELS, CalibrationCase
 from tasks.identification.calibration.scalars import calibration_scalars, scalar_value, with_scalars
 from tasks.identification.calibration.staged import Procedure
 from tasks.identification.calibration.staged import calibrate as run_stages
-from tasks.vehicle.effects.numbers import EFFECT_UNITS, NUMBERS_OF_EFFECTS
+from tasks.vehicle.effects.table import EFFECT_UNITS, NUMBERS_OF_EFFECTS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode
 
@@ -160,9 +161,9 @@ def _frozen(
     fitted: Vehicle, base: str, procedure_name: str, procedure: Procedure, split: str, data: dict[str, str]
 ) -> str:
     """The frozen file: the base's entry with the calibrated values in it, and where they come from."""
-    source = vehicle_source(base)
+    source = find_entry("vehicle", base)
     entry = yaml.safe_load(source.read_text(encoding="utf-8"))
-    entry.pop("provenance", None)
+    before = entry.pop("provenance", None) or {"bounds": {}}
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
     for group in procedure.groups:
         if group in EFFECT_UNITS:
@@ -183,7 +184,7 @@ def _frozen(
         "base": source.stem,
         "base_sha256": sha256_of_file(source),
         "procedure": Path(procedure_name).stem,
-        "procedure_sha256": sha256_of_file(procedure_source(procedure_name)),
+        "procedure_sha256": sha256_of_file(find_entry("calibration procedure", procedure_name)),
         "version": code_version()["version"],
         "split": split,
         "data_sha256": data,
@@ -191,7 +192,9 @@ def _frozen(
             {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(stage).items()}
             for stage in procedure.stages
         ],
-        "bounds": {
+        # what the base brought along keeps the bounds that it was found in
+        "bounds": {effect: limits for effect, limits in before["bounds"].items() if effect in fitted.effects}
+        | {
             group: {"unit": bounds.unit, "lower": bounds.lower, "upper": bounds.upper}
             for group, bounds in procedure.bounds.items()
         },

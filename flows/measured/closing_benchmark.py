@@ -16,7 +16,7 @@ from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
-from tasks.campaign.planned_runs import RICH, Drive
+from tasks.campaign.planned_runs import RICH, RunPlan
 from tasks.identification.benchmark import covered, outcome, synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import attribute
@@ -48,7 +48,7 @@ class Planned:
     kind: str
     truths: tuple[Truth, ...] = ()
     seed: int
-    design: tuple[Drive, ...] = RICH
+    design: tuple[RunPlan, ...] = RICH
 
     @property
     def name(self) -> str | None:

@@ -9,23 +9,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flows.drawing import literal
+from flows.drawing import escape_formulas
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.forms import Leftover, curve, form_hypotheses, scan
 from tasks.identification.decision.search import Found
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import CONSTANTS, RunModel, predict, roll
+from tasks.identification.inference.forward import RunModel, predict, simulate_run
 from tasks.identification.inference.hypothesis import compose
-from tasks.vehicle.effects.library import ALL_PARAMETERS
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
+from tasks.vehicle.effects.table import EFFECT_TABLE
 
 FROZEN, AFTER, MEASURED = "#c0392b", "#1f6fb2", "#222222"
 SHOWN = ("speed", "longitudinal_acceleration", "pitch")
 MEAN_OVER = 20
 """Samples averaged into one point of the residual force: its noise falls below what is looked for."""
-DISC_STATE = 13
-"""Column of the front disc's temperature in a run's states."""
 
 
 def picture(figure: Figure) -> str:
@@ -45,7 +43,7 @@ def residual_force(trace: Trace) -> str:
         grown = state is trace.end and trace.end is not trace.start
         for run, colour in zip(state.evidence.train, colours, strict=True):
             x, force = _force_points(run.model, state, variable, grown)
-            axis.plot(x, force, ".", ms=2.5, color=colour, label=literal(run.model.run.name))
+            axis.plot(x, force, ".", ms=2.5, color=colour, label=escape_formulas(run.model.run.name))
         axis.axhline(0.0, color="#888888", lw=0.8)
         axis.set_title(title)
         axis.set_xlabel(f"{variable} [{VARIABLE_UNITS[VARIABLES.index(variable)]}]")
@@ -66,19 +64,15 @@ def _force_points(
     theta, slots = (
         compose(state.base.parts, state.base.values, state.base.session)
         if grown
-        else (np.zeros(len(ALL_PARAMETERS)), ())
+        else (np.zeros(len(EFFECT_TABLE)), ())
     )
     channel = CHANNELS.index("longitudinal_acceleration")
     y = predict(model, theta, slots=slots)
-    _, states = roll(model, theta, slots=slots)
-    mass = sum(
-        model.constants[CONSTANTS.index(n)] for n in ("sprung_mass", "unsprung_mass_f", "unsprung_mass_r")
-    )
-    force = mass * (model.measured - y)[:, channel]
+    force = model.vehicle.mass * (model.measured - y)[:, channel]
     x = {
         "speed": y[:, 0],
         "pressure": model.run.pressure[: model.samples],
-        "disc_temperature": states[:, DISC_STATE],
+        "disc_temperature": simulate_run(model, theta, slots=slots).column("disc_rise_f"),
         "deceleration": -y[:, channel],
     }[variable]
     count = model.samples // MEAN_OVER
@@ -165,7 +159,7 @@ def traces(trace: Trace) -> str:
     """Measured, frozen and after on the held-out runs that gained most and least."""
     runs = trace.start.evidence.held_out
     theta, slots = compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
-    plain = np.zeros(len(ALL_PARAMETERS))
+    plain = np.zeros(len(EFFECT_TABLE))
 
     def gain(run: RunEvidence) -> float:
         sigma = run.sigma
@@ -185,7 +179,7 @@ def traces(trace: Trace) -> str:
             c = CHANNELS.index(channel)
             _trace(axes[row, column], time, run.model.measured[:, c], frozen[:, c], after[:, c])
             axes[row, column].set_ylabel(f"{channel.replace('_', ' ')}\n[{CHANNEL_UNITS[c]}]", fontsize=8)
-        axes[0, column].set_title(literal(f"{title}: {run.model.run.name} ({run.model.run.weather})"))
+        axes[0, column].set_title(escape_formulas(f"{title}: {run.model.run.name} ({run.model.run.weather})"))
         axes[-1, column].set_xlabel("time [s]")
     axes[0, 0].legend(fontsize=7)
     return picture(figure)

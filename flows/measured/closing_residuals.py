@@ -7,14 +7,14 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flows.drawing import literal
+from flows.drawing import escape_formulas
 from flows.measured.closing_figures import picture
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.forward import predict
 from tasks.identification.inference.hypothesis import compose
-from tasks.vehicle.effects.library import ALL_PARAMETERS
+from tasks.vehicle.effects.table import EFFECT_TABLE
 
 TITLES = ("frozen", "after")
 
@@ -30,7 +30,7 @@ def residuals(
     runs : of its evidence
     """
     models = (
-        (np.zeros(len(ALL_PARAMETERS)), ()),
+        (np.zeros(len(EFFECT_TABLE)), ()),
         compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session),
     )
     for run in runs:
@@ -76,7 +76,7 @@ def residuals_over_time(trace: Trace) -> str:
         for column, left in enumerate(both):
             for c in range(len(CHANNELS)):
                 axes[c, column].plot(
-                    time, left[:, c], lw=0.6, color=colour, label=literal(run.model.run.name)
+                    time, left[:, c], lw=0.6, color=colour, label=escape_formulas(run.model.run.name)
                 )
     for c, (channel, unit) in enumerate(zip(CHANNELS, CHANNEL_UNITS, strict=True)):
         axes[c, 0].set_ylabel(f"{channel.replace('_', ' ')}\n[{unit}]", fontsize=7)

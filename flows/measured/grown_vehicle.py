@@ -6,7 +6,8 @@ from typing import Any
 import yaml
 
 from catalogs.effects import LIBRARY_FILE
-from catalogs.vehicles import vehicle_source
+from catalogs.entries import find_entry
+from catalogs.vehicles import load_vehicle
 from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of_file
@@ -14,29 +15,18 @@ from manifests.provenance import code_version
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
 from tasks.identification.decision.forms import form_in_range
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.effects.grown import FAMILY, apply_effects
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
-
-SCALED = {
-    "pressure_gain": ("brake_gain",),
-    "mass": ("sprung_mass",),
-    "wheel_radius": ("wheel_radius",),
-    "damping": ("suspension_damping_f", "suspension_damping_r"),
-    "stiffness": ("suspension_stiffness_f", "suspension_stiffness_r"),
-}
-"""Parameters that are a relative change of the vehicle's own numbers."""
-SHIFTED = {"front_bias": ("front_brake_share",), "wheel_inertia": ("wheel_inertia_f", "wheel_inertia_r")}
-"""Parameters that are added to the vehicle's own numbers."""
-TABLES = {"friction": "efficiency", "slip_stiffness": "slip_stiffness"}
-"""Parameters that are a relative change of a table of every tyre family."""
+from tasks.vehicle.effects.table import PARAMETERS, EffectParameter
+from tasks.vehicle.parameters import Vehicle
 
 
 def grown_vehicle(
     name: str, verdict: Verdict, reached: Mapping[str, tuple[float, float]]
 ) -> tuple[str | None, list[str]]:
-    """The text of the grown vehicle's file.
+    """Return the text of the grown vehicle's file: what was found on top of what the vehicle has.
 
-    Sensor faults are no part of the car. What else is none, as the grade of the proving ground, is left out and
+    Errors of instruments are no part of the car. Neither is the grade of the proving ground, which is left out and
     named.
 
     Parameters
@@ -49,10 +39,13 @@ def grown_vehicle(
     -------
     The text, or None where nothing was added; and the parameters that could not be.
     """
-    source = vehicle_source(name)
+    source = find_entry("vehicle", name)
     entry: dict[str, Any] = yaml.safe_load(source.read_text(encoding="utf-8"))
-    entry.pop("provenance", None)
+    before = entry.pop("provenance", None) or {"bounds": {}}
+    base = load_vehicle(name)
     bounds: dict[str, dict[str, Any]] = {}
+    values: dict[str, float] = {}
+    sources: dict[str, list[str]] = {}
     missing: list[str] = []
     for effect in verdict.effects:
         if effect.effect_class == "sensor":
@@ -61,18 +54,27 @@ def grown_vehicle(
             form = form_in_range(
                 effect.name, tuple(p.value for p in effect.parameters), *reached[effect.variable]
             )
-            sources = "; ".join(_source(effect, p, verdict) for p in effect.parameters)
-            entry["forms"] = [*entry.get("forms", ()), _form_entry(form, sources, verdict.campaign)]
+            source_text = "; ".join(_source(effect, p, verdict) for p in effect.parameters)
+            entry["forms"] = [*entry.get("forms", ()), _form_entry(form, source_text, verdict.campaign)]
             bounds |= {f"{effect.name}: {p.name}": _limits(p) for p in effect.parameters}
             continue
-        if not all(_carried(p.name) for p in effect.parameters):
+        if not all(PARAMETERS[p.name].of_vehicle for p in effect.parameters):
             missing += [f"{effect.name}: {p.name}" for p in effect.parameters]
             continue
-        for parameter in effect.parameters:
-            _apply(entry, parameter, _source(effect, parameter, verdict))
-            bounds[parameter.name] = _limits(parameter)
+        for p in effect.parameters:
+            # two effects that share a number, as air drag and headwind do, add up
+            values[p.name] = values.get(p.name, 0.0) + p.value
+            sources.setdefault(p.name, []).append(_source(effect, p, verdict))
+            own = base.effects.get(p.name, 0.0)
+            bounds[p.name] = {"unit": p.unit, "lower": own + p.lower, "upper": own + p.upper}
     if not bounds:
         return None, missing
+    grown = apply_effects(base, values)
+    for parameter, texts in sources.items():
+        for field in PARAMETERS[parameter].fields:
+            _write(entry, grown, PARAMETERS[parameter], field, "; ".join(texts))
+    kept = {effect: limits for effect, limits in before["bounds"].items() if effect in base.effects}
+    bounds = kept | bounds
     rivals = [rival.name for _, rival in verdict.rivals]
     untold = f"; the runs cannot tell it from {', '.join(rivals)}" if rivals else ""
     provenance = {
@@ -89,10 +91,6 @@ def grown_vehicle(
     }
     title = f"{source.stem} with what the campaign {verdict.campaign} shows it lacks. Frozen: do not edit."
     return frozen_text(entry, provenance, title), missing
-
-
-def _carried(name: str) -> bool:
-    return name in EFFECT_UNITS or name in SCALED or name in SHIFTED or name in TABLES
 
 
 def _limits(p: Parameter) -> dict[str, Any]:
@@ -126,26 +124,20 @@ def _source(effect: NamedEffect, p: Parameter, verdict: Verdict) -> str:
     )
 
 
-def _apply(entry: dict[str, Any], p: Parameter, source: str) -> None:
-    if p.name in SCALED or p.name in SHIFTED:
-        for key in SCALED.get(p.name, ()) or SHIFTED[p.name]:
-            value = entry[key]["value"]
-            grown = value * (1.0 + p.value) if p.name in SCALED else value + p.value
-            entry[key] = {**entry[key], "value": float(grown), "source": f"{entry[key]['source']}; {source}"}
-    elif p.name in TABLES:
-        for family in entry["families"].values():
-            table = family[TABLES[p.name]]
-            family[TABLES[p.name]] = {
-                **table,
-                "value": [float(v * (1.0 + p.value)) for v in table["value"]],
-                "source": f"{table['source']}; {source}",
-            }
-    else:
-        effects = entry.setdefault("effects", {})
-        # two effects that share a number, as air drag and headwind do, add up; so does what the base had
-        before = effects.get(p.name, {"value": 0.0, "source": ""})
-        effects[p.name] = {
-            "value": float(before["value"] + p.value),
-            "unit": EFFECT_UNITS[p.name],
-            "source": f"{before['source']}; {source}".removeprefix("; "),
-        }
+def _write(entry: dict[str, Any], grown: Vehicle, row: EffectParameter, field: str, source: str) -> None:
+    """Write one field of the grown vehicle into its file, with where it comes from."""
+    if row.kind == "added":
+        old = entry.setdefault("effects", {}).get(field, {"source": ""})
+        entry["effects"][field] = {
+            "value": grown.effects[field], "unit": row.unit, "source": f"{old['source']}; {source}".removeprefix("; "),
+        }  # fmt: skip
+        return
+    if field.startswith(FAMILY):
+        table = field.removeprefix(FAMILY)
+        for weather, family in grown.families.items():
+            old = entry["families"][weather][table]
+            entry["families"][weather][table] = {
+                **old, "value": list(getattr(family, table)), "source": f"{old['source']}; {source}",
+            }  # fmt: skip
+        return
+    entry[field] |= {"value": getattr(grown, field), "source": f"{entry[field]['source']}; {source}"}

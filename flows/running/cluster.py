@@ -19,7 +19,7 @@ VISIBLE = "CUDA_VISIBLE_DEVICES"
 
 
 def facts_here() -> dict[str, str]:
-    """What has to be equal on every machine that makes a dataset, because its manifest records one of each."""
+    """Return the facts that must be equal on every machine that makes a dataset: its manifest records one of each."""
     code, libraries = code_version(), library_versions()
     libraries["python"] = libraries["python"].rpartition(".")[0]
     kept = {name: version for name, version in libraries.items() if name not in NOT_ON_WORKERS}
@@ -47,7 +47,7 @@ def version_problems(
             if facts.get(name) != version:
                 sentence = f"{name} is {facts.get(name, 'absent')} there and {version} here: install the same"
                 told.setdefault(sentence, []).append(address)
-    return [f"{_some(addresses)}: {sentence}" for sentence, addresses in told.items()]
+    return [f"{_name_some(addresses)}: {sentence}" for sentence, addresses in told.items()]
 
 
 def check_cluster(client: Any, address: str) -> None:
@@ -84,7 +84,7 @@ def share_gpus(client: Any) -> None:
 
 
 def gpu_for(place: int, visible: str | None, present: Sequence[str]) -> str | None:
-    """The GPU of a worker; None where there is none to choose, because Slurm or dask-cuda has given it its one.
+    """Return the GPU of a worker; None where Slurm or dask-cuda has already assigned one.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ async def _call_in_thread(function: Callable[[], Any]) -> None:
     await asyncio.to_thread(function)
 
 
-def _some(addresses: list[str]) -> str:
+def _name_some(addresses: list[str]) -> str:
     shown = ", ".join(addresses[:SHOWN_WORKERS])
     rest = len(addresses) - SHOWN_WORKERS
     return f"workers {shown} and {rest} more" if rest > 0 else f"worker {shown}"

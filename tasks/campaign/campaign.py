@@ -43,7 +43,7 @@ class Run:
     ----------
     name : as in runs.csv
     held_out : belongs to the runs that no fit may see
-    weather : dry, rain or snow
+    weather : name of the kind of weather
     precipitation_mm_h, snow_accumulation_h : rate [mm/h] and time of snowfall [h]
     direction : +1 along the route, -1 against it
     disc_rise : disc temperature above ambient at the start [K]

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.channels import CHANNELS_BY_NAME, likely_unit
+from tasks.campaign.channels import CHANNELS_BY_NAME, guess_unit
 from tasks.campaign.signals import Signal
 
 GAP_STEPS = 5.0
@@ -124,7 +124,7 @@ def plausibility_problems(
                 f"channel {name} reaches {peak:.4g} {channel.unit}, which no road car does (limit {channel.limit:g}):"
                 " correct its unit or scale"
             )
-    smooth = {name: _smoothed(values, interval) for name, values in columns.items()}
+    smooth = {name: _moving_mean(values, interval) for name, values in columns.items()}
     problems += _radius_problems(smooth, interval)
     if "speed" in smooth:
         rate = np.gradient(smooth["speed"], interval)
@@ -181,7 +181,7 @@ def _pressure_problems(columns: Mapping[str, NDArray[np.float64]], interval: flo
         ]
     lost = 0.0
     if "speed" in columns:
-        rate = np.sort(np.gradient(_smoothed(columns["speed"], interval), interval))
+        rate = np.sort(np.gradient(_moving_mean(columns["speed"], interval), interval))
         lost = -float(np.mean(rate[: max(round(SMOOTHING / interval), 1)]))
     if lost <= WITHOUT_BRAKE:
         return []
@@ -243,7 +243,7 @@ def _pair_problems(
         ]
     if 0.4 < slope < 2.5 or mapped_unit is None:
         return []
-    guess = likely_unit(mapped_unit, slope)
+    guess = guess_unit(mapped_unit, slope)
     hint = f"; taken as {mapped_unit}, it looks like {guess}" if guess else ""
     return [
         f"channel {name} is {slope:.3g} times {other_name}: the unit or scale of one of them is wrong{hint}"
@@ -292,6 +292,6 @@ def _dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list
     ]
 
 
-def _smoothed(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+def _moving_mean(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
     width = min(max(round(SMOOTHING / interval), 1), len(values))
     return np.convolve(values, np.ones(width) / width, mode="valid")

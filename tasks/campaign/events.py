@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.episodes import Episode, pressure_episodes
-from tasks.surface.state import Weather
+from tasks.surface.weather import DRY, Weather
 
 Window = tuple[float, float]
-DRY = Weather(kind="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0)
+DRY_ROAD = Weather(kind=DRY)
 ROUNDING = 1e-6
 """Windows include a sample that misses their edge by less than this [s]."""
 
@@ -63,7 +63,7 @@ class Protocol:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class RecordedRun:
     """One run with the drive that it belongs to.
 
     Parameters
@@ -79,7 +79,7 @@ class Drive:
     drive: str
     interval: float
     columns: Mapping[str, NDArray[np.float64]]
-    weather: Weather = DRY
+    weather: Weather = DRY_ROAD
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +104,7 @@ class Event:
     time: NDArray[np.float64]
     columns: Mapping[str, NDArray[np.float64]]
     protocol: Protocol
-    weather: Weather = DRY
+    weather: Weather = DRY_ROAD
 
     def within(self, window: Window) -> NDArray[np.bool_]:
         """Mask of the samples in a window about the onset [s]."""
@@ -135,7 +135,7 @@ class Event:
         return float(self.columns["speed"][int(np.argmin(np.abs(self.time)))])
 
 
-def drive_events(drive: Drive, protocol: Protocol) -> tuple[int, list[Event]]:
+def find_events(drive: RecordedRun, protocol: Protocol) -> tuple[int, list[Event]]:
     """Number of pressure episodes of a run, and those whose analysis window it covers.
 
     Parameters
@@ -148,11 +148,13 @@ def drive_events(drive: Drive, protocol: Protocol) -> tuple[int, list[Event]]:
     episodes = pressure_episodes(
         time, pressure, threshold=protocol.onset_pressure, merge_gap=protocol.merge_gap
     )
-    cut = [_cut(drive, time, episode, protocol) for episode in episodes]
+    cut = [_cut_event(drive, time, episode, protocol) for episode in episodes]
     return len(episodes), [event for event in cut if event is not None]
 
 
-def _cut(drive: Drive, time: NDArray[np.float64], episode: Episode, protocol: Protocol) -> Event | None:
+def _cut_event(
+    drive: RecordedRun, time: NDArray[np.float64], episode: Episode, protocol: Protocol
+) -> Event | None:
     about = time - episode.onset_time
     start, end = protocol.analysis
     if about[0] > start + ROUNDING or about[-1] < end - ROUNDING:

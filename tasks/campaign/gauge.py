@@ -25,17 +25,17 @@ with which campaigns that lack nothing predict their held-out runs best. A large
 the brake gain comes out up to 1 % too high."""
 
 
-def at_rest(measured: NDArray[np.float64]) -> NDArray[np.float64]:
+def zero_pressure_at_rest(measured: NDArray[np.float64]) -> NDArray[np.float64]:
     """The pressure with 0 where the brake is off: a gauge that cannot read below 0 turns its noise into pressure.
 
     Parameters
     ----------
     measured : float64 [N] [MPa] at a fixed rate
     """
-    return np.where(_mean(measured, RESTING_SPAN // 2) < RESTING_PRESSURE, 0.0, measured)
+    return np.where(_moving_mean(measured, RESTING_SPAN // 2) < RESTING_PRESSURE, 0.0, measured)
 
 
-def braking_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
+def denoise_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
     """The brake pressure without the gauge's noise, ramps and steps kept.
 
     About every sample the mean over a symmetric window, which keeps any slope, is taken over the widest one whose
@@ -50,14 +50,14 @@ def braking_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
     -------
     float64 [N] [MPa], 0 where the brake is off
     """
-    best = at_rest(measured)
+    best = zero_pressure_at_rest(measured)
     alive = best > 0.0
-    sigma, rho = gauge_noise(measured[alive])
+    sigma, rho = estimate_gauge_noise(measured[alive])
     if sigma == 0.0:
         return best
     low, high = measured - AGREEING * sigma, measured + AGREEING * sigma
     for half in HALF_WIDTHS:
-        mean = _mean(measured, half)
+        mean = _moving_mean(measured, half)
         n = 2 * half + 1
         k = np.arange(1, n)
         spread = sigma * np.sqrt((1.0 + 2.0 * np.sum((1.0 - k / n) * rho**k)) / n)
@@ -68,7 +68,7 @@ def braking_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
     return best
 
 
-def gauge_noise(pressure: NDArray[np.float64]) -> tuple[float, float]:
+def estimate_gauge_noise(pressure: NDArray[np.float64]) -> tuple[float, float]:
     """Standard deviation [MPa] and correlation from sample to sample [1] of the gauge's noise.
 
     From differences of first-order autoregressive noise, whose medians leave the corners of ramps out. The variance of
@@ -83,8 +83,8 @@ def gauge_noise(pressure: NDArray[np.float64]) -> tuple[float, float]:
     if len(pressure) <= 4 * LAG:
         return 0.0, 0.0
     second = pressure[2:] - 2.0 * pressure[1:-1] + pressure[:-2]
-    near, fourth = _spread(second), _spread(np.diff(second, 2))
-    far = _spread(pressure[2 * LAG :] - 2.0 * pressure[LAG:-LAG] + pressure[: -2 * LAG])
+    near, fourth = _robust_deviation(second), _robust_deviation(np.diff(second, 2))
+    far = _robust_deviation(pressure[2 * LAG :] - 2.0 * pressure[LAG:-LAG] + pressure[: -2 * LAG])
     if far == 0.0:
         return 0.0, 0.0
     share = min((near / far) ** 2, 1.0)
@@ -92,10 +92,10 @@ def gauge_noise(pressure: NDArray[np.float64]) -> tuple[float, float]:
     return fourth / float(np.sqrt(np.polyval((2.0, -16.0, 56.0, -112.0, 70.0), rho))), rho
 
 
-def _mean(x: NDArray[np.float64], half: int) -> NDArray[np.float64]:
+def _moving_mean(x: NDArray[np.float64], half: int) -> NDArray[np.float64]:
     n = 2 * half + 1
     return np.convolve(np.pad(x, half, mode="edge"), np.ones(n) / n, mode="valid")
 
 
-def _spread(x: NDArray[np.float64]) -> float:
+def _robust_deviation(x: NDArray[np.float64]) -> float:
     return NORMAL * float(np.median(np.abs(x)))

@@ -44,7 +44,7 @@ def manoeuvre_errors(
     reached = float(np.max(lowest[:, -1]))
     if float(np.min(lowest[:, 0])) - reached < FELL:
         return None
-    distance = np.array([_distance(speed, reached, interval) for speed in lowest])
+    distance = np.array([_distance_until(speed, reached, interval) for speed in lowest])
     width = min(max(round(SMOOTHED / interval), 1), both.shape[1])
     window = np.full(width, 1.0 / width)
     peak = np.array([np.convolve(p, window, mode="valid").max() for p in both[:, :, CHANNELS.index("pitch")]])
@@ -52,7 +52,7 @@ def manoeuvre_errors(
     return np.asarray(figures[1:] - figures[0], dtype=np.float64)
 
 
-def _distance(speed: NDArray[np.float64], reached: float, interval: float) -> float:
+def _distance_until(speed: NDArray[np.float64], reached: float, interval: float) -> float:
     """Distance until a falling speed (float64 [N]) first reaches a value, by trapezia [m]."""
     end = int(np.argmax(speed <= reached))
     whole = float(np.sum(0.5 * (speed[1:end] + speed[: end - 1]))) * interval if end > 1 else 0.0

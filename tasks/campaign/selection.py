@@ -6,7 +6,7 @@ from math import isnan, nan
 
 import numpy as np
 
-from tasks.campaign.events import Drive, Event, Protocol, Rule, Window, drive_events
+from tasks.campaign.events import Event, Protocol, RecordedRun, Rule, Window, find_events
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +25,7 @@ class Quantity:
     measure: Callable[[Event], float]
 
 
-def _p95(event: Event, channel: str, window: Window) -> float:
+def _percentile_95(event: Event, channel: str, window: Window) -> float:
     return float(np.percentile(np.abs(event.columns[channel][event.within(window)]), 95))
 
 
@@ -38,13 +38,15 @@ def _onset_residual(event: Event) -> float:
     return float(abs(event.dive[int(np.argmin(np.abs(event.time)))]))
 
 
-def _deviation(event: Event) -> float:
+def _pitch_deviation(event: Event) -> float:
     return float(np.std(event.columns["pitch"][event.within(event.protocol.baseline)]))
 
 
-def _quality(channel: str, unit: str) -> Quantity:
+def _percentile_quantity(channel: str, unit: str) -> Quantity:
     return Quantity(
-        unit=unit, channels=(channel,), measure=lambda event: _p95(event, channel, event.protocol.quality)
+        unit=unit,
+        channels=(channel,),
+        measure=lambda event: _percentile_95(event, channel, event.protocol.quality),
     )
 
 
@@ -59,17 +61,19 @@ QUANTITIES: dict[str, Quantity] = {
         channels=("longitudinal_acceleration",),
         measure=lambda event: _largest_rise(event, "longitudinal_acceleration", -1.0),
     ),
-    "steering_p95": _quality("steering_angle", "deg"),
-    "yaw_rate_p95": _quality("yaw_rate", "deg/s"),
+    "steering_p95": _percentile_quantity("steering_angle", "deg"),
+    "yaw_rate_p95": _percentile_quantity("yaw_rate", "deg/s"),
     "pitch_slope": Quantity(
         unit="deg/s", channels=("pitch",), measure=lambda event: abs(event.pitch_baseline[0])
     ),
-    "pitch_deviation": Quantity(unit="deg", channels=("pitch",), measure=_deviation),
+    "pitch_deviation": Quantity(unit="deg", channels=("pitch",), measure=_pitch_deviation),
     "onset_residual": Quantity(unit="deg", channels=("pitch",), measure=_onset_residual),
-    "vertical_acceleration_p95": _quality("vertical_acceleration", "m/s^2"),
-    "roll_rate_p95": _quality("roll_rate", "deg/s"),
+    "vertical_acceleration_p95": _percentile_quantity("vertical_acceleration", "m/s^2"),
+    "roll_rate_p95": _percentile_quantity("roll_rate", "deg/s"),
     "pressure_before_p95": Quantity(
-        unit="MPa", channels=(), measure=lambda event: _p95(event, "brake_pressure", event.protocol.baseline)
+        unit="MPa",
+        channels=(),
+        measure=lambda event: _percentile_95(event, "brake_pressure", event.protocol.baseline),
     ),
 }
 """What selection rules may measure (paper, Appendix C.5)."""
@@ -112,7 +116,7 @@ class Selection:
         return tuple(judged.event for judged in self.judged if not judged.failed)
 
 
-def select_events(drives: Sequence[Drive], protocol: Protocol) -> Selection:
+def select_events(drives: Sequence[RecordedRun], protocol: Protocol) -> Selection:
     """Detect, cut and judge the braking events of all drives.
 
     Parameters
@@ -122,17 +126,17 @@ def select_events(drives: Sequence[Drive], protocol: Protocol) -> Selection:
     """
     episodes, events = 0, []
     for drive in drives:
-        found = drive_events(drive, protocol)
+        found = find_events(drive, protocol)
         episodes += found[0]
         events += found[1]
-    judged = tuple(judge(event, protocol.rules) for event in events)
+    judged = tuple(judge_event(event, protocol.rules) for event in events)
     unassessed = tuple(
         rule.name for rule in protocol.rules if judged and all(isnan(one.values[rule.name]) for one in judged)
     )
     return Selection(episodes=episodes, judged=judged, unassessed=unassessed)
 
 
-def judge(event: Event, rules: Sequence[Rule]) -> Judged:
+def judge_event(event: Event, rules: Sequence[Rule]) -> Judged:
     """Hold one event against every rule; a rule whose channel is missing is neither kept nor broken.
 
     Parameters

@@ -85,7 +85,7 @@ class ChannelRule:
         return self.sign * self.scale * inward * self.gain.value * unit_factor(self.gain.target_unit, target)
 
 
-def as_channel(signal: Signal, rule: ChannelRule) -> Signal:
+def convert_to_channel(signal: Signal, rule: ChannelRule) -> Signal:
     """The signal in the channel's unit and direction, at the times when it was true.
 
     Parameters
@@ -100,7 +100,7 @@ def as_channel(signal: Signal, rule: ChannelRule) -> Signal:
     )
 
 
-def on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
+def resample_on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
     """Values at the times of a uniform clock.
 
     A slower signal is linear between its samples. A faster one is averaged over the clock's interval, so that
@@ -123,7 +123,7 @@ def on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
     return (np.interp(right, signal.time, area) - np.interp(left, signal.time, area)) / (right - left)
 
 
-def common_clock(signals: list[Signal], rate: float) -> NDArray[np.float64]:
+def make_common_clock(signals: list[Signal], rate: float) -> NDArray[np.float64]:
     """Times at ``rate`` [Hz] over what all signals cover [s]; empty if they share less than two samples.
 
     Parameters

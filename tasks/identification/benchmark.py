@@ -1,6 +1,6 @@
 """The tool's own error rates: campaigns with a known truth, made unlike the model that judges them.
 
-The generator integrates at a quarter of the step, draws session and run offsets, Gauss-Markov disturbances in
+The generator integrates at an eighth of the step, draws session and run offsets, Gauss-Markov disturbances in
 force, friction and pitch moment on knots of its own, AR(1) sensor noise and coloured noise on the pressure that
 the model is given; wheel inertia is off by an amount that no nuisance covers.
 """
@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 
 from tasks.campaign.campaign import Campaign, Run, Tolerances
-from tasks.campaign.planned_runs import RICH, TRAINING, Drive, planned_run
+from tasks.campaign.planned_runs import RICH, TRAINING, RunPlan, make_planned_run
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.inference.evidence import SESSION_INDEX
-from tasks.identification.inference.forward import SUBSTEPS, instruments, roll, run_model
+from tasks.identification.inference.forward import SUBSTEPS, instrument_readings, run_model, simulate_run
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.effects.library import PARAMETER_INDEX, parameter_vector
 from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import PARAMETER_INDEX, parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 NOISE_SIGMA = np.array([0.03, 0.05, 0.09, 0.09, 0.015, 0.1, 0.1])
 NOISE_RHO = np.array([0.6, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0])
 PRESSURE_NOISE = 0.01
+GENERATOR_SUBSTEPS = 8 * SUBSTEPS
 TOLERANCES = Tolerances(
     session=(0.02, 0.01, 0.02, 0.005, 0.04, 0.02, 0.0015),
     initial_speed=0.05,
@@ -47,7 +48,7 @@ def synthetic_campaign(
     seed: int,
     *,
     slots: tuple[Slot, ...] = (),
-    design: Sequence[Drive] = RICH,
+    design: Sequence[RunPlan] = RICH,
 ) -> Campaign:
     """A campaign of a car that has what ``truth`` says.
 
@@ -78,7 +79,7 @@ def synthetic_campaign(
 
 
 def _measure(
-    drive: Drive,
+    drive: RunPlan,
     number: int,
     direction: int,
     vehicle: Vehicle,
@@ -87,15 +88,17 @@ def _measure(
     slots: tuple[Slot, ...],
     rng: np.random.Generator,
 ) -> Run:
-    run = planned_run(drive, f"run-{number + 1:02d}", direction, held_out=number >= TRAINING)
+    run = make_planned_run(drive, f"run-{number + 1:02d}", direction, held_out=number >= TRAINING)
     pressure, count = run.pressure, len(run.pressure)
     model = run_model(run, vehicle, surface)
     own = theta.copy()
     own[PARAMETER_INDEX["friction"]] += TOLERANCES.friction * rng.standard_normal()
     disturbed = tuple(_disturbance(*entry, drive.duration, rng) for entry in DISTURBANCE)
     speed = drive.speed + TOLERANCES.initial_speed * rng.standard_normal()
-    out, _ = roll(model, own, slots=(*slots, *disturbed), initial_speed=speed, substeps=4 * SUBSTEPS)
-    y = instruments(model, own, out)
+    driven = simulate_run(
+        model, own, slots=(*slots, *disturbed), initial_speed=speed, substeps=GENERATOR_SUBSTEPS
+    )
+    y = instrument_readings(model, own, driven)
     y[:, 1] += TOLERANCES.acceleration_bias * rng.standard_normal()
     y[:, 4] += TOLERANCES.pitch_offset * rng.standard_normal()
     for j in range(y.shape[1]):

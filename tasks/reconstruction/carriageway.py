@@ -59,7 +59,7 @@ def carriageway_extents(
     return max(left, NARROWEST), -max(right, NARROWEST)
 
 
-def classify(
+def classify_points(
     lateral: NDArray[np.float64],
     height: NDArray[np.float64],
     depth: NDArray[np.float64],

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
-from tasks.reconstruction.carriageway import carriageway_extents, classify
-from tasks.reconstruction.normals import turned_to_camera
-from tasks.reconstruction.surfels import COVERAGE, Surfels, ellipses
+from tasks.reconstruction.carriageway import carriageway_extents, classify_points
+from tasks.reconstruction.normals import turn_to_camera
+from tasks.reconstruction.surfels import COVERAGE, Surfels, derive_discs
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 from tasks.scene.spherical_harmonics import C0
@@ -43,7 +43,7 @@ class Cloud:
     extents: tuple[float, float]
 
 
-def cloud_of(
+def build_cloud(
     surfels: Surfels,
     T_world_camera: NDArray[np.float64],
     route: Route,
@@ -66,23 +66,23 @@ def cloud_of(
     rays = np.einsum("nij,nj->ni", R, surfels.rays)
     station, lateral, height = route.project(rays * surfels.depth[:, None] + t)
     extents = carriageway_extents(station, lateral, height, surfels.depth, route.length, carriageway_limit)
-    class_id = classify(lateral, height, surfels.depth, extents)
+    class_id = classify_points(lateral, height, surfels.depth, extents)
     up = route.pose(np.clip(station, 0, route.length))[:, :3, 2]
 
     road = class_id == SemanticClass.ROAD
     depth = surfels.depth.copy()
-    depth[road] *= _onto_route(
+    depth[road] *= _depth_factor_onto_route(
         height[road], -(rays[road] * up[road]).sum(axis=1), depth[road], disparity_scale
     )
 
     level = road | ((class_id == SemanticClass.TERRAIN) & (depth > FAR_GROUND))
-    normals = turned_to_camera(surfels.normals, surfels.rays, LEAST_COSINE)
+    normals = turn_to_camera(surfels.normals, surfels.rays, LEAST_COSINE)
     normals[level] = np.einsum("nji,nj->ni", R[level], up[level])
-    rotation, scales = ellipses(surfels.rays, depth, normals, surfels.spacing, focal_length)
+    rotation, scales = derive_discs(surfels.rays, depth, normals, surfels.spacing, focal_length)
     rotation = R @ rotation
 
     ground = np.isin(class_id, (SemanticClass.ROAD, SemanticClass.TERRAIN))
-    of, offset = _split(scales[:, 0], ground)
+    of, offset = _split_long_discs(scales[:, 0], ground)
     pieces = np.bincount(of, minlength=len(scales))
     means = rays * depth[:, None] + t
     means = means[of] + offset[:, None] * rotation[of, :, 0]
@@ -100,7 +100,7 @@ def cloud_of(
     return Cloud(gaussians=gaussians, rays=rays[of], extents=extents)
 
 
-def _onto_route(
+def _depth_factor_onto_route(
     height: NDArray[np.float64],
     descent: NDArray[np.float64],
     depth: NDArray[np.float64],
@@ -123,7 +123,7 @@ def _onto_route(
     return np.clip(1 + lowered / np.maximum(descent * depth, 1e-3), 0.5, 2.0)
 
 
-def _split(
+def _split_long_discs(
     length: NDArray[np.float64], splittable: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Pieces that replace Gaussians which are too long: whose piece each is, and how far along its first axis.

@@ -14,7 +14,7 @@ LARGEST_LEAN = 0.5
 """The steps stay within this of the first match [px]."""
 
 
-def match(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
+def match_stereo(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
     """Sub-pixel disparity of the left picture, NaN where the match is not confirmed from the right picture.
 
     Semi-global matching over three paths (Hirschmueller, doi:10.1109/TPAMI.2007.1166) runs once for
@@ -43,7 +43,7 @@ def match(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -
     speckles = np.where(agreed, forward * 16, 0).astype(np.int16)
     cv2.filterSpeckles(speckles, 0, 60, 32)
     confirmed = np.where(speckles > 0, forward, np.nan).astype(np.float32)
-    return _sharpened(left, right, confirmed)
+    return _refine_disparity(left, right, confirmed)
 
 
 def _semi_global(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
@@ -62,7 +62,7 @@ def _semi_global(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities:
     return matcher.compute(*widened)[:, disparities:].astype(np.float32) / 16
 
 
-def _sharpened(
+def _refine_disparity(
     left: NDArray[np.uint8], right: NDArray[np.uint8], disparity: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Disparity after Gauss-Newton steps on the local squared difference of the pictures.
@@ -87,7 +87,7 @@ def _sharpened(
     return np.where(np.isnan(disparity), disparity, found)
 
 
-def filled(disparity: NDArray[np.float32], background: NDArray[np.bool_]) -> NDArray[np.float32]:
+def fill_disparity(disparity: NDArray[np.float32], background: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Disparity with a guess where there was none: the farther of the neighbours left and right in the row.
 
     What one camera sees and the other does not is mostly the background beside an object, so the farther

@@ -139,9 +139,9 @@ def corresponding_directions(
     intrinsics : float64 [3, 3] camera matrix [px]
     relative : float64 [4, 4] camera coordinates of the first to those of the other; only turned
     """
-    rows, columns = _grid(calm)
+    rows, columns = _coarse_grid_pixels(calm)
     rays = np.stack([columns, rows, np.ones(len(rows))], axis=1) @ np.linalg.inv(intrinsics).T
-    first, second = _seen(rows, columns, rays @ relative[:3, :3].T, intrinsics, calm.shape)[:2]
+    first, second = _find_visible_points(rows, columns, rays @ relative[:3, :3].T, intrinsics, calm.shape)[:2]
     same = other_calm[second]
     return (first[0][same], first[1][same]), (second[0][same], second[1][same])
 
@@ -162,17 +162,17 @@ def corresponding_pixels(
     disparity_scale : focal length times baseline [px m]
     relative : float64 [4, 4] camera coordinates of the first to those of the other
     """
-    rows, columns = _grid(disparity > 1)
+    rows, columns = _coarse_grid_pixels(disparity > 1)
     rays = np.stack([columns, rows, np.ones(len(rows))], axis=1) @ np.linalg.inv(intrinsics).T
     points = (
         rays * (disparity_scale / disparity[rows, columns])[:, None] @ relative[:3, :3].T + relative[:3, 3]
     )
-    first, second, depth = _seen(rows, columns, points, intrinsics, disparity.shape)
+    first, second, depth = _find_visible_points(rows, columns, points, intrinsics, disparity.shape)
     same = np.abs(other_disparity[second] - disparity_scale / depth) < MATCHED
     return (first[0][same], first[1][same]), (second[0][same], second[1][same])
 
 
-def _grid(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _coarse_grid_pixels(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows and columns of the wanted pixels on a coarse grid."""
     coarse = np.zeros_like(wanted)
     coarse[STRIDE // 2 :: STRIDE, STRIDE // 2 :: STRIDE] = True
@@ -180,7 +180,7 @@ def _grid(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int6
     return rows, columns
 
 
-def _seen(
+def _find_visible_points(
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
     points: NDArray[np.float64],

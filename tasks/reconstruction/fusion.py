@@ -1,5 +1,7 @@
 """Depth maps checked against each other: what several pictures agree on, and who sees it best."""
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,13 @@ FINER_OFFSETS = (1, 2, 3, 4, 6, 8, 11, 15, 20, -1, -2, -3, -4, -6)
 """Places in the training sequence that may show a surface larger [1]."""
 FINER = 0.985
 """A surface at less than this share of the depth is seen finer [1]."""
+
+
+class _Neighbours(NamedTuple):
+    """Pictures that a picture is compared with: their numbers [M], and its camera's pose in each camera [M, 4, 4]."""
+
+    numbers: NDArray[np.int64]
+    relative: NDArray[np.float64]
 
 
 def fuse_depth(
@@ -48,13 +57,12 @@ def fuse_depth(
     fused = depth.copy()
     confirmed = np.zeros(depth.shape, dtype=np.bool_)
     for n in range(len(depth)):
-        others = [n + o for o in CHECK_OFFSETS if 0 <= n + o < len(depth)]
-        relative = np.linalg.inv(T_world_camera[others]) @ T_world_camera[n]
-        _check(n, depth, guessed, np.array(others), relative, intrinsics, disparity_scale, fused, confirmed)
+        neighbours = _find_neighbours(n, CHECK_OFFSETS, T_world_camera)
+        _compare_with_neighbours(n, depth, guessed, neighbours, intrinsics, disparity_scale, fused, confirmed)
     return fused, confirmed
 
 
-def seen_finest(
+def find_finest_view(
     n: int,
     fused: NDArray[np.float32],
     confirmed: NDArray[np.bool_],
@@ -63,15 +71,21 @@ def seen_finest(
     T_world_camera: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """Confirmed pixels of picture n whose surface no other picture shows larger, bool [H, W]; see `fuse_depth`."""
-    others = [n + o for o in FINER_OFFSETS if 0 <= n + o < len(fused)]
-    relative = np.linalg.inv(T_world_camera[others]) @ T_world_camera[n]
+    neighbours = _find_neighbours(n, FINER_OFFSETS, T_world_camera)
     keep = confirmed[n].copy()
-    _drop_coarser(n, fused, confirmed, np.array(others), relative, intrinsics, disparity_scale, keep)
+    _drop_coarser(n, fused, confirmed, neighbours, intrinsics, disparity_scale, keep)
     return keep
 
 
+def _find_neighbours(n: int, offsets: tuple[int, ...], T_world_camera: NDArray[np.float64]) -> _Neighbours:
+    numbers = [n + offset for offset in offsets if 0 <= n + offset < len(T_world_camera)]
+    relative = np.linalg.inv(T_world_camera[numbers]) @ T_world_camera[n]
+    return _Neighbours(np.array(numbers), relative)
+
+
 @numba.njit(cache=True, nogil=True)
-def _check(n, depth, guessed, others, relative, K, bf, fused, confirmed):  # type: ignore[no-untyped-def]
+def _compare_with_neighbours(n, depth, guessed, neighbours, K, bf, fused, confirmed):  # type: ignore[no-untyped-def]
+    others, relative = neighbours
     height, width = depth.shape[1:]
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     for v in range(height):
@@ -119,7 +133,8 @@ def _check(n, depth, guessed, others, relative, K, bf, fused, confirmed):  # typ
 
 
 @numba.njit(cache=True, nogil=True)
-def _drop_coarser(n, depth, confirmed, others, relative, K, bf, keep):  # type: ignore[no-untyped-def]
+def _drop_coarser(n, depth, confirmed, neighbours, K, bf, keep):  # type: ignore[no-untyped-def]
+    others, relative = neighbours
     height, width = depth.shape[1:]
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     for v in range(height):

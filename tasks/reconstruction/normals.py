@@ -69,7 +69,7 @@ def _plane_normals(disparity, K):  # type: ignore[no-untyped-def]
     return normals
 
 
-def turned_to_camera(
+def turn_to_camera(
     normals: NDArray[np.floating], rays: NDArray[np.floating], least_cosine: float
 ) -> NDArray[np.float64]:
     """Normals turned just so far that a surface is not seen flatter than a least cosine.

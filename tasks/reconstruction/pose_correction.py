@@ -50,7 +50,7 @@ def correct_poses(
     pairs = []
     for gap in FRAME_GAPS:
         for i, j in zip(training[:-gap], training[gap:], strict=True):
-            points, pixels = _tracks(
+            points, pixels = _track_corners(
                 pictures[i],
                 pictures[j],
                 disparity[i],
@@ -74,22 +74,22 @@ def correct_poses(
             information, gradient = _reprojection_normal_equations(
                 relative, points, pixels, intrinsics, np.inf if iteration < 2 else GROSS
             )
-            A = _adjoint(relative)
+            A = _adjoint_matrix(relative)
             for a, left in ((row[i], A.T), (row[j], -np.eye(6))):
                 b[a] += left @ gradient
                 for c, right in ((row[i], A), (row[j], -np.eye(6))):
                     H[a, :, c, :] += left @ information @ right
         size = 6 * len(row)
         step = np.linalg.solve(H.reshape(size, size), b.reshape(size)).reshape(-1, 6)
-        poses = {i: poses[i] @ exponential(step[n]) for i, n in row.items()}
+        poses = {i: poses[i] @ exponential_map(step[n]) for i, n in row.items()}
 
     corrections = np.array([_small_log(np.linalg.inv(given[i]) @ poses[i]) for i in row])
     frames = np.arange(len(given))
     everywhere = np.stack([np.interp(frames, training, corrections[:, k]) for k in range(6)], axis=1)
-    return np.array([given[i] @ exponential(everywhere[i]) for i in frames])
+    return np.array([given[i] @ exponential_map(everywhere[i]) for i in frames])
 
 
-def _tracks(
+def _track_corners(
     first: NDArray[np.uint8],
     second: NDArray[np.uint8],
     disparity: NDArray[np.float32],
@@ -114,13 +114,13 @@ def _tracks(
     if not len(corners):
         return np.empty((0, 3)), np.empty((0, 2))
 
-    found, ok = _flow(first, second, corners, guess)
-    back, ok_back = _flow(second, first, found, corners)
+    found, ok = _track_points(first, second, corners, guess)
+    back, ok_back = _track_points(second, first, found, corners)
     good = ok & ok_back & (np.abs(back - corners).max(axis=1) < 0.5)
     return points[good], found[good].astype(np.float64)
 
 
-def _flow(
+def _track_points(
     first: NDArray[np.uint8],
     second: NDArray[np.uint8],
     start: NDArray[np.float32],
@@ -173,13 +173,13 @@ def _cross_matrices(v: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-def _adjoint(T: NDArray[np.float64]) -> NDArray[np.float64]:
+def _adjoint_matrix(T: NDArray[np.float64]) -> NDArray[np.float64]:
     """Carries a right increment (rotation, translation) of T's source to a left increment of T."""
     R, t = T[:3, :3], T[:3, 3]
     return np.block([[R, np.zeros((3, 3))], [_cross_matrices(t) @ R, R]])
 
 
-def exponential(increment: NDArray[np.float64]) -> NDArray[np.float64]:
+def exponential_map(increment: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rigid motion of a small increment: rotation vector [rad], then translation [m]."""
     T = np.eye(4)
     T[:3, :3] = cv2.Rodrigues(increment[:3])[0]
@@ -188,5 +188,5 @@ def exponential(increment: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _small_log(T: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inverse of `exponential`."""
+    """Inverse of `exponential_map`."""
     return np.concatenate([cv2.Rodrigues(T[:3, :3])[0][:, 0], T[:3, 3]])

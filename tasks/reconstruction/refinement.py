@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numba
@@ -21,8 +22,15 @@ from tasks.reconstruction.adjoint import (
     WEIGHT,
     blend_and_derive,
 )
-from tasks.render.rasterise.preparation import BLOCK, LOG_OPACITY, OFFSET, SH, PreparedGaussians, prepare
-from tasks.render.rasterise.projection import DEPTH, X, Y, project
+from tasks.render.rasterise.preparation import (
+    BLOCK,
+    LOG_OPACITY,
+    OFFSET,
+    SH,
+    PreparedGaussians,
+    prepare_gaussians,
+)
+from tasks.render.rasterise.projection import DEPTH, X, Y, project_gaussians
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
@@ -76,7 +84,14 @@ class TrainingView:
     sky: NDArray[np.float32]
 
 
-def refine(
+class _Camera(NamedTuple):
+    """A view's camera as the kernel takes it: rotation [3, 3] [1], focal lengths and principal point [4] [px]."""
+
+    rotation: NDArray[np.float32]
+    lens: NDArray[np.float32]
+
+
+def refine_gaussians(
     gaussians: Gaussians,
     rays: NDArray[np.floating],
     view: Callable[[int], TrainingView],
@@ -102,39 +117,40 @@ def refine(
     -------
     Gaussians, less those that became transparent, without `Gaussians.surroundings`
     """
-    prepared = prepare(gaussians)
+    prepared = prepare_gaussians(gaussians)
     along = np.asarray(rays, dtype=np.float32)[prepared.order]
     fixed = np.isin(gaussians.class_id, ROAD_CLASSES)[prepared.order]
     for _ in range(passes):
-        for n in scattered(count):
-            _correct(prepared, along, fixed, view(n))
-    return _unpacked(gaussians, prepared)
+        for n in bit_reversed_order(count):
+            _correct_by_view(prepared, along, fixed, view(n))
+    return _unpack_gaussians(gaussians, prepared)
 
 
-def scattered(count: int) -> list[int]:
+def bit_reversed_order(count: int) -> list[int]:
     """0 .. count - 1 in bit-reversed order, so that neighbours in the list are far apart."""
     bits = max(count - 1, 1).bit_length()
     return [n for k in range(1 << bits) if (n := int(f"{k:0{bits}b}"[::-1], 2)) < count]
 
 
-def _correct(
+def _correct_by_view(
     prepared: PreparedGaussians, along: NDArray[np.float32], fixed: NDArray[np.bool_], view: TrainingView
 ) -> None:
     """One step of all Gaussians that a picture shows, in place."""
     height, width = view.clipped.shape
-    records, slots = project(prepared, view_of(view.viewmat, view.K, width, height))
+    records, slots = project_gaussians(prepared, view_of(view.viewmat, view.K, width, height))
     weight = _display_response(view) ** 2
     target = np.where(view.clipped[..., None], -view.radiance, view.radiance)
     _, sums = blend_and_derive(records, target, weight, view.sky)
-    camera = np.array((view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2]), dtype=np.float32)
-    rotation = view.viewmat[:3, :3].astype(np.float32)
+    lens = np.array((view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2]), dtype=np.float32)
+    camera = _Camera(view.viewmat[:3, :3].astype(np.float32), lens)
     floor = np.float32(COLOUR_DAMPING * weight.mean())
-    _step(prepared.blocks, slots, records, sums, along, fixed, rotation, camera, floor)
+    _step_gaussians(prepared.blocks, slots, records, sums, along, fixed, camera, floor)
 
 
 @numba.njit(cache=True, nogil=True)
-def _step(blocks, slots, records, sums, along, fixed, rotation, camera, floor):  # type: ignore[no-untyped-def]
-    fx, fy, cx, cy = camera
+def _step_gaussians(blocks, slots, records, sums, along, fixed, camera, floor):  # type: ignore[no-untyped-def]
+    rotation = camera.rotation
+    fx, fy, cx, cy = camera.lens
     for i in range(len(slots)):
         block, lane = slots[i] // BLOCK, slots[i] % BLOCK
         evidence = max(sums[i, WEIGHT], floor)
@@ -167,7 +183,7 @@ def _display_response(view: TrainingView) -> NDArray[np.float32]:
     return (1.055 / 2.4 * exposed ** (1 / 2.4 - 1) * view.gain).astype(np.float32)
 
 
-def _unpacked(gaussians: Gaussians, prepared: PreparedGaussians) -> Gaussians:
+def _unpack_gaussians(gaussians: Gaussians, prepared: PreparedGaussians) -> Gaussians:
     """The cloud with the corrected planes of the prepared blocks, in its own order."""
     n = len(gaussians)
     planes = prepared.blocks.transpose(1, 0, 2).reshape(prepared.blocks.shape[1], -1)[:, :n]

@@ -59,7 +59,7 @@ def fit_road_plane(
     return np.append(-m / norm, 1 / norm)
 
 
-def route_below(
+def lay_route_below(
     T_origin_camera: NDArray[np.float64],
     planes: NDArray[np.float64],
     camera_ahead_of_front_axle: float,
@@ -99,15 +99,15 @@ def route_below(
         )
     up = np.einsum("fij,fj->fi", R, planes[known, :3])
     at = np.arange(first_station, driven[-1], STATION_STEP)
-    path, direction = _smoothed(driven, centre - up * planes[known, 3:], at)
-    normal, _ = _smoothed(driven, up, at)
-    poses = _facing(path, direction, normal)
+    path, direction = _smooth_path(driven, centre - up * planes[known, 3:], at)
+    normal, _ = _smooth_path(driven, up, at)
+    poses = _poses_along_path(path, direction, normal)
     poses[:, :3, 3] -= camera_ahead_of_front_axle * poses[:, :3, 0]
     beyond = driven[-1] - at[-1] + extension
     return extend_route(route_from_poses(poses), beyond, STATION_STEP)
 
 
-def settled(route: Route, points: NDArray[np.floating], depth: NDArray[np.floating]) -> Route:
+def settle_route(route: Route, points: NDArray[np.floating], depth: NDArray[np.floating]) -> Route:
     """The route moved up or down, and rolled, onto the measured road surface.
 
     Parameters
@@ -142,10 +142,10 @@ def settled(route: Route, points: NDArray[np.floating], depth: NDArray[np.floati
     poses[:, :3, 3] += rise * poses[:, :3, 2]
     poses[:, :3, 2] -= crossfall * poses[:, :3, 1]
     direction = np.gradient(poses[:, :3, 3], route.station, axis=0)
-    return route_from_poses(_facing(poses[:, :3, 3], direction, poses[:, :3, 2]))
+    return route_from_poses(_poses_along_path(poses[:, :3, 3], direction, poses[:, :3, 2]))
 
 
-def _facing(
+def _poses_along_path(
     path: NDArray[np.float64], direction: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Poses on a path with x along the direction and z as near to the normal as can be."""
@@ -158,7 +158,7 @@ def _facing(
     return poses
 
 
-def _smoothed(
+def _smooth_path(
     s: NDArray[np.float64], values: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Value and slope by local linear regression with a Gaussian window."""

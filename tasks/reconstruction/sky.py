@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.reconstruction.camera import pixel_rays, rasteriser_intrinsics
-from tasks.render.camera import viewmat
+from tasks.render.camera import world_to_camera
 from tasks.render.environment import environment_view
 
 BIN = 12
@@ -52,7 +52,7 @@ class Sky:
 
     def radiance(self, azimuth: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDArray[np.float32]:
         """Linear light [..., 3] along directions [rad]."""
-        terms = _terms(np.clip(azimuth, *self.azimuth), np.clip(elevation, *self.elevation))
+        terms = _polynomial_terms(np.clip(azimuth, *self.azimuth), np.clip(elevation, *self.elevation))
         return np.maximum(terms @ self.coefficients, 0).astype(np.float32)
 
 
@@ -62,7 +62,7 @@ def azimuth_elevation(rays: NDArray[np.float64]) -> tuple[NDArray[np.float64], N
     return np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
 
 
-def _terms(azimuth: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDArray[np.float64]:
+def _polynomial_terms(azimuth: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     a, e = azimuth, elevation
     return np.stack([np.ones_like(a), a, e, a * a, a * e, e * e], axis=-1)
 
@@ -108,7 +108,7 @@ def fit_sky(
     if steady.sum() < ENOUGH:
         return None
     a, e = (cells[steady] + 0.5).T * bin_size
-    A, target = _terms(a, e), median[steady].astype(np.float64)
+    A, target = _polynomial_terms(a, e), median[steady].astype(np.float64)
     weight = np.ones(len(A))
     for _ in range(20):
         W = A * weight[:, None]
@@ -152,7 +152,7 @@ def sky_mask(
     return large[labels]
 
 
-def panorama(
+def build_panorama(
     sky: Sky | None,
     radiance: list[NDArray[np.float32]],
     masks: list[NDArray[np.bool_]],
@@ -210,5 +210,5 @@ def sky_view(
 ) -> NDArray[np.float32]:
     """The panorama as one picture [H, W, 3] of the sequence sees it."""
     return environment_view(
-        environment, viewmat(T_world_camera), rasteriser_intrinsics(intrinsics), shape[1], shape[0]
+        environment, world_to_camera(T_world_camera), rasteriser_intrinsics(intrinsics), shape[1], shape[0]
     )

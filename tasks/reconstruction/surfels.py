@@ -44,7 +44,7 @@ class Surfels:
         return len(self.depth)
 
 
-def sample(
+def sample_picture(
     wanted: NDArray[np.bool_],
     depth: NDArray[np.float32],
     normals: NDArray[np.float32],
@@ -70,30 +70,32 @@ def sample(
     rays = pixel_rays(depth.shape, intrinsics)
     disparity = np.where(wanted, disparity_scale / depth, 0)
     smooth = cv2.blur(picture.max(axis=2), (3, 3)).astype(np.int64)
-    even = np.logical_and.reduce(_blocks(wanted, COARSE), axis=(1, 3))
+    even = np.logical_and.reduce(_view_blocks(wanted, COARSE), axis=(1, 3))
     for values, limit in ((smooth, EVEN), (disparity, ONE_SURFACE)):
-        cells = _blocks(values, COARSE)
+        cells = _view_blocks(values, COARSE)
         even &= cells.max(axis=(1, 3)) - cells.min(axis=(1, 3)) <= limit
     in_even = np.zeros(wanted.shape, dtype=np.bool_)
-    _blocks(in_even, COARSE)[...] = even[:, None, :, None]
+    _view_blocks(in_even, COARSE)[...] = even[:, None, :, None]
 
     parts = []
     for cell, chosen in ((COARSE, even), (spacing, None)):
         # A cell is represented by its middle; its depth and normal are those of the pixel beside it.
-        middle = _blocks(wanted & ~in_even, cell)[:, cell // 2, :, cell // 2] if chosen is None else chosen
+        middle = (
+            _view_blocks(wanted & ~in_even, cell)[:, cell // 2, :, cell // 2] if chosen is None else chosen
+        )
         rows, columns = (cell * k + cell // 2 for k in np.nonzero(middle))
         shift = 0.5 if cell % 2 == 0 else 0.0
         parts.append(Surfels(
             rays=rays[rows, columns] - shift * np.append(1 / intrinsics[[0, 1], [0, 1]], 0),
             depth=depth[rows, columns].astype(np.float64),
             normals=normals[rows, columns].astype(np.float64),
-            radiance=_blocks(radiance, cell).mean(axis=(1, 3))[middle],
+            radiance=_view_blocks(radiance, cell).mean(axis=(1, 3))[middle],
             spacing=np.full(len(rows), float(cell)),
         ))  # fmt: skip
-    return joined(parts)
+    return join_samples(parts)
 
 
-def _blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
+def _view_blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
     """View of [H, W, ...] as [H / side, side, W / side, side, ...], without the rest at the far edges."""
     rows, columns = (n // side for n in values.shape[:2])
     cut = values[: rows * side, : columns * side]
@@ -105,13 +107,13 @@ def _blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
     )
 
 
-def joined(parts: list[Surfels]) -> Surfels:
+def join_samples(parts: list[Surfels]) -> Surfels:
     """All samples in one."""
     names = ("rays", "depth", "normals", "radiance", "spacing")
     return Surfels(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
-def ellipses(
+def derive_discs(
     rays: NDArray[np.float64],
     depth: NDArray[np.float64],
     normals: NDArray[np.float64],

@@ -192,7 +192,7 @@ def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01)
     """
     if problems := _range_problems(T_world_rig[:, :3, 3]):
         raise InputError(problems)
-    poses = T_world_rig[_moving(T_world_rig[:, :3, 3], standstill)]
+    poses = T_world_rig[_drop_standstill(T_world_rig[:, :3, 3], standstill)]
     steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     return Route(station=np.concatenate([[0.0], np.cumsum(steps)]), T_world_rig=poses)
 
@@ -212,7 +212,7 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
     """
     if problems := _range_problems(positions):
         raise InputError(problems)
-    kept = positions[_moving(positions, standstill)]
+    kept = positions[_drop_standstill(positions, standstill)]
     if len(kept) < 2:
         raise InputError(f"a route needs two points {standstill:g} m apart or more; it has {len(kept)}")
     steps = np.linalg.norm(np.diff(kept, axis=0), axis=1)
@@ -240,7 +240,7 @@ def _range_problems(positions: NDArray[np.float64]) -> list[str]:
     ]
 
 
-def _moving(positions: NDArray[np.float64], standstill: float) -> list[int]:
+def _drop_standstill(positions: NDArray[np.float64], standstill: float) -> list[int]:
     """Numbers of the positions that lie farther than ``standstill`` from the last one kept, NaN included."""
     kept: list[int] = []
     for i, position in enumerate(positions):

@@ -19,7 +19,7 @@ OPAQUE = 100.0
 _AT_ONCE = 65536
 
 
-def with_surroundings(gaussians: Gaussians) -> Gaussians:
+def add_surroundings(gaussians: Gaussians) -> Gaussians:
     """The cloud with `Gaussians.surroundings`, as `tasks.render.rasterise.painters_bias` wants them.
 
     The overlap of a surface is its Gaussians' opacity times area, added up, per area. It is counted over the
@@ -34,7 +34,7 @@ def with_surroundings(gaussians: Gaussians) -> Gaussians:
     if count < 1:
         alone = np.tile(np.array([0, 1], np.float32), (len(gaussians), 1))
         return replace(gaussians, surroundings=alone)
-    sizes = in_surface(gaussians.scales)
+    sizes = surface_scales(gaussians.scales)
     area = 2 * np.pi * sizes[:, 0] * sizes[:, 1] * gaussians.opacities
     square = (sizes**2).sum(axis=1)
     tree = cKDTree(gaussians.means)
@@ -42,11 +42,13 @@ def with_surroundings(gaussians: Gaussians) -> Gaussians:
     for first in range(0, len(gaussians), _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
         distance, near = tree.query(gaussians.means[part], k=count + 1)
-        _look_about(first, near, distance[:, -1], gaussians.means, gaussians.normals, area, square, out[part])
+        _measure_surroundings(
+            first, near, distance[:, -1], gaussians.means, gaussians.normals, area, square, out[part]
+        )
     return replace(gaussians, surroundings=out)
 
 
-def in_surface(scales: NDArray[np.floating]) -> NDArray[np.float64]:
+def surface_scales(scales: NDArray[np.floating]) -> NDArray[np.float64]:
     """The two standard deviations along the surface: all but the smallest, float64 [N, 2] [m].
 
     Parameters
@@ -57,7 +59,7 @@ def in_surface(scales: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _look_about(first, near, radius, means, normals, area, square, out):  # type: ignore[no-untyped-def]
+def _measure_surroundings(first, near, radius, means, normals, area, square, out):  # type: ignore[no-untyped-def]
     for i in range(len(near)):
         own = first + i
         covered, spread = area[own], area[own] * square[own]

@@ -15,7 +15,7 @@ SAMPLES = 64
 """Directions of the fit below: it is exact for any number of directions that spans the largest band."""
 
 
-def moved(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussians:
+def transform_gaussians(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussians:
     """The cloud in another frame.
 
     Parameters
@@ -41,13 +41,13 @@ def moved(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussian
         scales=scales,
         quats_wxyz=quats.astype(np.float32),
         normals=(gaussians.normals @ R.T).astype(np.float32),
-        sh=rotated_sh(gaussians.sh, R),
+        sh=rotate_sh(gaussians.sh, R),
     )
     check_gaussians(turned, "the cloud along the route")
     return turned
 
 
-def rotated_sh(sh: NDArray[np.float32], rotation: NDArray[np.float64]) -> NDArray[np.float32]:
+def rotate_sh(sh: NDArray[np.float32], rotation: NDArray[np.float64]) -> NDArray[np.float32]:
     """Coefficients of the turned colour function: ``f'(d) = f(R^T d)``.
 
     Each band is invariant under rotation, so its matrix follows from values at enough directions:

@@ -10,10 +10,9 @@ from scipy.optimize import least_squares
 
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.campaign.events import Event
-from tasks.identification.inference.forward import RunModel, roll, run_model
-from tasks.identification.inference.rollout import CONSTANTS, OUTPUTS
+from tasks.identification.inference.forward import RunModel, run_model, simulate_run
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.effects.library import ALL_PARAMETERS, PARAMETER_INDEX
+from tasks.vehicle.effects.table import EFFECT_TABLE, PARAMETER_INDEX
 from tasks.vehicle.half_car import half_car, integrate_half_car
 from tasks.vehicle.parameters import Vehicle
 
@@ -111,13 +110,13 @@ def fit_brake_gain(events: Sequence[Event], vehicle: Vehicle, surface: SurfacePa
     measured = [-event.change("longitudinal_acceleration") for event in events]
 
     def residual(log_factor: NDArray[np.float64]) -> NDArray[np.float64]:
-        theta = np.zeros(len(ALL_PARAMETERS))
+        theta = np.zeros(len(EFFECT_TABLE))
         theta[PARAMETER_INDEX["pressure_gain"]] = float(np.exp(log_factor[0])) - 1.0
         parts = []
         for event, model, truth in zip(events, models, measured, strict=True):
-            out, _ = roll(model, theta, initial_speed=event.start_speed)
+            driven = simulate_run(model, theta, initial_speed=event.start_speed)
             evaluated = event.within(event.protocol.evaluation)[_driven(event)]
-            predicted = -out[:, OUTPUTS.index("acceleration")]
+            predicted = -driven.column("longitudinal_acceleration")
             parts.append((predicted - truth[_driven(event)])[evaluated])
         return np.concatenate(parts)
 
@@ -203,18 +202,18 @@ def predict_event(event: Event, vehicle: Vehicle, model: DiveModel, surface: Sur
     """
     car = with_model(vehicle, model)
     prepared = _event_model(event, replace(car, brake_gain=model.brake_gain), surface)
-    theta = np.zeros(len(ALL_PARAMETERS))
-    tabled = float(prepared.constants[CONSTANTS.index("pitch_scale")])
-    theta[PARAMETER_INDEX["pitch_gain"]] = model.pitch_gain / tabled - 1.0
-    out, _ = roll(prepared, theta, initial_speed=event.start_speed)
+    theta = np.zeros(len(EFFECT_TABLE))
+    # the gain multiplies the moment of the sprung mass, the model's that of the whole vehicle
+    theta[PARAMETER_INDEX["pitch_gain"]] = model.pitch_gain * car.sprung_mass / car.mass - 1.0
+    driven = simulate_run(prepared, theta, initial_speed=event.start_speed)
     inside = event.within(event.protocol.evaluation)
     kept = inside[_driven(event)]
     return Prediction(
         time=event.time[inside],
         dive=event.dive[inside],
-        predicted_dive=np.degrees(out[kept, OUTPUTS.index("pitch")]),
+        predicted_dive=np.degrees(driven.column("pitch")[kept]),
         rate=event.change("pitch_rate")[inside] if "pitch_rate" in event.columns else None,
-        predicted_rate=np.degrees(out[kept, OUTPUTS.index("pitch_rate")]),
+        predicted_rate=np.degrees(driven.column("pitch_rate")[kept]),
     )
 
 

@@ -13,7 +13,7 @@ from tasks.studies.brake_dive import DiveModel, dive_of_deceleration, pitch_mode
 from tasks.studies.stop import MASKED_SPEED, REBOUND_S, Stop, StopErrors, rolling_radius, stop_errors
 from tasks.studies.stop_swing import Swing, fit_swing, with_swing
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.effects.library import parameter_vector
+from tasks.vehicle.effects.table import parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 LEAD_SAMPLES = 20

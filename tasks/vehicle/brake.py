@@ -84,7 +84,7 @@ class BrakeCommand:
         )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def brake_pressure(since_onset: float, profile: PressureProfile) -> float:
     """Commanded pressure p_b [MPa].
 
@@ -105,7 +105,7 @@ def brake_pressure(since_onset: float, profile: PressureProfile) -> float:
     return profile.peak * (1.0 - falling / profile.release)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def onset_by_position(time: float, station: float, speed: float, profile: PressureProfile) -> float:
     """Time of the brake onset once its position is passed, else infinity [s].
 
@@ -123,7 +123,7 @@ def onset_by_position(time: float, station: float, speed: float, profile: Pressu
     return max(time - (station - profile.onset_station) / speed, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def abs_command(braking_slip: float, target_slip: float, release_width: float) -> float:
     """Share of the brake torque that the proportional ABS asks for, q_cmd [1] (paper, Eq. app_abs_command).
 
@@ -137,7 +137,7 @@ def abs_command(braking_slip: float, target_slip: float, release_width: float) -
     return min(max(share, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def abs_update(command: float, scale: float, build_step: float, release_step: float) -> float:
     """ABS torque scale q after one step: the command within the rate limits [1] (paper, Appendix B).
 

@@ -65,7 +65,7 @@ def half_car(vehicle: Vehicle) -> HalfCar:
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def contact_load(road_height: float, unsprung_height: float, stiffness: float, static_load: float) -> float:
     """Load of one axle on the road, never negative [N] (paper, Eq. app_unilateral_contact).
 
@@ -78,7 +78,7 @@ def contact_load(road_height: float, unsprung_height: float, stiffness: float, s
     return static_load + max(stiffness * (road_height - unsprung_height), -static_load)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
     """Spring and damper force of the front and the rear axle, F_s,f and F_s,r [N] (paper, Appendix B).
 
@@ -97,7 +97,7 @@ def suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
     return force_f, force_r
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def half_car_rates(
     x: HalfCarState,
     load_f: float,
@@ -131,7 +131,7 @@ def half_car_rates(
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def moved(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
     """The state after going along a rate for a step [s]."""
     return (

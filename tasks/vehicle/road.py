@@ -21,7 +21,7 @@ def road_feature(hazard: RoadHazard) -> RoadFeature:
     return RoadFeature(float(hazard.center_m), float(hazard.length_m), float(hazard.height_m))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def height_at(station: float, road: RoadFeature) -> float:
     """Road height H_g [m] (paper, Eq. shared_road_profile).
 
@@ -36,7 +36,7 @@ def height_at(station: float, road: RoadFeature) -> float:
     return 0.5 * road.height * (1.0 + cos(2.0 * pi * offset / road.length))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def slope_at(station: float, road: RoadFeature) -> float:
     """Road slope dH_g/ds [m/m].
 

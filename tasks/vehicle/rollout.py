@@ -10,8 +10,12 @@ from numpy.typing import NDArray
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.model.coupled_mode import run_coupled_mode
+from tasks.vehicle.history import History
+from tasks.vehicle.model.brake_input import brake_command
+from tasks.vehicle.model.chassis import Conditions
+from tasks.vehicle.model.simulation import COLUMNS, Simulation, simulate
 from tasks.vehicle.paper.paper_mode import history_of, run_paper_mode
 from tasks.vehicle.parameters import Vehicle, surface_response
 
@@ -81,14 +85,12 @@ class Rollout:
 
 def rollout(
     vehicle: Vehicle,
-    family: str,
-    surface_friction: float,
+    surface: SurfaceState,
     controls: Controls,
     hazard: RoadHazard,
     *,
     mode: Mode,
     duration_s: float,
-    snow_depth_mm: float = 0.0,
     step_s: float = INTERNAL_STEP_S,
 ) -> Rollout:
     """Drive one scenario; after a stop the vehicle rests and its body comes to rest too.
@@ -96,13 +98,11 @@ def rollout(
     Parameters
     ----------
     vehicle : the vehicle
-    family : tyre family: dry, rain or snow
-    surface_friction : mu_c [1]
+    surface : kind of weather, mu_c, and the snow that wheels plough where the vehicle has that effect
     controls : initial speed and brake
     hazard : road feature
     mode : paper follows the publication, coupled is the physical model
     duration_s : length of the telemetry, whole milliseconds [s]
-    snow_depth_mm : of the snow on the road, which wheels plough where the vehicle has that effect [mm]
     step_s : internal step, a whole fraction of a millisecond [s]
 
     Raises
@@ -110,18 +110,25 @@ def rollout(
     InputError
         Listing every argument that breaks a rule.
     """
+    family, surface_friction, snow_depth_mm = surface.kind, surface.friction, surface.snow_depth_mm
     per_tick = _check(vehicle, family, surface_friction, mode, duration_s, step_s)
     response = surface_response(vehicle, family, surface_friction)
-    arguments = (
-        vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile, hazard
-    )  # fmt: skip
-    steps = round(duration_s * 1000) * per_tick
+    ticks = round(duration_s * 1000)
     if mode == "paper":
-        history = history_of(run_paper_mode(*arguments, steps=steps, step=step_s), step_s, per_tick)
+        run = run_paper_mode(
+            vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile,
+            hazard, steps=ticks * per_tick, step=step_s,
+        )  # fmt: skip
+        history = history_of(run, step_s, per_tick)
     else:
-        history = run_coupled_mode(
-            *arguments, snow_depth_mm=snow_depth_mm, steps=steps, step=step_s, per_tick=per_tick
-        )
+        history = _history(
+            simulate(
+                vehicle, response,
+                brake_command(controls.brake.profile, hold_speed=controls.hold_speed_until_brake),
+                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm), samples=ticks + 1, substeps=per_tick,
+                interval=0.001, initial_speed=controls.initial_speed,
+            )
+        )  # fmt: skip
     columns: dict[str, NDArray[Any]] = dict(history.columns)
     columns["t_ns"] = np.arange(len(columns["speed"]), dtype=np.int64) * TICK_NS
     columns["contact_f"] = columns["axle_load_f"] > 0
@@ -146,6 +153,12 @@ def rollout(
     )
 
 
+def _history(run: Simulation) -> History:
+    columns = dict(zip(COLUMNS, run.history.T.copy(), strict=True))
+    columns |= {f"axle_load_{axle}": columns[f"tyre_load_{axle}"] for axle in "fr"}
+    return History(columns=columns, onset=run.onset, onset_station=run.onset_station, stop_time=run.stop)
+
+
 def _check(
     vehicle: Vehicle, family: str, surface_friction: float, mode: str, duration_s: float, step_s: float
 ) -> int:
@@ -153,8 +166,10 @@ def _check(
     problems = []
     if mode not in MODES:
         problems.append(f"mode must be one of {', '.join(MODES)}; it is {mode}")
-    if family not in vehicle.families:
-        problems.append(f"tyre family {family}: no such family; there are: {', '.join(vehicle.families)}")
+    try:
+        vehicle.tyre_family(family)
+    except InputError as error:
+        problems += error.problems
     if not (isfinite(surface_friction) and surface_friction > 0):
         problems.append(f"surface_friction must be a positive number; it is {surface_friction}")
     whole = (

@@ -9,7 +9,8 @@ from catalogs.effects import load_effects
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.campaign.run_validation import run_problems
 from tasks.identification.inference.forward import predict, run_model
-from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.effects.table import EFFECT_TABLE
 from tests.identification.synthetic import NOISE, SURFACE, VEHICLE, plain_run
 
 EFFECTS = load_effects()
@@ -26,7 +27,7 @@ def columns_of(run: Run, theta: np.ndarray) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 @pytest.mark.parametrize("share", [-0.5, 0.5])
 def test_an_effect_that_the_model_lacks_is_no_fault(effect: Effect, share: float) -> None:
-    theta = np.zeros(len(ALL_PARAMETERS))
+    theta = np.zeros(len(EFFECT_TABLE))
     for k, parameter in enumerate(effect.parameters):
         bound = parameter.upper if share > 0 else parameter.lower
         theta[parameter.index] = abs(share) * bound if k == 0 else parameter.start

@@ -7,8 +7,8 @@ import pytest
 
 from catalogs.protocols import load_protocol
 from tasks.campaign.attrition import attrition_table
-from tasks.campaign.events import Drive, Event
-from tasks.campaign.selection import QUANTITIES, judge, select_events
+from tasks.campaign.events import Event, RecordedRun
+from tasks.campaign.selection import QUANTITIES, judge_event, select_events
 
 PROTOCOL = load_protocol("brake-dive")
 INTERVAL = 0.01
@@ -29,8 +29,8 @@ def good_columns() -> dict[str, np.ndarray]:
     }  # fmt: skip
 
 
-def drive(columns: dict[str, np.ndarray], name: str = "one") -> Drive:
-    return Drive(name=name, drive=name, interval=INTERVAL, columns=columns)
+def drive(columns: dict[str, np.ndarray], name: str = "one") -> RecordedRun:
+    return RecordedRun(name=name, drive=name, interval=INTERVAL, columns=columns)
 
 
 def only_event(columns: dict[str, np.ndarray]) -> Event:
@@ -138,4 +138,4 @@ def test_no_rule_sees_the_pitch_after_the_onset() -> None:
     event = only_event(good_columns())
     after = event.time > 1e-6
     moved = replace(event, columns={**event.columns, "pitch": event.columns["pitch"] + 5.0 * after})
-    assert judge(event, PROTOCOL.rules).values == judge(moved, PROTOCOL.rules).values
+    assert judge_event(event, PROTOCOL.rules).values == judge_event(moved, PROTOCOL.rules).values

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
+from tasks.eval.negative_controls import (
+    Claim,
+    claims_differ,
+    compute_separation,
+    delay_claim,
+    scale_claimed_pitch,
+    score_claim,
+)
 from tasks.eval.poses.motion import RecoveredMotion
 
 TIMES = np.arange(81) * 0.1
@@ -24,7 +31,7 @@ EXACT = seen(PITCH, 10 * TIMES)
 
 
 def scores(claim: Claim) -> dict[str, float]:
-    return claim_scores(EXACT, claim, np.deg2rad(0.2), TIMES, 2.2)
+    return score_claim(EXACT, claim, np.deg2rad(0.2), TIMES, 2.2)
 
 
 def test_a_true_claim_scores_nothing() -> None:
@@ -36,31 +43,34 @@ def test_a_true_claim_scores_nothing() -> None:
 
 
 def test_amplitude_is_invisible_to_correlation_and_to_progress() -> None:
-    faulty = scores(scaled(CLAIM, 0.8))
+    faulty = scores(scale_claimed_pitch(CLAIM, 0.8))
     assert faulty["e_geometry"] == pytest.approx(0.25, abs=0.001)  # an estimate of 1 against a claim of 0.8
     assert faulty["pitch_decorrelation"] < 1e-12 and faulty["normalised_progress_rmse"] < 1e-12
 
 
 def test_a_sign_flip_and_a_late_frame_are_seen() -> None:
-    assert scores(scaled(CLAIM, -1.0))["pitch_relative_error"] == pytest.approx(2.0)
-    late = delayed(CLAIM, 1)
+    assert scores(scale_claimed_pitch(CLAIM, -1.0))["pitch_relative_error"] == pytest.approx(2.0)
+    late = delay_claim(CLAIM, 1)
     assert late.station[5] == CLAIM.station[4] and late.station[0] == late.station[1] == CLAIM.station[0]
     assert scores(late)["progress_rmse"] > 0.9
 
 
 def test_relative_figures_are_left_out_without_a_response() -> None:
-    assert "pitch_relative_error" not in scores(scaled(CLAIM, 0.0))
+    assert "pitch_relative_error" not in scores(scale_claimed_pitch(CLAIM, 0.0))
 
 
 def test_a_copy_that_says_the_same_is_no_fault() -> None:
-    assert not differs(scaled(CLAIM, 0.999), CLAIM, np.deg2rad(0.05), 0.2)
-    assert differs(delayed(CLAIM, 1), CLAIM, np.deg2rad(0.05), 0.2)
+    assert not claims_differ(scale_claimed_pitch(CLAIM, 0.999), CLAIM, np.deg2rad(0.05), 0.2)
+    assert claims_differ(delay_claim(CLAIM, 1), CLAIM, np.deg2rad(0.05), 0.2)
 
 
 def test_the_threshold_accuses_no_sound_clip() -> None:
-    clear = separate([0.1, 0.2, 0.15], [0.3, 0.4])
+    clear = compute_separation([0.1, 0.2, 0.15], [0.3, 0.4])
     assert (clear.threshold, clear.detection_rate, clear.auc, clear.verdict) == (0.2, 1.0, 1.0, "sees")
-    mixed = separate([0.1, 0.2], [0.1, 0.3])
+    mixed = compute_separation([0.1, 0.2], [0.1, 0.3])
     assert (mixed.detection_rate, mixed.auc, mixed.verdict) == (0.5, pytest.approx(0.625), "partly")
-    assert separate([0.2, 0.2], [0.2]).auc == 0.5 and separate([0.2], [0.1]).verdict == "blind"
+    assert (
+        compute_separation([0.2, 0.2], [0.2]).auc == 0.5
+        and compute_separation([0.2], [0.1]).verdict == "blind"
+    )
     assert clear.false_alarms[-1] == clear.detections[-1] == 1.0

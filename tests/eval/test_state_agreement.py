@@ -14,8 +14,8 @@ from tasks.eval.state_agreement import (
     FIGURES,
     MODEL_COLUMNS,
     CaseFacts,
-    aggregate,
     case_agreement,
+    summarise_groups,
 )
 
 Columns = dict[str, NDArray[np.float64]]
@@ -176,7 +176,7 @@ def test_groups_are_the_paper_s() -> None:
         for e in (0.01, 0.03)
     ]
     rows.append(case_agreement(as_reference(hump), dict(hump, speed=hump["speed"] + 0.05), HUMP, STATIC))
-    groups = aggregate(rows)
+    groups = summarise_groups(rows)
     assert {name: g.count for name, g in groups.items()} == {"flat": 2, "hump": 1, "all": 3}
     assert groups["flat"].mean["speed_rmse_m_s"] == pytest.approx(0.02)
     assert groups["flat"].maximum["speed_rmse_m_s"] == pytest.approx(0.03)

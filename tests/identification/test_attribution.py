@@ -16,7 +16,7 @@ from tasks.identification.inference.disturbance import Disturbance, prior_precis
 from tasks.identification.inference.evidence import run_evidence
 from tasks.identification.inference.fit import fit
 from tasks.identification.inference.forward import predict, run_model
-from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
+from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
 
 WANTED = (
     "aerodynamic_drag",
@@ -43,7 +43,7 @@ def evidence_of(theta: np.ndarray) -> Evidence:
             measured(plain_run(v, p, name=str(i), direction=d, disc_rise=t), theta, i),
             np.zeros(7),
             NOISE,
-            np.zeros(len(ALL_PARAMETERS)),
+            np.zeros(len(EFFECT_TABLE)),
             LIBRARY,
             TOLERANCES,
             QUIET,
@@ -75,13 +75,13 @@ def test_the_effect_in_the_data_tops_the_ladder_with_its_value(
 
 
 def test_nothing_passes_where_nothing_is_missing() -> None:
-    evidence = evidence_of(np.zeros(len(ALL_PARAMETERS)))
+    evidence = evidence_of(np.zeros(len(EFFECT_TABLE)))
     null = fit(evidence.train, (), evidence.session_sigma)
     assert not any(c.passes for c in ladder(evidence, null, count=3))
 
 
 def test_the_marginal_misfit_is_that_of_the_dense_covariance() -> None:
-    evidence = evidence_of(np.zeros(len(ALL_PARAMETERS)))
+    evidence = evidence_of(np.zeros(len(EFFECT_TABLE)))
     run = evidence.train[0]
     keep = slice(0, 600)
     precision, _ = prior_precision(run.knots, TOLERANCES, QUIET)
@@ -108,7 +108,7 @@ def test_every_library_effect_moves_some_instrument_and_zero_moves_none() -> Non
             }
         )
         model = run_model(changed, VEHICLE, SURFACE)
-        plain[weather] = (model, predict(model, np.zeros(len(ALL_PARAMETERS))))
+        plain[weather] = (model, predict(model, np.zeros(len(EFFECT_TABLE))))
     for effect in load_effects():
         theta = parameter_vector({p.name: p.start for p in effect.parameters})
         theta[effect.parameters[0].index] = 5 * effect.parameters[0].step
@@ -121,6 +121,6 @@ def test_every_library_effect_moves_some_instrument_and_zero_moves_none() -> Non
 
 def test_halving_the_step_changes_less_than_the_noise() -> None:
     model = run_model(plain_run(20.0, 2.0), VEHICLE, SURFACE)
-    theta = np.zeros(len(ALL_PARAMETERS))
+    theta = np.zeros(len(EFFECT_TABLE))
     difference = np.abs(predict(model, theta) - predict(model, theta, substeps=20))
     assert np.all(difference.max(axis=0) < 0.35 * NOISE)

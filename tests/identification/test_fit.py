@@ -11,29 +11,22 @@ sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.effects import load_effects
-from tasks.campaign.planned_runs import RICH, planned_run
 from tasks.identification.decision.forms import RIDGE, form_hypotheses, scan, spline_slopes
 from tasks.identification.decision.screening import screen
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import run_evidence, second_values
 from tasks.identification.inference.fit import fit
-from tasks.identification.inference.forward import (
-    COARSE_SUBSTEPS,
-    SUBSTEPS,
-    RunModel,
-    predict,
-    run_model,
-    starting_speed,
-)
+from tasks.identification.inference.forward import RunModel, predict, run_model, starting_speed
 from tasks.identification.inference.hypothesis import library_hypothesis
 from tasks.identification.inference.linearisation import fit_disturbance, whitened_residuals
-from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect, parameter_vector
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
 LIBRARY = {e.name: e for e in load_effects()}
-PLAIN = np.zeros(len(ALL_PARAMETERS))
+PLAIN = np.zeros(len(EFFECT_TABLE))
 
 
 def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence:
@@ -108,14 +101,6 @@ def test_the_screen_sees_an_effect_whose_threshold_is_far_from_its_first_value()
     tried = [value for _, value in second_values(evidence.effects)]
     assert seconds[0] == min(tried, key=lambda value: abs(value - 8.0)) != creep.parameters[1].start
     assert gains[0] > 50.0 and estimates[0] > 300.0
-
-
-def test_long_steps_are_for_runs_that_they_hardly_change() -> None:
-    coasting, cycling = (
-        evidence_of([run_model(planned_run(drive, "run"), VEHICLE, SURFACE)], ()).train[0]
-        for drive in (RICH[0], RICH[4])
-    )
-    assert coasting.substeps == COARSE_SUBSTEPS and cycling.substeps == SUBSTEPS
 
 
 def test_a_run_starts_at_the_speed_the_sensor_read_less_its_scale_error() -> None:

@@ -21,7 +21,7 @@ from tasks.identification.inference.fit import fit, misfit_by_run
 from tasks.identification.inference.forward import predict, run_model
 from tasks.identification.inference.hypothesis import library_hypothesis
 from tasks.identification.inference.linearisation import prepare
-from tasks.vehicle.effects.library import ALL_PARAMETERS, parameter_vector
+from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
 
 LIBRARY = tuple(
     e for e in load_effects() if e.name in ("wet_friction_speed", "rolling_resistance", "brake_lag")
@@ -31,7 +31,7 @@ Judged = tuple[Evidence, Candidate, float]
 
 
 def rain_stops(speeds: tuple[float, ...], truth: dict[str, float], disturbance: Disturbance) -> Judged:
-    theta, zero, derived = parameter_vector(truth), np.zeros(len(ALL_PARAMETERS)), []
+    theta, zero, derived = parameter_vector(truth), np.zeros(len(EFFECT_TABLE)), []
     for i, speed in enumerate(speeds):
         run = replace(plain_run(speed, 6.0), weather="rain", precipitation_mm_h=8.0)
         clean = predict(run_model(run, VEHICLE, SURFACE), theta, substeps=20)

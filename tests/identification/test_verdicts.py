@@ -3,21 +3,19 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from tasks.campaign.make_planned_runs import RICH, RunPlan, make_planned_run
 
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_truths
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from tasks.campaign.planned_runs import RICH, Drive, planned_run
-from tasks.errors import InputError
 from tasks.identification.benchmark import synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import attribute
 from tasks.identification.inference.forward import predict, run_model
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.effects.library import parameter_vector
+from tasks.vehicle.effects.table import parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
@@ -31,14 +29,14 @@ LIBRARY = tuple(
 )  # fmt: skip
 """One or two for each verdict and what may be taken for them: all 55 take eight times as long."""
 LEAN = (
-    Drive(speed=32.0, peak=0.0, duration=5.0), Drive(speed=14.0, peak=0.0, duration=5.0),
-    Drive(speed=25.0, peak=2.0, disc_rise=350.0, duration=5.0), Drive(speed=26.4, peak=-2.4, duration=5.0),
-    Drive(speed=13.9, peak=2.3, duration=4.0), Drive(weather="rain", rate=10.0, speed=20.0, peak=2.3, duration=4.0),
-    Drive(weather="snow", rate=1.0, speed=9.7, peak=0.6, duration=4.0),
-    Drive(speed=11.1, peak=0.0, duration=3.0, hazard=(12.0, 3.7, 0.075)),
-    Drive(speed=9.7, peak=0.0, duration=3.0, hazard=(10.0, 2.0, -0.08)),
-    Drive(speed=25.0, peak=0.0, duration=5.0), Drive(speed=22.2, peak=2.6, disc_rise=250.0, duration=4.0),
-    Drive(speed=8.9, peak=0.8, duration=3.0, hazard=(9.0, 3.7, 0.05)),
+    RunPlan(speed=32.0, peak=0.0, duration=5.0), RunPlan(speed=14.0, peak=0.0, duration=5.0),
+    RunPlan(speed=25.0, peak=2.0, disc_rise=350.0, duration=5.0), RunPlan(speed=26.4, peak=-2.4, duration=5.0),
+    RunPlan(speed=13.9, peak=2.3, duration=4.0), RunPlan(weather="rain", rate=10.0, speed=20.0, peak=2.3, duration=4.0),
+    RunPlan(weather="snow", rate=1.0, speed=9.7, peak=0.6, duration=4.0),
+    RunPlan(speed=11.1, peak=0.0, duration=3.0, hazard=(12.0, 3.7, 0.075)),
+    RunPlan(speed=9.7, peak=0.0, duration=3.0, hazard=(10.0, 2.0, -0.08)),
+    RunPlan(speed=25.0, peak=0.0, duration=5.0), RunPlan(speed=22.2, peak=2.6, disc_rise=250.0, duration=4.0),
+    RunPlan(speed=8.9, peak=0.8, duration=3.0, hazard=(9.0, 3.7, 0.05)),
 )  # fmt: skip
 """Every port is excited by nine training runs; three are held out."""
 OUTSIDE = {truth.name: truth for truth in load_truths() if not truth.in_library}
@@ -50,7 +48,7 @@ def judged(
     seed: int = 31,
     vehicle: Vehicle = VEHICLE,
     outside: str | None = None,
-    design: tuple[Drive, ...] = LEAN,
+    design: tuple[RunPlan, ...] = LEAN,
 ) -> Verdict:
     slots = OUTSIDE[outside].slots if outside else ()
     campaign = synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
@@ -117,13 +115,13 @@ class TestACarThatIsGrown:
     )
 
     def test_it_predicts_as_the_plain_car_with_its_effects(self) -> None:
-        run = planned_run(RICH[4], "pulsed")
+        run = make_planned_run(RICH[4], "pulsed")
         theta = parameter_vector({"lag": 0.08, "drag_area": 0.7})
         grown = predict(run_model(run, self.GROWN, SURFACE), np.zeros_like(theta))
         np.testing.assert_array_equal(grown, predict(run_model(run, VEHICLE, SURFACE), theta))
 
     def test_it_predicts_with_its_forms(self) -> None:
-        run = planned_run(RICH[4], "pulsed")
+        run = make_planned_run(RICH[4], "pulsed")
         none = parameter_vector({})
         grown = predict(run_model(run, replace(VEHICLE, forms=(self.FORM,)), SURFACE), none)
         added = predict(run_model(run, VEHICLE, SURFACE), none, slots=(self.FORM.slot,))
@@ -138,6 +136,9 @@ class TestACarThatIsGrown:
     def test_it_lacks_nothing_of_what_it_has(self) -> None:
         assert judged({"lag": 0.08, "drag_area": 0.7}, vehicle=self.GROWN).verdict == "NOTHING"
 
-    def test_what_only_coupled_mode_knows_is_refused(self) -> None:
-        with pytest.raises(InputError, match=r"effects that only coupled mode knows .*abs_cutoff"):
-            run_model(planned_run(RICH[4], "pulsed"), load_vehicle("multibody-grown"), SURFACE)
+    def test_a_calibrated_vehicle_is_judged_with_all_that_calibration_gave_it(self) -> None:
+        grown = load_vehicle("multibody-grown")
+        assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
+        campaign = synthetic_campaign(grown, SURFACE, {"lag": 0.08}, 31)
+        verdict = attribute(campaign, grown, SURFACE, load_effects()).verdict
+        assert names(verdict) == ["brake_lag"]

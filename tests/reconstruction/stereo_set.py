@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.reconstruction.sequence import StereoSequence
-from tasks.render.camera import viewmat
+from tasks.render.camera import world_to_camera
 from tasks.render.composition import encode_8bit
 from tasks.render.environment import environment_view
-from tasks.render.rasterise.rasteriser import PreparedGaussians, prepare, rasterise
+from tasks.render.rasterise.rasteriser import PreparedGaussians, prepare_gaussians, rasterise
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 
@@ -44,7 +44,7 @@ class StereoSet:
 
 def stereo_set(frames: int = 7, step: float = 0.7) -> StereoSet:
     """Pictures every ``step`` metres, with gains that change from frame to frame."""
-    street, environment = prepare(_street()), _sky()
+    street, environment = prepare_gaussians(_street()), _sky()
     K = np.array([[FOCAL, 0, WIDTH / 2], [0, FOCAL, HEIGHT / 2 - 10], [0, 0, 1]])
     poses = np.tile(np.eye(4), (frames, 1, 1))
     poses[:, :3, :3] = AXES
@@ -56,7 +56,7 @@ def stereo_set(frames: int = 7, step: float = 0.7) -> StereoSet:
         for side, pictures in ((0.0, left), (BASELINE, right)):
             pose = poses[i].copy()
             pose[:3, 3] += side * AXES[:, 0]
-            view = viewmat(pose)
+            view = world_to_camera(pose)
             gbuffer = rasterise(street, view, K, WIDTH, HEIGHT)
             sky = environment_view(environment, view, K, WIDTH, HEIGHT)
             light = gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from catalogs.cameras import load_camera
-from tasks.render.camera import body_poses, viewmat
+from tasks.render.camera import body_poses, world_to_camera
 from tasks.scene.route import route_from_positions
 
 ROUTE = route_from_positions(np.stack([np.arange(100.0), np.zeros(100), np.zeros(100)], axis=1))
@@ -12,7 +12,7 @@ CG = {"cg_behind_front_axle": 1.2, "cg_height": 0.55}
 
 def pixel(point: list[float], station: float = 10.0, heave: float = 0.0, pitch: float = 0.0) -> np.ndarray:
     pose = body_poses(ROUTE, np.array([station]), np.array([heave]), np.array([pitch]), **CG)[0]
-    camera = viewmat(pose @ CAMERA.T_rig_camera) @ [*point, 1.0]
+    camera = world_to_camera(pose @ CAMERA.T_rig_camera) @ [*point, 1.0]
     return (CAMERA.K @ camera[:3])[:2] / camera[2]
 
 
@@ -53,4 +53,4 @@ def test_viewmat_is_the_inverse_pose():
     pose = (
         body_poses(ROUTE, np.array([7.0]), np.array([0.1]), np.array([0.03]), **CG)[0] @ CAMERA.T_rig_camera
     )
-    np.testing.assert_allclose(viewmat(pose) @ pose, np.eye(4), atol=1e-12)
+    np.testing.assert_allclose(world_to_camera(pose) @ pose, np.eye(4), atol=1e-12)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from tasks.render.composition import compose, encode_8bit, round_depth, to_display, to_linear
-from tasks.render.contact_sheet import CAPTION, CURVE_COLOURS, MARGIN, contact_sheet, encode_png
+from tasks.render.composition import compose_over_sky, encode_8bit, round_depth, to_display, to_linear
+from tasks.render.contact_sheet import CAPTION, CURVE_COLOURS, MARGIN, draw_contact_sheet, encode_png
 from tasks.render.environment import environment_view, plain_sky
 from tasks.render.rasterise.gbuffer import GBuffer
 
@@ -40,14 +40,16 @@ def buffer(alpha: float) -> GBuffer:
 
 def test_the_sky_fills_what_the_street_leaves():
     sky = np.full((4, 5, 3), 0.8, np.float32)
-    np.testing.assert_allclose(compose(buffer(0.25), sky, False), 0.25 * 0.4 + 0.75 * 0.8, rtol=1e-6)
-    np.testing.assert_array_equal(compose(buffer(0.0), sky, False), sky)
+    np.testing.assert_allclose(compose_over_sky(buffer(0.25), sky, False), 0.25 * 0.4 + 0.75 * 0.8, rtol=1e-6)
+    np.testing.assert_array_equal(compose_over_sky(buffer(0.0), sky, False), sky)
 
 
 def test_display_encoded_scenes_blend_before_they_are_linearised():
     sky = np.full((4, 5, 3), 0.8, np.float32)
-    np.testing.assert_allclose(compose(buffer(0.0), sky, True), sky, rtol=1e-5)
-    np.testing.assert_allclose(compose(buffer(1.0), sky, True), to_linear(np.float32([0.4]))[0], rtol=1e-5)
+    np.testing.assert_allclose(compose_over_sky(buffer(0.0), sky, True), sky, rtol=1e-5)
+    np.testing.assert_allclose(
+        compose_over_sky(buffer(1.0), sky, True), to_linear(np.float32([0.4]))[0], rtol=1e-5
+    )
 
 
 def test_depth_is_rounded_to_thirteen_bits_and_nan_stays():
@@ -88,16 +90,16 @@ def test_a_contact_sheet_has_a_row_a_clip_and_decodes():
 
     pictures = [np.full((32, 48, 3), 200, np.uint8)] * 2
     curves = {"speed": np.linspace(16, 0, 9), "pitch": np.linspace(0, 0.03, 9)}
-    sheet = contact_sheet([("dry", pictures, curves), ("snow", pictures, curves)], [0, 8], 10.0)
+    sheet = draw_contact_sheet([("dry", pictures, curves), ("snow", pictures, curves)], [0, 8], 10.0)
     assert (cv2.imdecode(np.frombuffer(encode_png(sheet), np.uint8), 1)[..., ::-1] == sheet).all()
-    one = contact_sheet([("dry", pictures, curves)], [0, 8], 10.0)
+    one = draw_contact_sheet([("dry", pictures, curves)], [0, 8], 10.0)
     assert sheet.shape[0] > 1.8 * one.shape[0]
 
 
 def test_each_curve_is_named_in_its_own_colour():
     pictures = [np.full((32, 48, 3), 200, np.uint8)]
     curves = {"speed": np.linspace(16, 0, 9), "pitch": np.linspace(0, 0.03, 9)}
-    sheet = contact_sheet([("dry", pictures, curves)], [0], 10.0)
+    sheet = draw_contact_sheet([("dry", pictures, curves)], [0], 10.0)
     heading = sheet[: MARGIN + CAPTION]
     for colour in CURVE_COLOURS.values():
         assert (np.abs(heading.astype(int) - colour).max(axis=2) < 20).any()

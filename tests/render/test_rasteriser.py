@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.projection import project
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.projection import project_gaussians
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.rasterise.reference_rasteriser import blend_steps, rasterise_reference
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
@@ -21,7 +21,7 @@ AHEAD = np.eye(4)
 
 
 def draw(gaussians: Gaussians, viewmat: NDArray[np.float64] = AHEAD) -> GBuffer:
-    return rasterise(prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
+    return rasterise(prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
 
 
 def all_bytes(gbuffer: GBuffer) -> list[bytes]:
@@ -156,7 +156,7 @@ def test_order_of_the_cloud_does_not_change_a_bit() -> None:
 
 
 def test_threads_do_not_change_a_bit() -> None:
-    prepared = prepare(random_cloud(2000))
+    prepared = prepare_gaussians(random_cloud(2000))
     views = [camera_at((0, 0, 0), rotation(seed)) for seed in range(4)]
     alone = [all_bytes(rasterise(prepared, view, K, WIDTH, HEIGHT)) for view in views]
     with ThreadPoolExecutor(2) as pool:
@@ -233,7 +233,9 @@ def test_needles_and_walls_through_the_eye_are_as_exact_as_the_rest() -> None:
 
 def test_a_gaussian_beyond_single_precision_is_left_out() -> None:
     means, scales = [(0, 0, 3.0), (0, 0, 4.0)], [(1e18, 1e18, 1e18), (0.1, 0.1, 0.1)]
-    records, slots = project(prepare(cloud(means, scales)), view_of(np.eye(4), K, WIDTH, HEIGHT))
+    records, slots = project_gaussians(
+        prepare_gaussians(cloud(means, scales)), view_of(np.eye(4), K, WIDTH, HEIGHT)
+    )
     assert len(slots) == 1 and np.isfinite(records).all()
 
 
@@ -241,16 +243,16 @@ def test_nan_is_refused_by_name_and_number() -> None:
     gaussians = random_cloud(10)
     gaussians.means[7, 1] = np.nan
     with pytest.raises(InputError, match=r"means must be finite; 1 of 10 .* number 7"):
-        prepare(gaussians)
+        prepare_gaussians(gaussians)
 
 
 def test_an_unusable_camera_is_refused_with_every_reason() -> None:
     broken = K.copy()
     broken[0, 0] = np.nan
     with pytest.raises(InputError) as caught:
-        rasterise(prepare(random_cloud(5)), np.eye(3), broken, 0, 10)
+        rasterise(prepare_gaussians(random_cloud(5)), np.eye(3), broken, 0, 10)
     assert [problem.split(" must")[0] for problem in caught.value.problems] == [
         "camera: viewmat", "camera: K", "camera: the picture",
     ]  # fmt: skip
     with pytest.raises(InputError, match=r"focal lengths must be positive; they are 60.0 and -58.0"):
-        rasterise(prepare(random_cloud(5)), np.eye(4), np.diag((60, -58, 1.0)), 10, 10)
+        rasterise(prepare_gaussians(random_cloud(5)), np.eye(4), np.diag((60, -58, 1.0)), 10, 10)

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tasks.eval.poses.unroll import row_times, unrolled
+from tasks.eval.poses.rolling_shutter import correct_rolling_shutter, row_times
 from tasks.render.composition import encode_8bit
 from tasks.render.labels import row_flow
-from tasks.render.lens import distorted
+from tasks.render.lens import distort_rays
 from tasks.render.readout import read_out, sensor_field
 from tasks.render.sight import row_points
 from tests.render.rolling_cameras import ALL, CAMERA, LENS, ROLLING, K
@@ -123,7 +123,7 @@ def test_a_straight_line_bends_as_the_formula_says():
     columns = np.arange(240) + 0.5
     found = (seen * columns).sum(axis=1) / seen.sum(axis=1)
     y = np.linspace(-0.55, 0.55, 2001)
-    bent_x, bent_y = distorted(np.full_like(y, x0), y, LENS.coefficients)
+    bent_x, bent_y = distort_rays(np.full_like(y, x0), y, LENS.coefficients)
     rows = np.arange(160) + 0.5
     expected = 120 + 200 * np.interp((rows - 80) / 200, bent_y, bent_x)
     assert np.ptp(expected) > 3
@@ -190,7 +190,7 @@ def test_the_judge_takes_rows_back_to_one_shutter():
     pinhole = K - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
     told = {"rgb": rgb, "depth": depth, "class": np.zeros(depth.shape, np.uint8)}
     times = row_times(pinhole, (160, 240), None, ROLLING.line_delay_s)
-    seen = unrolled(told, pinhole, times, SimpleNamespace(T_rig0_rig=way), np.eye(4), 0.01)
+    seen = correct_rolling_shutter(told, pinhole, times, SimpleNamespace(T_rig0_rig=way), np.eye(4), 0.01)
     middle = np.broadcast_to(np.eye(4), (160, 4, 4)).copy()
     middle[:, :3, 3] = way[1, :3, 3]
     light, z = wall_seen(still, middle)

@@ -12,7 +12,7 @@ from catalogs.scenes.street import load_street_layout
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.preparation import PreparedGaussians, rotation_matrices
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.scene.gaussians import check_gaussians
 from tasks.scene.scene import Scene
 from tasks.scene.street.build import build_street
@@ -31,7 +31,7 @@ def street() -> Scene:
 
 @pytest.fixture(scope="module")
 def prepared(street: Scene) -> PreparedGaussians:
-    return prepare(street.gaussians)
+    return prepare_gaussians(street.gaussians)
 
 
 def viewmat_at(street: Scene, station: float) -> NDArray[np.float64]:

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from tasks.vehicle.effects.brake_line import DISC_COOLING, acting_pressure, disc_rate, line_after
-from tasks.vehicle.effects.numbers import effect_numbers
-from tasks.vehicle.effects.ports import friction_factor, resistance, strut_force
+from tasks.vehicle.effects.equations import friction_factor, resistance, strut_force
+from tasks.vehicle.effects.table import effect_values
 from tests.vehicle.conftest import command
 
 STOP = command(1.5)
 
 
 def theta(**values):
-    return effect_numbers(values)[0]
+    return effect_values(values)
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def test_wind_creep_rubbing_pads_and_rolling_by_speed_change_coasting_by_their_f
             vehicle.mass + turning
         )
         assert got == pytest.approx(force, rel=0.02), effects
-    assert resistance(theta(drag_area=1.0, wind_speed=-10.0), 10.0, 1.0, 0.0, 0.0) == 0.0
+    assert resistance(theta(drag_area=1.0, wind_speed=-10.0), 10.0, 1.0, 0.0) == 0.0
 
 
 def test_struts_meet_friction_and_a_stop():

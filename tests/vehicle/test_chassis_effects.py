@@ -6,15 +6,14 @@ import pytest
 
 from tasks.errors import InputError
 from tasks.vehicle.effects.chassis import (
-    ChassisEffects,
     effective_friction,
     effective_slope,
     footprint,
     grip_reserve,
     stick_share,
 )
-from tasks.vehicle.effects.numbers import EFFECT_UNITS, NUMBERS_OF_EFFECTS, effect_numbers
-from tasks.vehicle.effects.ports import AIR_DENSITY, INDEX
+from tasks.vehicle.effects.equations import AIR_DENSITY
+from tasks.vehicle.effects.table import effect_values
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.road import height_at, road_feature
 from tests.vehicle.conftest import HUMP, command
@@ -31,15 +30,9 @@ def coupled(drive, vehicle):
     return run
 
 
-def test_every_number_has_a_unit_and_belongs_to_one_effect():
-    numbers = [number for effect in NUMBERS_OF_EFFECTS.values() for number in effect]
-    assert sorted(numbers) == sorted(EFFECT_UNITS)
-    assert set(EFFECT_UNITS) - set(INDEX) == set(ChassisEffects._fields)
-
-
 def test_an_effect_that_is_none_is_named_and_those_that_exist_are_listed():
-    with pytest.raises(InputError, match=r"effect turbo: coupled mode has no such number.*drag_area"):
-        effect_numbers({"turbo": 1.0})
+    with pytest.raises(InputError, match=r"effect turbo: a vehicle has no such number.*drag_area"):
+        effect_values({"turbo": 1.0})
 
 
 def test_coasting_loses_what_air_and_rolling_resistance_take(vehicle, coupled):
@@ -62,7 +55,7 @@ def test_brakes_lock_the_wheels_below_the_cut_off_and_not_above(coupled):
 
 
 def test_a_sticking_tyre_has_its_own_friction_below_one_speed_and_the_curve_above_the_other(vehicle):
-    effects = ChassisEffects(stick_ratio=0.7, stick_below=1.0, stick_above=3.0)
+    effects = effect_values({"stick_ratio": 0.7, "stick_below": 1.0, "stick_above": 3.0})
     tyre = surface_response(vehicle, "rain", 0.4).tyre
     shares = [stick_share(v, effects) for v in (0.1, 1.0, 2.0, 3.0, 20.0)]
     assert shares == [1.0, 1.0, pytest.approx(0.5), 0.0, 0.0]
@@ -75,7 +68,7 @@ def test_a_sticking_tyre_has_its_own_friction_below_one_speed_and_the_curve_abov
 
 
 def test_the_footprint_feels_the_mean_of_the_road(vehicle):
-    road, effects = road_feature(HUMP), ChassisEffects(enveloping_length=0.2)
+    road, effects = road_feature(HUMP), effect_values({"enveloping_length": 0.2})
     for station in (18.2, 18.9, 20.0, 21.3):
         at = np.linspace(station - 0.1, station + 0.1, 2001)
         heights = np.array([height_at(s, road) for s in at])

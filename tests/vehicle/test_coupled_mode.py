@@ -9,10 +9,10 @@ from scipy.integrate import solve_ivp
 
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle import reference
-from tasks.vehicle.model.chassis import chassis_of
-from tasks.vehicle.model.coupled_step import body_rates, motion_rates
+from tasks.vehicle.model.chassis import Conditions, chassis_of
 from tasks.vehicle.model.ports import ports_at
 from tasks.vehicle.model.states import AT_REST, Instant, Memory, Motion
+from tasks.vehicle.model.step import body_rates, motion_rates
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.road import road_feature
 from tests.vehicle.conftest import HUMP, command
@@ -33,7 +33,7 @@ def work(columns, power):
 @pytest.mark.parametrize("pressure", [0.0, 0.7, 2.3])
 def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
     response = surface_response(vehicle, "rain", 0.4)
-    chassis = chassis_of(vehicle, response, 0.0)
+    chassis = chassis_of(vehicle, response, Conditions())
     rng = np.random.default_rng(2)
     for _ in range(200):
         speed, station = rng.uniform(0.1, 30), rng.uniform(17, 25)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tasks.errors import InputError
 from tasks.vehicle import reference
 from tasks.vehicle.brake import BrakeCommand, abs_command, abs_update, brake_pressure, onset_by_position
-from tasks.vehicle.effects.chassis import ChassisEffects
+from tasks.vehicle.effects.table import effect_values
 from tasks.vehicle.model.axle_ports import lock_share, signed_friction, signed_slip
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.tyres.contract import braking_slip, tyre_friction, tyre_slope
@@ -42,7 +42,7 @@ def test_target_slips_are_those_of_the_base_curves_over_the_slip_stiffness(vehic
 def test_tyre_agrees_with_its_twin(vehicle, family, friction):
     response = surface_response(vehicle, family, friction)
     slips = np.linspace(-1, 1, 101)
-    plain = ChassisEffects()
+    plain = effect_values({})
     kernel = [signed_friction(slip, LOAD, 0.0, response.tyre, plain) for slip in slips]
     np.testing.assert_allclose(kernel, reference.burckhardt(slips, vehicle, family, response), atol=1e-6)
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tasks.errors import InputError
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.effects.table import EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle
 
 KNOT_GROUPS = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release_s")

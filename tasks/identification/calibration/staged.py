@@ -23,7 +23,7 @@ from tasks.identification.calibration.scalars import (
     scalar_value,
     with_scalars,
 )
-from tasks.vehicle.effects.numbers import EFFECT_UNITS
+from tasks.vehicle.effects.table import EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle, surface_response
 from tasks.vehicle.rollout import Mode
 

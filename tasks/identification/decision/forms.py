@@ -14,9 +14,9 @@ from tasks.identification.inference.forward import predict
 from tasks.identification.inference.hypothesis import Hypothesis, compose
 from tasks.identification.inference.noise import whiten
 from tasks.vehicle.effects.forms import SHAPES, Form, form_name
-from tasks.vehicle.effects.library import ALL_PARAMETERS
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
 from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import EFFECT_TABLE
 
 KNOTS = 5
 PORT_STEP = {
@@ -130,7 +130,7 @@ def spline_slopes(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], ...
 
 
 def _hats(run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...]) -> NDArray[np.float64]:
-    y = predict(run.model, theta, slots=slots, substeps=run.substeps)
+    y = predict(run.model, theta, slots=slots)
     columns = []
     for port, variable in KEYS:
         low, high = RANGE[variable]
@@ -140,7 +140,7 @@ def _hats(run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...])
             extra = Slot(
                 port=port, variable=variable, origin=low, spacing=(high - low) / (KNOTS - 1), values=hat
             )
-            moved = predict(run.model, theta, slots=(*slots, extra), substeps=run.substeps)
+            moved = predict(run.model, theta, slots=(*slots, extra))
             columns.append((moved - y) / PORT_STEP[port])
     return whiten(np.stack(columns, axis=-1), run.rho, run.sigma)
 
@@ -225,7 +225,7 @@ def _form(leftover: Leftover, name: str, start: NDArray[np.float64], scale: floa
             port=port, variable=variable, shape=name, coefficients=tuple(values.tolist()), scale=scale, low=low,
             high=high,
         )  # fmt: skip
-        return np.zeros(len(ALL_PARAMETERS)), (form.slot,)
+        return np.zeros(len(EFFECT_TABLE)), (form.slot,)
 
     k = len(start)
     step = np.full(k, PORT_STEP[port])

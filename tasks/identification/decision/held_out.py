@@ -12,7 +12,7 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit
 from tasks.identification.inference.forward import predict
 from tasks.identification.inference.hypothesis import compose
-from tasks.vehicle.effects.library import ALL_PARAMETERS
+from tasks.vehicle.effects.table import EFFECT_TABLE
 
 RETUNE_WIDENING = 10.0
 """Factor on the session's tolerances when a model is re-tuned without any new effect."""
@@ -38,7 +38,7 @@ def held_out_error(
         evidence.train, (), RETUNE_WIDENING * evidence.session_sigma, session=null.session, iterations=8
     )
     models = (
-        (np.zeros(len(ALL_PARAMETERS)), ()),
+        (np.zeros(len(EFFECT_TABLE)), ()),
         compose((), np.empty(0), retuned.session),
         compose(base.parts, base.values, base.session),
     )

@@ -21,22 +21,20 @@ from tasks.identification.inference.disturbance import (
     prior_precision,
 )
 from tasks.identification.inference.forward import (
-    COARSE_SUBSTEPS,
-    SUBSTEPS,
     RunModel,
-    instruments,
-    roll,
+    instrument_readings,
+    predict,
+    simulate_run,
     starting_speed,
 )
 from tasks.identification.inference.noise import whiten
-from tasks.vehicle.effects.library import PARAMETER_INDEX, Effect
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import PARAMETER_INDEX
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
 BROKEN = 1e4
 """Whitened residual of a trial that the integration does not survive: no fit goes there."""
-STEADY = 20.0
-"""Misfit by the longer step below which derivatives are taken with it."""
 SECOND_SHARES = (0.3, 0.6)
 """Where in its range an effect's second parameter is tried by the screen, besides its first value."""
 KNOT_STEP = (30.0, 0.01, 30.0)
@@ -59,7 +57,6 @@ class RunEvidence:
     factor : Cholesky factor (lower) of information + prior precision
     session_q : float64 [D, 7] factor^-1 nuisance' session
     library_q, others_q : float64 [D, E], [D, X] factor^-1 nuisance' library, and others
-    substeps : integration steps between samples with which derivatives are taken
     """
 
     model: RunModel
@@ -75,7 +72,6 @@ class RunEvidence:
     session_q: NDArray[np.float64]
     library_q: NDArray[np.float64]
     others_q: NDArray[np.float64]
-    substeps: int
 
     def residual(
         self,
@@ -90,10 +86,10 @@ class RunEvidence:
         in them, as on a road feature that is reached a moment later.
         """
         if offsets is None:
-            out, _ = roll(self.model, theta, slots=slots)
-            if not np.isfinite(out).all():
+            y = predict(self.model, theta, slots=slots)
+            if not np.isfinite(y).all():
                 return np.full(len(self.nuisance), BROKEN)
-            return whiten(self.model.measured - instruments(self.model, theta, out), self.rho, self.sigma)
+            return whiten(self.model.measured - y, self.rho, self.sigma)
         moved = theta.copy()
         moved[PARAMETER_INDEX["friction"]] += offsets[1]
         at = N_OFFSETS
@@ -104,12 +100,11 @@ class RunEvidence:
                 ),
             )
             at += count
-        out, _ = roll(
-            self.model, moved, slots=slots, initial_speed=starting_speed(self.model, theta) + offsets[0]
-        )
-        if not np.isfinite(out).all():
+        speed = starting_speed(self.model, theta) + offsets[0]
+        simulated = simulate_run(self.model, moved, slots=slots, initial_speed=speed)
+        y = instrument_readings(self.model, moved, simulated)
+        if not np.isfinite(y).all():
             return np.full(len(self.nuisance), BROKEN)
-        y = instruments(self.model, moved, out)
         y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
         y[:, CHANNELS.index("pitch")] += offsets[3]
         return whiten(self.model.measured - y, self.rho, self.sigma) + self.nuisance @ offsets
@@ -145,19 +140,14 @@ def run_evidence(
     disturbance : prior of the disturbances
     slots : forms that belong to the base point
     """
-    substeps = SUBSTEPS
-    out, states = roll(model, base, slots=slots)
-    y = instruments(model, base, out)
-    coarse, coarse_states = roll(model, base, slots=slots, substeps=COARSE_SUBSTEPS)
-    coarse_y = instruments(model, base, coarse)
-    if np.sum(whiten(y - coarse_y, rho, sigma) ** 2) < STEADY:
-        substeps, out, states, y = COARSE_SUBSTEPS, coarse, coarse_states, coarse_y
+    simulated = simulate_run(model, base, slots=slots, keep_states=True)
+    y = instrument_readings(model, base, simulated)
 
     def slope(
         theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
     ) -> NDArray[np.float64]:
-        moved, _ = roll(model, theta, slots=(*slots, *extra), substeps=substeps, **options)
-        return (instruments(model, theta, moved) - y) / step
+        moved = simulate_run(model, theta, slots=(*slots, *extra), **options)
+        return (instrument_readings(model, theta, moved) - y) / step
 
     columns = [
         slope(base, 0.02, initial_speed=starting_speed(model, base) + 0.02),
@@ -181,7 +171,7 @@ def run_evidence(
                 spacing=spacing,
                 values=np.array([0.0, step, 0.0]),
             )
-            columns.append(slope(base, step, (slot,), start=(first, states, out)))
+            columns.append(slope(base, step, (slot,), branch=(first, simulated)))
     session = [
         slope(_moved(base, i, 0.5 * s), 0.5 * s)
         for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
@@ -219,7 +209,6 @@ def run_evidence(
         session_q=np.empty(0),
         library_q=np.empty(0),
         others_q=np.empty(0),
-        substeps=substeps,
     )
     return with_disturbance(evidence, tolerances, disturbance)
 

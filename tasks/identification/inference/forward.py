@@ -1,4 +1,4 @@
-"""What the model says the instruments of one run should read."""
+"""Readings of the instruments that the vehicle model predicts for one run."""
 
 from dataclasses import dataclass, replace
 
@@ -7,23 +7,22 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from tasks.campaign.campaign import CHANNELS, Run
-from tasks.campaign.gauge import at_rest
-from tasks.errors import InputError
-from tasks.identification.inference.rollout import CONSTANTS, N_STATES, OUTPUTS, drive
-from tasks.surface.friction import surface_friction
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
-from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, DISC_COOLING
-from tasks.vehicle.effects.library import ALL_PARAMETERS, PARAMETER_INDEX, parameter_vector
-from tasks.vehicle.effects.ports import PARAMETERS
-from tasks.vehicle.effects.slots import Slot, slot_tables
+from tasks.campaign.gauge import zero_pressure_at_rest
+from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
+from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import Weather, surface_state
+from tasks.vehicle.effects.grown import apply_effects
+from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, named_values
+from tasks.vehicle.model.brake_input import measured_trace
+from tasks.vehicle.model.chassis import Conditions
+from tasks.vehicle.model.simulation import Simulation, simulate
 from tasks.vehicle.parameters import Vehicle, surface_response
 
 MASKED_SPEED = 2.0
-"""Below it the pitch rule and the slip denominator are not force-consistent: runs end there [m/s]."""
-SUBSTEPS = 10
+"""Below it the slip's denominator is not force-consistent: runs end there [m/s]."""
+SUBSTEPS = 5
 """Integration steps between samples at 100 Hz; halving the step is a check of its own."""
-COARSE_SUBSTEPS = 5
-"""The same for the derivatives of runs that the longer step hardly changes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,17 +32,17 @@ class RunModel:
     Parameters
     ----------
     run : the measured run
-    constants : float64 [len(CONSTANTS)]
-    own : float64 [len(ALL_PARAMETERS)] effects that the vehicle has already: what is fitted comes on top
-    forms : forms that it has already
+    vehicle : the vehicle with what it has already: what is fitted comes on top
+    surface_friction : mu_c [1]
+    conditions : road feature, snow, direction and discs of the run
     samples : how many samples are used (to the masked speed)
     initial_speed : speed at the first sample, from the line through the speed before the brake [m/s]
     """
 
     run: Run
-    constants: NDArray[np.float64]
-    own: NDArray[np.float64]
-    forms: tuple[Slot, ...]
+    vehicle: Vehicle
+    surface_friction: float
+    conditions: Conditions
     samples: int
     initial_speed: float
 
@@ -54,178 +53,130 @@ class RunModel:
 
 
 def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunModel:
-    """Constants of a run: the vehicle, the surface by the weather mapping, the road and the discs.
+    """Return a run with its vehicle, its surface by the weather mapping, its road and its discs.
 
     Parameters
     ----------
     run : measured run
     vehicle : the model's vehicle
     surface : pavement of the surface mapping
-
-    Raises
-    ------
-    InputError
-        If the vehicle has effects that coupled mode alone knows.
     """
-    foreign = [
-        name for name, value in vehicle.effects.items() if value != 0.0 and name not in PARAMETER_INDEX
-    ]
-    if foreign:
-        raise InputError(
-            f"vehicle {vehicle.name} has effects that only coupled mode knows ({', '.join(foreign)}): no campaign can"
-            " be held against it; use the vehicle that it was grown from"
-        )
-    if vehicle.tyre is not None:
-        raise InputError(
-            f"vehicle {vehicle.name} names a tyre: identification knows the families' Burckhardt curves only"
-        )
     weather = Weather(
-        kind=run.weather,  # type: ignore[arg-type]
+        kind=run.weather,
         precipitation_mm_h=run.precipitation_mm_h,
         snow_accumulation_h=run.snow_accumulation_h,
     )
     state = surface_state(weather, surface)
-    mu_c = surface_friction(weather, state, surface)
-    response = surface_response(vehicle, run.weather, mu_c)
-    c1, c2, c3 = vehicle.families[run.weather].burckhardt
-    values = {
-        "sprung_mass": vehicle.sprung_mass,
-        "unsprung_mass_f": vehicle.unsprung_mass_f,
-        "unsprung_mass_r": vehicle.unsprung_mass_r,
-        "l_f": vehicle.cg_to_front_axle,
-        "l_r": vehicle.cg_to_rear_axle,
-        "cg_height": vehicle.cg_height,
-        "pitch_inertia": vehicle.pitch_inertia,
-        "spring_f": vehicle.suspension_stiffness_f,
-        "spring_r": vehicle.suspension_stiffness_r,
-        "damper_f": vehicle.suspension_damping_f,
-        "damper_r": vehicle.suspension_damping_r,
-        "tyre_stiffness_f": vehicle.tyre_stiffness_f,
-        "tyre_stiffness_r": vehicle.tyre_stiffness_r,
-        "radius": vehicle.wheel_radius,
-        "wheel_inertia_f": vehicle.wheel_inertia_f,
-        "wheel_inertia_r": vehicle.wheel_inertia_r,
-        "torque_gain": vehicle.brake_gain,
-        "front_share": vehicle.front_brake_share,
-        "gravity": vehicle.gravity,
-        "coast": vehicle.coast_deceleration,
-        "release_width": vehicle.abs_release_width,
-        "slip_floor": vehicle.slip_speed_floor,
-        "friction": response.tyre.peak,
-        "slip_scale": c2 * response.slip_stiffness / c2,
-        "pitch_scale": response.pitch_scale,
-        "c1": c1,
-        "c2": c2,
-        "c3": c3,
-        "disc_rise": run.disc_rise,
-        "disc_capacity_f": DISC_CAPACITY_F,
-        "disc_capacity_r": DISC_CAPACITY_R,
-        "disc_cooling": DISC_COOLING,
-        "hazard_center": run.hazard_center,
-        "hazard_length": run.hazard_length,
-        "hazard_height": run.hazard_height if run.hazard_length > 0 else 0.0,
-        "direction": float(run.direction),
-        "snow_depth_mm": state.snow_depth_mm,
-        "wet": float(run.weather == "rain"),
-    }
+    hazard = FLAT_ROAD
+    if run.hazard_length > 0:
+        hazard = RoadHazard(
+            center_m=run.hazard_center, length_m=run.hazard_length, height_m=run.hazard_height
+        )
     speed = run.response[:, CHANNELS.index("speed")]
     slow = np.flatnonzero(speed < MASKED_SPEED)
     pressed = np.flatnonzero(run.pressure > 0.1)
     lead = min(100, int(pressed[0])) if pressed.size else 100
     return RunModel(
-        run=replace(run, pressure=at_rest(run.pressure)),
-        constants=np.array([values[name] for name in CONSTANTS]),
-        own=parameter_vector({name: v for name, v in vehicle.effects.items() if name in PARAMETER_INDEX}),
-        forms=tuple(form.slot for form in vehicle.forms),
+        run=replace(run, pressure=zero_pressure_at_rest(run.pressure)),
+        vehicle=vehicle,
+        surface_friction=state.friction,
+        conditions=Conditions(
+            hazard=hazard, snow_depth_mm=state.snow_depth_mm, direction=run.direction, disc_rise=run.disc_rise
+        ),
         samples=int(slow[0]) if slow.size else len(speed),
         initial_speed=float(np.polyfit(np.arange(max(lead, 5)), speed[: max(lead, 5)], 1)[1]),
     )
 
 
 def starting_speed(model: RunModel, theta: NDArray[np.float64]) -> float:
-    """Speed at the first sample [m/s]: what the sensor read, less its scale error.
+    """Return the speed at the first sample: the reading less its scale error [m/s].
 
     Parameters
     ----------
     model : the run
-    theta : float64 [len(ALL_PARAMETERS)]
+    theta : float64 [len(EFFECT_TABLE)]
     """
     return model.initial_speed / (1.0 + float(theta[PARAMETER_INDEX["speed_scale"]]))
 
 
-def roll(
+def simulate_run(
     model: RunModel,
     theta: NDArray[np.float64],
     *,
     slots: tuple[Slot, ...] = (),
     initial_speed: float | None = None,
-    start: tuple[int, NDArray[np.float64], NDArray[np.float64]] | None = None,
+    branch: tuple[int, Simulation] | None = None,
     substeps: int = SUBSTEPS,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Simulate a run.
+    keep_states: bool = False,
+) -> Simulation:
+    """Simulate a run under its measured pressure.
 
     Parameters
     ----------
     model : the run
-    theta : float64 [len(ALL_PARAMETERS)] effects on top of the vehicle's own
+    theta : float64 [len(EFFECT_TABLE)] effects on top of the vehicle's own
     slots : forms on top of the vehicle's own
     initial_speed : replaces the model's [m/s]
-    start : sample, states and outputs of an earlier rollout to branch off from
+    branch : sample, and an earlier simulation with its states, to branch off from; what precedes is taken over
     substeps : integration steps between samples
-
-    Returns
-    -------
-    outputs float64 [samples, len(OUTPUTS)] and states float64 [samples, N_STATES]
+    keep_states : keep the states, from which other simulations can branch off
     """
-    motion = np.ascontiguousarray((model.own + theta)[: len(PARAMETERS)])
-    keys, grids, tables = slot_tables((*model.forms, *slots))
-    if start is None:
-        first, out, states = 0, np.zeros((model.samples, len(OUTPUTS))), np.zeros((model.samples, N_STATES))
-        v0 = starting_speed(model, theta) if initial_speed is None else initial_speed
-        omega = v0 / (
-            model.constants[CONSTANTS.index("radius")] * (1.0 + motion[PARAMETER_INDEX["wheel_radius"]])
-        )
-        states[0, :4] = v0, 0.0, omega, omega
-        states[0, 12] = model.run.pressure[0]
-        states[0, 13:15] = model.run.disc_rise
-    else:
-        first, out, states = start[0], start[2].copy(), start[1].copy()
-    drive(
-        model.constants, motion, model.run.pressure, model.run.interval, substeps, first, model.samples - first,
-        states, keys, grids, tables, out,
-    )  # fmt: skip
-    return out, states
+    values = named_values(theta)
+    car = apply_effects(model.vehicle, {n: v for n, v in values.items() if PARAMETERS[n].of_vehicle})
+    first = branch[0] if branch else 0
+    simulated = simulate(
+        car,
+        surface_response(car, model.run.weather, model.surface_friction),
+        measured_trace(model.run.pressure, model.run.interval),
+        replace(model.conditions, grade=values.get("slope", 0.0)),
+        samples=model.samples - first,
+        substeps=substeps,
+        interval=model.run.interval,
+        initial_speed=starting_speed(model, theta) if initial_speed is None else initial_speed,
+        start=branch[1].states[first] if branch else None,
+        slots=slots,
+        keep_states=keep_states,
+    )
+    if branch is None:
+        return simulated
+    return replace(simulated, history=np.concatenate((branch[1].history[:first], simulated.history)))
 
 
-def instruments(model: RunModel, theta: NDArray[np.float64], out: NDArray[np.float64]) -> NDArray[np.float64]:
+def instrument_readings(
+    model: RunModel, theta: NDArray[np.float64], simulated: Simulation
+) -> NDArray[np.float64]:
     """Channels as the instruments give them: gravity along a grade is felt, sensor effects applied.
 
     Parameters
     ----------
     model : the run
-    theta : float64 [len(ALL_PARAMETERS)]
-    out : float64 [samples, len(OUTPUTS)] of `roll`
+    theta : float64 [len(EFFECT_TABLE)]
+    simulated : by `simulate_run`
 
     Returns
     -------
     float64 [samples, 7] in the order and units of `CHANNELS`
     """
-    g = float(model.constants[CONSTANTS.index("gravity")])
-    e = dict(zip(ALL_PARAMETERS[len(PARAMETERS) :], theta[len(PARAMETERS) :], strict=True))
-    felt = out[:, 1] + g * theta[PARAMETER_INDEX["slope"]] * model.run.direction
-    up = out[:, 6]
-    tilt = e["mount_tilt"]
-    ax = (felt - e["gravity_leak"] * g * np.sin(out[:, 4]) + tilt * (g + up)) * (
-        1.0 + e["acceleration_scale"]
+    g = model.vehicle.gravity
+    e = {
+        name: float(theta[PARAMETER_INDEX[name]]) for name, row in PARAMETERS.items() if row.port == "sensor"
+    }
+    speed, pitch, pitch_rate = (simulated.column(name) for name in ("speed", "pitch", "pitch_rate"))
+    felt = (
+        simulated.column("longitudinal_acceleration")
+        + g * theta[PARAMETER_INDEX["slope"]] * model.run.direction
     )
+    up = simulated.column("heave_acceleration")
+    tilt = e["mount_tilt"]
+    ax = (felt - e["gravity_leak"] * g * np.sin(pitch) + tilt * (g + up)) * (1.0 + e["acceleration_scale"])
     y = np.column_stack(
         (
-            out[:, 0] * (1.0 + e["speed_scale"]),
+            speed * (1.0 + e["speed_scale"]),
             ax,
-            out[:, 2] * (1.0 + e["wheel_speed_scale"]),
-            out[:, 3] * (1.0 + e["wheel_speed_scale"]),
-            np.degrees(out[:, 4]) * (1.0 + e["pitch_scale"]),
-            np.degrees(out[:, 5]) * (1.0 + e["pitch_rate_scale"]),
+            simulated.column("wheel_speed_f") * (1.0 + e["wheel_speed_scale"]),
+            simulated.column("wheel_speed_r") * (1.0 + e["wheel_speed_scale"]),
+            np.degrees(pitch) * (1.0 + e["pitch_scale"]),
+            np.degrees(pitch_rate) * (1.0 + e["pitch_rate_scale"]),
             (up - tilt * felt) * (1.0 + e["vertical_scale"]),
         )
     )
@@ -252,5 +203,5 @@ def instruments(model: RunModel, theta: NDArray[np.float64], out: NDArray[np.flo
 def predict(
     model: RunModel, theta: NDArray[np.float64], *, slots: tuple[Slot, ...] = (), substeps: int = SUBSTEPS
 ) -> NDArray[np.float64]:
-    """Predicted channels of a run, float64 [samples, 7]; arguments as in `roll`."""
-    return instruments(model, theta, roll(model, theta, slots=slots, substeps=substeps)[0])
+    """Return the predicted channels of a run, float64 [samples, 7]; arguments as in `simulate_run`."""
+    return instrument_readings(model, theta, simulate_run(model, theta, slots=slots, substeps=substeps))

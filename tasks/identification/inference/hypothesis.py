@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.inference.evidence import SESSION_INDEX
-from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import EFFECT_TABLE
 
 Build = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], tuple[Slot, ...]]]
 
@@ -45,7 +46,7 @@ def library_hypothesis(effect: Effect, start: float | None = None, second: float
     indices = [p.index for p in effect.parameters]
 
     def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
-        theta = np.zeros(len(ALL_PARAMETERS))
+        theta = np.zeros(len(EFFECT_TABLE))
         theta[indices] = values
         return theta, ()
 
@@ -73,7 +74,7 @@ def compose(
     parts: tuple[Hypothesis, ...], values: NDArray[np.float64], session: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
     """Full theta and slots of all parts together with the session's nuisances."""
-    theta = np.zeros(len(ALL_PARAMETERS))
+    theta = np.zeros(len(EFFECT_TABLE))
     theta[list(SESSION_INDEX)] += session
     slots: tuple[Slot, ...] = ()
     at = 0

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from tasks.campaign.campaign import Campaign, Tolerances
-from tasks.campaign.gauge import braking_pressure
+from tasks.campaign.gauge import denoise_pressure
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance, prior_precision
 from tasks.identification.inference.evidence import RunEvidence, run_evidence, with_disturbance
@@ -16,7 +16,8 @@ from tasks.identification.inference.forward import SUBSTEPS, RunModel, predict, 
 from tasks.identification.inference.hypothesis import compose
 from tasks.identification.inference.noise import channel_noise, whiten
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.effects.library import ALL_PARAMETERS, Effect
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.effects.table import EFFECT_TABLE
 from tasks.vehicle.parameters import Vehicle
 
 TORN = 100.0
@@ -38,9 +39,9 @@ def prepare(
     effects : the library of candidates
     """
     rho, sigma = channel_noise(campaign)
-    plain = np.zeros(len(ALL_PARAMETERS))
+    plain = np.zeros(len(EFFECT_TABLE))
     guess = Disturbance()
-    runs = [replace(run, pressure=braking_pressure(run.pressure)) for run in campaign.runs]
+    runs = [replace(run, pressure=denoise_pressure(run.pressure)) for run in campaign.runs]
     models = [run_model(run, vehicle, surface) for run in runs]
     used: list[str] = []
 
@@ -70,7 +71,7 @@ def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.flo
     model : the run
     rho, sigma : channel noise
     """
-    plain = np.zeros(len(ALL_PARAMETERS))
+    plain = np.zeros(len(EFFECT_TABLE))
     change = predict(model, plain) - predict(model, plain, substeps=2 * SUBSTEPS)
     return float(np.sum(whiten(change, rho, sigma) ** 2))
 

@@ -1,8 +1,8 @@
 """The same views drawn by gsplat 1.5 (Apache-2.0) on a CUDA device.
 
 gsplat compiles its kernels with nvcc at first use. It blends colours that are evaluated before, here
-three of light and three of the normal, and expected depth; class and surface depth are found from the
-list of (Gaussian, pixel) pairs that it can return.
+three of light and three of the normal, and expected depth. Class and surface depth are computed from the
+list of (Gaussian, pixel) pairs that it returns.
 """
 
 from dataclasses import dataclass
@@ -139,7 +139,7 @@ class GsplatBackend:
         )
 
     def _front(self, splats: dict[str, Any], width: int, height: int) -> torch.Tensor:
-        """Gaussian at which each pixel's transmittance falls below one half, -1 where none does; [H, W]."""
+        """Return the Gaussian at which each pixel's transmittance falls below one half, -1 for none; [H, W]."""
         gaussian, pixel, _ = gsplat.rasterize_to_indices_in_range(
             0,
             _EVERY_BATCH,
@@ -168,7 +168,7 @@ class GsplatBackend:
 
 
 def first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
-    """Which splats bring their pixel's transmittance from one half or more to less.
+    """Return the splats that bring their pixel's transmittance from one half or more to less.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
     front = behind - opaqueness
     starts = torch.ones_like(pixel, dtype=torch.bool)
     starts[1:] = pixel[1:] != pixel[:-1]
-    # What had gathered before the pixel's own first splat.
+    # The sum before the pixel's own first splat.
     before = front[starts][torch.cumsum(starts, dim=0) - 1]
     half = np.log(2.0)
     return (front - before <= half) & (behind - before > half)

@@ -55,7 +55,7 @@ class Course:
         return np.stack([x * cos - y * sin, x * sin + y * cos, z], axis=1)
 
 
-def course(layout: StreetLayout) -> Course:
+def integrate_course(layout: StreetLayout) -> Course:
     """Integrate the curvature, which grows smoothly from nothing to that of the bend, and again beyond the route."""
     first, last = layout.station_range
     n = round((last - first + 2 * _MARGIN) / _STEP) + 1
@@ -63,12 +63,12 @@ def course(layout: StreetLayout) -> Course:
     curvature = _grown(station - layout.bend_start, layout.bend_transition) / layout.bend_radius
     beyond = _grown(station - layout.route_length, layout.bend_transition)
     curvature += beyond * (1 / layout.end_radius - 1 / layout.bend_radius)
-    heading = _integral(curvature)
-    x, y = _integral(np.cos(heading)), _integral(np.sin(heading))
+    heading = _cumulative_integral(curvature)
+    x, y = _cumulative_integral(np.cos(heading)), _cumulative_integral(np.sin(heading))
     return Course(station=station, x=x - np.interp(0.0, station, x), y=y, heading=heading)
 
 
-def route(layout: StreetLayout, line: Course) -> Route:
+def lay_route(layout: StreetLayout, line: Course) -> Route:
     """Rig poses every half metre along the lane's middle."""
     station = np.linspace(0.0, layout.route_length, round(layout.route_length / _ROUTE_STEP) + 1)
     heading = line.heading_at(station)
@@ -86,5 +86,5 @@ def _grown(distance: NDArray[np.float64], length: float) -> NDArray[np.float64]:
     return t * t * (3 - 2 * t)
 
 
-def _integral(rate: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cumulative_integral(rate: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * _STEP

@@ -79,7 +79,7 @@ def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: 
     direct = np.zeros(len(point))
     lit = np.flatnonzero(facing > 0)
     direct[lit] = facing[lit] * _sun_share(point[lit], to_sun[lit], casters)
-    openness = surfels.openness[order] * _clearance(point, casters.footprints)
+    openness = surfels.openness[order] * _ambient_share(point, casters.footprints)
     sky = sky_share(point, normal, layout) * openness
     around = (1 - sky) * (0.25 + 0.75 * openness)
     light = (
@@ -122,11 +122,11 @@ def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
     return cross * across + (1 - cross) * along
 
 
-def _clearance(point: Floats, footprints: Floats) -> Floats:
+def _ambient_share(point: Floats, footprints: Floats) -> Floats:
     """Share of the ambient light that gets past parked cars to ground points sorted by station; float64 [N] [1]."""
     clear = np.ones(len(point))
     for low, high in footprints:
-        near = _window(point[:, 0], low[0] - 1.5, high[0] + 1.5)
+        near = _station_slice(point[:, 0], low[0] - 1.5, high[0] + 1.5)
         p = point[near]
         outside = np.maximum(np.maximum(low - p[:, :2], p[:, :2] - high), 0.0)
         shade = 1 - 0.88 * np.exp(-np.hypot(outside[:, 0], outside[:, 1]) / 0.28)
@@ -140,7 +140,7 @@ def _sun_share(point: Floats, to_sun: Floats, casters: Casters) -> Floats:
     lean = np.abs(to_sun[:, :2]).max(axis=0) / to_sun[0, 2]
     open_sun = np.ones(len(point))
     for low, high in casters.boxes:
-        near = _window(station, low[0] - lean[0] * high[2], high[0] + lean[0] * high[2])
+        near = _station_slice(station, low[0] - lean[0] * high[2], high[0] + lean[0] * high[2])
         p, l = point[near], to_sun[near]
         with np.errstate(divide="ignore"):
             a, b = (low - p) / l, (high - p) / l
@@ -150,7 +150,7 @@ def _sun_share(point: Floats, to_sun: Floats, casters: Casters) -> Floats:
     for balls in casters.balls:
         reach = balls[:, 3].max()
         low, high = balls[:, :3].min(axis=0) - reach, balls[:, :3].max(axis=0) + reach
-        near = _window(station, low[0] - lean[0] * high[2], high[0] + lean[0] * high[2])
+        near = _station_slice(station, low[0] - lean[0] * high[2], high[0] + lean[0] * high[2])
         p, l = point[near], to_sun[near]
         with np.errstate(divide="ignore"):
             a, b = (low - p) / l, (high - p) / l
@@ -168,6 +168,6 @@ def _sun_share(point: Floats, to_sun: Floats, casters: Casters) -> Floats:
     return open_sun
 
 
-def _window(station: Floats, low: float, high: float) -> slice:
+def _station_slice(station: Floats, low: float, high: float) -> slice:
     start, stop = np.searchsorted(station, [low, high])
     return slice(int(start), int(stop))

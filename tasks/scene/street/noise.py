@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 _LATTICE = 256
 
 
-def stream(seed: int, name: str) -> np.random.Generator:
+def named_generator(seed: int, name: str) -> np.random.Generator:
     """A counter-based generator of its own for one named part of the street.
 
     Parameters
@@ -38,7 +38,7 @@ def fractal_noise(
         lattice = rng.standard_normal((_LATTICE, _LATTICE))
         u, v = x / wavelength * 2**octave, y / wavelength * 2**octave
         i, j = np.floor(u).astype(np.int64), np.floor(v).astype(np.int64)
-        a, b = _ease(u - i), _ease(v - j)
+        a, b = smooth_step(u - i), smooth_step(v - j)
         i0, j0, i1, j1 = i % _LATTICE, j % _LATTICE, (i + 1) % _LATTICE, (j + 1) % _LATTICE
         low = lattice[i0, j0] * (1 - a) + lattice[i1, j0] * a
         high = lattice[i0, j1] * (1 - a) + lattice[i1, j1] * a
@@ -47,5 +47,5 @@ def fractal_noise(
     return total / np.sqrt(power)
 
 
-def _ease(t: NDArray[np.float64]) -> NDArray[np.float64]:
+def smooth_step(t: NDArray[np.float64]) -> NDArray[np.float64]:
     return t * t * (3 - 2 * t)

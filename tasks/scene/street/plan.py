@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.scene.street.layout import StreetLayout
-from tasks.scene.street.noise import stream
+from tasks.scene.street.noise import named_generator
 
 Roof = Literal["flat", "pitched", "mansard"]
 
@@ -134,12 +134,12 @@ def plan_street(layout: StreetLayout, seed: int) -> Plan:
     )
     buildings = tuple(b for side in (-1, 1) for b in _row_of_houses(layout, seed, side))
     trees = tuple(t for side in (-1, 1) for t in _row_of_trees(layout, seed, side, lamps))
-    cars = tuple(c for side in (-1, 1) for c in _parked(layout, seed, side))
+    cars = tuple(c for side in (-1, 1) for c in _park_cars(layout, seed, side))
     return Plan(buildings=buildings, trees=trees, cars=cars, lamps=lamps)
 
 
 def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]:
-    rng = stream(seed, f"houses {side}")
+    rng = named_generator(seed, f"houses {side}")
     first, last = layout.station_range
     houses: list[Building] = []
     station, storeys = first - rng.uniform(0, 8), 4
@@ -175,14 +175,14 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
 def _row_of_trees(
     layout: StreetLayout, seed: int, side: int, lamps: tuple[tuple[float, int], ...]
 ) -> list[Tree]:
-    rng = stream(seed, f"trees {side}")
+    rng = named_generator(seed, f"trees {side}")
     first, last = layout.station_range
     posts = np.array([s for s, post_side in lamps if post_side == side])
     lateral = layout.kerb(side) + side * (layout.kerb_width + 0.75)
     trees: list[Tree] = []
     for slot in np.arange(first + 4.0, last, layout.tree_spacing):
         station = float(slot + rng.uniform(-1.5, 1.5))
-        crown = _crown(rng, station, lateral, layout)
+        crown = _draw_crown(rng, station, lateral, layout)
         girth = float(rng.uniform(0.11, 0.17))
         near_crossing = -9.0 < station - layout.crossing_station < layout.crossing_length + 2.0
         if rng.random() < 0.12 or near_crossing or np.abs(posts - station).min(initial=np.inf) < 2.0:
@@ -192,7 +192,7 @@ def _row_of_trees(
     return trees
 
 
-def _crown(
+def _draw_crown(
     rng: np.random.Generator, station: float, lateral: float, layout: StreetLayout
 ) -> NDArray[np.float64]:
     """Balls of leaves that fill an egg: the big ones within, smaller ones around."""
@@ -208,8 +208,8 @@ def _crown(
     return np.concatenate([centre, size[:, None] * radius / 1.5], axis=1)
 
 
-def _parked(layout: StreetLayout, seed: int, side: int) -> list[Car]:
-    rng = stream(seed, f"cars {side}")
+def _park_cars(layout: StreetLayout, seed: int, side: int) -> list[Car]:
+    rng = named_generator(seed, f"cars {side}")
     first, last = layout.station_range
     lateral = layout.kerb(side) - side * (layout.parking_width / 2 - 0.12)
     cars: list[Car] = []

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
@@ -58,3 +59,42 @@ def slot_tables(slots: Sequence[Slot]) -> SlotTables:
         table[:] = slot.values[-1]
         table[: len(slot.values)] = slot.values
     return SlotTables(keys.reshape(-1, 2), grids.reshape(-1, 2), tables)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def table_value(table: NDArray[np.float64], origin: float, spacing: float, x: float) -> float:
+    """Value of a piecewise-linear table on a uniform grid, held constant beyond its ends [unit of the port].
+
+    Parameters
+    ----------
+    table : float64 [K] values
+    origin, spacing : of the grid [unit of the variable]
+    x : the variable
+    """
+    last = table.shape[0] - 1
+    u = (x - origin) / spacing
+    if u <= 0.0:
+        return float(table[0])
+    if u >= last:
+        return float(table[last])
+    i = int(u)
+    return float(table[i] + (u - i) * (table[i + 1] - table[i]))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def slot_sum(port: int, variables: tuple[float, ...], slots: SlotTables) -> float:
+    """Sum of all slots at a port [unit of the port].
+
+    Parameters
+    ----------
+    port : position in `PORTS`
+    variables : what slots can depend on, in the order of `VARIABLES`
+    slots : the tables
+    """
+    total = 0.0
+    for k in range(slots.keys.shape[0]):
+        if slots.keys[k, 0] == port:
+            total += table_value(
+                slots.tables[k], slots.grids[k, 0], slots.grids[k, 1], variables[slots.keys[k, 1]]
+            )
+    return total

@@ -6,19 +6,17 @@ from numba import njit
 
 from tasks.vehicle.brake import abs_command, abs_update
 from tasks.vehicle.effects.brake_line import acting_pressure
-from tasks.vehicle.effects.chassis import ChassisEffects, effective_friction, grip_reserve, stick_share
-from tasks.vehicle.effects.exact import friction_factor, slot_sum
-from tasks.vehicle.effects.ports import INDEX, PORTS
-from tasks.vehicle.effects.slots import SlotTables
+from tasks.vehicle.effects.chassis import effective_friction, grip_reserve, stick_share
+from tasks.vehicle.effects.equations import friction_factor
+from tasks.vehicle.effects.ports import PORTS
+from tasks.vehicle.effects.slots import SlotTables, slot_sum
+from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Instant
 from tasks.vehicle.model.vertical_ports import Ground, Strut
 from tasks.vehicle.paper.wheels import Wheels
 from tasks.vehicle.tyres.contract import Tyre
 
-_PAD, _ROLL, _ROLL_SPEED, _RELAXATION = (
-    INDEX[name] for name in ("pad_drag", "rolling_coefficient", "rolling_speed", "relaxation_length")
-)
 _BRAKE_FORM, _FRICTION_FORM = PORTS.index("brake_torque"), PORTS.index("friction")
 Senses = tuple[float, float, float, float, float, float, float, float, float]
 """What a form can depend on, in the order of `VARIABLES`."""
@@ -55,7 +53,7 @@ class AxlePorts(NamedTuple):
     ground_moment: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
     """Braking slip that is negative for a driven wheel, within [-1, 1]; ISO 8855's is its negative [1].
 
@@ -68,8 +66,8 @@ def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
     return min(max((speed - rim_speed) / max(speed, speed_floor), -1.0), 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def signed_friction(slip: float, load: float, share: float, tyre: Tyre, effects: ChassisEffects) -> float:
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def signed_friction(slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues) -> float:
     """Friction of the tyre, continued oddly to driving slip [1].
 
     Parameters
@@ -78,13 +76,13 @@ def signed_friction(slip: float, load: float, share: float, tyre: Tyre, effects:
     load : of the axle [N]
     share : of the tyre that sticks [1]
     tyre : on the surface
-    effects : the numbers
+    effects : the values
     """
     friction = effective_friction(abs(slip), load, share, tyre, effects)
     return friction if slip >= 0.0 else -friction
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def lock_share(omega: float, lock_speed: float) -> float:
     """Share of the brake torque that friction gives at a wheel speed: all of it, save around standstill [1].
 
@@ -96,7 +94,7 @@ def lock_share(omega: float, lock_speed: float) -> float:
     return min(max(omega / lock_speed, -1.0), 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def senses_of(speed: float, load_ratio: float, strut: Strut, memory: AxleMemory, instant: Instant) -> Senses:
     """What a form at an axle can depend on, in the order of `VARIABLES`.
 
@@ -112,7 +110,7 @@ def senses_of(speed: float, load_ratio: float, strut: Strut, memory: AxleMemory,
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
     """How fast the slip that builds up force follows the slip: v / length; 0 where it does at once [1/s].
 
@@ -125,7 +123,7 @@ def relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
     return max(speed, speed_floor) / length if length > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def rolling_axle(
     ground: Ground,
     strut: Strut,
@@ -160,25 +158,25 @@ def rolling_axle(
     forms : what no effect of the library has
     chassis, tyre : the values
     """
-    wheels, effects, theta = chassis.wheels, chassis.effects, chassis.theta
+    wheels, effects = chassis.wheels, chassis.effects
     slip = signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
-    force_slip = memory.slip if theta[_RELAXATION] > 0.0 else slip
+    force_slip = memory.slip if effects.relaxation_length > 0.0 else slip
     load_ratio = ground.load / static_load
-    grip = friction_factor(theta, speed, load_ratio, memory.slip_heat, chassis.wet)
-    pressure = acting_pressure(instant.pressure, speed, memory.disc_rise, theta)
+    grip = friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet)
+    pressure = acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
     if forms is not None:
         senses = senses_of(speed, load_ratio, strut, memory, instant)
-        grip *= max(1.0 + slot_sum(_FRICTION_FORM, senses, forms.keys, forms.grids, forms.tables), 0.0)
-        pressure *= max(1.0 + slot_sum(_BRAKE_FORM, senses, forms.keys, forms.grids, forms.tables), 0.0)
+        grip *= max(1.0 + slot_sum(_FRICTION_FORM, senses, forms), 0.0)
+        pressure *= max(1.0 + slot_sum(_BRAKE_FORM, senses, forms), 0.0)
     sticking = stick_share(speed, effects)
     tyre_force = signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
     wanted = abs_command(slip, tyre.target_slip, wheels.release_width) if speed >= effects.abs_cutoff else 1.0
     abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
     turning = lock_share(omega, chassis.lock_speed)
-    rubbing = theta[_PAD] / (wheels.front.brake_gain + wheels.rear.brake_gain)
+    rubbing = effects.pad_drag / (wheels.front.brake_gain + wheels.rear.brake_gain)
     brake_torque = gain * (pressure * abs_scale + rubbing) * turning
     lever = wheels.radius - effects.radius_by_load * (ground.load - static_load) / stiffness
-    rolling = theta[_ROLL] + theta[_ROLL_SPEED] * speed
+    rolling = effects.rolling_coefficient + effects.rolling_speed * speed
     offset = rolling * turning - effects.slope_moment * ground.slope
     ground_moment = ground.load * lever * offset
     return AxlePorts(
@@ -187,7 +185,7 @@ def rolling_axle(
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
     """The ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 
@@ -212,7 +210,7 @@ def standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def with_links(ports: AxlePorts, force: float) -> AxlePorts:
     """The same ports with a force of the links in parallel to spring and damper.
 
@@ -227,7 +225,7 @@ def with_links(ports: AxlePorts, force: float) -> AxlePorts:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def reserve_of(ports: AxlePorts, tyre: Tyre) -> float:
     """Sideways grip that an axle has left; none off the road [1].
 

@@ -1,12 +1,33 @@
-"""The vehicle on its surface as the kernels of coupled mode take it."""
+"""The vehicle on its surface as the kernels of the model take it."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from tasks.vehicle.effects.chassis import ChassisEffects
-from tasks.vehicle.effects.numbers import effect_numbers
+from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
+from tasks.vehicle.effects.table import EffectValues, effect_values
 from tasks.vehicle.half_car import HalfCar, half_car
 from tasks.vehicle.paper.wheels import Wheels, wheels_of
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """Conditions of a run, beside its surface.
+
+    Parameters
+    ----------
+    hazard : road feature
+    snow_depth_mm : of the snow on the road [mm]
+    grade : rise of the road along the route [1]
+    direction : +1 along the route, -1 against it
+    disc_rise : temperature of the discs above ambient at the start [K]
+    """
+
+    hazard: RoadHazard = FLAT_ROAD
+    snow_depth_mm: float = 0.0
+    grade: float = 0.0
+    direction: int = 1
+    disc_rise: float = 0.0
 
 
 class Chassis(NamedTuple):
@@ -19,10 +40,11 @@ class Chassis(NamedTuple):
     lever : height of the body's centre of gravity above the wheel centres [m]
     lock_speed : wheel speed below which brake friction is proportional to it [rad/s]
     transfer : height of the centre of gravity over the wheelbase [1]
-    theta : the library's effects in the order of `PARAMETERS`; a tuple, for arrays are counted at every call
-    effects : those of coupled mode alone
+    effects : values of its effects; a tuple, for arrays are counted at every call
     wet : 1 on a wet road, else 0 [1]
     snow_depth_mm : of the snow on it [mm]
+    direction : +1 along the route, -1 against it; the wind blows along the route [1]
+    climb : deceleration by the grade [m/s2]
     """
 
     body: HalfCar
@@ -30,14 +52,15 @@ class Chassis(NamedTuple):
     lever: float
     lock_speed: float
     transfer: float
-    theta: tuple[float, ...]
-    effects: ChassisEffects
+    effects: EffectValues
     wet: float
     snow_depth_mm: float
+    direction: float
+    climb: float
 
 
-def chassis_of(vehicle: Vehicle, response: SurfaceResponse, snow_depth_mm: float) -> Chassis:
-    """The coupled model's values of a vehicle on a surface.
+def chassis_of(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditions) -> Chassis:
+    """Return the model's values of a vehicle on a surface.
 
     ``cg_height`` is that of the whole vehicle; the axles' centres of gravity are at wheel height.
 
@@ -45,19 +68,19 @@ def chassis_of(vehicle: Vehicle, response: SurfaceResponse, snow_depth_mm: float
     ----------
     vehicle : the vehicle
     response : its tyres on the surface
-    snow_depth_mm : of the snow on the road [mm]
+    conditions : of the run
     """
     axles = vehicle.unsprung_mass_f + vehicle.unsprung_mass_r
     body_height = (vehicle.mass * vehicle.cg_height - axles * vehicle.wheel_radius) / vehicle.sprung_mass
-    theta, effects = effect_numbers(vehicle.effects)
     return Chassis(
         body=half_car(vehicle),
         wheels=wheels_of(vehicle),
         lever=body_height - vehicle.wheel_radius,
         lock_speed=vehicle.lock_speed,
         transfer=vehicle.cg_height / vehicle.wheelbase,
-        theta=tuple(theta.tolist()),
-        effects=effects,
+        effects=effect_values(vehicle.effects),
         wet=float(response.wet),
-        snow_depth_mm=snow_depth_mm,
+        snow_depth_mm=float(conditions.snow_depth_mm),
+        direction=float(conditions.direction),
+        climb=vehicle.gravity * conditions.grade * conditions.direction,
     )

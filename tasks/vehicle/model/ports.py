@@ -9,9 +9,9 @@ from typing import NamedTuple
 from numba import njit
 
 from tasks.vehicle.effects.chassis import link_lift, stick_share
-from tasks.vehicle.effects.exact import resistance, slot_sum
-from tasks.vehicle.effects.ports import INDEX, PORTS
-from tasks.vehicle.effects.slots import SlotTables
+from tasks.vehicle.effects.equations import resistance
+from tasks.vehicle.effects.ports import PORTS
+from tasks.vehicle.effects.slots import SlotTables, slot_sum
 from tasks.vehicle.half_car import HalfCarState
 from tasks.vehicle.model.axle_ports import (
     AxlePorts,
@@ -27,13 +27,6 @@ from tasks.vehicle.model.vertical_ports import ground_at, struts_at
 from tasks.vehicle.road import RoadFeature
 from tasks.vehicle.tyres.contract import Tyre
 
-_ENGINE, _ENGINE_SPEED, _BIAS, _DIVE, _LIFT, _PITCH, _AERO_PITCH, _AERO_LIFT = (
-    INDEX[name]
-    for name in (
-        "engine_torque", "engine_viscous", "bias_pressure", "anti_dive", "anti_lift", "pitch_gain", "aero_pitch",
-        "aero_lift",
-    )
-)  # fmt: skip
 _FORCE_FORM, _PITCH_FORM, _STRUT_FORM = (
     PORTS.index(port) for port in ("longitudinal_force", "pitch_moment", "suspension_force")
 )
@@ -61,7 +54,7 @@ class Ports(NamedTuple):
     lift: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float]:
     """Brake torque per pressure of the front and the rear axle, of which neither is negative [N m/MPa].
 
@@ -71,11 +64,11 @@ def brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float]:
     chassis : the values
     """
     front, rear = chassis.wheels.front.brake_gain, chassis.wheels.rear.brake_gain
-    moved = min(max(chassis.theta[_BIAS] * pressure * (front + rear), -front), rear)
+    moved = min(max(chassis.effects.bias_pressure * pressure * (front + rear), -front), rear)
     return front + moved, rear - moved
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def ports_at(
     motion: Motion,
     memory: Memory,
@@ -104,7 +97,7 @@ def ports_at(
     forms : what no effect of the library has
     chassis, tyre, road : the values
     """
-    body, wheels, effects, theta = chassis.body, chassis.wheels, chassis.effects, chassis.theta
+    body, wheels, effects = chassis.body, chassis.wheels, chassis.effects
     speed, standing = motion.speed, instant.standing
     ground_f = ground_at(motion.station, speed, x[2], x[6], body.tyre_f, body.static_f, road, effects)
     behind = motion.station - wheels.wheelbase
@@ -114,7 +107,7 @@ def ports_at(
         front, rear = standing_axle(ground_f, strut_f, wheels), standing_axle(ground_r, strut_r, wheels)
     else:
         gain_f, gain_r = brake_gains(instant.pressure, chassis)
-        engine = theta[_ENGINE] + theta[_ENGINE_SPEED] * motion.omega_f
+        engine = effects.engine_torque + effects.engine_viscous * motion.omega_f
         front = rolling_axle(
             ground_f, strut_f, speed, motion.omega_f, memory.front, scale_f, gain_f, engine, body.static_f,
             body.tyre_f, step, instant, forms, chassis, tyre,
@@ -124,30 +117,31 @@ def ports_at(
             body.tyre_r, step, instant, forms, chassis, tyre,
         )  # fmt: skip
     share = 0.0 if standing else stick_share(speed, effects)
-    lift_f = link_lift(front.tyre_force, chassis.transfer, theta[_DIVE], effects.stick_anti_dive, share)
-    lift_r = link_lift(rear.tyre_force, chassis.transfer, theta[_LIFT], effects.stick_anti_lift, share)
+    lift_f = link_lift(front.tyre_force, chassis.transfer, effects.anti_dive, effects.stick_anti_dive, share)
+    lift_r = link_lift(rear.tyre_force, chassis.transfer, effects.anti_lift, effects.stick_anti_lift, share)
     if effects.scrub_stiffness != 0.0 and not standing:
         scrub = effects.scrub_stiffness * (1.0 - share)
         lift_f -= scrub * body.spring_f * strut_f.travel * reserve_of(front, tyre)
         lift_r += scrub * body.spring_r * strut_r.travel * reserve_of(rear, tyre)
     slope_f, slope_r = ground_f.load * ground_f.slope, ground_r.load * ground_r.slope
-    drag = wheels.mass * wheels.coast + resistance(theta, speed, 1.0, 0.0, chassis.snow_depth_mm)
-    moment = theta[_AERO_PITCH] * speed * speed
+    drag = wheels.mass * wheels.coast + resistance(effects, speed, chassis.direction, chassis.snow_depth_mm)
+    drag += wheels.mass * chassis.climb
+    moment = effects.aero_pitch * speed * speed
     if forms is not None:
         senses_f = senses_of(speed, ground_f.load / body.static_f, strut_f, memory.front, instant)
         senses_r = senses_of(speed, ground_r.load / body.static_r, strut_r, memory.rear, instant)
-        lift_f -= slot_sum(_STRUT_FORM, senses_f, forms.keys, forms.grids, forms.tables)
-        lift_r += slot_sum(_STRUT_FORM, senses_r, forms.keys, forms.grids, forms.tables)
-        drag += slot_sum(_FORCE_FORM, senses_f, forms.keys, forms.grids, forms.tables)
-        moment += slot_sum(_PITCH_FORM, senses_f, forms.keys, forms.grids, forms.tables)
+        lift_f -= slot_sum(_STRUT_FORM, senses_f, forms)
+        lift_r += slot_sum(_STRUT_FORM, senses_r, forms)
+        drag += slot_sum(_FORCE_FORM, senses_f, forms)
+        moment += slot_sum(_PITCH_FORM, senses_f, forms)
     front, rear = with_links(front, -lift_f), with_links(rear, lift_r)
     acceleration = 0.0
     if not (standing or instant.held):
         acceleration = -(front.tyre_force + rear.tyre_force + slope_f + slope_r + drag) / wheels.mass
-    link_f = front.tyre_force + slope_f + body.unsprung_f * acceleration
-    link_r = rear.tyre_force + slope_r + body.unsprung_r * acceleration
+    link_f = front.tyre_force + slope_f + body.unsprung_f * (acceleration + chassis.climb)
+    link_r = rear.tyre_force + slope_r + body.unsprung_r * (acceleration + chassis.climb)
     braking = (link_f + link_r) * chassis.lever + front.brake_torque + rear.brake_torque + front.shaft_torque
-    moment += braking * (1.0 + theta[_PITCH])
+    moment += braking * (1.0 + effects.pitch_gain)
     return Ports(
-        front, rear, -slope_f - slope_r, drag, acceleration, moment, theta[_AERO_LIFT] * speed * speed
+        front, rear, -slope_f - slope_r, drag, acceleration, moment, effects.aero_lift * speed * speed
     )

@@ -6,7 +6,6 @@ from typing import NamedTuple
 from numba import njit
 
 from tasks.vehicle.effects.chassis import effective_slope, stick_share
-from tasks.vehicle.effects.ports import INDEX
 from tasks.vehicle.model.axle_ports import AxlePorts, lock_share, relaxation_rate
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Memory, Motion
@@ -15,7 +14,6 @@ from tasks.vehicle.tyres.contract import Tyre
 
 GAMMA = 1.0 - sqrt(0.5)
 """Coefficient of ROS2 that makes it damp what is stiff."""
-_RELAXATION = INDEX["relaxation_length"]
 
 
 class AxleSlope(NamedTuple):
@@ -44,7 +42,7 @@ class AxleSlope(NamedTuple):
     slip_share: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def axle_slope(
     ports: AxlePorts,
     motion: Motion,
@@ -71,7 +69,7 @@ def axle_slope(
     slip_per_speed = (
         (1.0 - ports.slip) / motion.speed if motion.speed > wheels.speed_floor else 1.0 / wheels.speed_floor
     )
-    following = relaxation_rate(motion.speed, wheels.speed_floor, chassis.theta[_RELAXATION])
+    following = relaxation_rate(motion.speed, wheels.speed_floor, chassis.effects.relaxation_length)
     force, torque, locking = 0.0, 0.0, 0.0
     if abs(ports.slip) < 1.0:
         share = stick_share(motion.speed, chassis.effects)
@@ -103,7 +101,7 @@ def axle_slope(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def without_speed(slope: AxleSlope) -> AxleSlope:
     """The same derivatives while the speed is held from outside."""
     return AxleSlope(
@@ -112,7 +110,7 @@ def without_speed(slope: AxleSlope) -> AxleSlope:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def solve_slip(
     rates: Motion, memory: Memory, front: AxleSlope, rear: AxleSlope, g: float
 ) -> tuple[Motion, Memory]:
@@ -140,7 +138,7 @@ def solve_slip(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _with_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: float) -> AxleMemory:
     if slope.slip_share == 0.0:
         return memory

@@ -1,8 +1,12 @@
-"""The states of coupled mode beside the half-car's: motion along the road, and what tyres and discs remember."""
+"""State of the model: motion along the road, the half-car, what tyres, discs and brake line carry on, and events."""
 
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+from tasks.vehicle.half_car import HalfCarState
 
 
 class Motion(NamedTuple):
@@ -56,11 +60,67 @@ class Instant(NamedTuple):
     held: bool
 
 
+STATE_WIDTH = 27
+"""Numbers of a state's row."""
 AT_REST = AxleMemory(0.0, 0.0, 0.0)
 """No slip, tyres and discs at ambient temperature."""
 
 
+class VehicleState(NamedTuple):
+    """All that a run needs to go on from one instant.
+
+    Parameters
+    ----------
+    time : since the start of the run [s]
+    motion, memory, body : the states that are integrated
+    line : pressure at the pads [MPa]
+    scale_f, scale_r : ABS scales one step before [1]
+    deceleration : -dv/dt of the evaluation before [m/s2]
+    standing : the vehicle has come to rest
+    onset, onset_station, stop : brake onset [s], the station there [m], and the stop [s]; infinite before they come
+    """
+
+    time: float
+    motion: Motion
+    memory: Memory
+    body: HalfCarState
+    line: float
+    scale_f: float
+    scale_r: float
+    deceleration: float
+    standing: bool
+    onset: float
+    onset_station: float
+    stop: float
+
+
 @njit(cache=True, nogil=True)
+def state_row(state: VehicleState) -> tuple[float, ...]:
+    """Return a state as a row of numbers, from which `state_of_row` makes it again."""
+    motion, front, rear, x = state.motion, state.memory.front, state.memory.rear, state.body
+    return (
+        state.time, motion.station, motion.speed, motion.omega_f, motion.omega_r, front.slip, front.slip_heat,
+        front.disc_rise, rear.slip, rear.slip_heat, rear.disc_rise, x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7],
+        state.line, state.scale_f, state.scale_r, state.deceleration, 1.0 if state.standing else 0.0, state.onset,
+        state.onset_station, state.stop,
+    )  # fmt: skip
+
+
+def state_of_row(row: NDArray[np.float64]) -> VehicleState:
+    """Return the state that `state_row` wrote into a row.
+
+    Parameters
+    ----------
+    row : float64 [S]
+    """
+    v = [float(value) for value in row]
+    return VehicleState(
+        v[0], Motion(*v[1:5]), Memory(AxleMemory(*v[5:8]), AxleMemory(*v[8:11])), tuple(v[11:19]),  # type: ignore[arg-type]
+        v[19], v[20], v[21], v[22], bool(v[23]), v[24], v[25], v[26],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, forceinline=True)
 def moved_motion(motion: Motion, rate: Motion, step: float) -> Motion:
     """The longitudinal state after going along a rate for a step [s]."""
     return Motion(
@@ -71,7 +131,7 @@ def moved_motion(motion: Motion, rate: Motion, step: float) -> Motion:
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def moved_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemory:
     """What an axle remembers after going along a rate for a step [s]."""
     return AxleMemory(
@@ -81,7 +141,7 @@ def moved_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemory:
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def without_slip(memory: Memory) -> Memory:
     """The same with tyres that have come to rest; what is warm stays warm."""
     front, rear = memory.front, memory.rear

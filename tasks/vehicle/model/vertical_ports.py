@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 from numba import njit
 
-from tasks.vehicle.effects.chassis import ChassisEffects, footprint
-from tasks.vehicle.effects.exact import strut_force
+from tasks.vehicle.effects.chassis import footprint
+from tasks.vehicle.effects.equations import strut_force
+from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.half_car import HalfCarState, contact_load
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.road import RoadFeature
@@ -27,7 +28,7 @@ class Strut(NamedTuple):
     force: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def ground_at(
     station: float,
     speed: float,
@@ -36,7 +37,7 @@ def ground_at(
     stiffness: float,
     static_load: float,
     road: RoadFeature,
-    effects: ChassisEffects,
+    effects: EffectValues,
 ) -> Ground:
     """Road and load under one axle.
 
@@ -48,7 +49,7 @@ def ground_at(
     stiffness : of the tyre [N/m]
     static_load : half-car's load at rest [N]
     road : the feature
-    effects : the numbers
+    effects : the values
     """
     height, slope = footprint(station, road, effects)
     load = contact_load(height, unsprung_height, stiffness, static_load)
@@ -57,7 +58,7 @@ def ground_at(
     return Ground(height, slope, load)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def struts_at(x: HalfCarState, chassis: Chassis) -> tuple[Strut, Strut]:
     """The struts of the front and the rear axle.
 
@@ -66,10 +67,10 @@ def struts_at(x: HalfCarState, chassis: Chassis) -> tuple[Strut, Strut]:
     x : half-car state [m, rad, m/s, rad/s]
     chassis : the values
     """
-    body, theta = chassis.body, chassis.theta
+    body, effects = chassis.body, chassis.effects
     travel_f, rate_f = x[0] - x[2] - body.to_front * x[1], x[4] - x[6] - body.to_front * x[5]
     travel_r, rate_r = x[0] - x[3] + body.to_rear * x[1], x[4] - x[7] + body.to_rear * x[5]
     return (
-        Strut(travel_f, rate_f, strut_force(theta, body.spring_f, body.damper_f, travel_f, rate_f)),
-        Strut(travel_r, rate_r, strut_force(theta, body.spring_r, body.damper_r, travel_r, rate_r)),
+        Strut(travel_f, rate_f, strut_force(effects, body.spring_f, body.damper_f, travel_f, rate_f)),
+        Strut(travel_r, rate_r, strut_force(effects, body.spring_r, body.damper_r, travel_r, rate_r)),
     )

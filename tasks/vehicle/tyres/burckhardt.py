@@ -46,7 +46,7 @@ def scale_burckhardt(
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def burckhardt_friction(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
     """Return braking force over load [1] (paper, Eq. tire_force).
 
@@ -59,7 +59,7 @@ def burckhardt_friction(braking_slip: float, load: float, tyre: BurckhardtTyre) 
     return tyre.rise * (1.0 - exp(-tyre.decay * braking_slip)) - tyre.fall * braking_slip
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def burckhardt_slope(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
     """Return the derivative of ``burckhardt_friction`` by slip [1].
 

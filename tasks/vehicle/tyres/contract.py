@@ -86,7 +86,7 @@ def _compile_slope(braking_slip: Any, load: Any, tyre: Any) -> Callable[..., flo
     return slope
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def braking_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
     """Return the braking slip kappa, clipped to [0, 1] [1] (paper, Eq. tire_force).
 

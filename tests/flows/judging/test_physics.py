@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from flows.judging.physics import audit_physics, clip_columns, clip_facts, read_constants
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.physics.audit import audit_clip
@@ -38,7 +38,9 @@ TRIALS = 100
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("laws")
-    generate(write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    generate_dataset(
+        write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu"
+    )
     return folder / "made"
 
 

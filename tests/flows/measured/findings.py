@@ -7,7 +7,8 @@ from flows.measured.grown_vehicle import grown_vehicle
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.vehicle.effects.forms import SHAPES, form_name
-from tasks.vehicle.effects.library import Effect, parameter_vector
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.effects.table import parameter_vector
 
 FOUND = {"score": 50.0, "gain": 60.0, "inflation": 1.0, "held_out_gain": 9.0, "win_share": 1.0}
 

@@ -16,7 +16,7 @@ import pytest
 from distributed import Client, LocalCluster
 
 from flows.making.clip import warm_up
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from flows.running.cluster import check_cluster, facts_here, gpu_for, version_problems, warm_cluster
 from flows.running.runner import open_executor
 from flows.store.layout import Layout
@@ -120,7 +120,9 @@ def test_a_worker_killed_in_the_middle_changes_no_byte(toy_dataset, tmp_path):
             client.wait_for_workers(2, timeout=60)
         watcher = Thread(target=kill_one_when_a_clip_is_there, args=workers[:1], daemon=True)
         watcher.start()
-        made = generate(str(toy_dataset.root.parent / "grid.yaml"), str(layout.root), scheduler=address)
+        made = generate_dataset(
+            str(toy_dataset.root.parent / "grid.yaml"), str(layout.root), scheduler=address
+        )
         assert workers[0].wait(5) == -signal.SIGKILL and workers[1].poll() is None
     assert told["clips"] < made.made == 4
     assert layout.manifest.read_bytes() == toy_dataset.manifest.read_bytes()

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.calibration import FOLDER, load_procedure
+from catalogs.calibration import load_procedure
+from catalogs.entries import find_entry
 from catalogs.references import read_reference
 from flows.measured.calibration import calibrate, calibration_case
 from flows.studies.vehicle_model import agreement_of
@@ -16,7 +17,7 @@ from tasks.identification.calibration.staged import run_stage, smoothness, stage
 
 
 def procedure_file(folder: Path, base: str, stages: list[dict], passes: int = 2) -> str:
-    entry = yaml.safe_load((FOLDER / f"{base}.yaml").read_text())
+    entry = yaml.safe_load(find_entry("calibration procedure", base).read_text())
     entry["stages"] = stages
     entry["passes"]["value"] = passes
     path = folder / "procedure.yaml"

@@ -57,10 +57,10 @@ def window_rows(storey_height: float, sill: float, height: float, *, banded: boo
         foot,
         (sill - BAND_HEIGHT - 0.1, Part.WALL),
         (0.1, Part.TRIM),
-        *_glazing(low, high),
+        *_glaze_opening(low, high),
         (0.17, Part.TRIM),
     ]
-    return _filled(rows, storey_height)
+    return _fill_with_wall(rows, storey_height)
 
 
 def ground_window_rows(storey_height: float, height: float) -> Pattern:
@@ -70,10 +70,10 @@ def ground_window_rows(storey_height: float, height: float) -> Pattern:
         (_PLINTH, Part.PLINTH),
         (0.5, Part.WALL),
         (0.1, Part.TRIM),
-        *_glazing(low, high),
+        *_glaze_opening(low, high),
         (0.2, Part.TRIM),
     ]
-    return _filled(rows, storey_height)
+    return _fill_with_wall(rows, storey_height)
 
 
 def shop_columns(bay: float) -> Pattern:
@@ -92,7 +92,7 @@ def shop_rows(storey_height: float) -> Pattern:
         (0.08, Part.FRAME),
         (SIGN_HEIGHT, Part.SIGN),
     ]
-    return _filled(rows, storey_height)
+    return _fill_with_wall(rows, storey_height)
 
 
 def door_columns(bay: float) -> Pattern:
@@ -111,19 +111,19 @@ def door_rows(storey_height: float) -> Pattern:
         (0.07, Part.FRAME),
         (0.22, Part.TRIM),
     ]
-    return _filled(rows, storey_height)
+    return _fill_with_wall(rows, storey_height)
 
 
 DOOR_HEIGHT = 2.2
 """Of the door leaves, which are wood where the pattern says glass [m]."""
 
 
-def _glazing(low: float, high: float) -> Pattern:
+def _glaze_opening(low: float, high: float) -> Pattern:
     frame = (0.06, Part.FRAME)
     return [frame, (low, Part.GLASS), (0.05, Part.FRAME), (high, Part.GLASS), frame]
 
 
-def _filled(rows: Pattern, total: float) -> Pattern:
+def _fill_with_wall(rows: Pattern, total: float) -> Pattern:
     return [*rows, (total - sum(height for height, _ in rows), Part.WALL)]
 
 
@@ -152,7 +152,7 @@ def storey_pattern(
     return window_columns(bay, window[0]), window_rows(height, 0.95, window[1], banded=banded)
 
 
-def simplified(pattern: Pattern, least: float) -> Pattern:
+def drop_thin_parts(pattern: Pattern, least: float) -> Pattern:
     """The pattern without parts too thin to be seen [m]; their neighbours share their place."""
     kept = [(size, part) for size, part in pattern if size >= least]
     stretch = sum(size for size, _ in pattern) / sum(size for size, _ in kept)

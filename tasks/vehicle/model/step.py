@@ -1,4 +1,4 @@
-"""One step of coupled mode, by a W-method of second order.
+"""One step of the model, by a W-method of second order.
 
 The method is ROS2 (Verwer et al. 1999, doi:10.1137/S1064827597326651), which keeps its order for any matrix in
 the place of the Jacobian. Here that matrix holds only the stiff slip that ties speed and wheels: with it the
@@ -8,7 +8,6 @@ wheels stay quiet to standstill; everywhere else (body, axles, road, heat) the m
 from numba import njit
 
 from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, disc_rate
-from tasks.vehicle.effects.ports import INDEX
 from tasks.vehicle.effects.slots import SlotTables
 from tasks.vehicle.half_car import HalfCar, HalfCarState, half_car_rates, moved
 from tasks.vehicle.model.axle_ports import AxlePorts, relaxation_rate
@@ -20,10 +19,8 @@ from tasks.vehicle.paper.wheels import Axle
 from tasks.vehicle.road import RoadFeature
 from tasks.vehicle.tyres.contract import Tyre
 
-_RELAXATION = INDEX["relaxation_length"]
 
-
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def wheel_rate(ports: AxlePorts, axle: Axle) -> float:
     """Angular acceleration of an axle's wheels [rad/s2].
 
@@ -36,7 +33,7 @@ def wheel_rate(ports: AxlePorts, axle: Axle) -> float:
     return torque / axle.inertia
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def memory_rate(
     memory: AxleMemory, ports: AxlePorts, speed: float, omega: float, disc_capacity: float, chassis: Chassis
 ) -> AxleMemory:
@@ -50,7 +47,7 @@ def memory_rate(
     disc_capacity : heat capacity of its discs [J/K]
     chassis : the values
     """
-    following = relaxation_rate(speed, chassis.wheels.speed_floor, chassis.theta[_RELAXATION])
+    following = relaxation_rate(speed, chassis.wheels.speed_floor, chassis.effects.relaxation_length)
     return AxleMemory(
         following * (ports.slip - memory.slip),
         abs(ports.tyre_force * ports.force_slip) * speed,
@@ -58,7 +55,7 @@ def memory_rate(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis) -> Motion:
     """Rates of station, speed and wheel speeds (paper, Eq. app_longitudinal_complete).
 
@@ -80,7 +77,7 @@ def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis)
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: Chassis) -> Memory:
     """Rates of what tyres and discs carry on.
 
@@ -97,7 +94,7 @@ def memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: Chassis)
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def body_rates(x: HalfCarState, ports: Ports, body: HalfCar) -> HalfCarState:
     """Rate of the half-car state under the ports (paper, Eq. app_half_car_complete).
 
@@ -119,8 +116,8 @@ def body_rates(x: HalfCarState, ports: Ports, body: HalfCar) -> HalfCarState:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def coupled_step(
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def take_step(
     motion: Motion,
     memory: Memory,
     x: HalfCarState,
@@ -184,6 +181,6 @@ def coupled_step(
     return after, remembered, moved(moved(x, h1, 0.5 * step), h2, 0.5 * step)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _stepped(memory: AxleMemory, k1: AxleMemory, k2: AxleMemory, step: float) -> AxleMemory:
     return moved_axle(moved_axle(memory, k1, 1.5 * step), k2, 0.5 * step)

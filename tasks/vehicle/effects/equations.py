@@ -1,0 +1,95 @@
+"""Equations of the effects, one per port. With all values 0 each returns exactly what the plain model has there."""
+
+from math import exp
+
+from numba import njit
+
+from tasks.vehicle.effects.table import EffectValues
+
+AIR_DENSITY = 1.2
+"""Air at 20 degrees and sea level [kg/m^3]."""
+COULOMB_SPEED = 0.01
+"""Suspension speed over which dry friction changes sign [m/s]."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def resistance(effects: EffectValues, speed: float, direction: float, snow_depth_mm: float) -> float:
+    """Force at the body against the motion [N]: air and ploughing, less the idle creep that drives.
+
+    Parameters
+    ----------
+    effects : the values
+    speed : of the vehicle [m/s]
+    direction : +1 along the route, -1 against it; the wind blows along the route [1]
+    snow_depth_mm : of the snow on the road [mm]
+    """
+    force = 0.0
+    if speed > 0.0:
+        if effects.drag_area != 0.0:
+            air = speed + direction * effects.wind_speed
+            force += 0.5 * AIR_DENSITY * effects.drag_area * air * abs(air)
+        force += effects.ploughing * snow_depth_mm
+        if effects.creep_force != 0.0 and speed < effects.creep_speed:
+            force -= effects.creep_force * (1.0 - speed / effects.creep_speed)
+    return force
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def brake_factor(effects: EffectValues, pressure: float, speed: float, disc_rise: float) -> float:
+    """Pad friction and hydraulics as a factor on the linear law from pressure to torque [1].
+
+    Parameters
+    ----------
+    effects : the values
+    pressure : at the pads [MPa]
+    speed : of the vehicle [m/s]
+    disc_rise : temperature of the discs above ambient [K]
+    """
+    factor = 1.0 + effects.pressure_curve * pressure
+    factor *= 1.0 - effects.fade * disc_rise / 100.0
+    factor *= 1.0 - effects.pad_speed * (speed - effects.pad_speed_reference)
+    return max(factor, 0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def friction_factor(
+    effects: EffectValues, speed: float, load_ratio: float, slip_energy: float, wet: float
+) -> float:
+    """Factor on the tyre's friction [1]: load, heat of sliding, water film and speed.
+
+    Parameters
+    ----------
+    effects : the values
+    speed : of the vehicle [m/s]
+    load_ratio : contact load over that at rest [1]
+    slip_energy : heat of sliding so far [J]
+    wet : 1 on a wet road, else 0 [1]
+    """
+    factor = 1.0 - effects.load_sensitivity * (load_ratio - 1.0)
+    factor *= 1.0 - effects.tyre_heating * slip_energy / 1e5
+    if wet > 0.0:
+        factor *= 1.0 - effects.wet_speed * max(speed - effects.wet_threshold, 0.0)
+    factor *= 1.0 - effects.friction_speed * speed
+    return max(factor, 0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def strut_force(effects: EffectValues, stiffness: float, damping: float, travel: float, rate: float) -> float:
+    """Spring and damper force of one axle, positive in extension [N].
+
+    Parameters
+    ----------
+    effects : the values
+    stiffness, damping : of the axle [N/m, N s/m]
+    travel, rate : of the strut, rebound positive [m, m/s]
+    """
+    asymmetry = effects.damper_asymmetry
+    c = damping * (1.0 + asymmetry) if rate > 0.0 else damping * (1.0 - asymmetry)
+    force = stiffness * travel + c * rate
+    if effects.coulomb_friction != 0.0:
+        u = rate / COULOMB_SPEED
+        force += effects.coulomb_friction * (1.0 - 2.0 / (exp(2.0 * min(max(u, -20.0), 20.0)) + 1.0))
+    force += effects.progressive_rate * travel * travel * travel
+    if effects.stop_stiffness != 0.0 and -travel > effects.stop_clearance:
+        force += effects.stop_stiffness * (travel + effects.stop_clearance)
+    return force

@@ -1,0 +1,44 @@
+"""A vehicle with effects: the one way in which a fit and a grown vehicle change a car."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from tasks.errors import InputError
+from tasks.vehicle.effects.table import PARAMETERS
+from tasks.vehicle.parameters import Vehicle
+
+FAMILY = "families."
+
+
+def apply_effects(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
+    """Return the vehicle with effects on top of those that it has.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    values : by parameter name, in the units of the table
+
+    Raises
+    ------
+    InputError
+        For parameters that no vehicle carries.
+    """
+    foreign = [name for name in values if name not in PARAMETERS or not PARAMETERS[name].of_vehicle]
+    if foreign:
+        raise InputError([f"effect parameter {name}: no vehicle carries it" for name in foreign])
+    effects, families = dict(vehicle.effects), dict(vehicle.families)
+    fields: dict[str, float] = {}
+    for name, value in values.items():
+        row = PARAMETERS[name]
+        for field in row.fields:
+            if row.kind == "added":
+                effects[field] = effects.get(field, 0.0) + value
+            elif field.startswith(FAMILY):
+                table = field.removeprefix(FAMILY)
+                for weather, family in families.items():
+                    scaled = tuple(v * (1.0 + value) for v in getattr(family, table))
+                    families[weather] = replace(family, **{table: scaled})
+            else:
+                old = fields.get(field, getattr(vehicle, field))
+                fields[field] = old * (1.0 + value) if row.kind == "scaled" else old + value
+    return replace(vehicle, effects=effects, families=families, **fields)  # type: ignore[arg-type]

@@ -1,0 +1,227 @@
+"""One time loop over speed, wheels, body, contact, and the heat of tyres and discs: the vehicle model.
+
+Generated datasets, calibration and the closing of the loop all drive it; what differs is the input (a brake command,
+or a pressure trace as it was measured), the step, and how often the motion is kept.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isinf
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tasks.vehicle.brake import onset_by_position
+from tasks.vehicle.effects.brake_line import line_after
+from tasks.vehicle.effects.slots import Slot, SlotTables, slot_tables
+from tasks.vehicle.model.brake_input import BrakeInput, pressure_at
+from tasks.vehicle.model.chassis import Chassis, Conditions, chassis_of
+from tasks.vehicle.model.ports import ports_at
+from tasks.vehicle.model.states import (
+    STATE_WIDTH,
+    AxleMemory,
+    Instant,
+    Memory,
+    Motion,
+    VehicleState,
+    state_of_row,
+    state_row,
+    without_slip,
+)
+from tasks.vehicle.model.step import take_step
+from tasks.vehicle.parameters import SurfaceResponse, Vehicle
+from tasks.vehicle.road import RoadFeature, road_feature
+from tasks.vehicle.tyres.contract import Tyre
+
+COLUMNS = (
+    "station", "speed", "longitudinal_acceleration", "braking_slip_f", "braking_slip_r", "wheel_speed_f",
+    "wheel_speed_r", "tyre_force_f", "tyre_force_r", "tyre_load_f", "tyre_load_r", "brake_torque_f",
+    "brake_torque_r", "abs_scale_f", "abs_scale_r", "brake_pressure_mpa", "road_force", "heave", "pitch",
+    "unsprung_heave_f", "unsprung_heave_r", "heave_rate", "pitch_rate", "road_height_f", "road_height_r",
+    "heave_acceleration", "disc_rise_f", "disc_rise_r", "suspension_travel_f", "suspension_travel_r",
+    "suspension_rate_f", "suspension_rate_r", "acting_pressure",
+)  # fmt: skip
+"""Columns of a history, in SI units but for the pressures [MPa]."""
+COLUMN = {name: i for i, name in enumerate(COLUMNS)}
+_WIDTH = len(COLUMNS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulation:
+    """Motion of one run at equal intervals, and its events; infinity for an event that never comes.
+
+    Parameters
+    ----------
+    history : float64 [N, len(COLUMNS)]
+    states : float64 [N, S] the state at each row, from which a run can be branched off; empty unless asked for
+    onset : brake onset of a brake command [s]
+    onset_station : front axle at the onset [m]
+    stop : when the vehicle comes to rest [s]
+    """
+
+    history: NDArray[np.float64]
+    states: NDArray[np.float64]
+    onset: float
+    onset_station: float
+    stop: float
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """One column of the history, float64 [N]; ``name`` is one of `COLUMNS`."""
+        return self.history[:, COLUMN[name]]
+
+
+def simulate(
+    vehicle: Vehicle,
+    surface: SurfaceResponse,
+    drive: BrakeInput,
+    conditions: Conditions,
+    *,
+    samples: int,
+    substeps: int,
+    interval: float,
+    initial_speed: float = 0.0,
+    start: NDArray[np.float64] | None = None,
+    slots: Sequence[Slot] = (),
+    keep_states: bool = False,
+) -> Simulation:
+    """Simulate one run with the vehicle's effects and forms.
+
+    Of the paper's calibration only the tyre's peak and slip stiffness are used; pitch follows from the forces.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    surface : its tyres on the surface
+    drive : what the driver does
+    conditions : road feature, snow, grade, direction, disc temperature
+    samples : number of samples, the one at the start included
+    substeps : internal steps between samples
+    interval : between samples [s]
+    initial_speed : with which the run begins, the body at rest [m/s]
+    start : a row of an earlier run's states with the same step, to branch off from; replaces ``initial_speed``
+    slots : what acts in this run alone, on top of the vehicle's forms
+    keep_states : return the state at each sample
+    """
+    tables = [form.slot for form in vehicle.forms] + list(slots)
+    if start is None:
+        rolling = initial_speed / vehicle.wheel_radius
+        cold = AxleMemory(0.0, 0.0, conditions.disc_rise)
+        state = VehicleState(
+            0.0, Motion(0.0, initial_speed, rolling, rolling), Memory(cold, cold), (0.0,) * 8, 0.0, 1.0, 1.0, 0.0,
+            False, drive.profile.onset_time, inf, inf,
+        )  # fmt: skip
+    else:
+        state = state_of_row(start)
+    history = np.empty((samples, _WIDTH))
+    states = np.empty((samples if keep_states else 0, STATE_WIDTH))
+    onset, onset_station, stop = integrate(
+        state,
+        samples,
+        substeps,
+        interval / substeps,
+        drive,
+        road_feature(conditions.hazard),
+        slot_tables(tables) if tables else None,
+        chassis_of(vehicle, surface, conditions),
+        surface.tyre,
+        history,
+        states,
+    )
+    return Simulation(history=history, states=states, onset=onset, onset_station=onset_station, stop=stop)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def integrate(
+    state: VehicleState,
+    samples: int,
+    substeps: int,
+    step: float,
+    drive: BrakeInput,
+    road: RoadFeature,
+    slots: SlotTables | None,
+    chassis: Chassis,
+    tyre: Tyre,
+    history: NDArray[np.float64],
+    states: NDArray[np.float64],
+) -> tuple[float, float, float]:
+    """Drive, brake and stand; fill ``history``, and ``states`` unless it is empty.
+
+    Parameters
+    ----------
+    state : the start
+    samples : rows to fill
+    substeps : internal steps between them
+    step : internal step [s]
+    drive : what the driver does
+    road : road feature
+    slots : forms and disturbances; None compiles to a loop that knows none
+    chassis, tyre : the vehicle on its surface
+    history : float64 [samples, len(COLUMNS)]
+    states : float64 [samples or 0, S]
+
+    Returns
+    -------
+    The brake onset [s], the station there [m] and the time of the stop [s], each infinite if it never comes.
+    """
+    wheels, body = chassis.wheels, chassis.body
+    motion, memory, x = state.motion, state.memory, state.body
+    line, scale_f, scale_r, deceleration = state.line, state.scale_f, state.scale_r, state.deceleration
+    standing, onset, onset_station, stop = state.standing, state.onset, state.onset_station, state.stop
+    dead, lag = chassis.effects.dead_time, chassis.effects.lag
+    first, last = round(state.time / step), (samples - 1) * substeps
+    for n in range(last + 1):
+        time = (first + n) * step
+        if n % substeps == 0 and len(states) > 0:
+            kept = VehicleState(
+                time,
+                motion,
+                memory,
+                x,
+                line,
+                scale_f,
+                scale_r,
+                deceleration,
+                standing,
+                onset,
+                onset_station,
+                stop,
+            )
+            states[n // substeps] = state_row(kept)
+        if isinf(onset):
+            onset = onset_by_position(time, motion.station, motion.speed, drive.profile)
+        if isinf(onset_station) and time >= onset:
+            onset_station = motion.station - motion.speed * (time - onset)
+        held = drive.hold_speed and time < onset
+        commanded = pressure_at(time, onset, dead, drive)
+        if first + n == 0 or lag <= 0.0:
+            line = commanded
+        next_line = line_after(
+            line, commanded, pressure_at(time + step, onset, dead, drive), step, chassis.effects
+        )
+        rate = (next_line - line) / step
+        instant = Instant(time, line, rate, deceleration, standing, held)
+        ports = ports_at(motion, memory, x, instant, scale_f, scale_r, step, slots, chassis, tyre, road)
+        if n % substeps == 0:
+            f, r = ports.front, ports.rear
+            history[n // substeps] = (
+                motion.station, motion.speed, ports.acceleration, f.slip, r.slip, motion.omega_f, motion.omega_r,
+                f.tyre_force, r.tyre_force, f.ground.load, r.ground.load, f.brake_torque, r.brake_torque, f.abs_scale,
+                r.abs_scale, pressure_at(time, onset, 0.0, drive), ports.road_force, x[0], x[1], x[2], x[3], x[4], x[5],
+                f.ground.height, r.ground.height,
+                (ports.lift - f.suspension_force - r.suspension_force) / body.sprung_mass, memory.front.disc_rise,
+                memory.rear.disc_rise, x[0] - x[2] - body.to_front * x[1], x[0] - x[3] + body.to_rear * x[1],
+                x[4] - x[6] - body.to_front * x[5], x[4] - x[7] + body.to_rear * x[5], line,
+            )  # fmt: skip
+        if n == last:
+            break
+        deceleration = -ports.acceleration
+        next_instant = Instant(time + step, next_line, rate, deceleration, standing, held)
+        motion, memory, x = take_step(
+            motion, memory, x, ports, instant, next_instant, step, slots, chassis, tyre, road
+        )
+        line, scale_f, scale_r = next_line, ports.front.abs_scale, ports.rear.abs_scale
+        if not standing and motion.speed <= wheels.stop_speed:
+            standing, stop = True, time + step
+            motion, memory = Motion(motion.station, 0.0, 0.0, 0.0), without_slip(memory)
+    return onset, onset_station, stop

@@ -1,0 +1,104 @@
+"""The one model: a command and its trace drive alike, a run goes on from a stored state, halving the step is small."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tasks.surface.road_profile import RoadHazard
+from tasks.vehicle.brake import brake_pressure
+from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import EFFECT_TABLE, EFFECT_UNITS, PARAMETERS
+from tasks.vehicle.model.brake_input import brake_command, measured_trace
+from tasks.vehicle.model.chassis import Conditions
+from tasks.vehicle.model.simulation import simulate
+from tasks.vehicle.model.states import STATE_WIDTH, state_of_row, state_row
+from tasks.vehicle.parameters import surface_response
+from tests.vehicle.conftest import command
+
+HUMP = Conditions(hazard=RoadHazard(center_m=12.0, length_m=3.7, height_m=0.075), disc_rise=80.0)
+STOP = command(1.6, onset=0.5, ramp_s=0.4, hold_s=1.0, release_s=0.4).profile
+EFFECTS = {"lag": 0.08, "dead_time": 0.03, "relaxation_length": 0.4, "fade": 0.05, "tyre_heating": 0.4}
+
+
+@pytest.fixture
+def run(vehicle):
+    def simulated(drive=None, *, samples=300, effects=None, conditions=HUMP, substeps=5, **options):
+        return simulate(
+            replace(vehicle, effects=effects or {}), surface_response(vehicle, "rain", 0.5),
+            drive or brake_command(STOP), conditions, samples=samples, substeps=substeps, interval=0.01,
+            initial_speed=18.0, **options,
+        )  # fmt: skip
+
+    return simulated
+
+
+def test_a_command_and_its_pressure_at_the_samples_drive_alike(run):
+    trace = np.array([brake_pressure(0.01 * n - 0.5, STOP) for n in range(300)])
+    for effects in ({}, EFFECTS):
+        commanded, measured = run(effects=effects), run(measured_trace(trace, 0.01), effects=effects)
+        np.testing.assert_allclose(measured.history, commanded.history, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("effects", [{}, EFFECTS], ids=["plain", "states of effects"])
+def test_a_run_goes_on_from_a_stored_state_bit_by_bit(run, effects):
+    whole = run(effects=effects, keep_states=True)
+    assert whole.states.shape == (300, STATE_WIDTH)
+    rest = run(effects=effects, samples=170, start=whole.states[130])
+    np.testing.assert_array_equal(rest.history, whole.history[130:])
+    assert (rest.onset, rest.onset_station, rest.stop) == (whole.onset, whole.onset_station, whole.stop)
+
+
+def test_a_state_is_its_row(run):
+    row = run(effects=EFFECTS, keep_states=True).states[200]
+    assert state_row(state_of_row(row)) == tuple(row)
+
+
+def test_a_branch_differs_from_where_something_else_acts(run):
+    whole = run(keep_states=True)
+    pulse = Slot(
+        port="longitudinal_force",
+        variable="time",
+        origin=1.5,
+        spacing=0.2,
+        values=np.array([0.0, 500.0, 0.0]),
+    )
+    branch = run(samples=150, start=whole.states[150], slots=(pulse,))
+    np.testing.assert_array_equal(branch.history, run(slots=(pulse,)).history[150:])
+    assert branch.column("speed")[-1] < whole.column("speed")[-1] - 0.05
+
+
+def test_a_grade_takes_its_share_of_gravity_and_pitches_the_body_as_braking_does(vehicle, run):
+    coast = measured_trace(np.zeros(300), 0.01)
+    up, flat, down = (run(coast, conditions=Conditions(grade=0.03, direction=d)) for d in (1, 0, -1))
+    turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
+    share = vehicle.mass / (vehicle.mass + turning)
+    for hill, sign in ((up, 1.0), (down, -1.0)):
+        lost = flat.column("longitudinal_acceleration")[250] - hill.column("longitudinal_acceleration")[250]
+        assert lost == pytest.approx(sign * 0.03 * vehicle.gravity * share, rel=1e-3)
+    # the tyres feel only the inertia of the wheels, so the body all but rests on the hill
+    assert abs(up.column("pitch")[250] - flat.column("pitch")[250]) < np.radians(0.02)
+
+
+def test_inference_may_take_steps_of_2_ms(run):
+    """The longest step that stays below the noise of a campaign: 0.03 m/s, 0.015 deg."""
+    coarse, fine = run(substeps=5), run(substeps=40)
+    assert np.abs(coarse.column("speed") - fine.column("speed")).max() < 0.003
+    assert np.abs(np.degrees(coarse.column("pitch") - fine.column("pitch"))).max() < 0.005
+
+
+class TestTheTableOfEffects:
+    def test_names_are_unique_and_bounds_leave_room_for_a_step(self):
+        assert len(PARAMETERS) == len(EFFECT_TABLE)
+        for row in EFFECT_TABLE:
+            assert row.lower <= row.start <= row.upper and 0.0 < row.step < row.upper - row.lower, row.name
+
+    def test_fields_exist(self, vehicle):
+        family = next(iter(vehicle.families.values()))
+        for row in EFFECT_TABLE:
+            for field in row.fields:
+                owner = family if field.startswith("families.") else vehicle
+                assert row.kind == "added" or hasattr(owner, field.removeprefix("families.")), row.name
+
+    def test_fade_is_per_100_kelvin(self):
+        assert EFFECT_UNITS["fade"] == "(100 K)-1"
