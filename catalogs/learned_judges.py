@@ -55,7 +55,7 @@ class LoadedJudge:
     Parameters
     ----------
     network : TorchScript module; None where it is missing
-    text_features : float [3, D] of dry, rain and snow; None but for CLIP
+    text_features : float [N, D], a row a kind of weather in the order of the prompts; None but for CLIP
     note : where the weights come from, or why there are none
     """
 

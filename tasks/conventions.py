@@ -10,7 +10,7 @@ from enum import IntEnum
 
 
 class SemanticClass(IntEnum):
-    """What a Gaussian, and so a pixel, belongs to. 0 is a pixel that no Gaussian covers."""
+    """Class of a Gaussian, and so of a pixel. 0 is a pixel that no Gaussian covers."""
 
     SKY = 0
     ROAD = 1
@@ -26,7 +26,7 @@ class SemanticClass(IntEnum):
 
 
 ROAD_CLASSES = (SemanticClass.ROAD, SemanticClass.MARKING)
-"""Classes that carry the water film and the snow cover, and that follow the road profile."""
+"""Classes that hold the water film and the snow cover, and that follow the road profile."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +122,7 @@ IDENTITY_CHANNELS: tuple[Channel, ...] = (
     Channel(name="seed", unit="", symbol="", description="visual seed, 64 bit, as text"),
     Channel(name="split", unit="", symbol="", description="the grid's split that the clip belongs to; empty where it names none"),
     Channel(name="calibration", unit="", symbol="", description="in-grid, interpolated, off-grid or beyond-calibration, as the paper's Appendix C says it"),
-    Channel(name="weather", unit="", symbol="w", description="dry, rain or snow; also the tyre family"),
+    Channel(name="weather", unit="", symbol="w", description="kind of weather; also the name of the tyre family"),
     Channel(name="calibration_extrapolated", unit="", symbol="", description="mu_c lies outside the calibrated knots, whose end values hold"),
 )  # fmt: skip
 

@@ -24,6 +24,7 @@ from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError
+from tasks.eval.motion_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.severity import severity_agreement
 from tasks.eval.video_motion import (
@@ -31,7 +32,6 @@ from tasks.eval.video_motion import (
     geometry_error,
     path_error,
     reference_progress,
-    rms,
     weather_error,
 )
 

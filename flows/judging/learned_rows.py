@@ -41,7 +41,10 @@ def _score_with_dover(view: View, clips: list[JudgedClip], loaded: LoadedJudge) 
         yield from _list_missing(names, loaded.note)
         return
     judge = WholeVideo(network=loaded.network)
-    scores = {clip.facts["label"]: dover_scores(judge.numbers(_read_pictures(view, clip))) for clip in clips}
+    scores = {
+        clip.facts["label"]: dover_scores(judge.evaluate_network(_read_pictures(view, clip)))
+        for clip in clips
+    }
     for name in names:
         given = {label: found[name] for label, found in scores.items() if name in found}
         if not given:

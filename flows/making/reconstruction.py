@@ -30,6 +30,6 @@ def scene_from_stereo(
     if problems := sun_problems(sun_direction_deg):
         raise InputError(problems)
     result = reconstruct_street(read_stereo_folder(Path(folder)))
-    figures = result.figures()
+    figures = result.summarise()
     write_scene(replace(result.scene, sun_direction_deg=sun_direction_deg), Path(out), figures)
     return {"scene": out, **figures}

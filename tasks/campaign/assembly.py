@@ -1,4 +1,4 @@
-"""From a file's signals to the columns of one run, with every problem of it."""
+"""Assembly of one run's columns from a file's signals, with every problem of the run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,19 +17,19 @@ from tasks.campaign.signals import (
 )
 
 MINIMUM_SAMPLES = 100
-"""Shorter runs hold too little to tell noise from motion."""
+"""Shorter runs hold too little data to separate noise from motion."""
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
     "°": "deg", "°/s": "deg/s", "1/min": "rpm", "-": "1",
     "Unit_Bar": "bar", "Unit_KiloMeterPerHour": "km/h", "Unit_DegreOfArc": "deg", "Unit_DegreOfArcPerSecon": "deg/s",
     "Unit_MeterPerSeconSquar": "m/s^2",
 }  # fmt: skip
-"""Ways in which files write the units that this project knows."""
+"""Spellings of the units that this project knows, as files have them."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Assembled:
-    """One run on a common clock, or what is wrong with it.
+    """One run on a common clock, or its problems.
 
     Parameters
     ----------
@@ -52,13 +52,13 @@ def assemble_run(
     ----------
     signals : logged signals by name
     rules : the channel map
-    start, end : stretch of the run in the logger's time, infinite for all there is [s]
+    start, end : limits of the run in the logger's time; infinite for the whole recording [s]
     rate : of the run [Hz]
     """
     found: list[tuple[str, str]] = []
     parts: dict[str, list[Signal]] = {}
     for rule in rules:
-        logged = [signals[name].between(start, end) for name in rule.sources]
+        logged = [signals[name].cut_window(start, end) for name in rule.sources]
         for signal in logged:
             stated = ALIASES.get(signal.unit, signal.unit)
             if stated in UNITS and stated != rule.unit:
@@ -87,7 +87,7 @@ def assemble_run(
 
 
 def _write_sentences(found: list[tuple[str, str]]) -> list[str]:
-    """One sentence per problem; channels of one clock share its faults, so they share the sentence."""
+    """Write one sentence per problem; channels of one clock share its faults, so they share the sentence."""
     channels: dict[str, list[str]] = {}
     for channel, problem in found:
         if channel not in channels.setdefault(problem, []):

@@ -27,7 +27,7 @@ class MeasuredChannel:
     ----------
     name, unit : as in the run's file
     limit : magnitude that no road car exceeds [the channel's unit]
-    moves : a moving car's sensor never holds one value for long
+    moves : in a moving car the sensor never holds one value for long
     description : for people
     """
 
@@ -54,7 +54,7 @@ MAIN_CHANNELS = (
     _make_channel("pitch_rate", "deg/s", 150.0, "nose-down positive"),
     _make_channel("vertical_acceleration", "m/s^2", 60.0, "of the body, up positive, without gravity"),
 )
-"""What closing the loop compares; a map must say of each where it is or that it was not measured."""
+"""Channels that closing the loop compares; a map must give the source of each or state that it was not measured."""
 
 SIDE_CHANNELS = (
     _make_channel("steering_angle", "deg", 900.0, "at the steering wheel, left positive", moves=False),
@@ -64,13 +64,13 @@ SIDE_CHANNELS = (
     _make_channel("brake_torque", "N m", 40000.0, "all wheels together, braking positive", moves=False),
     _make_channel("engine_torque", "N m", 40000.0, "at the wheels, driving positive", moves=False),
 )
-"""What selection rules and residual plots use."""
+"""Channels that selection rules and residual plots use."""
 
 CHANNELS_BY_NAME = {channel.name: channel for channel in (*MAIN_CHANNELS, *SIDE_CHANNELS)}
 
 
 def unit_factor(unit: str, target: str) -> float:
-    """What a value in ``unit`` is multiplied with to be in ``target``.
+    """Return the factor that converts a value in ``unit`` to ``target``.
 
     Raises
     ------
@@ -89,11 +89,11 @@ def unit_factor(unit: str, target: str) -> float:
 
 
 def guess_unit(taken: str, ratio: float) -> str | None:
-    """The unit of values that come out ``ratio`` times too large when taken to be in another; None if none fits.
+    """Return the likely unit of values that are ``ratio`` times too large in the assumed unit; None if none fits.
 
     Parameters
     ----------
-    taken : the unit that they were taken to be in
+    taken : the assumed unit
     ratio : size found over size expected [1]
     """
     dimension, size = UNITS[taken]

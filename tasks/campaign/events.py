@@ -17,7 +17,7 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Rule:
-    """One criterion that every retained event keeps.
+    """One criterion that every retained event satisfies.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Rule:
     paper_fails: int | None
 
     def holds(self, value: float) -> bool:
-        """Whether a measured value keeps the rule."""
+        """Return whether a measured value satisfies the rule."""
         return value >= self.limit if self.is_minimum else value <= self.limit
 
 
@@ -64,12 +64,12 @@ class Protocol:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordedRun:
-    """One run with the drive that it belongs to.
+    """One recorded run with the drive that it belongs to.
 
     Parameters
     ----------
     name : of the run
-    drive : complete drives are what is left out
+    drive : name of the drive; cross-validation leaves out complete drives
     interval : time between samples [s]
     columns : channels by name, each float64 [N]
     weather : on the road
@@ -88,7 +88,7 @@ class Event:
 
     Parameters
     ----------
-    run, drive : where it is from
+    run, drive : its run and drive
     at : time of the onset in the run [s]
     duration : of the active pressure [s]
     time : float64 [N] about the onset [s]
@@ -106,20 +106,20 @@ class Event:
     protocol: Protocol
     weather: Weather = DRY_ROAD
 
-    def within(self, window: Window) -> NDArray[np.bool_]:
-        """Mask of the samples in a window about the onset [s]."""
+    def mask_window(self, window: Window) -> NDArray[np.bool_]:
+        """Return the mask of the samples in a window about the onset [s]."""
         inside: NDArray[np.bool_] = (self.time >= window[0] - ROUNDING) & (self.time <= window[1] + ROUNDING)
         return inside
 
-    def change(self, channel: str) -> NDArray[np.float64]:
-        """A channel less its median over the baseline window, float64 [N]."""
+    def subtract_baseline(self, channel: str) -> NDArray[np.float64]:
+        """Return a channel less its median over the baseline window, float64 [N]."""
         values = self.columns[channel]
-        return values - float(np.median(values[self.within(self.protocol.baseline)]))
+        return values - float(np.median(values[self.mask_window(self.protocol.baseline)]))
 
     @property
     def pitch_baseline(self) -> tuple[float, float]:
         """Slope [deg/s] and value at the onset [deg] of the line through the pitch before the event."""
-        before = self.within(self.protocol.baseline)
+        before = self.mask_window(self.protocol.baseline)
         slope, at_onset = np.polyfit(self.time[before], self.columns["pitch"][before], 1)
         return float(slope), float(at_onset)
 
@@ -136,7 +136,7 @@ class Event:
 
 
 def find_events(drive: RecordedRun, protocol: Protocol) -> tuple[int, list[Event]]:
-    """Number of pressure episodes of a run, and those whose analysis window it covers.
+    """Return the number of pressure episodes of a run, and the events whose analysis window it covers.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Planned runs: what a test driver is asked to do, before anything is measured."""
+"""Planned runs: the instructions to a test driver before anything is measured."""
 
 from dataclasses import dataclass
 
@@ -49,7 +49,7 @@ RICH: tuple[RunPlan, ...] = (
     RunPlan(speed=8.9, peak=0.8, duration=4.0, hazard=(9.0, 3.7, 0.05)),
     RunPlan(speed=9.7, peak=0.0, duration=4.0, hazard=(12.0, 2.5, 0.06)),
 )  # fmt: skip
-"""A design that excites every port, 14 training runs first."""
+"""An experiment design that excites every port, 14 training runs first."""
 TRAINING = 14
 
 EXPERIMENTS: tuple[tuple[str, RunPlan], ...] = (
@@ -72,18 +72,18 @@ EXPERIMENTS: tuple[tuple[str, RunPlan], ...] = (
         RunPlan(speed=11.0, peak=0.0, duration=5.0, hazard=(15.0, 3.7, 0.075)),
     ),
 )
-"""Runs that any proving ground can make, to choose from when two explanations must be told apart."""
+"""Runs that any proving ground allows, from which one is chosen to separate two hypotheses."""
 
 
 def make_planned_run(drive: RunPlan, name: str, direction: int = 1, *, held_out: bool = False) -> Run:
-    """The run of a plan, with its pressure trace and no response yet but the speed it starts with.
+    """Return the run of a plan, with its pressure trace and initial speed but no other response.
 
     Parameters
     ----------
     drive : the plan
     name : of the run
     direction : along (1) or against (-1) the route
-    held_out : belongs to the runs that no fit may see
+    held_out : belongs to the runs that no fit may read
     """
     count = round(drive.duration / INTERVAL)
     t = np.arange(count) * INTERVAL

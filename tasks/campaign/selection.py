@@ -1,4 +1,4 @@
-"""Conjunctive selection of braking events: what the rules measure, and what becomes of each event."""
+"""Conjunctive selection of braking events: the quantities of the rules, and the verdict on each event."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from tasks.campaign.events import Event, Protocol, RecordedRun, Rule, Window, fi
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """What a rule measures.
+    """A quantity that a rule limits.
 
     Parameters
     ----------
     unit : of the result
-    channels : that must have been measured
+    channels : channels that it needs
     measure : its function of an event
     """
 
@@ -26,12 +26,12 @@ class Quantity:
 
 
 def _percentile_95(event: Event, channel: str, window: Window) -> float:
-    return float(np.percentile(np.abs(event.columns[channel][event.within(window)]), 95))
+    return float(np.percentile(np.abs(event.columns[channel][event.mask_window(window)]), 95))
 
 
 def _largest_rise(event: Event, channel: str, sign: float) -> float:
-    inside = event.within(event.protocol.evaluation)
-    return max(float(np.max(sign * event.change(channel)[inside])), 0.0)
+    inside = event.mask_window(event.protocol.evaluation)
+    return max(float(np.max(sign * event.subtract_baseline(channel)[inside])), 0.0)
 
 
 def _onset_residual(event: Event) -> float:
@@ -39,7 +39,7 @@ def _onset_residual(event: Event) -> float:
 
 
 def _pitch_deviation(event: Event) -> float:
-    return float(np.std(event.columns["pitch"][event.within(event.protocol.baseline)]))
+    return float(np.std(event.columns["pitch"][event.mask_window(event.protocol.baseline)]))
 
 
 def _percentile_quantity(channel: str, unit: str) -> Quantity:
@@ -76,18 +76,18 @@ QUANTITIES: dict[str, Quantity] = {
         measure=lambda event: _percentile_95(event, "brake_pressure", event.protocol.baseline),
     ),
 }
-"""What selection rules may measure (paper, Appendix C.5)."""
+"""Quantities that selection rules may limit (paper, Appendix C.5)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """One event held against every rule.
+    """One event with its result for every rule.
 
     Parameters
     ----------
     event : the event
     values : measured quantity by rule; NaN where its channel was not measured
-    failed : names of the rules that it breaks
+    failed : names of the rules that it violates
     """
 
     event: Event
@@ -97,12 +97,12 @@ class Judged:
 
 @dataclass(frozen=True, kw_only=True)
 class Selection:
-    """The events of a campaign and what became of them.
+    """The events of a campaign and the verdict on each.
 
     Parameters
     ----------
     episodes : detected pressure episodes
-    judged : those that support the analysis window, in order of drive and time
+    judged : events that cover the analysis window, in order of drive and time
     unassessed : rules whose channel no run has
     """
 
@@ -112,7 +112,7 @@ class Selection:
 
     @property
     def retained(self) -> tuple[Event, ...]:
-        """Events that keep every rule that could be assessed."""
+        """Events that satisfy every rule that could be assessed."""
         return tuple(judged.event for judged in self.judged if not judged.failed)
 
 
@@ -137,12 +137,12 @@ def select_events(drives: Sequence[RecordedRun], protocol: Protocol) -> Selectio
 
 
 def judge_event(event: Event, rules: Sequence[Rule]) -> Judged:
-    """Hold one event against every rule; a rule whose channel is missing is neither kept nor broken.
+    """Judge one event by every rule; a rule whose channel is missing is neither satisfied nor violated.
 
     Parameters
     ----------
     event : the event
-    rules : all are tried, none ends the trial
+    rules : all are evaluated, also after a violation
     """
     values = {
         rule.name: QUANTITIES[rule.name].measure(event)

@@ -1,4 +1,4 @@
-"""What a recording's channels say about one another: two sensors of one motion, gravity on a slope."""
+"""Agreement between the channels of a recording: two sensors of one motion, gravity on a slope."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 SMOOTHING_S = 0.5
 EDGE_S = 2.0
-"""Left out at both ends, where smoothing lacks samples."""
+"""Time left out at both ends, where smoothing lacks samples [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorAgreement:
-    """How channels of one run agree.
+    """Agreement of channels of one run.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class SensorAgreement:
 
 
 def measure_sensor_agreement(columns: Mapping[str, NDArray[np.float64]], interval: float) -> SensorAgreement:
-    """Regress each pair over the run.
+    """Fit each pair of channels over the run by a line.
 
     Parameters
     ----------

@@ -64,11 +64,11 @@ def compare_figures(a: Mapping[str, float | None], b: Mapping[str, float | None]
     Each in the unit of its name; NaN where either version has none.
     """
 
-    def change(name: str) -> float:
+    def change_of(name: str) -> float:
         old, new = a.get(name), b.get(name)
         return nan if old is None or new is None else float(new) - float(old)
 
-    return {label: change(name) * factor for label, (name, factor) in FIGURES.items()}
+    return {label: change_of(name) * factor for label, (name, factor) in FIGURES.items()}
 
 
 def _stack_differences(

@@ -82,7 +82,7 @@ class WholeVideo:
 
     network: Network
 
-    def numbers(self, frames: NDArray[np.uint8]) -> tuple[float, ...]:
+    def evaluate_network(self, frames: NDArray[np.uint8]) -> tuple[float, ...]:
         """Return all outputs of the network for all frames."""
         video = torch.from_numpy(np.ascontiguousarray(frames.transpose(3, 0, 1, 2)[None])).float() / 255
         with torch.inference_mode():
@@ -96,7 +96,7 @@ class WholeVideo:
         InputError
             If it has more than one output.
         """
-        found = self.numbers(frames)
+        found = self.evaluate_network(frames)
         if len(found) != 1:
             raise InputError(f"A video judge's module must give one number; it gives {len(found)}.")
         return found[0]
@@ -148,9 +148,9 @@ class FlowAlignedDistance:
         if len(frames) < 2:
             return float("nan")
         later = np.linspace(1, len(frames) - 1, min(PAIRS, len(frames) - 1)).astype(int)
-        return float(np.mean([self._distance(frames[k - 1], frames[k]) for k in later]))
+        return float(np.mean([self._measure_distance(frames[k - 1], frames[k]) for k in later]))
 
-    def _distance(self, before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> float:
+    def _measure_distance(self, before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> float:
         pictures = [
             torch.from_numpy(picture.transpose(2, 0, 1)[None].astype(np.float32)) / 127.5 - 1
             for picture in (warp_to_successor(before, frame), frame)

@@ -96,14 +96,14 @@ def pose_verdict(
     claimed = np.rad2deg(claimed_pitch - claimed_pitch[0])[seen]
     pitch = np.rad2deg(recovered.pitch)[seen]
     way = (claimed_station - claimed_station[0])[seen]
-    pitch_rmse, response = _rms(pitch - claimed), _rms(claimed)
+    pitch_rmse, response = rms(pitch - claimed), rms(claimed)
     judged = response >= thresholds.response_deg
     relative = pitch_rmse / response if judged else float("nan")
     varies = bool(np.ptp(pitch) > 0 and np.ptp(claimed) > 0)
     correlation = float(np.corrcoef(pitch, claimed)[0, 1]) if varies else float("nan")
-    progress_rmse = _rms(recovered.progress[seen] - way)
+    progress_rmse = rms(recovered.progress[seen] - way)
     moved = way[-1] > 0
-    normalised = _rms(recovered.normalised_path[seen, 0] - way / way[-1]) if moved else float("nan")
+    normalised = rms(recovered.normalised_path[seen, 0] - way / way[-1]) if moved else float("nan")
     failed = int(recovered.failed.sum())
 
     reasons = []
@@ -139,5 +139,6 @@ def pose_verdict(
     )
 
 
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+def rms(values: Floats) -> float:
+    """Return the root mean square [any]."""
+    return float(np.sqrt(np.mean(np.square(values))))

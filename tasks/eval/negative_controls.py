@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tasks.errors import InputError
+from tasks.eval.motion_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.rigid import Floats
-from tasks.eval.video_motion import geometry_error, reference_progress, rms
+from tasks.eval.video_motion import geometry_error, reference_progress
 
 SEES, PARTLY = 0.9, 0.5
 """Least detection rates without a false alarm at which a metric detects a fault, and detects it partly [1]."""

@@ -40,23 +40,23 @@ def piqe(picture: NDArray[np.uint8]) -> float:
 def _normalise_contrast(luma: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean-subtracted, contrast-normalised luma (7 x 7 Gaussian, one unit of stabilisation)."""
 
-    def blurred(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def blur_luma(values: NDArray[np.float64]) -> NDArray[np.float64]:
         return cv2.GaussianBlur(values, (7, 7), 7 / 6, borderType=cv2.BORDER_REPLICATE)
 
-    mean = blurred(luma)
-    spread = np.sqrt(np.abs(blurred(luma * luma) - mean * mean))
+    mean = blur_luma(luma)
+    spread = np.sqrt(np.abs(blur_luma(luma * luma) - mean * mean))
     return (luma - mean) / (spread + 1.0)
 
 
 def _has_flat_edge(blocks: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether any segment along any of a block's four edges shows no texture, bool [N]."""
+    """Return whether any segment along any of a block's four edges shows no texture, bool [N]."""
     edges = np.stack([blocks[:, 0], blocks[:, -1], blocks[:, :, 0], blocks[:, :, -1]], axis=1)
     segments = np.lib.stride_tricks.sliding_window_view(edges, SEGMENT, axis=2)
     return np.asarray((segments.std(axis=-1, ddof=1) < FLAT).any(axis=(1, 2)))
 
 
 def _is_noisy(blocks: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether a block's deviation is above twice its distance from that of centre over surround, bool [N]."""
+    """Return whether a block's deviation is above twice its distance from centre over surround, bool [N]."""
     middle = BLOCK // 2
     centre = blocks[:, :, middle - 1 : middle + 1]
     surround = np.delete(blocks, [middle - 1, middle], axis=2)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from tasks.errors import InputError
+from tasks.eval.motion_agreement import rms
 from tasks.eval.poses.rigid import Floats
 
 WINDOWS: tuple[int | None, ...] = (None, 5, 7, 9)
@@ -116,10 +117,10 @@ def event_response(times: Floats, pitch: Floats, opening: float, protocol: Motio
     """
     since = times - opening
 
-    def within(span: tuple[float, float]) -> NDArray[np.bool_]:
+    def in_span(span: tuple[float, float]) -> NDArray[np.bool_]:
         return (since >= span[0] - 1e-9) & (since <= span[1] + 1e-9)
 
-    before, after, event = within(protocol.before), within(protocol.after), within(protocol.event)
+    before, after, event = in_span(protocol.before), in_span(protocol.after), in_span(protocol.event)
     if before.sum() < 2 or after.sum() < 2 or event.sum() < 3:
         raise InputError(
             f"The event window opens at {opening:.2f} s; the clip must hold"
@@ -193,8 +194,3 @@ def motion_retention(
         outside = (frame < event[0]) | (frame > event[1])
         curves.append((change - np.polyval(np.polyfit(frame[outside], change[outside], 1), frame))[inside])
     return float(abs(np.corrcoef(curves[0], curves[1])[0, 1]))
-
-
-def rms(values: Floats) -> float:
-    """Root mean square [any]."""
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,4 +1,4 @@
-"""The derivative of blending: how each Gaussian's colour, opacity and place would mend a picture.
+"""The derivative of blending with respect to each Gaussian's colour, opacity and place.
 
 The picture is ``C = sum_i T_i a_i c_i + T_end sky`` with ``T_i`` the transmittance in front of Gaussian i.
 Then ``dC/dc_i = T_i a_i`` and ``dC/da_i = T_i (c_i - B_i)``, where ``B_i`` is what is seen behind Gaussian i.
@@ -64,12 +64,12 @@ def blend_and_derive(
     weight: NDArray[np.float32],
     sky: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The blended picture, and per splat the sums of derivative times residual and of derivative squared.
+    """Return the blended picture, and per splat the sums of derivative times residual and of derivative squared.
 
     Parameters
     ----------
     records : float32 [V, 16] splats, from `tasks.render.rasterise.projection.project_gaussians`
-    target : float32 [H, W, 3] the picture wanted; where negative, blended values above its modulus are as good
+    target : float32 [H, W, 3] the target picture; where negative, any value above its modulus matches
     weight : float32 [H, W] of a pixel's squared residual [1]
     sky : float32 [H, W, 3] what is seen where no splat is [1]
 
@@ -88,9 +88,9 @@ def blend_and_derive(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _opacity_of_logarithm(p):  # type: ignore[no-untyped-def]
-    """Opacity of logarithm p, 0 where the rasteriser draws nothing: exp as the 64th power of four Taylor terms.
+    """Return the opacity of logarithm p, 0 where the rasteriser draws nothing: the 64th power of four Taylor terms.
 
-    The library's exponential would keep the loops from being vectorised; this one is right to 3e-6.
+    The library's exponential would prevent vectorisation of the loops; the error of this one is 3e-6.
     """
     x = p * _SHARE
     e = _ONE + x * (_ONE + x * (_HALF + x * (_SIXTH + x * _TWENTYFOURTH)))
@@ -148,7 +148,7 @@ def _row_range(records, splat, y_tile):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _blend_tile(s, records, splats, tile):  # type: ignore[no-untyped-def]
-    """Blend colours front to back; return the end of the splats that still got light."""
+    """Blend colours front to back; return the end of the splats that still received light."""
     start, end, x_tile, y_tile = tile
     for i in range(start, end):
         if (i - start) % 64 == 0:
@@ -209,7 +209,7 @@ def _derive_tile(s, lanes, records, splats, tile, sums):  # type: ignore[no-unty
                 w = before * a
                 after = before - w
                 s[l] = after
-                # The finished picture less this splat: over the light left, it is what lies behind.
+                # The finished picture less this splat, over the light left, is the colour behind the splat.
                 left_r, left_g, left_b = s[_RED + l] - w * r, s[_GREEN + l] - w * g, s[_BLUE + l] - w * b
                 s[_RED + l], s[_GREEN + l], s[_BLUE + l] = left_r, left_g, left_b
                 share = before / max(after, _TINY)

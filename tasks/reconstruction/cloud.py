@@ -1,4 +1,4 @@
-"""The Gaussians of the samples: on the road where they are road, classed, and small where a car may come near."""
+"""The Gaussians of the samples: road samples moved onto the road, classified, and small where a car may come near."""
 
 from dataclasses import dataclass
 
@@ -16,20 +16,20 @@ from tasks.scene.spherical_harmonics import C0
 
 INITIAL_OPACITY = 0.9
 LEAST_COSINE = 0.25
-"""Surfaces other than the ground are not taken to be seen flatter than this [1]."""
+"""Least cosine between a surface's normal and the ray, for surfaces other than the ground [1]."""
 SADDLE = 0.02
-"""The road surface deviates this much from the route's plane [m]."""
+"""Standard deviation of the road surface from the route's plane [m]."""
 DISPARITY_ERROR = 0.3
 """Standard deviation of a disparity [px]."""
 FAR_GROUND = 14.0
-"""Ground farther from the camera than this is taken to be level, its measured normal being noise [m]."""
+"""Ground farther from the camera than this counts as level, since its measured normal is noise [m]."""
 LONGEST = 0.15
 """Largest standard deviation of a Gaussian on the ground [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cloud:
-    """Gaussians with what else is known about them.
+    """Gaussians with the ray of each and the carriageway's extent.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def build_cloud(
     disparity_scale: float,
     carriageway_limit: float,
 ) -> Cloud:
-    """Place, class, turn and size the samples.
+    """Build Gaussians from the samples: place, class, orientation and size.
 
     Parameters
     ----------
@@ -106,10 +106,10 @@ def _depth_factor_onto_route(
     depth: NDArray[np.float64],
     disparity_scale: float,
 ) -> NDArray[np.float64]:
-    """Factor by which a road point's depth changes so that its height becomes the likeliest one.
+    """Return the factor of a road point's depth that makes its height the most likely one.
 
-    Stereo's error of height grows as depth squared times the ray's descent; the route says that the height
-    is 0 but for the saddle of the road. Near the camera stereo is right, far away the route is.
+    The height error of stereo grows as depth squared times the ray's descent; on the route the height is 0 except for
+    the unevenness of the road. Near the camera the stereo height dominates, far away the route.
 
     Parameters
     ----------
@@ -126,10 +126,10 @@ def _depth_factor_onto_route(
 def _split_long_discs(
     length: NDArray[np.float64], splittable: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Pieces that replace Gaussians which are too long: whose piece each is, and how far along its first axis.
+    """Split Gaussians that are too long: return the parent of each piece, and its offset along the first axis.
 
-    A disc seen at a grazing angle from afar is metres long; a camera that later drives over it would see it
-    smeared over the whole picture, since a Gaussian's picture is taken to be an ellipse around its middle.
+    A disc seen at a grazing angle from afar is metres long. For a camera that later drives over it, it would cover the
+    whole picture, since a Gaussian is projected as an ellipse around its middle.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Depth maps checked against each other: what several pictures agree on, and who sees it best."""
+"""Fusion of depth maps: surfaces that several pictures confirm, and the picture that shows each one largest."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 AGREEMENT = 1.0
 """Largest difference of predicted and measured disparity of one surface [px]."""
 SEE_THROUGH = 1.5
-"""Disparity deficit from which another picture looks through the surface [px]."""
+"""Disparity deficit above which another picture sees through the surface [px]."""
 CHECK_OFFSETS = (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6)
 """Places in the training sequence whose depth is compared with a picture's own [1]."""
 FINER_OFFSETS = (1, 2, 3, 4, 6, 8, 11, 15, 20, -1, -2, -3, -4, -6)
@@ -32,14 +32,13 @@ def fuse_depth(
     disparity_scale: float,
     T_world_camera: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Average each picture's depth with what its neighbours measure, and find out what is confirmed.
+    """Average each picture's depth with that of its neighbours, and return which of it is confirmed.
 
     A pixel's point is projected into the neighbouring pictures. A neighbour whose own depth there agrees
-    supports the point and contributes its depth with weight z^-4 (stereo depth errors grow as z^2); one
-    that looks through the point, into sky or onto something farther, contradicts it; one that sees
-    something nearer says nothing. A measured point is confirmed by more supporters than contradict it, or
-    where no other picture can tell. A guessed point has no say about others; it is confirmed where nobody
-    contradicts it and nobody has measured the same surface.
+    supports the point and contributes its depth with weight z^-4 (stereo depth errors grow as z^2); one that sees
+    through the point, into sky or onto a farther surface, contradicts it; one that sees a nearer surface does not
+    count. A measured point is confirmed if more neighbours support than contradict it, or if no neighbour counts. A
+    guessed point does not count for others; it is confirmed if no neighbour contradicts it or has measured it.
 
     Parameters
     ----------
@@ -70,7 +69,7 @@ def find_finest_view(
     disparity_scale: float,
     T_world_camera: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Confirmed pixels of picture n whose surface no other picture shows larger, bool [H, W]; see `fuse_depth`."""
+    """Return the confirmed pixels of picture n whose surface no other picture shows larger, bool [H, W]."""
     neighbours = _find_neighbours(n, FINER_OFFSETS, T_world_camera)
     keep = confirmed[n].copy()
     _drop_coarser(n, fused, confirmed, neighbours, intrinsics, disparity_scale, keep)

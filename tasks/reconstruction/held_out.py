@@ -62,7 +62,7 @@ def score_held_out_frames(
     for i in map(int, frames):
         gbuffer = rasterise(prepared, world_to_camera(T_world_camera[i]), K, width, height)
         sky = sky_view(scene.environment, (height, width), sequence.intrinsics, T_world_camera[i])
-        shown = exposure.picture(gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky, i)
+        shown = exposure.to_picture(gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky, i)
         shown = np.rint(shown * np.float32(255)).astype(np.uint8)
         wanted = sequence.left[i]
         road = np.isin(gbuffer.class_id, ROAD_CLASSES)

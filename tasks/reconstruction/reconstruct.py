@@ -1,4 +1,4 @@
-"""The whole way from a posed stereo sequence to a street one can drive, and how well it shows what it never saw."""
+"""Reconstruction of a drivable street from a posed stereo sequence, with its quality on held-out pictures."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -26,12 +26,12 @@ from tasks.scene.scene import Scene
 from tasks.scene.surroundings import add_surroundings
 
 CLIPPED = 254
-"""Pixel values from here on may stand for any brighter light."""
+"""Pixel values of at least this may stand for any brighter light."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reconstruction:
-    """A scene and what is known about it.
+    """A scene and the record of its reconstruction.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ class Reconstruction:
     T_world_camera: NDArray[np.float64]
     exposure: Exposure
 
-    def figures(self) -> dict[str, Any]:
-        """Means over the held-out frames and the table, in plain numbers."""
+    def summarise(self) -> dict[str, Any]:
+        """Return means over the held-out frames and the table, in plain numbers."""
         frames = [vars(frame) for frame in self.held_out]
         means = {
             f"held_out_{name}": float(np.nanmean([frame[name] for frame in frames]))
@@ -59,8 +59,8 @@ class Reconstruction:
 def reconstruct_street(sequence: StereoSequence, settings: StereoSettings | None = None) -> Reconstruction:
     """Build a Gaussian street from a posed stereo sequence.
 
-    The held-out frames are left out of everything: their pose receives the correction, and their exposure
-    the gain, interpolated between the neighbouring training frames.
+    No step of the build reads a held-out frame: its pose correction and its gain are interpolated between the
+    neighbouring training frames.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def reconstruct_street(sequence: StereoSequence, settings: StereoSettings | None
         return TrainingView(
             viewmat=world_to_camera(poses[i]),
             K=K,
-            radiance=exposure.radiance(sequence.left[i], i),
+            radiance=exposure.to_radiance(sequence.left[i], i),
             clipped=sequence.left[i].min(axis=2) >= CLIPPED,
             gain=exposure.falloff * np.float32(exposure.gains[i]),
             sky=sky_view(environment, shape, sequence.intrinsics, poses[i]),
@@ -148,7 +148,7 @@ def _find_poses_and_route(
     training: NDArray[np.int64],
     settings: StereoSettings,
 ) -> tuple[NDArray[np.float64], Route]:
-    """Corrected poses and the route, in the rig frame at the start of the route."""
+    """Return corrected poses and the route, in the rig frame at the start of the route."""
     scale = sequence.disparity_scale
     poses = correct_poses(
         sequence.left[..., 1], disparity, sequence.intrinsics, scale, sequence.T_origin_camera, training
@@ -165,7 +165,7 @@ def _find_poses_and_route(
 
 
 def _move_to_start(route: Route, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], Route]:
-    """Poses and route in the frame of the route's first pose."""
+    """Return poses and route in the frame of the route's first pose."""
     T = np.linalg.inv(route.T_world_rig[0])
     return T @ poses, Route(station=route.station, T_world_rig=T @ route.T_world_rig)
 
@@ -177,8 +177,8 @@ def _find_sky(
     training: NDArray[np.int64],
     settings: StereoSettings,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """The panorama, and the sky pixels of each training picture."""
-    radiance = [exposure.radiance(sequence.left[i], int(i)) for i in training]
+    """Return the panorama, and the sky pixels of each training picture."""
+    radiance = [exposure.to_radiance(sequence.left[i], int(i)) for i in training]
     sky = fit_sky(radiance, sequence.intrinsics, poses[training])
     masks = [
         sky_mask(picture, sky, sequence.intrinsics, poses[i])
@@ -197,7 +197,7 @@ def _fuse_depth_maps(
     poses: NDArray[np.float64],
     settings: StereoSettings,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Depth of the training pictures, filled, averaged over neighbours, and which of it is confirmed."""
+    """Return the depth of the training pictures, filled, averaged over neighbours, and which of it is confirmed."""
     scale = sequence.disparity_scale
     complete = np.array([fill_disparity(d, sky) for d, sky in zip(disparity, is_sky, strict=True)])
     guessed = np.isnan(disparity) & np.isfinite(complete)
@@ -214,7 +214,7 @@ def _settle_on_road(
     sequence: StereoSequence,
     training: NDArray[np.int64],
 ) -> tuple[Route, NDArray[np.float64]]:
-    """Route settled on the measured road, and everything in the frame of its new start."""
+    """Return the route moved onto the measured road, and the poses in the frame of its new start."""
     stride = 4
     points, distances = [], []
     for n, i in enumerate(training):
@@ -239,7 +239,7 @@ def _sample_surfels(
     training: NDArray[np.int64],
     settings: StereoSettings,
 ) -> tuple[Surfels, NDArray[np.int64]]:
-    """Samples of all training pictures, each surface from the picture that shows it largest, and which one."""
+    """Return samples of all training pictures, each surface from the picture that shows it largest, and its number."""
     K, scale = sequence.intrinsics, sequence.disparity_scale
     parts = [
         sample_picture(
@@ -247,7 +247,7 @@ def _sample_surfels(
             depth[n],
             camera_normals(depth[n], K, scale),
             sequence.left[i],
-            exposure.radiance(sequence.left[i], int(i)),
+            exposure.to_radiance(sequence.left[i], int(i)),
             K,
             scale,
             settings.spacing,

@@ -1,4 +1,4 @@
-"""Correction of Gaussians against the pictures they came from, picture by picture."""
+"""Refinement of Gaussians by the pictures they came from, one picture after the other."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -36,17 +36,17 @@ from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 
 COLOUR_STEP, OPACITY_STEP, DEPTH_STEP = 0.7, 0.5, 0.3
-"""Shares of the full step, which alone would null the residual, taken per picture [1]."""
+"""Shares of the full Gauss-Newton step taken per picture [1]."""
 COLOUR_DAMPING, OPACITY_DAMPING = 1.0, 0.02
-"""Evidence below which a colour or opacity is moved less: pixels of average weight, squared display value [1]."""
+"""Evidence below which a colour or opacity changes less: pixels of average weight, squared display value [1]."""
 DEPTH_SPREAD = 0.01
-"""Scale of the depth's own uncertainty, as a share of the depth; also the longest step [1]."""
+"""Standard uncertainty of the depth as a share of the depth; also the longest step [1]."""
 DEPTH_DAMPING = 0.02
 """Weight of that uncertainty against the picture's evidence [1]."""
 OPACITY_RANGE = (0.005, 0.99)
 """Opacities are kept within [1]."""
 LONGEST_OPACITY_STEP = 0.5
-"""Of the logarithm of opacity [1]."""
+"""Longest step of the logarithm of opacity [1]."""
 FAINTEST = 0.02
 """Gaussians that end less opaque than this are dropped [1]."""
 DARKEST = 0.01
@@ -71,7 +71,7 @@ class TrainingView:
     viewmat : float64 [4, 4] world to camera
     K : float64 [3, 3] intrinsics, pixel centres at +0.5 [px]
     radiance : float32 [H, W, 3] wanted linear light [1]
-    clipped : bool [H, W] pixels at the camera's ceiling: anything brighter matches too
+    clipped : bool [H, W] saturated pixels: any brighter value matches too
     gain : float32 [H, W] from radiance to linear pixel value [1]
     sky : float32 [H, W, 3] linear light behind the Gaussians [1]
     """
@@ -98,7 +98,7 @@ def refine_gaussians(
     count: int,
     passes: int,
 ) -> Gaussians:
-    """Make the Gaussians reproduce the training pictures better.
+    """Refine the Gaussians so that they reproduce the training pictures better.
 
     After each picture every Gaussian in it takes a damped Gauss-Newton step, with the off-diagonal of the
     normal matrix neglected, on the squared error of display values: its colour, its opacity and its depth
@@ -127,7 +127,7 @@ def refine_gaussians(
 
 
 def bit_reversed_order(count: int) -> list[int]:
-    """0 .. count - 1 in bit-reversed order, so that neighbours in the list are far apart."""
+    """Return 0 .. count - 1 in bit-reversed order, so that neighbours in the list are far apart."""
     bits = max(count - 1, 1).bit_length()
     return [n for k in range(1 << bits) if (n := int(f"{k:0{bits}b}"[::-1], 2)) < count]
 
@@ -135,7 +135,7 @@ def bit_reversed_order(count: int) -> list[int]:
 def _correct_by_view(
     prepared: PreparedGaussians, along: NDArray[np.float32], fixed: NDArray[np.bool_], view: TrainingView
 ) -> None:
-    """One step of all Gaussians that a picture shows, in place."""
+    """Take one step of all Gaussians that a picture shows, in place."""
     height, width = view.clipped.shape
     records, slots = project_gaussians(prepared, view_of(view.viewmat, view.K, width, height))
     weight = _display_response(view) ** 2
@@ -161,7 +161,7 @@ def _step_gaussians(blocks, slots, records, sums, along, fixed, camera, floor): 
         step = _OPACITY_STEP * sums[i, OPACITY] / (sums[i, OPACITY_SQUARE] + _OPACITY_DAMPING)
         opacity = blocks[block, LOG_OPACITY, lane] + min(max(step, -_OPACITY_LIMIT), _OPACITY_LIMIT)
         blocks[block, LOG_OPACITY, lane] = min(max(opacity, _FAINTEST), _DENSEST)
-        # How the splat moves in the picture per metre of depth along its ray.
+        # The splat's motion in the picture per metre of depth along its ray.
         z = records[i, DEPTH]
         ray = rotation @ along[slots[i]]
         du = (fx * ray[0] - (records[i, X] - cx) * ray[2]) / z
@@ -178,13 +178,13 @@ def _step_gaussians(blocks, slots, records, sums, along, fixed, camera, floor): 
 
 
 def _display_response(view: TrainingView) -> NDArray[np.float32]:
-    """Change of display value per change of radiance, at the local mean of the picture, [H, W]."""
+    """Return the change of display value per change of radiance, at the local mean of the picture, [H, W]."""
     exposed = np.clip(cv2.blur(view.radiance.mean(axis=2), (5, 5)) * view.gain, DARKEST, 1)
     return (1.055 / 2.4 * exposed ** (1 / 2.4 - 1) * view.gain).astype(np.float32)
 
 
 def _unpack_gaussians(gaussians: Gaussians, prepared: PreparedGaussians) -> Gaussians:
-    """The cloud with the corrected planes of the prepared blocks, in its own order."""
+    """Return the cloud with the corrected planes of the prepared blocks, in its own order."""
     n = len(gaussians)
     planes = prepared.blocks.transpose(1, 0, 2).reshape(prepared.blocks.shape[1], -1)[:, :n]
     means, sh, opacities = gaussians.means.copy(), gaussians.sh.copy(), gaussians.opacities.copy()

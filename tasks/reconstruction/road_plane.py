@@ -1,4 +1,4 @@
-"""The road under the drive: one plane per picture, joined to a route that lies on the road."""
+"""The road under the drive: one plane per picture, joined to a route on the road."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +11,19 @@ STATION_STEP = 0.5
 BANDWIDTH = 4.0
 """Length over which the route is smoothed [m]."""
 ROAD_SPREAD = 0.3
-"""Disparity error at which a pixel no longer counts fully as road [px]."""
+"""Disparity error above which a pixel counts less as road [px]."""
 LANE = 1.2
 """Half width of the strip whose height the route takes [m]."""
 SURFACE_REACH = 14.0
-"""Road nearer than this to a camera is measured well enough to settle the route on it [m]."""
+"""Road nearer than this to a camera is measured precisely enough to correct the route by it [m]."""
 SURFACE_SPREAD = 0.03
-"""Height above the road at which a point no longer counts fully as road [m]."""
+"""Height above the road above which a point counts less as road [m]."""
 
 
 def fit_road_plane(
     disparity: NDArray[np.float32], intrinsics: NDArray[np.float64], disparity_scale: float
 ) -> NDArray[np.float64]:
-    """Plane of the road ahead in camera coordinates, from one disparity picture.
+    """Fit the plane of the road ahead in camera coordinates to one disparity picture.
 
     A plane is linear in disparity: d(u, v) = a u + b v + c. Robust least squares over a trapezoid that
     narrows towards the vanishing point, as a lane does, gives a, b, c.
@@ -66,10 +66,10 @@ def lay_route_below(
     first_station: float,
     extension: float,
 ) -> Route:
-    """Route on the road below the cameras, in the poses' own frame.
+    """Return the route on the road below the cameras, in the frame of the poses.
 
-    Every camera is dropped onto its plane; the foot points and the planes' normals are smoothed along the
-    drive; the rig's x axis follows the path. Beyond the last foot point the route runs straight on.
+    Every camera is projected onto its plane; the projections and the planes' normals are smoothed along the
+    drive; the rig's x axis follows the path. Beyond the last projection the route continues straight.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def lay_route_below(
 
 
 def settle_route(route: Route, points: NDArray[np.floating], depth: NDArray[np.floating]) -> Route:
-    """The route moved up or down, and rolled, onto the measured road surface.
+    """Move the route up or down, and roll it, onto the measured road surface.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def settle_route(route: Route, points: NDArray[np.floating], depth: NDArray[np.f
 def _poses_along_path(
     path: NDArray[np.float64], direction: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Poses on a path with x along the direction and z as near to the normal as can be."""
+    """Return poses on a path with x along the direction and z as close to the normal as possible."""
     x = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     z = normal - (normal * x).sum(axis=1, keepdims=True) * x
     z /= np.linalg.norm(z, axis=1, keepdims=True)
@@ -161,7 +161,7 @@ def _poses_along_path(
 def _smooth_path(
     s: NDArray[np.float64], values: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Value and slope by local linear regression with a Gaussian window."""
+    """Return value and slope by local linear regression with a Gaussian window."""
     out, slope = np.empty((len(at), values.shape[1])), np.empty((len(at), values.shape[1]))
     for k, x in enumerate(at):
         A = np.stack([np.ones(len(s)), s - x], axis=1)

@@ -1,4 +1,4 @@
-"""From confirmed pixels to Gaussians: where, how large, how turned."""
+"""Samples of confirmed pixels: place, size and orientation of the Gaussians."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +23,7 @@ THICKNESS = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class Surfels:
-    """Samples of surfaces, each as the picture that shows it largest sees it.
+    """Samples of surfaces, each from the picture that shows it largest.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def sample_picture(
 
 
 def _view_blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
-    """View of [H, W, ...] as [H / side, side, W / side, side, ...], without the rest at the far edges."""
+    """Return [H, W, ...] viewed as [H / side, side, W / side, side, ...], without the rest at the far edges."""
     rows, columns = (n // side for n in values.shape[:2])
     cut = values[: rows * side, : columns * side]
     shape, strides = cut.shape, cut.strides
@@ -108,7 +108,7 @@ def _view_blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
 
 
 def join_samples(parts: list[Surfels]) -> Surfels:
-    """All samples in one."""
+    """Concatenate the samples."""
     names = ("rays", "depth", "normals", "radiance", "spacing")
     return Surfels(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
@@ -120,7 +120,7 @@ def derive_discs(
     spacing: NDArray[np.float64],
     focal_length: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Axes and standard deviations of discs in the surface whose picture is round.
+    """Return axes and standard deviations of discs in the surface whose picture is round.
 
     In the camera that took the sample, the disc's picture is a Gaussian of standard deviation
     ``COVERAGE * spacing``.
@@ -138,7 +138,7 @@ def derive_discs(
     rotation : float64 [N, 3, 3] local axes as columns, camera coordinates: the longest, the one across, the normal
     scales : float64 [N, 3] standard deviations [m]
     """
-    # How the surface point moves per pixel to the right and per pixel down.
+    # Motion of the surface point per pixel to the right and per pixel down.
     along = (rays * normals).sum(axis=1, keepdims=True)
     unit = depth[:, None] / focal_length
     right = unit * (np.array([1.0, 0, 0]) - rays * normals[:, :1] / along)

@@ -128,7 +128,7 @@ def continuous_rig(
         Frame number and times relative to the frame's own time, to poses.
     """
 
-    def inside(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pose_within_clip(t: NDArray[np.float64]) -> NDArray[np.float64]:
         at = (np.interp(t, time, column) for column in (station, heave, pitch))
         return body_poses(route, *at, cg_behind_front_axle=cg_behind_front_axle, cg_height=cg_height)
 
@@ -137,9 +137,11 @@ def continuous_rig(
         end = np.clip(t, time[0], time[-1])
         beyond = t != end
         if not beyond.any():
-            return inside(t)
-        turn = inside(end)
-        return np.where(beyond[:, None, None], turn @ np.linalg.inv(inside(2 * end - t)) @ turn, turn)
+            return pose_within_clip(t)
+        turn = pose_within_clip(end)
+        return np.where(
+            beyond[:, None, None], turn @ np.linalg.inv(pose_within_clip(2 * end - t)) @ turn, turn
+        )
 
     return rig_at
 

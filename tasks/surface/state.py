@@ -26,6 +26,8 @@ class SurfaceParameters:
     fresh_snow_density : rho_s [kg/m3]
     water_density : rho_w [kg/m3]
     full_cover_depth_mm : snow depth that covers the whole pavement, h_cover [mm]
+    glaze_mm : clear ice after freezing rain, from the bottom of the texture; NaN where no entry of ice was read [mm]
+    ice_friction : friction of that ice, mu_ice; NaN where no entry of ice was read [1]
     bounds : declared range of each parameter that the sensitivity study varies, by field name
     """
 
@@ -45,6 +47,8 @@ class SurfaceParameters:
     fresh_snow_density: float
     water_density: float
     full_cover_depth_mm: float
+    glaze_mm: float = nan
+    ice_friction: float = nan
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, compare=False)
 
 

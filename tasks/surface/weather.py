@@ -100,6 +100,17 @@ def snow_depth(weather: Weather, parameters: SurfaceParameters) -> float:
     return weather.precipitation_mm_h * weather.snow_accumulation_h * p.water_density / p.fresh_snow_density
 
 
+def glaze_depth(weather: Weather, parameters: SurfaceParameters) -> float:
+    """Depth of the clear ice that freezing rain has left, from the bottom of the texture [mm]; nothing falls any more.
+
+    Parameters
+    ----------
+    weather : not used
+    parameters : holds the glaze
+    """
+    return parameters.glaze_mm
+
+
 def dry_friction(film_mm: float, coverage: float, parameters: SurfaceParameters) -> float:
     """Friction of the dry pavement, mu_dry [1] (paper, Eq. surface_friction_mapping).
 
@@ -148,6 +159,17 @@ def snow_friction(film_mm: float, coverage: float, parameters: SurfaceParameters
     return p.bare_wet_friction - (p.bare_wet_friction - p.snow_friction) * coverage
 
 
+def ice_friction(film_mm: float, coverage: float, parameters: SurfaceParameters) -> float:
+    """Friction of black ice, whatever the pavement below [1] (Wallman & Astrom 2001, VTI meddelande 911A).
+
+    Parameters
+    ----------
+    film_mm, coverage : not used
+    parameters : the friction anchors
+    """
+    return parameters.ice_friction
+
+
 def derive_dry(weather: Weather, state: SurfaceState, p: SurfaceParameters) -> tuple[Derivation, ...]:
     """Derivation of a dry road's friction."""
     return (_friction_derivation("5", f"dry pavement: {p.dry_friction:g}"),)
@@ -183,6 +205,17 @@ def derive_snow(weather: Weather, state: SurfaceState, p: SurfaceParameters) -> 
             formula=f"min(1, {state.snow_depth_mm:.4g} / {p.full_cover_depth_mm:g})",
         ),
         _friction_derivation("5, S23", f"{p.bare_wet_friction:g} - {lost} * {state.snow_coverage:.4g}"),
+    )  # fmt: skip
+
+
+def derive_ice(weather: Weather, state: SurfaceState, p: SurfaceParameters) -> tuple[Derivation, ...]:
+    """Derivations of the glaze and its friction, of which the paper has none."""
+    return (
+        Derivation(
+            field="film_depth_mm", quantity="ice film", symbol="h_t", equation="none",
+            formula=f"glaze: {p.glaze_mm:g}",
+        ),
+        _friction_derivation("none", f"black ice: {p.ice_friction:g}"),
     )  # fmt: skip
 
 
@@ -234,6 +267,7 @@ WEATHERS: Mapping[str, WeatherKind] = {
             name="snow", snow=snow_depth, friction=snow_friction, derive=derive_snow, rate_limit="snow_rate",
             accumulates=True,
         ),
+        WeatherKind(name="ice", film=glaze_depth, friction=ice_friction, derive=derive_ice),
     )
 }  # fmt: skip
 """Every kind of weather there is, by its name."""

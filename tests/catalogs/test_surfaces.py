@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from catalogs.entries import entry_names, find_entry
-from catalogs.surfaces import load_surface
+from catalogs.surfaces import SurfaceEntry, load_surface
 from catalogs.weather.grip import FOLDER as WEATHER
 from tasks.errors import InputError
 
@@ -31,7 +31,7 @@ def test_dense_asphalt_holds_the_papers_values_and_bounds():
     asphalt = load_surface("dense-asphalt")
     assert (asphalt.dry_friction, asphalt.texture_depth_mm, asphalt.crossfall) == (0.82, 0.5, 0.02)
     assert asphalt.bounds["flooded_friction"] == (0.306, 0.374)
-    assert len(asphalt.bounds) == 10
+    assert len(asphalt.bounds.keys() & SurfaceEntry.model_fields.keys()) == 10
 
 
 def test_an_unknown_name_lists_what_exists():

@@ -12,7 +12,7 @@ CHANNELS = (
 )  # fmt: skip
 
 
-def ticks() -> dict[str, np.ndarray]:
+def make_ticks() -> dict[str, np.ndarray]:
     rng = np.random.default_rng(3)
     return {name: rng.standard_normal(N) for name in CHANNELS}
 
@@ -30,9 +30,9 @@ def ticks() -> dict[str, np.ndarray]:
     ],
 )
 def test_a_shift_of_a_channel_is_its_figure(channel: str, shift: float, figure: str, value: float) -> None:
-    moved = ticks()
+    moved = make_ticks()
     moved[channel] = moved[channel] + shift
-    moves = compare_ticks(ticks(), moved)
+    moves = compare_ticks(make_ticks(), moved)
     assert moves[figure] == pytest.approx(value)
     untouched = {
         k: v for k, v in moves.items() if not k.startswith(channel.rsplit("_", 1)[0]) and "station" not in k
@@ -41,10 +41,10 @@ def test_a_shift_of_a_channel_is_its_figure(channel: str, shift: float, figure: 
 
 
 def test_only_shared_ticks_count_and_a_missing_channel_is_no_number() -> None:
-    short = {name: values[:100] for name, values in ticks().items()}
-    assert compare_ticks(ticks(), short)["speed_rms_m_s"] == 0.0
+    short = {name: values[:100] for name, values in make_ticks().items()}
+    assert compare_ticks(make_ticks(), short)["speed_rms_m_s"] == 0.0
     del short["pitch"]
-    assert np.isnan(compare_ticks(ticks(), short)["pitch_rms_deg"])
+    assert np.isnan(compare_ticks(make_ticks(), short)["pitch_rms_deg"])
 
 
 def test_figures_change_from_a_to_b_and_nothing_stays_nothing() -> None:

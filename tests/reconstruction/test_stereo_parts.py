@@ -40,7 +40,7 @@ def smooth_noise(shape: tuple[int, int], seed: int) -> np.ndarray:
     return 128 + 45 * picture / picture.std()
 
 
-def shifted(picture: np.ndarray, by: float) -> np.ndarray:
+def shift_picture(picture: np.ndarray, by: float) -> np.ndarray:
     """The periodic picture moved to the left by a part of a pixel, by its spectrum."""
     phase = np.exp(2j * np.pi * np.fft.rfftfreq(picture.shape[1]) * by)
     return np.fft.irfft(np.fft.rfft(picture, axis=1) * phase, picture.shape[1], axis=1)
@@ -49,7 +49,7 @@ def shifted(picture: np.ndarray, by: float) -> np.ndarray:
 @pytest.mark.parametrize("disparity", [12.0, 12.4, 7.75])
 def test_disparity_is_found_to_a_fraction_of_a_pixel(disparity: float) -> None:
     left = smooth_noise((80, 200), 1)
-    to_bytes = [np.clip(np.rint(p), 0, 255).astype(np.uint8) for p in (left, shifted(left, disparity))]
+    to_bytes = [np.clip(np.rint(p), 0, 255).astype(np.uint8) for p in (left, shift_picture(left, disparity))]
     found = match_stereo(*to_bytes, 32)
     inner = found[10:-10, 40:-10]
     assert np.isfinite(inner).mean() > 0.97
@@ -58,7 +58,7 @@ def test_disparity_is_found_to_a_fraction_of_a_pixel(disparity: float) -> None:
 
 def test_what_the_right_camera_does_not_see_has_no_disparity() -> None:
     left = smooth_noise((80, 200), 2).clip(0, 255).astype(np.uint8)
-    found = match_stereo(left, shifted(left.astype(float), 15.0).clip(0, 255).astype(np.uint8), 32)
+    found = match_stereo(left, shift_picture(left.astype(float), 15.0).clip(0, 255).astype(np.uint8), 32)
     assert np.isnan(found[:, :10]).mean() > 0.9
 
 
@@ -268,8 +268,8 @@ def test_gains_and_lens_shading_are_found_together() -> None:
     exposure = estimate_exposure(np.array(pictures), disparity, K, SCALE, poses, np.arange(4))
     np.testing.assert_allclose(exposure.gains / exposure.gains[0], gains, rtol=0.05)
     assert exposure.falloff[5, 5] == pytest.approx(falloff[5, 5], abs=0.03)
-    light = exposure.radiance(np.repeat(pictures[1][..., None], 3, axis=2), 1)
-    np.testing.assert_allclose(exposure.picture(light, 1)[..., 0], pictures[1] / 255, atol=2e-3)
+    light = exposure.to_radiance(np.repeat(pictures[1][..., None], 3, axis=2), 1)
+    np.testing.assert_allclose(exposure.to_picture(light, 1)[..., 0], pictures[1] / 255, atol=2e-3)
 
 
 CAMERA_TO_WORLD = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.5], [0, 0, 0, 1]])

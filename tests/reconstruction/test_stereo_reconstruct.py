@@ -152,7 +152,7 @@ def test_poses_that_jitter_are_put_right_by_the_pictures(built: Reconstruction, 
 
 
 def test_figures_are_plain_numbers_with_a_row_per_frame(built: Reconstruction) -> None:
-    figures = built.figures()
+    figures = built.summarise()
     assert figures["held_out_psnr_db"] == built.held_out[0].psnr_db
     assert [row["frame"] for row in figures["held_out_frames"]] == [HELD_OUT]
     assert all(isinstance(value, int | float) for value in figures["held_out_frames"][0].values())
@@ -179,7 +179,7 @@ def test_a_real_street_is_shown_within_20_db_and_its_road_within_22(outside_data
     folder = outside_data / "measured" / "kitti_street"
     if not folder.is_dir():
         pytest.skip(f"no stereo sequence at {folder}")
-    short = _halved(read_stereo_folder(folder), slice(12, 21))
+    short = _halve_sequence(read_stereo_folder(folder), slice(12, 21))
     settings = StereoSettings(disparities=64, refinement_passes=2, extension=5.0, environment_rows=256)
     (figure,) = reconstruct_street(short, settings).held_out
     assert figure.frame == 4
@@ -187,7 +187,7 @@ def test_a_real_street_is_shown_within_20_db_and_its_road_within_22(outside_data
     assert figure.road_psnr_db > 22
 
 
-def _halved(sequence: StereoSequence, frames: slice) -> StereoSequence:
+def _halve_sequence(sequence: StereoSequence, frames: slice) -> StereoSequence:
     """Some of the pictures at half the width and height."""
     intrinsics = sequence.intrinsics.copy()
     intrinsics[:2, 2] += 0.5

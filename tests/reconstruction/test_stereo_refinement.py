@@ -29,7 +29,7 @@ K = np.array([[60.0, 0, 22.5], [0, 60, 18.5], [0, 0, 1]])
 NAMES = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
 
 
-def cloud(count: int = 120, seed: int = 1) -> Gaussians:
+def make_cloud(count: int = 120, seed: int = 1) -> Gaussians:
     """Gaussians in front of a camera at the origin that looks along +z."""
     draw = np.random.Generator(np.random.Philox(seed))
     means = draw.uniform((-1.6, -1.3, 4), (1.6, 1.3, 7), (count, 3))
@@ -49,7 +49,7 @@ def records_of(gaussians: Gaussians) -> np.ndarray:
     return project_gaussians(prepare_gaussians(gaussians), view_of(np.eye(4), K, WIDTH, HEIGHT))[0].copy()
 
 
-def backdrop(seed: int) -> np.ndarray:
+def make_backdrop(seed: int) -> np.ndarray:
     draw = np.random.Generator(np.random.Philox(seed))
     return draw.uniform(0, 1, (HEIGHT, WIDTH, 3)).astype(np.float32)
 
@@ -58,7 +58,7 @@ ONES = np.ones((HEIGHT, WIDTH), np.float32)
 
 
 def test_the_blended_picture_is_the_rasterisers() -> None:
-    gaussians, sky = cloud(), backdrop(2)
+    gaussians, sky = make_cloud(), make_backdrop(2)
     picture, _ = blend_and_derive(records_of(gaussians), sky, ONES, sky)
     gbuffer = rasterise(prepare_gaussians(gaussians), np.eye(4), K, WIDTH, HEIGHT)
     np.testing.assert_allclose(picture[..., 3], 1 - gbuffer.alpha, atol=2e-5)
@@ -73,7 +73,12 @@ def test_the_blended_picture_is_the_rasterisers() -> None:
 )
 def test_derivatives_are_those_of_the_picture(column: int, of: int, step: float) -> None:
     """Half the squared error falls by the derivative times residual, per unit of each quantity."""
-    records, sky, target, weight = records_of(cloud()), backdrop(2), backdrop(3), backdrop(4)[..., 0].copy()
+    records, sky, target, weight = (
+        records_of(make_cloud()),
+        make_backdrop(2),
+        make_backdrop(3),
+        make_backdrop(4)[..., 0].copy(),
+    )
 
     def loss(changed: np.ndarray) -> float:
         picture, _ = blend_and_derive(changed, target, weight, sky)
@@ -91,7 +96,7 @@ def test_derivatives_are_those_of_the_picture(column: int, of: int, step: float)
 
 
 def test_squares_of_derivatives_are_those_of_a_single_splat() -> None:
-    gaussians = cloud(1)
+    gaussians = make_cloud(1)
     records, sky = records_of(gaussians), np.zeros((HEIGHT, WIDTH, 3), np.float32)
     _, sums = blend_and_derive(records, sky, ONES, sky)
     for column, of in ((LOG_ALPHA, OPACITY_SQUARE), (X, SQUARE_XX)):
@@ -105,7 +110,7 @@ def test_squares_of_derivatives_are_those_of_a_single_splat() -> None:
 
 
 def test_a_pixel_at_the_ceiling_is_matched_by_anything_brighter() -> None:
-    records, sky = records_of(cloud()), backdrop(2)
+    records, sky = records_of(make_cloud()), make_backdrop(2)
     picture, _ = blend_and_derive(records, sky, ONES, sky)
     _, darker = blend_and_derive(records, -np.maximum(picture[..., :3] - 0.05, 1e-4), ONES, sky)
     assert (darker[:, COLOUR : COLOUR + 3] == 0).all()
@@ -114,7 +119,7 @@ def test_a_pixel_at_the_ceiling_is_matched_by_anything_brighter() -> None:
 
 
 def test_nothing_to_blend_shows_the_sky() -> None:
-    sky = backdrop(2)
+    sky = make_backdrop(2)
     picture, sums = blend_and_derive(np.empty((0, RECORD), np.float32), sky, ONES, sky)
     np.testing.assert_array_equal(picture[..., :3], sky)
     assert sums.shape[0] == 0
@@ -149,7 +154,7 @@ def error_of(gaussians: Gaussians, views: list[TrainingView]) -> float:
     return total
 
 
-def disturbed(gaussians: Gaussians) -> tuple[Gaussians, np.ndarray]:
+def disturb_cloud(gaussians: Gaussians) -> tuple[Gaussians, np.ndarray]:
     """Colours, opacities and depths that are off, and the rays along which the depths are."""
     draw = np.random.Generator(np.random.Philox(9))
     rays = gaussians.means / gaussians.means[:, 2:]
@@ -165,20 +170,20 @@ def disturbed(gaussians: Gaussians) -> tuple[Gaussians, np.ndarray]:
 
 
 def test_refinement_brings_the_pictures_back() -> None:
-    true = cloud()
+    true = make_cloud()
     views = views_of(true)
-    start, rays = disturbed(true)
+    start, rays = disturb_cloud(true)
     better = refine_gaussians(start, rays, lambda n: views[n], len(views), 12)
     assert error_of(better, views) < 0.05 * error_of(start, views)
 
 
 def test_refinement_moves_along_the_rays_only_and_leaves_road_where_it_is() -> None:
     true = replace(
-        cloud(),
+        make_cloud(),
         class_id=np.where(np.arange(120) < 60, SemanticClass.ROAD, SemanticClass.OTHER).astype(np.uint8),
     )
     views = views_of(true)
-    start, rays = disturbed(true)
+    start, rays = disturb_cloud(true)
     better = refine_gaussians(start, rays, lambda n: views[n], len(views), 3)
     assert len(better) == len(start)
     np.testing.assert_allclose(better.means[:60], start.means[:60], atol=1e-6)
@@ -193,10 +198,12 @@ def test_refinement_moves_along_the_rays_only_and_leaves_road_where_it_is() -> N
 
 def test_what_should_not_be_there_fades_away() -> None:
     """A floater of the right colour for no picture loses its opacity, and is dropped in the end."""
-    true = cloud()
+    true = make_cloud()
     views = views_of(true)
     floater = replace(
-        cloud(1, seed=5), means=np.array([[0.1, 0.1, 2.5]], np.float32), opacities=np.array([0.6], np.float32)
+        make_cloud(1, seed=5),
+        means=np.array([[0.1, 0.1, 2.5]], np.float32),
+        opacities=np.array([0.6], np.float32),
     )
     both = Gaussians(
         **{name: np.concatenate([getattr(true, name), getattr(floater, name)]) for name in NAMES}
@@ -213,6 +220,6 @@ def test_the_order_of_pictures_visits_each_once_and_jumps() -> None:
 
 def test_records_hold_what_the_derivative_reads() -> None:
     """The columns that the kernel addresses are the projection's own."""
-    records = records_of(cloud(1))
+    records = records_of(make_cloud(1))
     assert records.shape == (1, RECORD)
     assert 4 < records[0, DEPTH] < 7

@@ -9,7 +9,7 @@ from tasks.render.rasterise.gbuffer import GBuffer
 K = np.array([[40.0, 0, 24], [0, 40.0, 16], [0, 0, 1]])
 
 
-def looking(forward: list[float], down: list[float]) -> np.ndarray:
+def look_along(forward: list[float], down: list[float]) -> np.ndarray:
     view = np.eye(4)
     view[:3, :3] = [np.cross(down, forward), down, forward]
     return view
@@ -28,7 +28,7 @@ def test_every_byte_survives_linear_light_and_back():
     assert (encode_8bit(to_linear((levels / 255).astype(np.float32))) == levels).all()
 
 
-def buffer(alpha: float) -> GBuffer:
+def make_buffer(alpha: float) -> GBuffer:
     shape = (4, 5)
     return GBuffer(
         rgb=np.full((*shape, 3), 0.4 * alpha, np.float32), depth=np.ones(shape, np.float32),
@@ -40,15 +40,17 @@ def buffer(alpha: float) -> GBuffer:
 
 def test_the_sky_fills_what_the_street_leaves():
     sky = np.full((4, 5, 3), 0.8, np.float32)
-    np.testing.assert_allclose(compose_over_sky(buffer(0.25), sky, False), 0.25 * 0.4 + 0.75 * 0.8, rtol=1e-6)
-    np.testing.assert_array_equal(compose_over_sky(buffer(0.0), sky, False), sky)
+    np.testing.assert_allclose(
+        compose_over_sky(make_buffer(0.25), sky, False), 0.25 * 0.4 + 0.75 * 0.8, rtol=1e-6
+    )
+    np.testing.assert_array_equal(compose_over_sky(make_buffer(0.0), sky, False), sky)
 
 
 def test_display_encoded_scenes_blend_before_they_are_linearised():
     sky = np.full((4, 5, 3), 0.8, np.float32)
-    np.testing.assert_allclose(compose_over_sky(buffer(0.0), sky, True), sky, rtol=1e-5)
+    np.testing.assert_allclose(compose_over_sky(make_buffer(0.0), sky, True), sky, rtol=1e-5)
     np.testing.assert_allclose(
-        compose_over_sky(buffer(1.0), sky, True), to_linear(np.float32([0.4]))[0], rtol=1e-5
+        compose_over_sky(make_buffer(1.0), sky, True), to_linear(np.float32([0.4]))[0], rtol=1e-5
     )
 
 
@@ -67,7 +69,7 @@ def test_the_panorama_centre_is_forward_and_its_left_quarter_is_left(forward, co
     panorama = np.zeros((64, 128, 3), np.float32)
     at = int(column * 128)
     panorama[28:36, at - 4 : at + 4] = 1.0
-    view = environment_view(panorama, looking(forward, [0, 0, -1]), K, 48, 32)
+    view = environment_view(panorama, look_along(forward, [0, 0, -1]), K, 48, 32)
     assert view[15:17, 23:25].min() > 0.9
     assert view[:, :4].max() < 0.1
 
@@ -75,13 +77,13 @@ def test_the_panorama_centre_is_forward_and_its_left_quarter_is_left(forward, co
 def test_the_first_panorama_row_is_the_zenith():
     panorama = np.zeros((64, 128, 3), np.float32)
     panorama[:8] = 1.0
-    up = environment_view(panorama, looking([0, 0, 1], [1, 0, 0]), K, 48, 32)
+    up = environment_view(panorama, look_along([0, 0, 1], [1, 0, 0]), K, 48, 32)
     assert up[16, 24].min() > 0.99
 
 
 def test_there_is_no_seam_behind():
     panorama = plain_sky()
-    view = environment_view(panorama, looking([-1, 0, 0], [0, 0, -1]), K, 48, 32)
+    view = environment_view(panorama, look_along([-1, 0, 0], [0, 0, -1]), K, 48, 32)
     assert np.abs(np.diff(view, axis=1)).max() < 0.02
 
 

@@ -14,13 +14,13 @@ from tasks.render.rasterise.reference_rasteriser import rasterise_reference
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.surroundings import add_surroundings
-from tests.render.clouds import HEIGHT, WIDTH, K, cloud, random_cloud
+from tests.render.clouds import HEIGHT, WIDTH, K, make_cloud, random_cloud
 from tests.render.striped_road import crossing_row, striped_road, true_row
 
 AHEAD = np.eye(4)
 
 
-def surrounded(gaussians: Gaussians, seed: int = 3) -> Gaussians:
+def surround_cloud(gaussians: Gaussians, seed: int = 3) -> Gaussians:
     """With surroundings of every kind."""
     rng = np.random.default_rng(seed)
     n = len(gaussians)
@@ -81,7 +81,7 @@ def test_a_level_road_of_discs_stays_while_the_camera_comes_closer():
 
 
 def test_the_kernel_draws_what_the_reference_integrates():
-    level = surrounded(random_cloud(600))
+    level = surround_cloud(random_cloud(600))
     got = rasterise(prepare_gaussians(level), AHEAD, K, WIDTH, HEIGHT)
     wanted = rasterise_reference(level, AHEAD, K, WIDTH, HEIGHT)
     plain = rasterise(prepare_gaussians(replace(level, surroundings=None)), AHEAD, K, WIDTH, HEIGHT)
@@ -90,7 +90,7 @@ def test_the_kernel_draws_what_the_reference_integrates():
 
 
 def test_centres_for_a_gpu_project_where_the_kernel_puts_the_splats():
-    level = surrounded(random_cloud(600))
+    level = surround_cloud(random_cloud(600))
     prepared, view = prepare_gaussians(level), view_of(AHEAD, K, WIDTH, HEIGHT)
     records, slots = project_gaussians(prepared, view)
     arrays = (level.means, level.quats_wxyz, level.scales, level.normals, level.surroundings)
@@ -103,7 +103,7 @@ def test_centres_for_a_gpu_project_where_the_kernel_puts_the_splats():
 
 
 def test_centres_in_the_camera_s_plane_stay_on_a_gpu():
-    level = surrounded(random_cloud(50))
+    level = surround_cloud(random_cloud(50))
     means = level.means.copy()
     means[::3, 2] = 0.0
     arrays = (means, level.quats_wxyz, level.scales, level.normals, level.surroundings)
@@ -123,7 +123,7 @@ def test_a_cloud_without_surroundings_is_drawn_as_its_trainer_drew_it():
 
 
 def test_a_disc_that_faces_the_camera_stays():
-    facing = cloud((0.1, 0.2, 5.0), scales=(0.3, 0.3, 1e-3), normals=(0, 0, -1))
+    facing = make_cloud((0.1, 0.2, 5.0), scales=(0.3, 0.3, 1e-3), normals=(0, 0, -1))
     level = replace(facing, surroundings=np.array([[4.0, 1.0]], np.float32), antialiased=True)
     (record,), _ = project_gaussians(prepare_gaussians(level), view_of(AHEAD, K, WIDTH, HEIGHT))
     assert record[[X, Y]] == pytest.approx(K[:2, :2] @ (0.02, 0.04) + K[:2, 2], abs=1e-4)
@@ -133,7 +133,7 @@ def test_a_disc_that_its_lead_brings_into_the_picture_is_not_culled_with_its_blo
     """Balls beyond the left edge, on a surface that comes nearer to the right, one at a time."""
     drawn = 0
     for x in np.linspace(-2.2, -1.0, 25):
-        ball = cloud((x, 0.0, 2.0), scales=0.1, opacities=0.9, normals=(0.6, 0, 0.8))
+        ball = make_cloud((x, 0.0, 2.0), scales=0.1, opacities=0.9, normals=(0.6, 0, 0.8))
         level = replace(ball, surroundings=np.array([[20.0, 1.0]], np.float32), antialiased=True)
         got = rasterise(prepare_gaussians(level), AHEAD, K, WIDTH, HEIGHT).alpha
         assert np.abs(got - rasterise_reference(level, AHEAD, K, WIDTH, HEIGHT).alpha).max() < 5e-3

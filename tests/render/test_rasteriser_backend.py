@@ -16,7 +16,7 @@ from tasks.render.rasterise import backend
 from tasks.render.rasterise.backend import CpuBackend, compare_with_cpu, probe_scene, select_backend
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
-from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
+from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"
 
@@ -95,7 +95,10 @@ def test_gsplat_draws_the_cpus_picture() -> None:
     pytest.importorskip("gsplat", reason="gsplat is not installed; it comes with the gpu extra")
     gpu, cpu = select_backend("gsplat"), CpuBackend()
     for seed, sh_count in ((0, 16), (1, 4), (2, 1)):
-        gaussians, viewmat = random_cloud(1500, sh_count, seed), camera_at((0.1, 0.2, 0), rotation(seed))
+        gaussians, viewmat = (
+            random_cloud(1500, sh_count, seed),
+            camera_at((0.1, 0.2, 0), rotation_matrix(seed)),
+        )
         got = gpu.rasterise(gpu.prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
         wanted = cpu.rasterise(cpu.prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
         assert np.mean((got.rgb - wanted.rgb) ** 2) < 1e-6

@@ -29,7 +29,7 @@ from tasks.render.rasterise.reference_rasteriser import blend_steps
 from tasks.render.rasterise.shading import shade_lanes
 from tasks.render.rasterise.view import view_of
 from tasks.scene.spherical_harmonics import sh_basis
-from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
+from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
 
 
 def test_sh_basis_is_scipys_real_harmonics_with_the_condon_shortley_sign() -> None:
@@ -93,7 +93,7 @@ def test_morton_neighbours_are_near_and_equal_points_keep_their_order() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_culling_blocks_never_loses_a_splat(seed: int) -> None:
     prepared = prepare_gaussians(random_cloud(4000, sh_count=1, seed=seed))
-    viewmat = camera_at(np.random.default_rng(seed).uniform(-4, 4, 3), rotation(seed))
+    viewmat = camera_at(np.random.default_rng(seed).uniform(-4, 4, 3), rotation_matrix(seed))
     view = view_of(viewmat, K, WIDTH, HEIGHT)
     everything = replace(prepared, radii=np.full_like(prepared.radii, 1e6))
     records, slots = project_gaussians(prepared, view)

@@ -1,4 +1,4 @@
-"""What a low camera sees of a depression and of a hump: as rays over the profile say, in depth, class and mask."""
+"""A depression and a hump from a low camera: depth, class and mask agree with rays over the profile."""
 
 import numpy as np
 import pytest

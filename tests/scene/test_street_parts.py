@@ -47,7 +47,7 @@ def test_world_position_keeps_the_lateral_offset() -> None:
     middle = line.to_world(np.stack([s, np.zeros(50), np.zeros(50)], axis=1))
     assert np.allclose(np.linalg.norm((left - middle)[:, :2], axis=1), 3.0)
     assert np.allclose(left[:, 2], 0.7)
-    across = np.cross(line.directions(s, np.tile([1.0, 0, 0], (50, 1))), left - middle)
+    across = np.cross(line.to_world_directions(s, np.tile([1.0, 0, 0], (50, 1))), left - middle)
     assert (across[:, 2] > 0).all()
 
 
@@ -80,8 +80,8 @@ def test_box_and_tube_face_outward() -> None:
 
 def test_sky_share_in_mid_street_is_the_closed_form() -> None:
     # Oke 1987, Boundary Layer Climates: the floor's middle sees cos(arctan(2 H / W)) of the sky
-    width = LAYOUT.front(1) - LAYOUT.front(-1)
-    middle = np.array([[50.0, (LAYOUT.front(1) + LAYOUT.front(-1)) / 2, 0.0]])
+    width = LAYOUT.front_position(1) - LAYOUT.front_position(-1)
+    middle = np.array([[50.0, (LAYOUT.front_position(1) + LAYOUT.front_position(-1)) / 2, 0.0]])
     share = sky_share(middle, np.array([[0.0, 0.0, 1.0]]), LAYOUT)
     assert share[0] == pytest.approx(np.cos(np.arctan(2 * 12.0 / width)), rel=1e-9)
 

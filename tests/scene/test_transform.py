@@ -8,7 +8,7 @@ from tasks.scene.transform import rotate_sh, transform_gaussians
 from tests.toy_street import toy_street
 
 
-def directions(count: int) -> np.ndarray:
+def draw_directions(count: int) -> np.ndarray:
     d = np.random.default_rng(4).normal(size=(count, 3))
     return d / np.linalg.norm(d, axis=1, keepdims=True)
 
@@ -16,7 +16,7 @@ def directions(count: int) -> np.ndarray:
 def test_turned_colour_is_the_colour_seen_from_the_turned_back_direction():
     turn = Rotation.from_rotvec([0.7, -1.9, 0.4]).as_matrix()
     sh = np.random.default_rng(5).normal(size=(3, 16, 3)).astype(np.float32)
-    d = directions(200)
+    d = draw_directions(200)
     expected = np.einsum("dk,nkc->ndc", sh_basis(d @ turn, 16), sh)
     found = np.einsum("dk,nkc->ndc", sh_basis(d, 16), rotate_sh(sh, turn))
     np.testing.assert_allclose(found, expected, atol=1e-5)

@@ -227,5 +227,9 @@ SURFACE_FORMS: Mapping[str, SurfaceForm] = {
             "surface_friction": "clips.snow_coverage",
         },
     ),
+    "ice": SurfaceForm(
+        film=lambda rate, surface: surface["glaze_mm"],
+        friction=lambda film, cover, surface: surface["ice_friction"],
+    ),
 }
 """The judge's own table of weathers, by the name of the kind."""

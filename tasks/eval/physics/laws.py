@@ -112,8 +112,8 @@ def wheel_laws(
     rolls = np.flatnonzero((v[1:] > 0) & (v[:-1] > 0))
     after = half.rate[axle][rolls]
     step = np.diff(omega)[rolls] - INNER_STEP * (rate[rolls] + after)
-    doubt = radius / inertia * half.load_uncertainty[axle][rolls]
-    undecided = INNER_STEP * (doubt + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0))
+    uncertainty = radius / inertia * half.load_uncertainty[axle][rolls]
+    integration_tolerance = INNER_STEP * (uncertainty + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0))
     x = f"_{axle}"
     laws = [
         evaluate_law(f"slip of wheel speed, {axle}", f"braking_slip{x} wheel_speed{x} speed", kappa - slip, 1e-9),
@@ -124,7 +124,7 @@ def wheel_laws(
             torque - q * gain * ticks["brake_pressure_mpa"], rounding_tolerance(torque) + 1e-9),
         evaluate_law(f"wheel torque balance, {axle}", f"wheel_speed{x} tyre_force{x} brake_torque{x} tyre_load{x} speed"
             f" longitudinal_acceleration {ASKED}",
-            step, undecided),
+            step, integration_tolerance),
         evaluate_law(f"wheel starts rolling, {axle}", f"wheel_speed{x} clips.initial_speed_km_h",
             omega[:1] * radius - facts["initial_speed_km_h"] / 3.6, 1e-9),
     ]  # fmt: skip
@@ -163,7 +163,7 @@ def motion_laws(
     time = ticks["t_ns"]
 
     later = half.acceleration
-    doubt = (half.load_uncertainty["f"] + half.load_uncertainty["r"])[both - 1] / m
+    uncertainty = (half.load_uncertainty["f"] + half.load_uncertainty["r"])[both - 1] / m
     between = v[:-1] + h * a[:-1]
     way = (np.diff(s) - 0.5 * h * (v[:-1] + 2 * between + v[1:]))[both - 1]
     gained = (np.diff(v) - h * (a[:-1] + later))[both - 1]
@@ -187,7 +187,7 @@ def motion_laws(
         evaluate_law("station is the integral of speed", "station speed longitudinal_acceleration", way, 1e-10),
         evaluate_law("station rests with the car", "station speed", np.diff(s)[stays[1:] - 1], 1e-9),
         evaluate_law("speed is the integral of acceleration", "speed longitudinal_acceleration " + drives,
-            gained, h * (doubt + 1e-5)),
+            gained, h * (uncertainty + 1e-5)),
         evaluate_law("m dv/dt is the sum of forces", "longitudinal_acceleration tyre_force_f tyre_force_r road_force",
             a - net, rounding_tolerance(a, force / m, road / m)),
         evaluate_law("kinetic energy falls by the work done", "speed longitudinal_acceleration road_force " + drives,

@@ -60,7 +60,7 @@ def place_frames_by_depth(
     one placement for each of the frames 1 .. count - 1
     """
 
-    def place(anchor: int, frame: int, predicted: Floats) -> FrameStep:
+    def place_frame(anchor: int, frame: int, predicted: Floats) -> FrameStep:
         earlier, later = prepared(anchor), prepared(frame)
         if anchor > 0:
             step = track(earlier, later, predicted).step
@@ -69,7 +69,7 @@ def place_frames_by_depth(
         attempts = [search(earlier, later, guess) for guess in guesses]
         return max(attempts, key=lambda attempt: (not attempt.step.failure, attempt.quality)).step
 
-    return place_frames(count, place)
+    return place_frames(count, place_frame)
 
 
 def invert_depth(depth: NDArray[np.float32], hidden: NDArray[np.bool_] | None) -> NDArray[np.float32]:

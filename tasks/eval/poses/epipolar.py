@@ -78,7 +78,7 @@ def refine_essential(
     t : float64 [3] first guess of the direction of ``t_later_earlier`` [1]
     rays, later_rays : float64 [N, 3] the points in both cameras, z = 1 [1]
     focal : focal length [px]
-    noise_floor : smallest tracking error believed [px]
+    noise_floor : smallest assumed tracking error [px]
 
     Returns
     -------

@@ -49,7 +49,7 @@ class EssentialSettings:
     min_parallax : median shift that no rotation explains, below which the camera counts as standing [px]
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
-    noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
+    noise_floor, noise_ceiling : smallest assumed tracking error, and largest error of a valid track [px]
     link_span : frames that the longer steps beside the chain span [1]
     link_stride : frames between their starts [1]
     """

@@ -36,7 +36,7 @@ class PhotometricSettings:
     min_pixels : fewest full-resolution pixels that carry a pose [1]
     min_inlier_share : least share of the pixels whose grey level must agree [1]
     min_correlation : least correlation of the aligned pictures [1]
-    noise_floor : smallest error of a grey level believed, that of rounding two of them [1]
+    noise_floor : smallest assumed error of a grey level, that of rounding two of them [1]
     block : side of the blocks whose errors count as independent [px]
     """
 

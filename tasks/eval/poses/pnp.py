@@ -46,7 +46,7 @@ class PnpSettings:
     crowded_contrast : difference of grey levels, of 255, to the warped earlier frame that shows such a thing [1]
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
-    noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
+    noise_floor, noise_ceiling : smallest assumed tracking error, and largest error of a valid track [px]
     depth_error : relative standard error of the rendered depth [1]
     link_span : frames that the longer steps beside the chain span [1]
     link_stride : frames between their starts [1]
@@ -130,15 +130,15 @@ def recover_motion_pnp(
         lambda k: _prepare_frame(frames[k], depth[k], None if unusable is None else unusable[k])
     )
 
-    def place(earlier: _Frame, later: _Frame, guess: Floats, levels: int) -> Attempt:
+    def attempt_step(earlier: _Frame, later: _Frame, guess: Floats, levels: int) -> Attempt:
         step = _place_frame(earlier, later, guess, K, levels, chosen)
         return Attempt(step=step, quality=step.inliers)
 
     placements = place_frames_by_depth(
         len(frames),
         prepared,
-        track=partial(place, levels=chosen.track_levels),
-        search=partial(place, levels=chosen.search_levels),
+        track=partial(attempt_step, levels=chosen.track_levels),
+        search=partial(attempt_step, levels=chosen.search_levels),
         guesses=[advance_pose(way, T_rig_camera) for way in chosen.search_advances],
     )
     poses, links = chained_poses(placements), []

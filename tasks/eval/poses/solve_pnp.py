@@ -26,8 +26,8 @@ class PnpLimits:
     Parameters
     ----------
     min_inliers : fewest points that must agree on the pose [1]
-    noise_floor : smallest error of a pixel believed [px]
-    noise_ceiling : largest error of a pixel that still is a track of something [px]
+    noise_floor : smallest assumed error of a pixel [px]
+    noise_ceiling : largest error of a pixel of a valid track [px]
     overlap : number of patches behind the pixels that share each pixel, and so its error [1]
     depth_error : relative standard error of the points' distance from the earlier camera; an error of the pixel along
         the image of that ray counts by so much less [1]

@@ -1,4 +1,4 @@
-"""How the road's surface looks: grain, tyre tracks, repairs, sealed cracks, iron covers, worn paint."""
+"""Reflectance of the road's surface: grain, tyre tracks, repairs, sealed cracks, iron covers, worn paint."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,14 @@ Floats = NDArray[np.float64]
 def asphalt_albedo(
     layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, grain: Floats
 ) -> Floats:
-    """Reflectance of the asphalt at each cell.
+    """Return the reflectance of the asphalt at each cell.
 
     Parameters
     ----------
     layout : dimensions
     seed : the street's seed [1]
     s, d : station and lateral position [N] [m]
-    size : width of the cell [N], over which thin things are spread [m]
+    size : width of the cell [N], over which thin details are averaged [m]
     grain : [N, 2] independent normal numbers, the stones of the cell [1]
 
     Returns
@@ -49,7 +49,7 @@ def asphalt_albedo(
 
 
 def paint_albedo(seed: int, s: Floats, d: Floats, grain: Floats) -> Floats:
-    """Reflectance of worn road paint; parameters as `asphalt_albedo`, result float64 [N, 3] [1]."""
+    """Return the reflectance of worn road paint, float64 [N, 3] [1]; parameters as `asphalt_albedo`."""
     wear = 0.10 * fractal_noise(named_generator(seed, "paint wear"), s, d, 0.7, 3) + 0.05 * grain[:, 0]
     return _PAINT * np.clip(0.95 + np.minimum(wear, 0.06), 0.45, 1.0)[:, None]
 

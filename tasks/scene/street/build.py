@@ -76,11 +76,11 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
         gaussians=add_surroundings(
             Gaussians(
                 means=line.to_world(surfels.centre).astype(np.float32),
-                quats_wxyz=line.quaternions(station, surfels.axes).astype(np.float32),
+                quats_wxyz=line.to_world_quaternions(station, surfels.axes).astype(np.float32),
                 scales=np.concatenate([surfels.scale, thickness], axis=1).astype(np.float32),
                 opacities=surfels.opacity.astype(np.float32),
                 sh=((radiance - 0.5) / _SH_BAND_0).astype(np.float32)[:, None, :],
-                normals=line.directions(station, surfels.axes[:, 2]).astype(np.float32),
+                normals=line.to_world_directions(station, surfels.axes[:, 2]).astype(np.float32),
                 class_id=surfels.class_id,
                 antialiased=True,
             )

@@ -17,12 +17,12 @@ _POST_INSET = 0.45
 
 
 def build_furniture(layout: StreetLayout, plan: Plan, seed: int) -> Surfels:
-    """Surfels of the street furniture, classes pole and other.
+    """Build the surfels of the street furniture, classes pole and other.
 
     Parameters
     ----------
     layout : dimensions
-    plan : what stands where
+    plan : positions of everything on the street
     seed : the street's seed [1]
     """
     parts = [part for station, side in plan.lamps for part in _build_lamp(layout, station, side)]
@@ -35,7 +35,7 @@ def build_furniture(layout: StreetLayout, plan: Plan, seed: int) -> Surfels:
 
 
 def post_boxes(layout: StreetLayout, plan: Plan) -> Floats:
-    """Boxes [K, 2, 3] that cast the lamp posts' shadows [m]."""
+    """Return the boxes [K, 2, 3] that cast the lamp posts' shadows [m]."""
     half = np.array([0.06, 0.06, 0.0])
     boxes = []
     for station, side in plan.lamps:
@@ -45,7 +45,7 @@ def post_boxes(layout: StreetLayout, plan: Plan) -> Floats:
 
 
 def _post_line(layout: StreetLayout, side: int) -> float:
-    return layout.kerb(side) + side * (layout.kerb_width + _POST_INSET)
+    return layout.kerb_position(side) + side * (layout.kerb_width + _POST_INSET)
 
 
 def _build_lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
@@ -75,7 +75,7 @@ def _build_lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels
 
 
 def _build_crossing_signs(layout: StreetLayout) -> list[Surfels]:
-    """A sign at either end of the crossing, facing the traffic that keeps right, and bollards beside it."""
+    """Build a sign at either end of the crossing, facing the traffic that keeps right, and bollards beside it."""
     pole, up = SemanticClass.POLE, np.array([0.0, 0.0, 1.0])
     start, stop = layout.crossing_station, layout.crossing_station + layout.crossing_length
     parts = []
@@ -86,7 +86,7 @@ def _build_crossing_signs(layout: StreetLayout) -> list[Surfels]:
         )
         parts += _build_sign(foot + np.array([0.06 * outward, 0, 2.5]), outward)
         for s in (start - 1.6, start - 3.2, stop + 1.6, stop + 3.2):
-            base = np.array([s, layout.kerb(side) + side * 0.4, layout.kerb_height])
+            base = np.array([s, layout.kerb_position(side) + side * 0.4, layout.kerb_height])
             parts.append(
                 build_tube(base + np.linspace(0, 0.9, 10)[:, None] * up, 0.05, 8, pole, _banded_albedo(10))
             )
@@ -94,7 +94,7 @@ def _build_crossing_signs(layout: StreetLayout) -> list[Surfels]:
 
 
 def _build_sign(middle: Floats, outward: float) -> list[Surfels]:
-    """A pedestrian on a white triangle on blue (Vienna Convention, sign E,12), front and back."""
+    """Build a pedestrian on a white triangle on blue (Vienna Convention, sign E,12), front and back."""
     n, edge = 15, 0.66
     grid = (np.arange(n) + 0.5) / n * 2 - 1
     a, b = np.meshgrid(grid, grid, indexing="ij")
@@ -115,7 +115,7 @@ def _build_sign(middle: Floats, outward: float) -> list[Surfels]:
 
 
 def _banded_albedo(n: int) -> Floats:
-    """Albedo [8, n - 1, 3] of a dark bollard with a light band near its top."""
+    """Return the albedo [8, n - 1, 3] of a dark bollard with a light band near its top."""
     colour = np.tile(palette.METAL_DARK, (8, n - 1, 1))
     colour[:, -3:-1] = palette.WHITE_PAINT
     return colour
@@ -134,5 +134,5 @@ def _build_bin(layout: StreetLayout, station: float, side: int) -> list[Surfels]
 
 def _build_letter_box(layout: StreetLayout, station: float) -> Surfels:
     side = -1
-    low = np.array([station, layout.front(side) + 0.35, layout.kerb_height + 0.25])
+    low = np.array([station, layout.front_position(side) + 0.35, layout.kerb_height + 0.25])
     return build_box(low, low + np.array([0.5, 0.4, 1.0]), 0.1, SemanticClass.OTHER, palette.POST_YELLOW)

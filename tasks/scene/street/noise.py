@@ -1,4 +1,4 @@
-"""Named random streams and smooth noise, so that every part of the street repeats on its own."""
+"""Named random streams and smooth noise, so that every part of the street is reproducible by itself."""
 
 from hashlib import blake2b
 
@@ -9,12 +9,12 @@ _LATTICE = 256
 
 
 def named_generator(seed: int, name: str) -> np.random.Generator:
-    """A counter-based generator of its own for one named part of the street.
+    """Return a separate counter-based generator for one named part of the street.
 
     Parameters
     ----------
     seed : the street's seed [1]
-    name : what the numbers are for; other names give independent numbers
+    name : name of the part; other names give independent numbers
     """
     key = blake2b(f"{seed}/{name}".encode(), digest_size=16).digest()
     return np.random.Generator(np.random.Philox(key=np.frombuffer(key, dtype="<u8")))
@@ -23,7 +23,7 @@ def named_generator(seed: int, name: str) -> np.random.Generator:
 def fractal_noise(
     rng: np.random.Generator, x: ArrayLike, y: ArrayLike, wavelength: float, octaves: int = 1
 ) -> NDArray[np.float64]:
-    """Smooth noise of about zero mean and unit deviation, each octave half as long and half as strong.
+    """Return smooth noise of about zero mean and unit deviation, each octave half as long and half as strong.
 
     Parameters
     ----------
@@ -48,4 +48,6 @@ def fractal_noise(
 
 
 def smooth_step(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return 3 t^2 - 2 t^3, which rises from 0 at t = 0 to 1 at t = 1 and is constant outside [1]."""
+    t = np.clip(t, 0.0, 1.0)
     return t * t * (3 - 2 * t)

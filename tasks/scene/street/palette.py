@@ -1,11 +1,11 @@
-"""Colours of the street, as linear reflectance. They are taste, not data: muted, and never brighter than chalk."""
+"""Colours of the street, as linear reflectance. They are chosen, not measured, and never brighter than chalk."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def _linear_light(*colours: str) -> NDArray[np.float64]:
-    """Linear light of sRGB colours written #rrggbb (IEC 61966-2-1); float64 [len(colours), 3] [1]."""
+    """Return the linear light of sRGB colours written #rrggbb (IEC 61966-2-1); float64 [len(colours), 3] [1]."""
     code = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in colours]) / 255
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
 

@@ -22,7 +22,7 @@ _PIT = 0.58
 
 
 def build_pavement(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
-    """Surfels of the kerbstones (class kerb), the slabs (sidewalk) and the earth about the trees (terrain).
+    """Build the surfels of the kerbstones (class kerb), the slabs (sidewalk) and the earth about the trees (terrain).
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def _add_tree_pits(paving: Surfels, planted: tuple[Tree, ...], seed: int) -> Sur
 def _build_kerb(layout: StreetLayout, seed: int, side: int) -> Surfels:
     rng = named_generator(seed, f"kerb {side}")
     first, last = layout.station_range
-    face, h = layout.kerb(side), layout.kerb_height
+    face, h = layout.kerb_position(side), layout.kerb_height
     per_stone = 3
     step = _KERBSTONE / per_stone
     s = np.arange(first + step / 2, last, step)
@@ -84,12 +84,12 @@ def _build_kerb(layout: StreetLayout, seed: int, side: int) -> Surfels:
 
 def _build_slabs(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
     first, last = layout.station_range
-    inner = layout.kerb(side) + side * layout.kerb_width
+    inner = layout.kerb_position(side) + side * layout.kerb_width
     width = layout.pavement_width + 0.4  # under the fronts that stand back
     rows = round(width / layout.slab)
     slab = width / rows
     parts = []
-    # stretches of like distance share one number of cells per slab
+    # stretches of similar distance share one number of cells per slab
     end = layout.route_length
     for start, stop in pairwise(np.unique(np.clip([first, -2.0, end + 4.0, end + 20.0, last], first, last))):
         rng = named_generator(seed, f"slabs {side} {start:.3f}")

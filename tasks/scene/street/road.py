@@ -25,7 +25,7 @@ _SLENDER = (2.0, 4.0)
 
 
 def build_road(layout: StreetLayout, seed: int) -> Surfels:
-    """Surfels of the carriageway, class road or marking, normals straight up.
+    """Build the surfels of the carriageway, class road or marking, normals upward.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def build_road(layout: StreetLayout, seed: int) -> Surfels:
 
 
 def _build_stones(layout: StreetLayout, seed: int) -> Surfels:
-    """Stones of the surface that stand out: the sharp detail between the cells."""
+    """Build single light or dark stones: the sharp detail between the cells."""
     rng = named_generator(seed, "stones")
     half = 0.8 * layout.lane_width
     n = int(_STONES * 2 * half * layout.route_length)
@@ -84,7 +84,7 @@ def _build_stones(layout: StreetLayout, seed: int) -> Surfels:
 def _lay_cells(
     layout: StreetLayout, seed: int, start: float, stop: float, *, is_crossing: bool
 ) -> NDArray[np.float64]:
-    """Station, lateral, length, width [m] and 1 for paint of each cell of one stretch, as rows."""
+    """Return station, lateral, length, width [m] and 1 for paint of each cell of one stretch, as rows."""
     rng = named_generator(seed, f"road {start:.3f}")
     breaks, kind = _cross_section(layout, is_crossing)
     nearest = nearest_depth(
@@ -99,7 +99,7 @@ def _lay_cells(
         n = max(round((stop - start) / length), 1)
         length = (stop - start) / n
         if kind[k] == "asphalt" and j % 2:
-            # laid in running bond: smaller gaps than a chequerboard leaves
+            # running bond leaves smaller gaps than a chequerboard
             s = start + np.clip(np.arange(n + 1) * length, 0.25 * length, stop - start - 0.25 * length)
         else:
             s = start + (np.arange(n) + 0.5) * length
@@ -116,7 +116,7 @@ def _on_dash(layout: StreetLayout, s: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _cross_section(layout: StreetLayout, is_crossing: bool) -> tuple[NDArray[np.float64], list[str]]:
-    """Edges across the road from right to left [m], and what lies between each two."""
+    """Return the edges across the road from right to left [m], and the surface between each two."""
     right, left, half = layout.carriageway_right, layout.carriageway_left, layout.marking_width / 2
     if is_crossing:
         bar = layout.crossing_bar
@@ -133,7 +133,7 @@ def _cross_section(layout: StreetLayout, is_crossing: bool) -> tuple[NDArray[np.
 
 
 def _is_on_paint(layout: StreetLayout, s: NDArray[np.float64], d: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which points lie on paint, or so close that they would blur its edge."""
+    """Return whether points lie on paint, or so close to it that they would blur its edge."""
     margin = 0.04
     line = np.zeros(len(s), dtype=bool)
     for middle in (-layout.lane_width / 2, layout.lane_width / 2):

@@ -20,7 +20,7 @@ _CLOUD_BASE, _CLOUD_WAVE = 1.0, 0.8
 
 
 def draw_panorama(layout: StreetLayout, seed: int) -> NDArray[np.float32]:
-    """Equirectangular picture in linear light, as `Scene.environment` lays it out.
+    """Draw the equirectangular picture in linear light, as in `Scene.environment`.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def _sky_radiance(layout: StreetLayout, seed: int, elevation: Floats, azimuth: F
 def _draw_clouds(
     layout: StreetLayout, seed: int, up: Floats, flat: Floats, azimuth: Floats
 ) -> tuple[Floats, Floats]:
-    """How bright the clouds are (0 shade, 1 sun) and how much sky they cover, in each direction."""
+    """Return the brightness of the clouds (0 shade, 1 sun) and the share of sky that they cover, per direction."""
     slant = _CLOUD_BASE / (up + 0.10)
     x, y = slant * flat * np.cos(azimuth), slant * flat * np.sin(azimuth)
     sun = sun_direction(layout)
@@ -68,7 +68,7 @@ def _draw_clouds(
     towards = fractal_noise(
         named_generator(seed, "clouds"), x + 0.10 * sun[0], y + 0.10 * sun[1], _CLOUD_WAVE, 5
     )
-    # the shadows in the street are sharp: no cloud stands before the sun
+    # the shadows in the street are sharp: no cloud covers the sun
     away = np.hypot(x - sun[0] / (sun[2] + 0.10), y - sun[1] / (sun[2] + 0.10))
     field = field - 2.0 * np.exp(-((away / 0.6) ** 2))
     cover = np.clip((field - 0.75) / 0.8, 0, 1)
@@ -78,7 +78,7 @@ def _draw_clouds(
 
 
 def _add_skyline(seed: int, sky: Floats, elevation: Floats, azimuth: Floats) -> Floats:
-    """Rows of far houses and trees, paler the further they are."""
+    """Add rows of far houses and trees, paler with distance."""
     rng = named_generator(seed, "skyline")
     turn = (azimuth[0] % (2 * np.pi)) / (2 * np.pi)
     for blocks, height, pale in ((90, 0.050, 0.72), (140, 0.036, 0.45)):

@@ -1,4 +1,4 @@
-"""Flat Gaussians that tile surfaces, in route coordinates and before the light falls on them."""
+"""Flat Gaussians that tile surfaces, in route coordinates, before lighting."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from tasks.conventions import SemanticClass
 
 OVERLAP = 0.74
-"""Standard deviation over cell size: below 0.7 the sky shows through, above 0.8 the picture turns soft."""
+"""Standard deviation over cell size: below 0.7 the sky shows through, above 0.8 the picture becomes blurred."""
 OPACITY = 0.985
-"""Peak opacity: where nearly opaque splats end a pixel early, they leave up to a tenth of it open."""
+"""Peak opacity: nearly opaque splats that close a pixel early leave up to a tenth of its light."""
 THICKNESS = 0.002
 """Standard deviation along the normal [m]."""
 
 
 class Cover(NamedTuple):
-    """How the Gaussians of cells cover a surface: standard deviation over cell size [1], and peak opacity [1]."""
+    """Coverage of a surface by the Gaussians of its cells: standard deviation over cell size and peak opacity [1]."""
 
     overlap: float = OVERLAP
     opacity: float = OPACITY
@@ -45,7 +45,7 @@ class Surfels:
     axes : float64 [N, 3, 3] unit axes as rows, the last one the normal [1]
     scale : float64 [N, 2] standard deviations along the first two axes [m]
     albedo : float64 [N, 3] diffuse reflectance, linear light [1]
-    glow : float64 [N, 3] radiance that does not depend on the light that falls here: mirror images, lamps [1]
+    glow : float64 [N, 3] radiance that does not depend on the incident light: reflections, lamps [1]
     openness : float64 [N] share of the ambient light that reaches the surfel past its own object [1]
     opacity : float64 [N] peak opacity [1]
     class_id : uint8 [N] `SemanticClass`
@@ -65,7 +65,7 @@ class Surfels:
 
 
 def join_surfels(parts: Sequence[Surfels]) -> Surfels:
-    """All surfels of the parts, in order; none where there are no parts."""
+    """Concatenate the surfels of the parts, in order; without parts there are none."""
     nothing = np.empty((0, 3))
     parts = parts or [tile_surface(nothing, nothing, nothing, SemanticClass.OTHER, nothing)]
     return Surfels(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Surfels)})
@@ -82,7 +82,7 @@ def tile_surface(
     openness: ArrayLike = 1.0,
     cover: Cover = CLOSED,
 ) -> Surfels:
-    """One surfel per cell of a surface; leading shapes broadcast and are flattened.
+    """Build one surfel per cell of a surface; leading shapes broadcast and are flattened.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def tile_surface(
 def sheet_cells(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Centres and edges of the cells of a curved sheet given by its corner points.
+    """Return centres and edges of the cells of a curved sheet given by its corner points.
 
     Parameters
     ----------
@@ -136,13 +136,13 @@ def sheet_cells(
 def graded_cells(
     breaks: ArrayLike, size: ArrayLike, fine: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Split a line at sharp edges, with cells that grow away from them, so that the edges stay crisp.
+    """Split a line at sharp edges into cells that grow away from them, so that the edges stay sharp.
 
     Parameters
     ----------
     breaks : [n + 1] increasing positions of the edges [m]
     size : [n] or scalar, largest cell of each interval, kept to within a quarter [m]
-    fine : [n] or scalar, largest cell next to an edge over ``size``; from 1 on all cells are alike [1]
+    fine : [n] or scalar, largest cell next to an edge over ``size``; from 1 on all cells have one size [1]
 
     Returns
     -------
@@ -168,7 +168,7 @@ def graded_cells(
 
 
 def _halve_interval(length: float, largest: float, share: float) -> list[float]:
-    """Inner cuts of an interval [m]: halved until no cell is too large for its distance from the ends."""
+    """Return inner cuts of an interval [m], halved until no cell is too large for its distance from the ends."""
     cuts, pending = [], [(0.0, length)]
     while pending:
         a, b = pending.pop()
@@ -188,7 +188,7 @@ def build_tube(
     *,
     glow: ArrayLike = 0.0,
 ) -> Surfels:
-    """A round tube along a path, open at both ends.
+    """Build a round tube along a path, open at both ends.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def build_panel(
     grain: Grain | None = None,
     glow: ArrayLike = 0.0,
 ) -> Surfels:
-    """A plain rectangle in square cells.
+    """Build a plain rectangle of square cells.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def build_box(
     albedo: ArrayLike,
     grain: Grain | None = None,
 ) -> Surfels:
-    """The four walls and the top of an upright box; parameters as `build_panel`, between two corners [3] [m]."""
+    """Build the four walls and the top of an upright box between two corners [3] [m]; parameters as `build_panel`."""
     a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     x, y, z = np.diag(b - a)
     sides = (

@@ -23,7 +23,7 @@ from tasks.scene.street.surfels import (
 Floats = NDArray[np.float64]
 
 LEAF_EXTINCTION = 0.9
-"""Of sunlight within a crown: about a quarter passes through 1.5 m of leaves [m-1]."""
+"""Extinction of sunlight in a crown: about a quarter passes through 1.5 m of leaves [m-1]."""
 _LEAF = 7.3
 """Length of a tuft of leaves where it is seen closest [px]."""
 _LAYERS = 1.7
@@ -31,7 +31,7 @@ _LAYERS = 1.7
 
 
 def build_trees(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
-    """Surfels of all trees, class vegetation.
+    """Build the surfels of all trees, class vegetation.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def build_trees(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> S
 
 
 def build_leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Generator) -> Surfels:
-    """Tufts of leaves over the outer skin of a heap of balls.
+    """Build tufts of leaves over the outer surface of a group of balls.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _build_wood(tree: Tree, ground: float, rng: np.random.Generator) -> list[Sur
 
 
 def build_gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
-    """Low walls, hedges, lawns and shrubs in the gaps between houses, classes other, vegetation and terrain.
+    """Build low walls, hedges, lawns and shrubs in the gaps between houses, classes other, vegetation and terrain.
 
     Parameters
     ----------
@@ -130,25 +130,33 @@ def build_gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: i
 
 def _build_garden(layout: StreetLayout, seed: int, side: int, start: float, stop: float) -> list[Surfels]:
     rng = named_generator(seed, f"garden {side} {start:.3f}")
-    front, ground, width = layout.front(side), layout.kerb_height, stop - start
+    front, ground, width = layout.front_position(side), layout.kerb_height, stop - start
     depth = float(nearest_depth(layout, start, front))
     size = 7.0 * PIXEL * depth
     brick = palette.BRICK[rng.integers(len(palette.BRICK))]
     begin = start if side > 0 else stop
     along = np.array([side * width, 0.0, 0.0])
 
-    def corner(back: float, z: float) -> Floats:
+    def corner_point(back: float, z: float) -> Floats:
         return np.array([begin, front + side * back, ground + z])
 
     other, green = SemanticClass.OTHER, SemanticClass.TERRAIN
     wall = [
-        build_panel(corner(0.1, 0), along, [0, 0, 1.0], size, other, brick, grain=Grain(rng, 0.12)),
+        build_panel(corner_point(0.1, 0), along, [0, 0, 1.0], size, other, brick, grain=Grain(rng, 0.12)),
         build_panel(
-            corner(0.05, 1.0), along, [0, side * 0.3, 0], 0.25, other, palette.TRIM[1], grain=Grain(rng, 0.04)
+            corner_point(0.05, 1.0),
+            along,
+            [0, side * 0.3, 0],
+            0.25,
+            other,
+            palette.TRIM[1],
+            grain=Grain(rng, 0.04),
         ),
     ]
     lawn_u, lawn_v = (along, np.array([0, side * 12.0, 0]))
-    lawn = build_panel(corner(0.3, 0.05), lawn_u, lawn_v, 0.5, green, palette.GRASS, grain=Grain(rng, 0.15))
+    lawn = build_panel(
+        corner_point(0.3, 0.05), lawn_u, lawn_v, 0.5, green, palette.GRASS, grain=Grain(rng, 0.15)
+    )
     n = int(width / 0.45)
     hedge = np.column_stack(
         [

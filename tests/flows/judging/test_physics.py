@@ -139,3 +139,12 @@ def test_a_table_without_a_column_is_refused(dataset: Path, tmp_path: Path) -> N
         pq.write_table(table.drop_columns(["speed"]), path)
     with pytest.raises(InputError, match="lacks speed"):
         audit_physics(str(copy))
+
+
+def test_a_dataset_on_another_tyre_is_refused_by_its_name(dataset: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(dataset, copy, ignore=shutil.ignore_patterns("frames.zarr", "telemetry"))
+    with open(copy / "inputs" / "vehicle.yaml", "a") as file:
+        file.write("\ntyre: pacejka-205-60r15\n")
+    with pytest.raises(InputError, match=r"knows Burckhardt's tyre; .* drives on pacejka-205-60r15"):
+        read_constants(copy)

@@ -29,6 +29,7 @@ SNOW = {
     )
     for rate in (0.5, 1, 2, 3)
 }
+ICE = SurfaceState(kind="ice", film_depth_mm=0.4)
 SIZE = {"width": 144, "height": 96, "focal": 120.0}
 
 
@@ -64,14 +65,13 @@ def test_dry_weather_changes_no_bit(street, parameters):
     assert attribution(weather, drawn, gbuffer, view).max() == 0
 
 
-@pytest.mark.parametrize("state", [RAIN[25], SNOW[1]], ids=["rain", "snow"])
+@pytest.mark.parametrize("state", [RAIN[25], SNOW[1], ICE], ids=["rain", "snow", "ice"])
 def test_layers_recompose_to_the_picture_bit_for_bit(street, parameters, state):
     _, drawn, _, _ = frame(street, state, parameters)
     assert recompose(drawn.base, drawn.layers).tobytes() == drawn.picture.tobytes()
     names = [layer.name for layer in drawn.layers]
-    assert names == (
-        ["light", "wet", "air", "particles"] if state.kind == "rain" else ["light", "air", "particles"]
-    )
+    layers = {"rain": ["light", "wet", "air", "particles"], "snow": ["light", "air", "particles"]}
+    assert names == layers.get(state.kind, ["light", "wet", "air"])
     assert np.isfinite(drawn.picture).all()
     assert drawn.picture.min() >= 0
     assert drawn.picture.dtype == np.float32

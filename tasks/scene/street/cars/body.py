@@ -1,4 +1,4 @@
-"""The bodywork of a car: a skin lofted over its outline, with glass, lamps, plates and what the lacquer mirrors."""
+"""The bodywork of a car: a skin lofted over its outline, with glass, lamps, plates and reflections in the lacquer."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ _SKY, _HOUSES, _ROAD = (
 
 
 def build_bodywork(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> Surfels:
-    """The skin from sill to sill over the roof, class vehicle, in the car's axes: x from the tail, y left, z up.
+    """Build the skin from sill to sill over the roof, class vehicle, in the car's axes: x from the tail, y left, z up.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def build_bodywork(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> Su
 
 
 def build_car_ends(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> list[Surfels]:
-    """Tail and nose, with lamps, number plates, bumpers and grille; parameters as `build_bodywork`."""
+    """Build tail and nose, with lamps, number plates, bumpers and grille; parameters as `build_bodywork`."""
     parts = []
     for along, outward in ((0.0, -1.0), (1.0, 1.0)):
         half_width, height = cross_section(shape, np.array([along]))[0, :6].T
@@ -119,7 +119,7 @@ def build_car_ends(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> li
 
 
 def _mirrored_radiance(centre: Floats, edge_u: Floats, edge_v: Floats, gloss: Floats, eye: Floats) -> Floats:
-    """Radiance [..., 3] mirrored towards the eye, after Schlick (1994), doi:10.1111/1467-8659.1330233."""
+    """Return the radiance [..., 3] mirrored towards the eye, after Schlick (1994), doi:10.1111/1467-8659.1330233."""
     normal = np.cross(edge_u, edge_v)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     view = eye - centre

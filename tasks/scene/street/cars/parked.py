@@ -1,4 +1,4 @@
-"""Parked cars: where their parts go, their wheels, and the shade they cast."""
+"""Parked cars: their parts in the street, their wheels, and the shade they cast."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ _SEEN_FROM = 9.0
 
 
 def build_cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> Surfels:
-    """Surfels of all parked cars, class vehicle.
+    """Build the surfels of all parked cars, class vehicle.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def build_cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> Surf
 
 
 def car_boxes(parked: tuple[Car, ...]) -> Floats:
-    """Boxes [K, 2, 3] that cast the cars' shadows, body and cabin, a little within the surface [m]."""
+    """Return the boxes [K, 2, 3] that cast the cars' shadows: body and cabin, slightly inside the surface [m]."""
     boxes = []
     for car in parked:
         shape = SHAPES[car.model]
@@ -51,7 +51,7 @@ def car_boxes(parked: tuple[Car, ...]) -> Floats:
 
 
 def car_footprints(parked: tuple[Car, ...]) -> Floats:
-    """Ground under the cars [K, 2, 2]: lowest and highest station and lateral position [m]."""
+    """Return the ground under the cars [K, 2, 2]: lowest and highest station and lateral position [m]."""
     rectangles = []
     for car in parked:
         length, width = 0.46 * SHAPES[car.model].length, 0.42 * SHAPES[car.model].width
@@ -102,7 +102,7 @@ def _build_wheels(shape: Shape, cell: Floats) -> list[Surfels]:
 
 
 def _build_underside(shape: Shape) -> list[Surfels]:
-    """Dark sheets that close the space under the car, with the tyres' treads."""
+    """Build dark sheets that close the space under the car, with the tyres' treads."""
     low, high, cell, kind = 0.02, SILL + 0.12, 0.15, SemanticClass.VEHICLE
     rear, front = (axle * shape.length for axle in shape.axles)
     width, up = 0.92 * shape.width, np.array([0, 0, high - low])

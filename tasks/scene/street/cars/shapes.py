@@ -93,7 +93,7 @@ SHAPES = {
 
 
 def cross_section(shape: Shape, along: Floats) -> Floats:
-    """Corner points of half a cross-section, from the sill to the middle of the roof.
+    """Return the corner points of half a cross-section, from the sill to the middle of the roof.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What people fix to house fronts: awnings, balconies, flower boxes and downpipes."""
+"""Fixtures of house fronts: awnings, balconies, flower boxes and downpipes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ _KIND = SemanticClass.BUILDING
 
 
 def build_adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
-    """Surfels of what is fixed to the fronts, classes building and vegetation.
+    """Build the surfels of the fixtures, classes building and vegetation.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def build_adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed
     """
     parts = []
     for house in buildings:
-        front = layout.front(house.side) + house.side * house.setback
+        front = layout.front_position(house.side) + house.side * house.setback
         depth = float(nearest_depth(layout, house.nearest_station, front, 4.0))
         if depth > 40:
             continue
@@ -62,11 +62,11 @@ def build_adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed
 
 
 def awning_boxes(layout: StreetLayout, buildings: tuple[Building, ...]) -> Floats:
-    """Boxes [K, 2, 3] that cast the awnings' shadows [m]."""
+    """Return the boxes [K, 2, 3] that cast the awnings' shadows [m]."""
     boxes = []
     for house in buildings:
         if house.shop and house.awnings:
-            front = layout.front(house.side) + house.side * house.setback
+            front = layout.front_position(house.side) + house.side * house.setback
             d = sorted((front, front - house.side * _AWNING_REACH))
             top = layout.kerb_height + SIGN_BOTTOM
             boxes += [[[a, d[0], top - 0.3], [b, d[1], top - 0.2]] for a, b in _shop_bays(house)]
@@ -153,5 +153,5 @@ def _build_flower_box(
 
 def _build_downpipe(layout: StreetLayout, house: Building, front: float) -> Surfels:
     foot = np.array([house.start, front - house.side * 0.09, layout.kerb_height])
-    path = foot + np.linspace(0, 1, 16)[:, None] * [0, 0, house.eaves(layout) - layout.kerb_height]
+    path = foot + np.linspace(0, 1, 16)[:, None] * [0, 0, house.eaves_height(layout) - layout.kerb_height]
     return build_tube(path, 0.055, 5, _KIND, palette.METAL_GREY)

@@ -1,4 +1,4 @@
-"""How house fronts look: plaster and brick, woodwork, curtains, and what the panes mirror."""
+"""Colours of house fronts: plaster and brick, woodwork, curtains, and reflections in the panes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -48,14 +48,14 @@ class FrontCells:
 
     @staticmethod
     def join(parts: Sequence["FrontCells"]) -> "FrontCells":
-        """All cells, in order."""
+        """Concatenate the cells, in order."""
         names = [f.name for f in fields(FrontCells)]
         return FrontCells(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """Colours and habits of one house.
+    """Colours and windows of one house.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Look:
 
 
 def draw_look(house: Building, seed: int) -> Look:
-    """The house's colours and window size, from a stream of its own.
+    """Draw the house's colours and window size from its own random stream.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def draw_look(house: Building, seed: int) -> Look:
 def paint_fronts(
     layout: StreetLayout, cells: FrontCells, looks: Sequence[Look], seed: int
 ) -> tuple[Floats, Floats]:
-    """Albedo and glow of the cells.
+    """Return albedo and glow of the cells.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def paint_fronts(
     s, z, part = cells.station, cells.height, cells.part
     tone = 1 + 0.05 * fractal_noise(named_generator(seed, "stains"), s + 400.0 * (cells.house % 7), z, 2.5, 3)
     grain = np.array([look.grain for look in looks])[cells.house]
-    # a cell averages what lies within it: the thin ones beside the openings must not stand out as streaks
+    # a cell averages its content: the thin cells beside the openings must not appear as streaks
     grain = grain * np.clip(cells.size.min(axis=1) / 0.3, 0.15, 1.0)
     tone += grain * rng.standard_normal(len(s)) * (part == Part.WALL)
     tone *= np.clip(0.84 + 0.06 * z, 0.0, 1.0)
@@ -142,7 +142,7 @@ def paint_fronts(
     window = pane & ~shop & ~doors
     drawn = (drape < 0.4) & (np.abs(cells.across) > 0.2) | (drape > 0.75) & (cells.up > 2.2 - 1.8 * drape)
     albedo = np.where((window & drawn)[:, None], 0.55 * palette.CURTAIN, albedo)
-    # from the road a pane mirrors the houses opposite up to where their roofs end, and the sky above
+    # from the road a pane mirrors the houses opposite up to their roofs, and the sky above
     ridge = 5.2 + 0.8 * fractal_noise(named_generator(seed, "opposite"), s, 0.0 * s, 4.0, 2)
     sky = np.clip((z - ridge) / 0.5 + 0.5, 0.0, 1.0) * (0.65 + 0.7 * glint) * (0.75 + 0.35 * cells.up)
     mirrored = _MIRRORED_STREET + (_MIRRORED_SKY - _MIRRORED_STREET) * sky[:, None]

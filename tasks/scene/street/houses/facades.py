@@ -22,11 +22,11 @@ Floats = NDArray[np.float64]
 _CELL = (19.0, 12.0)
 """Largest width and height of a wall cell where it is seen closest [px]."""
 _RECESS = np.array([0.0, -0.03, 0.10, 0.14, -0.06, -0.08, -0.04])
-"""How far each part stands back from the wall [m]."""
+"""Distance of each part behind the wall's surface [m]."""
 
 
 def build_facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
-    """Surfels of all fronts, class building.
+    """Build the surfels of all fronts, class building.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def build_facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: i
     ]
     cells = FrontCells.join(grids)
     side = np.array([house.side for house in buildings], dtype=np.float64)[cells.house]
-    front = np.array([layout.front(house.side) + house.side * house.setback for house in buildings])[
+    front = np.array([layout.front_position(house.side) + house.side * house.setback for house in buildings])[
         cells.house
     ]
     zero = np.zeros(len(side))
@@ -83,14 +83,14 @@ def _cut_bays(
     rows: Pattern,
     kind: str,
 ) -> FrontCells:
-    """The cells of some bays (first, count) of one storey."""
+    """Cut the cells of some bays (first, count) of one storey."""
     bottom = layout.kerb_height + (layout.ground_storey_height + (storey - 1) * layout.storey_height) * (
         storey > 0
     )
     cell = (
         np.array(_CELL)
         * PIXEL
-        * nearest_depth(layout, house.nearest_station, layout.front(house.side), bottom)
+        * nearest_depth(layout, house.nearest_station, layout.front_position(house.side), bottom)
     )
     columns, rows = drop_thin_parts(columns, 0.08 * cell[0]), drop_thin_parts(rows, 0.11 * cell[1])
     x, width, column = _cut_pattern(columns, cell[0])
@@ -113,6 +113,6 @@ def _cut_bays(
 
 
 def _cut_pattern(pattern: Pattern, cell: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Cells along one side of a grid: walls fine at their ends, panes and boards alike throughout."""
+    """Cut cells along one side of a grid: walls finely at their ends, panes and boards evenly."""
     alike = np.array([part in (Part.GLASS, Part.SIGN, Part.PLINTH) for _, part in pattern])
     return graded_cells(np.cumsum([0.0, *(size for size, _ in pattern)]), cell, np.where(alike, 1.0, 0.45))
