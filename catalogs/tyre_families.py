@@ -14,7 +14,7 @@ KNOT_TABLES = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release
 
 
 class FamilyEntry(CatalogueEntry):
-    """What a tyre family must hold; the meanings stand at ``TyreFamily``."""
+    """Content of a tyre family; `TyreFamily` gives the meanings."""
 
     burckhardt: Annotated[Table, require_quantity("1", above=0)]
     surface_friction: Scales

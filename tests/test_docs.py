@@ -8,10 +8,11 @@ from typer.testing import CliRunner
 
 from catalogs.grids import load_grid
 from flows.cli import app
+from flows.registry import COMMANDS
 from manifests.provenance import SOURCE_ROOT
 
 DOCUMENTS = sorted([*SOURCE_ROOT.glob("*.md"), *(SOURCE_ROOT / "docs").rglob("*.md")])
-COMMANDS = sorted(
+NAMED = sorted(
     {
         match
         for document in DOCUMENTS
@@ -20,10 +21,15 @@ COMMANDS = sorted(
 )
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", NAMED)
 def test_every_command_in_the_documents_exists(command):
     result = CliRunner().invoke(app, [*command.split(), "--help"])
     assert result.exit_code == 0, result.output
+
+
+def test_the_readme_lists_every_command():
+    text = (SOURCE_ROOT / "README.md").read_text()
+    assert not [command.name for command in COMMANDS if f"`musync {command.name}" not in text]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)

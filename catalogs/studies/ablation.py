@@ -25,7 +25,7 @@ Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class AblationEntry(CatalogueEntry):
-    """What the file must hold; ``family_rates`` stand for all rates of a kind of weather."""
+    """Content of the file; each of ``family_rates`` represents all rates of a kind of weather."""
 
     family_rates: dict[WeatherName, Rate]
     stop_condition: Text

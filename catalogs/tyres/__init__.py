@@ -142,7 +142,7 @@ def _read_number(text: str) -> float | None:
 
 
 def _shape_problems(values: Mapping[str, float], version: str) -> list[str]:
-    """What keeps the coefficients from being a tyre: no load, no peak, no grip, or forces beyond all numbers."""
+    """List why the coefficients describe no tyre: no load, no peak, no grip, or forces that are not finite."""
     if values["FNOMIN"] <= 0 or values.get("LFZO", 1.0) <= 0:
         return [
             f"FNOMIN and LFZO must be above 0; they are {values['FNOMIN']:g} and {values.get('LFZO', 1.0):g}"

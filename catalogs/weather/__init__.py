@@ -37,7 +37,7 @@ def load_weather(folder: Path = FOLDER) -> WeatherParameters:
     """
     problems: list[str] = []
     hints = get_type_hints(WeatherParameters)
-    shared = {name: _read(hints[name], folder, name, problems) for name in ("air", "sky")}
+    shared = {name: _read_files(hints[name], folder, name, problems) for name in ("air", "sky")}
     overcast = [name for name, kind in WEATHERS.items() if kind.overcast]
     found = sorted(path.stem for path in folder.glob("*.yaml") if path.stem not in shared)
     problems += [
@@ -46,13 +46,13 @@ def load_weather(folder: Path = FOLDER) -> WeatherParameters:
         for name in found
         if name not in overcast
     ]
-    kinds = {name: _read(KindLook, folder, name, problems) for name in overcast if name in found}
+    kinds = {name: _read_files(KindLook, folder, name, problems) for name in overcast if name in found}
     if problems:
         raise InputError(cap_problems(problems))
     return WeatherParameters(kinds=kinds, **shared)
 
 
-def _read(form: Any, folder: Path, name: str, problems: list[str]) -> Any:
+def _read_files(form: Any, folder: Path, name: str, problems: list[str]) -> Any:
     """One file in its form; None, and a problem, where that fails."""
     path = folder / f"{name}.yaml"
     if not path.is_file():

@@ -1,4 +1,4 @@
-"""What the entries of the kinds of weather bring to road and tyre: numbers of the surface, and a tyre family."""
+"""Numbers of the surface, and tyre families, that the entries of the kinds of weather give."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -45,7 +45,7 @@ def shared_families(folder: Path) -> dict[str, TyreFamily]:
     InputError
         Listing every problem of a file.
     """
-    return {kind: entry.tyre.family for kind, entry in _entries(folder) if entry.tyre is not None}
+    return {kind: entry.tyre.family for kind, entry in _load_entries(folder) if entry.tyre is not None}
 
 
 def weather_numbers(folder: Path) -> dict[str, Bounded]:
@@ -60,17 +60,17 @@ def weather_numbers(folder: Path) -> dict[str, Bounded]:
     InputError
         Listing every problem of a file.
     """
-    return {name: number for _, entry in _entries(folder) for name, number in entry.surface.items()}
+    return {name: number for _, entry in _load_entries(folder) for name, number in entry.surface.items()}
 
 
-def _entries(folder: Path) -> Iterator[tuple[str, GripEntry]]:
+def _load_entries(folder: Path) -> Iterator[tuple[str, GripEntry]]:
     for kind in WEATHERS:
         path = folder / f"{kind}.yaml"
         if path.is_file():
             status = path.stat()
-            yield kind, _entry(path, status.st_mtime_ns, status.st_size)
+            yield kind, _load_entry(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(maxsize=64)
-def _entry(path: Path, changed_ns: int, size: int) -> GripEntry:
+def _load_entry(path: Path, changed_ns: int, size: int) -> GripEntry:
     return read_entry(GripEntry, path, "weather catalogue's file")

@@ -27,7 +27,7 @@ from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
 from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures
 from flows.making.places import find_scene, remember_place
-from flows.making.plan import TICK_RATE_HZ, ClipPlan, Plan, read_plan
+from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
 from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_json
@@ -301,11 +301,6 @@ def nothing_to_judge(frames: int) -> dict[str, Any]:
         "recovered_progress": np.full(frames, np.nan),
         "verdict": verdict | {"reasons": ["no frames were made"]},
     }
-
-
-def clip_plan_of(root: Path, clip_id: str) -> ClipPlan:
-    """The planned clip of that id."""
-    return next(clip for clip in read_plan(root).clips if clip.clip_id == clip_id)
 
 
 def _json_numbers(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -205,7 +205,7 @@ def test_quaternions_of_any_length_become_unit_ones(tmp_path, value):
 
 
 def spz(count, payload, version=2):
-    return gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", version, count, 0, 12, 0, 0) + payload)
+    return gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", version, count, 0, 12, 0, 0) + payload, mtime=0)
 
 
 @pytest.mark.parametrize(

@@ -176,7 +176,7 @@ def test_a_query_without_end_is_ended_by_ctrl_c(toy_dataset, query):
     code = (
         "import sys; from flows.reading import query\n"
         "print('asks', flush=True)\n"
-        "try: query.sql(sys.argv[1], sys.argv[2])\n"
+        "try: query.query_dataset(sys.argv[1], sys.argv[2])\n"
         "except KeyboardInterrupt: print('ended')"
     )
     asking = subprocess.Popen(

@@ -37,7 +37,7 @@ def unlucky_twice(*args, **options):
     tries.append("generate")
     if len(tries) < 3:
         raise ClipsFailed("lightning struck")
-    return generate(*args, **options)
+    return generate_dataset(*args, **options)
 
 def wrong(*args, **options):
     tries.append("wrong")
@@ -56,9 +56,9 @@ def scheduled_flows():
     delays = list(prefect_schedule.make_dataset.retry_delay_seconds)
     prefect_schedule.make_dataset.retry_delay_seconds = [0.1, 0.1, 0.1]
     options = {"grid": "grid.yaml", "root": "root", "runner": "threads", "workers": 1, "notify": "./hook.sh"}
-    scheduling.generate = unlucky_twice
+    scheduling.generate_dataset = unlucky_twice
     dataset = prefect_schedule.scheduled(**options)
-    scheduling.generate = wrong
+    scheduling.generate_dataset = wrong
     state = prefect_schedule.scheduled(**options | {"root": "bad"}, return_state=True)
     run = SimpleNamespace(parameters=options | {"root": "killed"}, expected_start_time=datetime.now(UTC))
     (hook,) = prefect_schedule.scheduled.on_crashed_hooks
@@ -79,7 +79,7 @@ if __name__ == "__main__":  # a worker of Dask needs none of this
     from prefect.client.schemas.objects import StateType
     from tasks.errors import InputError
 
-    generate = scheduling.generate
+    generate_dataset = scheduling.generate_dataset
     plain = plain_flows()
     print("scheduled:", file=sys.stderr, flush=True)
     print(json.dumps({"plain": plain, "scheduled": scheduled_flows()}))
