@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.campaigns import read_campaign
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_source
@@ -49,7 +50,7 @@ def close_loop(
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown)
     results.write_json("split.json", split_of(measured))
     earlier = record_reading(measured, sha256_of_file(vehicle_source(name)))
-    trace = attribute(measured, model, road, load_effects())
+    trace = attribute(measured, model, road, load_effects(), load_decision_rules())
     result = verdict_json(trace.verdict)
     result["residual_rmse"] = residual_rmse(trace)
     result["held_out_readings_before"] = earlier

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import Truth, load_sizes, load_truths
 from catalogs.studies.closing import load_closing_study
@@ -34,6 +35,7 @@ JUDGES = (
     "tasks/vehicle/",
     "tasks/surface/",
     "catalogs/effects/",
+    "catalogs/decision_rules",
     "catalogs/studies/closing.yaml",
     "catalogs/surfaces/",
     "catalogs/vehicles/paper",
@@ -90,7 +92,7 @@ def close_loop_benchmark(
     rows = [row for row in read_lines(log, {"engine", "truth", "seed"}) if row["engine"] == engine]
     done = {(row["truth"], row["seed"]) for row in rows}
     model, surface, effects = load_vehicle(vehicle), load_surface("dense-asphalt"), load_effects()
-    started = time.monotonic()
+    rules, started = load_decision_rules(), time.monotonic()
     for planned in _plan(seeds, nulls, harder):
         if (planned.name, planned.seed) in done:
             continue
@@ -104,7 +106,7 @@ def close_loop_benchmark(
         )  # fmt: skip
         made = time.process_time()
         verdict = attribute(
-            campaign, model, surface, tuple(e for e in effects if e.name not in left_out)
+            campaign, model, surface, tuple(e for e in effects if e.name not in left_out), rules
         ).verdict
         row = {
             "kind": planned.kind,

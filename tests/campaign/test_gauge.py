@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
@@ -64,4 +65,4 @@ def test_a_gauge_that_cannot_read_below_zero_brakes_no_wheel_at_rest() -> None:
 def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery(seed: int) -> None:
     model, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     campaign = synthetic_campaign(model, surface, {}, seed, design=load_closing_study().drives())
-    assert attribute(campaign, model, surface, load_effects()).verdict.verdict == "NOTHING"
+    assert attribute(campaign, model, surface, load_effects(), load_decision_rules()).verdict.verdict == "NOTHING"

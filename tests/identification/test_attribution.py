@@ -9,6 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.identification.decision.attribution import ladder
 from tasks.identification.inference.campaign_evidence import Evidence
@@ -51,7 +52,12 @@ def evidence_of(theta: np.ndarray) -> Evidence:
         for i, (v, p, d, t) in enumerate(runs)
     )
     return Evidence(
-        train=derived, held_out=derived[-2:], effects=LIBRARY, tolerances=TOLERANCES, disturbance=QUIET
+        train=derived,
+        held_out=derived[-2:],
+        effects=LIBRARY,
+        tolerances=TOLERANCES,
+        disturbance=QUIET,
+        rules=load_decision_rules(),
     )
 
 

@@ -10,6 +10,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.identification.decision.forms import RIDGE, form_hypotheses, scan, spline_slopes
 from tasks.identification.decision.screening import screen
@@ -31,7 +32,10 @@ PLAIN = np.zeros(len(EFFECT_TABLE))
 
 def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence:
     runs = tuple(run_evidence(m, np.zeros(7), NOISE, PLAIN, effects, TOLERANCES, QUIET) for m in models)
-    return Evidence(train=runs, held_out=runs[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET)
+    return Evidence(
+        train=runs, held_out=runs[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET,
+        rules=load_decision_rules(),
+    )  # fmt: skip
 
 
 def over_a_hump(speed_offset: float) -> RunModel:

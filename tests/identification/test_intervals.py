@@ -10,6 +10,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.identification.benchmark import synthetic_campaign
 from tasks.identification.decision.attribution import Candidate, judge
@@ -40,7 +41,7 @@ def rain_stops(speeds: tuple[float, ...], truth: dict[str, float], disturbance: 
         derived.append(run_evidence(model, np.zeros(7), NOISE, zero, LIBRARY, TOLERANCES, disturbance))
     evidence = Evidence(
         train=tuple(derived), held_out=tuple(derived[-2:]), effects=LIBRARY, tolerances=TOLERANCES,
-        disturbance=disturbance,
+        disturbance=disturbance, rules=load_decision_rules(),
     )  # fmt: skip
     base = fit(evidence.train, (), evidence.session_sigma)
     held_out = misfit_by_run(evidence.held_out, base)
@@ -106,7 +107,7 @@ def test_intervals_stay_within_the_bounds_of_their_parameters(
 def test_with_derivatives_taken_at_it_an_estimate_forgets_where_it_started() -> None:
     rolling = next(e for e in LIBRARY if e.name == "rolling_resistance")
     campaign = synthetic_campaign(VEHICLE, SURFACE, {"rolling_coefficient": 0.012}, 56)
-    evidence = prepare(campaign, VEHICLE, SURFACE, (rolling,))
+    evidence = prepare(campaign, VEHICLE, SURFACE, (rolling,), load_decision_rules())
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
     part = library_hypothesis(rolling)
     far = fit(evidence.train, (part,), evidence.session_sigma, session=null.session, iterations=8)

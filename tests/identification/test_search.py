@@ -10,6 +10,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, planned_run
@@ -23,7 +24,7 @@ from tasks.identification.inference.evidence import run_evidence
 from tasks.identification.inference.fit import fall, fit
 from tasks.identification.inference.forward import run_model
 from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import TORN, step_change
+from tasks.identification.inference.linearisation import step_change
 from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
@@ -41,16 +42,22 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
         for i, (v, p, d, t) in enumerate(runs)
     )  # fmt: skip
     return Evidence(
-        train=derived, held_out=derived[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET
+        train=derived,
+        held_out=derived[-2:],
+        effects=effects,
+        tolerances=TOLERANCES,
+        disturbance=QUIET,
+        rules=load_decision_rules(),
     )
 
 
 def test_a_run_that_forks_at_the_abs_threshold_is_told_from_sound_ones() -> None:
+    forked = load_decision_rules().forked_misfit
     changes = [
         step_change(run_model(planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
-        for drive in (RICH[0], RICH[2], RICH[11], RICH[19], replace(RICH[19], peak=3.0))
+        for drive in (RICH[0], RICH[2], RICH[11], RICH[19], replace(RICH[19], speed=12.0, peak=3.0))
     ]
-    assert max(changes[:4]) < 0.5 * TORN < 10.0 * TORN < changes[4]
+    assert max(changes[:4]) < 0.5 * forked < 10.0 * forked < changes[4]
 
 
 def test_a_fall_counts_only_beyond_the_doubt() -> None:

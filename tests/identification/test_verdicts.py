@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_truths
 from catalogs.studies.closing import load_closing_study
@@ -32,7 +33,7 @@ def judged(
 ) -> Verdict:
     slots = OUTSIDE[outside].slots if outside else ()
     campaign = synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
-    return attribute(campaign, vehicle, SURFACE, load_effects()).verdict
+    return attribute(campaign, vehicle, SURFACE, load_effects(), load_decision_rules()).verdict
 
 
 def names(verdict: Verdict) -> list[str]:
@@ -114,5 +115,5 @@ class TestACarThatIsGrown:
         grown = load_vehicle("multibody-grown")
         assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
         campaign = synthetic_campaign(grown, SURFACE, {"lag": 0.08}, 31)
-        verdict = attribute(campaign, grown, SURFACE, load_effects()).verdict
+        verdict = attribute(campaign, grown, SURFACE, load_effects(), load_decision_rules()).verdict
         assert names(verdict) == ["brake_lag"]

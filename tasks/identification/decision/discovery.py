@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.identification.decision.attribution import ACCEPT_SCORE, RIVAL_SPAN, Candidate, judge
+from tasks.identification.decision.attribution import Candidate, judge
 from tasks.identification.decision.forms import form_hypotheses, is_constant, scan, spline_slopes
 from tasks.identification.decision.screening import inflation
 from tasks.identification.decision.search import (
-    MAX_EFFECTS,
     Found,
     Round,
     retuned,
@@ -20,13 +19,6 @@ from tasks.identification.decision.search import (
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit, misfit_by_run
 from tasks.identification.inference.linearisation import rederived, rescaled
-
-FAR_PULL = 2.5
-"""Pull, in prior sigmas, from which the model without effects has its derivatives taken anew at its session."""
-AT_ODDS = 2.0
-"""Inflation of a named effect from which its runs are at odds about it, and a form alone is held against it."""
-WORTHY = 0.3
-"""Share of the gain of what is named that a form alone must have, linearly, to be held against it."""
 
 
 def forms(
@@ -48,12 +40,13 @@ def forms(
     -------
     The state, and a form alone that cannot be told from the first effect.
     """
-    state, near = start, None
+    state, near, rules = start, None, start.evidence.rules
     left = best_form(state.evidence, state.base, splines=splines)
     over = left is not None and left.passes
-    torn = any(r.accepted.inflation > AT_ODDS for r in state.rounds)
+    torn = any(r.accepted.inflation > rules.disagreement for r in state.rounds)
     if state.rounds and (over or torn):
-        alone = best_form(null.evidence, null.base, WORTHY * sum(r.accepted.gain for r in state.rounds))
+        least = rules.lone_form_share * sum(r.accepted.gain for r in state.rounds)
+        alone = best_form(null.evidence, null.base, least)
         ahead = -np.inf
         if alone is not None and alone.passes:
             # a form has no direction of its own to be judged by, so both sides take the larger inflation
@@ -71,17 +64,17 @@ def forms(
                 or (first.variable == "constant" and is_constant(alone.hypothesis))
             )
         )
-        if alone is not None and ahead > RIVAL_SPAN and not dressed:
+        if alone is not None and ahead > rules.rival_span and not dressed:
             reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
             state = Found(
                 evidence=null.evidence,
                 base=alone.fitted,
                 rounds=(Round(base=null.base, tried=(), accepted=alone, evidence=null.evidence),),
             )
-        elif alone is not None and ahead > -RIVAL_SPAN:
+        elif alone is not None and ahead > -rules.rival_span:
             elsewhere = alone.hypothesis.port != first.port
-            near = alone if (ahead > RIVAL_SPAN if dressed else elsewhere or torn) else None
-    if left is not None and over and state is start and len(state.rounds) < MAX_EFFECTS:
+            near = alone if (ahead > rules.rival_span if dressed else elsewhere or torn) else None
+    if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
         reasons.append(f"something is left over: {left.hypothesis.name}")
         state = replace(
             state,
@@ -107,7 +100,7 @@ def best_form(
     splines : `spline_slopes` where they are known
     """
     level = inflation(evidence, base, None)
-    enough = max(ACCEPT_SCORE + float(np.log(evidence.samples)), least / level)
+    enough = max(evidence.rules.accept_score + float(np.log(evidence.samples)), least / level)
     leftovers = [x for x in scan(evidence, base, splines)[:2] if x.gain > enough]
     if not leftovers:
         return None
@@ -131,7 +124,7 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
     -------
     The start without effects, what was found, and a form alone that cannot be told from the first effect.
     """
-    if np.any(np.abs(null.session) > FAR_PULL * evidence.session_sigma):
+    if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
         evidence = rederived(evidence, null, library=True)
         null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search(Found(evidence=evidence, base=null), gated=False)

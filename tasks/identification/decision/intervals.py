@@ -13,11 +13,6 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit
 from tasks.identification.inference.linearisation import rederived
 
-SECANTS = 5
-"""Points of the profile that are tried on each side of an estimate."""
-CLOSE = 0.05
-"""Relative error of the limit, as a root of the deviance, at which the profile is followed no further."""
-
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
@@ -132,9 +127,9 @@ def _limit(
     if at_outside <= wanted:
         return outside
     x = guess if min(inside, outside) < guess < max(inside, outside) else 0.5 * (inside + outside)
-    for _ in range(SECANTS):
+    for _ in range(evidence.rules.profile_points):
         here = root(x)
-        if abs(here - wanted) < CLOSE * wanted:
+        if abs(here - wanted) < evidence.rules.profile_tolerance * wanted:
             return x
         if here < wanted:
             inside, at_inside = x, here

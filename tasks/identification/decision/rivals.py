@@ -6,9 +6,6 @@ import numpy as np
 
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (  # fmt: skip
-    ACCEPT_SCORE,
-    RIVAL_SPAN,
-    WIN_SHARE,
     Candidate,
     judge,
     ladder,
@@ -17,7 +14,7 @@ from tasks.identification.decision.attribution import (  # fmt: skip
     without,
 )
 from tasks.identification.decision.screening import inflation
-from tasks.identification.decision.search import RETUNE_PULL, Round
+from tasks.identification.decision.search import Round
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, misfit_by_run
 
@@ -77,13 +74,14 @@ def compare(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Co
 
 
 def _close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
-    return other.score > own.score - RIVAL_SPAN or (share < WIN_SHARE and wins > 0.5 * (1.0 - WIN_SHARE))
+    needed = own.rules.win_share
+    return other.score > own.score - own.rules.rival_span or (share < needed and wins > 0.5 * (1.0 - needed))
 
 
 def _credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
     """An explanation that still bends the session beyond belief is none, beside one that does not."""
     bent, straight = (float(np.max(np.abs(c.fitted.session) / evidence.session_sigma)) for c in (other, own))
-    return bent <= RETUNE_PULL or straight > RETUNE_PULL
+    return bent <= evidence.rules.retune_pull or straight > evidence.rules.retune_pull
 
 
 def detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
@@ -108,7 +106,9 @@ def detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
     information = np.diag(library) - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(session), cross)
     sizes = {}
     for effect, known in zip(evidence.effects, information, strict=True):
-        needed = 2.0 * level * (ACCEPT_SCORE + len(effect.parameters) * np.log(evidence.samples))
+        needed = (
+            2.0 * level * (evidence.rules.accept_score + len(effect.parameters) * np.log(evidence.samples))
+        )
         first = effect.parameters[0]
         size = float(np.sqrt(needed / known)) if known > 0 else np.inf
         sizes[effect.name] = size if size <= max(first.upper, -first.lower) else np.inf

@@ -7,7 +7,7 @@ import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Verdict, VerdictName, named_effect
-from tasks.identification.decision.attribution import RIVAL_SPAN, Candidate
+from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.correlation import residual_input_correlation
 from tasks.identification.decision.discovery import search_all
 from tasks.identification.decision.experiment import next_experiment
@@ -18,11 +18,10 @@ from tasks.identification.decision.search import Found
 from tasks.identification.inference.fit import Fit, fit
 from tasks.identification.inference.hypothesis import compose
 from tasks.identification.inference.linearisation import prepare
+from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
-
-WORSE_LIMIT = 1.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +47,7 @@ def attribute(
     vehicle: Vehicle,
     surface: SurfaceParameters,
     effects: tuple[Effect, ...],
+    rules: DecisionRules,
     *,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Trace:
@@ -58,6 +58,7 @@ def attribute(
     campaign : measured runs with their split
     vehicle, surface : the model that is judged
     effects : the library of candidates
+    rules : by which it is decided
     progress : called with the name of each stage as it begins
 
     Returns
@@ -65,7 +66,7 @@ def attribute(
     The verdict and what it stands on; nothing in it has been fitted to a held-out run.
     """
     progress("derivatives")
-    evidence = prepare(campaign, vehicle, surface, tuple(e for e in effects if not _fixed(e, vehicle)))
+    evidence = prepare(campaign, vehicle, surface, tuple(e for e in effects if not _fixed(e, vehicle)), rules)
     reasons: list[str] = []
     progress("search")
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
@@ -75,7 +76,7 @@ def attribute(
     progress("held-out error")
     error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     tried = list(found.tried)
-    while compared and (worse := _worse(error)):
+    while compared and (worse := _worse(error, rules.worse_limit)):
         # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
         reasons.append(
             f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
@@ -108,7 +109,7 @@ def attribute(
     kind = _kind(named, near)
     if kind == "SET":
         reasons.append(
-            f"{len(near)} other explanation(s) lie within {RIVAL_SPAN:g} units or win too many resamples"
+            f"{len(near)} other explanation(s) lie within {rules.rival_span:g} units or win too many resamples"
         )
     if not named and not reasons:
         reasons.append("no candidate passes the score, held-out and bound gates together")
@@ -130,7 +131,7 @@ def attribute(
         tried=tuple(named_effect(c, 0.0, curvature_interval(c)) for c in tried[:6]),
         error=error,
         manoeuvre_error=manoeuvres,
-        correlation=residual_input_correlation(start.evidence.held_out, *grown),
+        correlation=residual_input_correlation(start.evidence.held_out, *grown, rules.longest_lag),
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
         noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
         disturbance=start.evidence.disturbance,
@@ -147,8 +148,8 @@ def attribute(
     return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
 
 
-def _worse(error: Mapping[str, ChannelError]) -> list[str]:
-    return [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
+def _worse(error: Mapping[str, ChannelError], limit: float) -> list[str]:
+    return [name for name, e in error.items() if e.after > limit * e.frozen and e.change_low > 0.0]
 
 
 def _fixed(effect: Effect, vehicle: Vehicle) -> bool:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import Tolerances
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import RunEvidence
+from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.library import Effect
 
 
@@ -20,6 +21,7 @@ class Evidence:
     train, held_out : runs
     effects : the library
     tolerances, disturbance : priors of session, offsets and disturbances
+    rules : by which a verdict is reached
     torn : names of the runs that fork when the integration step is halved, and are left out
     """
 
@@ -28,6 +30,7 @@ class Evidence:
     effects: tuple[Effect, ...]
     tolerances: Tolerances
     disturbance: Disturbance
+    rules: DecisionRules
     torn: tuple[str, ...] = ()
 
     @property
