@@ -12,7 +12,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.gauge import braking_pressure, gauge_noise
 from tasks.identification.benchmark import synthetic_campaign
-from tasks.identification.decision.verdict import attribute
+from tasks.identification.decision.verdict import find_missing_effects
 
 TIME = np.arange(600) * 0.01
 STOP = 2.0 * np.clip((TIME - 1.0) / 0.3, 0.0, 1.0)
@@ -65,4 +65,4 @@ def test_a_gauge_that_cannot_read_below_zero_brakes_no_wheel_at_rest() -> None:
 def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery(seed: int) -> None:
     model, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     campaign = synthetic_campaign(model, surface, {}, seed, design=load_closing_study().drives())
-    assert attribute(campaign, model, surface, load_effects(), load_decision_rules()).verdict.verdict == "NOTHING"
+    assert find_missing_effects(campaign, model, surface, load_effects(), load_decision_rules()).verdict.verdict == "NOTHING"

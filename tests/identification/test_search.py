@@ -14,14 +14,14 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, planned_run
-from tasks.identification.decision.attribution import ladder
+from tasks.identification.decision.attribution import refine_candidates
 from tasks.identification.decision.experiment import next_experiment
-from tasks.identification.decision.rivals import detectable
+from tasks.identification.decision.rivals import find_detectable_sizes
 from tasks.identification.decision.screening import inflation, look_alikes
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import run_evidence
-from tasks.identification.inference.fit import fall, fit
+from tasks.identification.inference.fit import fit, sum_misfit_falls
 from tasks.identification.inference.forward import run_model
 from tasks.identification.inference.hypothesis import library_hypothesis
 from tasks.identification.inference.linearisation import step_change
@@ -63,7 +63,7 @@ def test_a_run_that_forks_at_the_abs_threshold_is_told_from_sound_ones() -> None
 def test_a_fall_counts_only_beyond_the_doubt() -> None:
     before = (np.array([100.0, 100.0, 50.0]), np.array([0.0, 30.0, 0.0]))
     after = (np.array([90.0, 60.0, 55.0]), np.array([2.0, 20.0, 1.0]))
-    assert fall(before, after) == pytest.approx(8.0 + 0.0 - 4.0)
+    assert sum_misfit_falls(before, after) == pytest.approx(8.0 + 0.0 - 4.0)
 
 
 def test_a_free_parameter_takes_its_session_nuisance_over() -> None:
@@ -112,7 +112,7 @@ def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> 
     evidence = evidence_of(parameter_vector({"fade": 0.06}), "brake_fade", "rolling_resistance")
     null = fit(evidence.train, (), evidence.session_sigma)
     plain, asked = (
-        {c.hypothesis.name for c in ladder(evidence, null, gated=False, also=also)}
+        {c.hypothesis.name for c in refine_candidates(evidence, null, gated=False, also=also)}
         for also in (frozenset[str](), frozenset({"rolling_resistance"}))
     )
     assert plain == {"brake_fade"} and asked == {"brake_fade", "rolling_resistance"}
@@ -121,7 +121,7 @@ def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> 
 def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bounds() -> None:
     evidence = evidence_of(np.zeros(len(EFFECT_TABLE)), "rolling_resistance", "wet_friction_speed")
     null = fit(evidence.train, (), evidence.session_sigma)
-    sizes = detectable(evidence, null)
+    sizes = find_detectable_sizes(evidence, null)
     assert 0.0 < sizes["rolling_resistance"] < 0.05
     rolling = LIBRARY["rolling_resistance"]
     found = fit(evidence.train, (library_hypothesis(rolling),), evidence.session_sigma)
@@ -130,6 +130,6 @@ def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bo
     (first,) = rolling.parameters
     tight = replace(rolling, parameters=(replace(first, bounds=(0.0, 0.9 * sizes["rolling_resistance"])),))
     bounded = replace(evidence, effects=(tight, *evidence.effects[1:]))
-    assert detectable(bounded, null)["rolling_resistance"] == np.inf
+    assert find_detectable_sizes(bounded, null)["rolling_resistance"] == np.inf
     # stops on a dry road say nothing of wet friction
     assert sizes["wet_friction_speed"] == np.inf

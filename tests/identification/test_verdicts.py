@@ -13,7 +13,7 @@ from catalogs.vehicles import load_vehicle
 from tasks.campaign.planned_runs import RICH, Drive, planned_run
 from tasks.identification.benchmark import synthetic_campaign
 from tasks.identification.decision.answer import Verdict
-from tasks.identification.decision.verdict import attribute
+from tasks.identification.decision.verdict import find_missing_effects
 from tasks.identification.inference.forward import predict, run_model
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.table import parameter_vector
@@ -33,7 +33,7 @@ def judged(
 ) -> Verdict:
     slots = OUTSIDE[outside].slots if outside else ()
     campaign = synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
-    return attribute(campaign, vehicle, SURFACE, load_effects(), load_decision_rules()).verdict
+    return find_missing_effects(campaign, vehicle, SURFACE, load_effects(), load_decision_rules()).verdict
 
 
 def names(verdict: Verdict) -> list[str]:
@@ -115,5 +115,7 @@ class TestACarThatIsGrown:
         grown = load_vehicle("multibody-grown")
         assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
         campaign = synthetic_campaign(grown, SURFACE, {"lag": 0.08}, 31)
-        verdict = attribute(campaign, grown, SURFACE, load_effects(), load_decision_rules()).verdict
+        verdict = find_missing_effects(
+            campaign, grown, SURFACE, load_effects(), load_decision_rules()
+        ).verdict
         assert names(verdict) == ["brake_lag"]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.screening import inflation, look_alikes, screen
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fall, fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, fit, misfit_by_run, sum_misfit_falls
 from tasks.identification.inference.hypothesis import Hypothesis, library_hypothesis
 from tasks.identification.rules import DecisionRules
 
@@ -47,7 +47,7 @@ class Candidate:
         return enough and not self.fitted.at_bound
 
 
-def judge(
+def judge_hypothesis(
     evidence: Evidence,
     base: Fit,
     base_held_out: Misfits | None,
@@ -95,10 +95,10 @@ def judge(
         if gain > min(enough, rules.relinearisation_gain) or hopeless:
             break
     fitted = min(trials, key=lambda trial: trial.objective)
-    return assess(evidence, base, base_held_out, hypothesis, fitted)
+    return assess_fit(evidence, base, base_held_out, hypothesis, fitted)
 
 
-def assess(
+def assess_fit(
     evidence: Evidence,
     base: Fit,
     base_held_out: Misfits | None,
@@ -121,18 +121,18 @@ def assess(
     penalty = float(len(hypothesis.names) * np.log(evidence.samples))
     if gain / factor - penalty > evidence.rules.accept_score and base_held_out is not None:
         # what the base reaches from here as well is no merit of the hypothesis
-        gain = min(gain, 0.5 * (_back(evidence, base, hypothesis, fitted).objective - fitted.objective))
+        gain = min(gain, 0.5 * (_refit_base(evidence, base, hypothesis, fitted).objective - fitted.objective))
     score = gain / factor - penalty
     held_out = 0.0
     if score > evidence.rules.accept_score and base_held_out is not None:
-        held_out = fall(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
+        held_out = sum_misfit_falls(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
     return Candidate(
         hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
         informed=len(own) or len(evidence.train), rules=evidence.rules,
     )  # fmt: skip
 
 
-def _back(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
+def _refit_base(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
     """The base fitted again from where a fit that extends it ended."""
     session = fitted.session.copy()
     k = len(hypothesis.names)
@@ -159,7 +159,7 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
     return np.array(scores)
 
 
-def ladder(
+def refine_candidates(
     evidence: Evidence,
     base: Fit,
     count: int | None = None,
@@ -185,7 +185,7 @@ def ladder(
 
     def judged(j: int) -> Candidate:
         hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
-        return judge(evidence, base, held_out, hypothesis, float(gains[j]))
+        return judge_hypothesis(evidence, base, held_out, hypothesis, float(gains[j]))
 
     candidates: list[Candidate] = []
     refined: list[int] = []
@@ -207,7 +207,7 @@ def ladder(
     return sorted(candidates, key=lambda c: -c.score)
 
 
-def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
+def bootstrap_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     """Share of bootstrap resamples of the runs in which the first candidate keeps the best score.
 
     Parameters
@@ -229,12 +229,12 @@ def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     return float(np.mean((winner == 0) & (scores[0] > 0.0)))
 
 
-def nested(small: Hypothesis, large: Hypothesis) -> bool:
+def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
     """Whether every parameter of ``small`` is also one of ``large``."""
     return set(small.names) < set(large.names)
 
 
-def without(base: Fit, index: int, evidence: Evidence) -> Fit:
+def refit_without(base: Fit, index: int, evidence: Evidence) -> Fit:
     """Refit with one accepted part left out.
 
     Parameters

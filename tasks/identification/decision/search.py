@@ -8,17 +8,17 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (
     Candidate,
-    assess,
-    judge,
-    ladder,
-    nested,
+    assess_fit,
+    is_nested,
+    judge_hypothesis,
+    refine_candidates,
 )
 from tasks.identification.decision.forms import RIDGE
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.fit import Fit, fall, fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, fit, misfit_by_run, sum_misfit_falls
 from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import fit_disturbance, rederived, whitened_residuals
+from tasks.identification.inference.linearisation import differentiate_at, fit_disturbance, whitened_residuals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ class Found:
     tried: tuple[Candidate, ...] = ()
 
 
-def settle(
+def relinearise_candidate(
     evidence: Evidence, base: Fit, candidate: Candidate, *, gated: bool = True, known: Evidence | None = None
 ) -> tuple[Evidence, Candidate]:
     """Take derivatives anew at a candidate whose gain is large, refit it and judge it there.
@@ -73,7 +73,7 @@ def settle(
         return evidence, candidate
     here, fitted = evidence, candidate.fitted
     for _ in range(2):
-        here = known or rederived(here, fitted, library=True)
+        here = known or differentiate_at(here, fitted, library=True)
         known = None
         again = fit(
             here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
@@ -83,10 +83,10 @@ def settle(
         if np.all(shift < evidence.rules.relinearisation_change):
             break
     base_held_out = misfit_by_run(evidence.held_out, base) if gated else None
-    return here, assess(here, base, base_held_out, candidate.hypothesis, fitted)
+    return here, assess_fit(here, base, base_held_out, candidate.hypothesis, fitted)
 
 
-def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
+def search_library(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
     """Add library effects one by one, the best first.
 
     Parameters
@@ -99,14 +99,14 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
     met = frozenset(r.accepted.hypothesis.name for r in explored.rounds) if explored else frozenset()
     for _ in range(rules.most_effects):
         count = rules.refined_candidates if gated else rules.explored_candidates
-        tried = ladder(state.evidence, state.base, count, gated=gated, also=met)
+        tried = refine_candidates(state.evidence, state.base, count, gated=gated, also=met)
         places: dict[str, Evidence] = {}
         for i, candidate in enumerate(tried[: rules.relinearised_candidates] if gated else tried[:1]):
             if candidate.score > max(rules.accept_score, 0.3 * tried[0].score):
                 near, known = candidate, None
                 if explored and candidate.gain >= rules.relinearisation_gain:
-                    near, known = _met_before(explored, candidate)
-                places[candidate.hypothesis.name], tried[i] = settle(
+                    near, known = _recall_candidate(explored, candidate)
+                places[candidate.hypothesis.name], tried[i] = relinearise_candidate(
                     state.evidence, state.base, near, gated=gated, known=known
                 )
         tried.sort(key=lambda c: -c.score)
@@ -117,7 +117,7 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
         simpler = [
             c
             for c in passing
-            if nested(c.hypothesis, best.hypothesis) and c.score > best.score - rules.rival_span
+            if is_nested(c.hypothesis, best.hypothesis) and c.score > best.score - rules.rival_span
         ]
         best = simpler[0] if simpler else best
         here = places.get(best.hypothesis.name, state.evidence)
@@ -125,7 +125,7 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
             held_out = misfit_by_run(state.evidence.held_out, state.base)
             tried = [
                 c if c.score < 0.3 * best.score or c.hypothesis.name in places
-                else judge(here, state.base, held_out, c.hypothesis)
+                else judge_hypothesis(here, state.base, held_out, c.hypothesis)
                 for c in tried
             ]  # fmt: skip
         state = Found(
@@ -136,7 +136,7 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
     return state
 
 
-def _met_before(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
+def _recall_candidate(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
     """The candidate at the values that an earlier search settled it at, and its derivatives there."""
     k = len(candidate.hypothesis.names)
     for earlier in explored.rounds:
@@ -168,7 +168,7 @@ def scale_disturbances(explored: Found, splines: tuple[NDArray[np.float64], ...]
     )
 
 
-def retuned(start: Found, reasons: list[str]) -> Found:
+def find_retune(start: Found, reasons: list[str]) -> Found:
     """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session.
 
     Parameters
@@ -187,8 +187,10 @@ def retuned(start: Found, reasons: list[str]) -> Found:
         frozen = null.session.copy()
         frozen[place] = 0.0
         held_out = misfit_by_run(evidence.held_out, replace(null, session=frozen))
-        found = judge(evidence, null, held_out, library_hypothesis(effect, float(null.session[place])))
-        gained = fall(held_out, misfit_by_run(evidence.held_out, found.fitted))
+        found = judge_hypothesis(
+            evidence, null, held_out, library_hypothesis(effect, float(null.session[place]))
+        )
+        gained = sum_misfit_falls(held_out, misfit_by_run(evidence.held_out, found.fitted))
         judged.append(replace(found, held_out_gain=gained / found.inflation))
     accepted = [c for c in judged if c.held_out_gain > evidence.rules.held_out_gain and c.gain > 0.0]
     if not accepted:

@@ -12,12 +12,12 @@ from tasks.identification.decision.correlation import residual_input_correlation
 from tasks.identification.decision.discovery import search_all
 from tasks.identification.decision.experiment import next_experiment
 from tasks.identification.decision.held_out import held_out_error
-from tasks.identification.decision.intervals import curvature_interval, profile_interval, refitted
-from tasks.identification.decision.rivals import Compared, compare, detectable
+from tasks.identification.decision.intervals import curvature_interval, profile_interval, refit_named
+from tasks.identification.decision.rivals import Compared, compare_with_rivals, find_detectable_sizes
 from tasks.identification.decision.search import Found
 from tasks.identification.inference.fit import Fit, fit
 from tasks.identification.inference.hypothesis import compose
-from tasks.identification.inference.linearisation import prepare
+from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -42,7 +42,7 @@ class Trace:
     compared: tuple[Compared, ...]
 
 
-def attribute(
+def find_missing_effects(
     campaign: Campaign,
     vehicle: Vehicle,
     surface: SurfaceParameters,
@@ -66,17 +66,19 @@ def attribute(
     The verdict and what it stands on; nothing in it has been fitted to a held-out run.
     """
     progress("derivatives")
-    evidence = prepare(campaign, vehicle, surface, tuple(e for e in effects if not _fixed(e, vehicle)), rules)
+    evidence = prepare_evidence(
+        campaign, vehicle, surface, tuple(e for e in effects if not _is_fixed(e, vehicle)), rules
+    )
     reasons: list[str] = []
     progress("search")
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
     start, found, near_form = search_all(evidence, null, reasons)
     progress("rivals")
-    compared = compare(found.evidence, found.base, found.rounds)
+    compared = compare_with_rivals(found.evidence, found.base, found.rounds)
     progress("held-out error")
     error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     tried = list(found.tried)
-    while compared and (worse := _worse(error, rules.worse_limit)):
+    while compared and (worse := _worse_channels(error, rules.worse_limit)):
         # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
         reasons.append(
             f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
@@ -88,11 +90,11 @@ def attribute(
             start, base=last.base, rounds=found.rounds[:-1],
             evidence=found.rounds[-2].evidence if found.rounds[1:] else start.evidence,
         )  # fmt: skip
-        compared = compare(found.evidence, found.base, found.rounds)
+        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
         error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     progress("intervals")
     if compared:
-        here, settled, again = refitted(found.evidence, found.base, [c.own for c in compared])
+        here, settled, again = refit_named(found.evidence, found.base, [c.own for c in compared])
         found = replace(found, evidence=here, base=settled)
         compared = [replace(c, own=own) for c, own in zip(compared, again, strict=True)]
         error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
@@ -106,7 +108,7 @@ def attribute(
         near.append(
             (named[0].name, named_effect(near_form, 0.0, profile_interval(near_form, start.evidence)))
         )
-    kind = _kind(named, near)
+    kind = _verdict_name(named, near)
     if kind == "SET":
         reasons.append(
             f"{len(near)} other explanation(s) lie within {rules.rival_span:g} units or win too many resamples"
@@ -135,24 +137,24 @@ def attribute(
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
         noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
         disturbance=start.evidence.disturbance,
-        detectable=detectable(start.evidence, start.base),
+        detectable=find_detectable_sizes(start.evidence, start.base),
         campaign=campaign.name,
         content_hash=campaign.content_hash,
         split_hash=campaign.split_hash,
         theta=theta,
         slots=slots,
         experiment=experiment,
-        torn=evidence.torn,
+        forked=evidence.forked,
         reasons=tuple(reasons),
     )
     return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
 
 
-def _worse(error: Mapping[str, ChannelError], limit: float) -> list[str]:
+def _worse_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:
     return [name for name, e in error.items() if e.after > limit * e.frozen and e.change_low > 0.0]
 
 
-def _fixed(effect: Effect, vehicle: Vehicle) -> bool:
+def _is_fixed(effect: Effect, vehicle: Vehicle) -> bool:
     """Whether the vehicle has an effect of several parameters already: those cannot be found as a change of it."""
     return len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
 
@@ -172,7 +174,7 @@ def _to_tell_apart(
     return own.fitted, other.fitted
 
 
-def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
+def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
     if not named:
         return "NOTHING"
     classes = {effect.effect_class for effect in named}

@@ -22,7 +22,7 @@ class Evidence:
     effects : the library
     tolerances, disturbance : priors of session, offsets and disturbances
     rules : by which a verdict is reached
-    torn : names of the runs that fork when the integration step is halved, and are left out
+    forked : names of the runs that fork when the integration step is halved, and are left out
     """
 
     train: tuple[RunEvidence, ...]
@@ -31,7 +31,7 @@ class Evidence:
     tolerances: Tolerances
     disturbance: Disturbance
     rules: DecisionRules
-    torn: tuple[str, ...] = ()
+    forked: tuple[str, ...] = ()
 
     @property
     def session_sigma(self) -> NDArray[np.float64]:

@@ -25,7 +25,7 @@ FREED = 20.0
 """Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
 
 
-def prepare(
+def prepare_evidence(
     campaign: Campaign,
     vehicle: Vehicle,
     surface: SurfaceParameters,
@@ -59,10 +59,10 @@ def prepare(
         )
 
     train, held_out = derived(False, effects), derived(True, ())
-    torn = tuple(run.name for run in campaign.runs if run.name not in used)
+    forked = tuple(run.name for run in campaign.runs if run.name not in used)
     return Evidence(
         train=train, held_out=held_out, effects=effects,
-        tolerances=campaign.tolerances, disturbance=guess, rules=rules, torn=torn,
+        tolerances=campaign.tolerances, disturbance=guess, rules=rules, forked=forked,
     )  # fmt: skip
 
 
@@ -79,7 +79,7 @@ def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.flo
     return float(np.sum(whiten(change, rho, sigma) ** 2))
 
 
-def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
+def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     """The same runs with derivatives taken about a fit.
 
     Parameters
@@ -106,7 +106,7 @@ def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     )
 
 
-def rescaled(evidence: Evidence, disturbance: Disturbance) -> Evidence:
+def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Evidence:
     """The same runs under other scales of the disturbances.
 
     Parameters
