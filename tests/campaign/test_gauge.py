@@ -65,4 +65,7 @@ def test_a_gauge_that_cannot_read_below_zero_brakes_no_wheel_at_rest() -> None:
 def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery(seed: int) -> None:
     model, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     campaign = synthetic_campaign(model, surface, {}, seed, design=load_closing_study().drives())
-    assert find_missing_effects(campaign, model, surface, load_effects(), load_decision_rules()).verdict.verdict == "NOTHING"
+    assert (
+        find_missing_effects(campaign, model, surface, load_effects(), load_decision_rules()).verdict.verdict
+        == "NOTHING"
+    )

@@ -12,7 +12,7 @@ from tasks.vehicle.effects.slots import Slot
 def find_reached_range(
     models: Iterable[RunModel], theta: NDArray[np.float64], slots: tuple[Slot, ...], variable: str
 ) -> tuple[float, float]:
-    """Return the lowest and highest value of a variable over runs, by the model with what was found [unit of the variable].
+    """Return the lowest and highest value of a variable over runs, by the grown model [unit of the variable].
 
     Parameters
     ----------
