@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_truths
 from catalogs.studies.closing import load_closing_study
@@ -12,7 +13,7 @@ from catalogs.vehicles import load_vehicle
 from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run
 from tasks.identification.benchmark import synthetic_campaign
 from tasks.identification.decision.answer import Verdict
-from tasks.identification.decision.verdict import attribute
+from tasks.identification.decision.verdict import find_missing_effects
 from tasks.identification.inference.forward import predict, run_model
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.table import parameter_vector
@@ -54,7 +55,9 @@ def judged(
     campaign = synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
     last = 3 * len(design) // 4
     runs = tuple(replace(run, held_out=number >= last) for number, run in enumerate(campaign.runs))
-    return attribute(replace(campaign, runs=runs), vehicle, SURFACE, LIBRARY).verdict
+    return find_missing_effects(
+        replace(campaign, runs=runs), vehicle, SURFACE, LIBRARY, load_decision_rules()
+    ).verdict
 
 
 def names(verdict: Verdict) -> list[str]:
@@ -140,5 +143,7 @@ class TestACarThatIsGrown:
         grown = load_vehicle("multibody-grown")
         assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
         campaign = synthetic_campaign(grown, SURFACE, {"lag": 0.08}, 31)
-        verdict = attribute(campaign, grown, SURFACE, load_effects()).verdict
+        verdict = find_missing_effects(
+            campaign, grown, SURFACE, load_effects(), load_decision_rules()
+        ).verdict
         assert names(verdict) == ["brake_lag"]
