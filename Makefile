@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test check study study-schedule study-crash study-fuzz study-faults freeze bench lock clean
+.PHONY: demo test check study study-schedule study-crash study-fuzz study-faults study-mutants freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -52,6 +52,9 @@ study-fuzz: $(READY)
 
 study-faults: $(READY)
 	$(BIN)/python -m benchmarks.store_faults
+
+study-mutants: $(READY)
+	$(BIN)/python -m benchmarks.mutants
 
 freeze: $(READY)
 	$(BIN)/musync freeze

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from catalogs.cameras import load_camera
 from catalogs.scenes import load_scene
 from tasks.eval.image_quality import psnr
-from tasks.render.camera import Camera, continuous_rig, viewmat
-from tasks.render.composition import compose, encode_8bit
+from tasks.render.camera import Camera, continuous_rig, world_to_camera
+from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import Field, read_out, sensor_field
@@ -25,7 +25,7 @@ RENDERS, ROW_STEP, REPEATS = 32, 8, 3
 Light = NDArray[np.float32]
 
 
-def rows(scene_name: str = "street") -> list[dict[str, Any]]:
+def measure_rows(scene_name: str = "street") -> list[dict[str, Any]]:
     """Hold one render, resampled, against 32 renders over the exposure and one render for every eighth row.
 
     Returns
@@ -49,13 +49,13 @@ def rows(scene_name: str = "street") -> list[dict[str, Any]]:
     one = sensor_field(replace(pinhole, line_delay_s=0.0, motion_blur=False))
 
     def draw(pose: NDArray[np.float64], field: Field = one) -> tuple[Light, Light]:
-        view = viewmat(pose)
+        view = world_to_camera(pose)
         gbuffer = backend.rasterise(prepared, view, field.K, field.width, field.height)
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
-        return compose(gbuffer, sky, scene.gaussians.display_encoded), gbuffer.depth
+        return compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded), gbuffer.depth
 
     def sensed(camera: Camera, field: Field) -> Light:
-        to_rows = viewmat(here) @ poses(camera.row_times)
+        to_rows = world_to_camera(here) @ poses(camera.row_times)
         return read_out(*draw(here, field), field, to_rows, camera.motion_blur).picture
 
     def mean_of(count: int) -> Light:
@@ -84,26 +84,33 @@ def rows(scene_name: str = "street") -> list[dict[str, Any]]:
         field = sensor_field(camera)
         picture = sensed(camera, field)
         spent = _cpu_ms(lambda camera=camera, field=field: sensed(camera, field))  # type: ignore[misc]
-        found.append(_row(f"{name}: cost", spent, "CPU-ms", "one shutter, no blur", clear_ms))
+        found.append(_make_row(f"{name}: cost", spent, "CPU-ms", "one shutter, no blur", clear_ms))
         if camera is blurred:
-            near, far = _near(picture, exact), _near(plain, exact)
-            found.append(_row("blur: to 32 renders", near, "dB", "blur left out", far))
+            near, far = _compute_psnr(picture, exact), _compute_psnr(plain, exact)
+            found.append(_make_row("blur: to 32 renders", near, "dB", "blur left out", far))
             found.append(
-                _row(
-                    "blur of two renders: to 32 renders", _near(mean_of(2), exact), "dB", "blur left out", far
+                _make_row(
+                    "blur of two renders: to 32 renders",
+                    _compute_psnr(mean_of(2), exact),
+                    "dB",
+                    "blur left out",
+                    far,
                 )
             )
         if camera is rolling:
-            near, far = _near(picture[row_numbers], row_pictures), _near(plain[row_numbers], row_pictures)
-            found.append(_row("rolling shutter: to a render a row", near, "dB", "one shutter", far))
+            near, far = (
+                _compute_psnr(picture[row_numbers], row_pictures),
+                _compute_psnr(plain[row_numbers], row_pictures),
+            )
+            found.append(_make_row("rolling shutter: to a render a row", near, "dB", "one shutter", far))
     return found
 
 
-def _near(picture: Light, exact: Light) -> float:
+def _compute_psnr(picture: Light, exact: Light) -> float:
     return psnr(encode_8bit(exact), encode_8bit(picture))
 
 
-def _row(name: str, value: float, unit: str, peer: str, held: float) -> dict[str, Any]:
+def _make_row(name: str, value: float, unit: str, peer: str, held: float) -> dict[str, Any]:
     return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": value / held}
 
 
@@ -120,6 +127,6 @@ def _cpu_ms(call: Callable[[], object]) -> float:
 
 if __name__ == "__main__":
     for scene_name in sys.argv[1:] or ["street"]:
-        for row in rows(scene_name):
+        for row in measure_rows(scene_name):
             ratio = "" if row["ratio"] is None else f"{row['ratio']:.2f} of {row['peer']}"
             print(f"{Path(scene_name).name:8} {row['name']:36} {row['value']:8.1f} {row['unit']:7} {ratio}")

@@ -19,7 +19,7 @@ _SURFACES = (
 _BUSHES = 60
 
 
-def corridor(count: int, sh_count: int = 16, seed: int = 0) -> Gaussians:
+def make_corridor(count: int, sh_count: int = 16, seed: int = 0) -> Gaussians:
     """Gaussians about as large as their spacing, flat on the road and the walls, thick in the bushes.
 
     Parameters
@@ -33,7 +33,7 @@ def corridor(count: int, sh_count: int = 16, seed: int = 0) -> Gaussians:
     sizes[-1] = count - sum(sizes[:-1])
     class_id = np.repeat([label for label, _, _ in _SURFACES], sizes).astype(np.uint8)
     means = np.concatenate([
-        _points(rng, label, normal, size)
+        _draw_points(rng, label, normal, size)
         for (label, _, normal), size in zip(_SURFACES, sizes, strict=True)
     ])  # fmt: skip
     normals = np.repeat([normal for _, _, normal in _SURFACES], sizes, axis=0)
@@ -59,7 +59,7 @@ def corridor(count: int, sh_count: int = 16, seed: int = 0) -> Gaussians:
     )
 
 
-def _points(
+def _draw_points(
     rng: np.random.Generator, label: SemanticClass, normal: tuple[float, float, float], size: int
 ) -> NDArray[np.float64]:
     if label == SemanticClass.VEGETATION:

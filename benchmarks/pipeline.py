@@ -1,16 +1,16 @@
-"""What the pipeline costs beyond its work: wall time against the clips' own wall time over the workers."""
+"""Overhead of the pipeline: wall time compared with the clips' own wall time over the workers."""
 
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 
 WORKERS = 2
 
 
-def rows(grid: str = "demo") -> list[dict[str, Any]]:
+def measure_rows(grid: str = "demo") -> list[dict[str, Any]]:
     """Generate a grid into a temporary folder and split its wall time into work and overhead.
 
     Returns
@@ -19,10 +19,10 @@ def rows(grid: str = "demo") -> list[dict[str, Any]]:
     """
     with tempfile.TemporaryDirectory() as folder:
         started = time.perf_counter()
-        report = generate(grid, str(Path(folder) / "dataset"), workers=WORKERS)
+        report = generate_dataset(grid, str(Path(folder) / "dataset"), workers=WORKERS)
         wall = time.perf_counter() - started
         resumed = time.perf_counter()
-        generate(grid, str(Path(folder) / "dataset"), workers=WORKERS)
+        generate_dataset(grid, str(Path(folder) / "dataset"), workers=WORKERS)
         resume_wall = time.perf_counter() - resumed
     work = sum(cost["wall_s"] for cost in report.cost.values()) / WORKERS
     cpu = sum(cost["cpu_s"] for cost in report.cost.values())
@@ -49,6 +49,6 @@ def rows(grid: str = "demo") -> list[dict[str, Any]]:
 
 
 if __name__ == "__main__":
-    for row in rows():
+    for row in measure_rows():
         ratio = "" if row["ratio"] is None else f"{row['ratio']:.3f} of {row['peer']}"
         print(f"{row['name']:32} {row['value']:10.3f} {row['unit']:12} {ratio}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.synthetic_street import Clip, drive_clip
 from tasks.conventions import SemanticClass
-from tasks.eval.flip import flip
+from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim
 from tasks.eval.no_reference import piqe, temporal_error
 from tasks.eval.poses.essential import recover_motion_essential
@@ -39,7 +39,7 @@ REPEATS = 3
 T = TypeVar("T")
 
 
-def rows() -> list[dict[str, Any]]:
+def measure_rows() -> list[dict[str, Any]]:
     """Measure each check on one drive over a hump at 40 km/h, 16 frames per second.
 
     Returns
@@ -55,11 +55,11 @@ def rows() -> list[dict[str, Any]]:
     }
     result, total = [], 0.0
     for name, check in checks.items():
-        seen, cpu_s = _timed(check)
+        seen, cpu_s = _measure_time(check)
         total += cpu_s
         result += [
             *_error_rows(name, seen, clip),
-            _row(f"{name}: CPU time", cpu_s, "CPU-s", "limit, all checks", CPU_LIMIT_S),
+            _make_row(f"{name}: CPU time", cpu_s, "CPU-s", "limit, all checks", CPU_LIMIT_S),
         ]
     others: dict[str, Callable[[], object]] = {
         "piqe": lambda: [piqe(picture) for picture in clip.frames[sampled_frames(len(clip.frames))]],
@@ -69,19 +69,19 @@ def rows() -> list[dict[str, Any]]:
     totals = {}
     for kind, measures in {"a clip": others, "a feature clip": _feature_checks(clip)}.items():
         for name, measure in measures.items():
-            _, cpu_s = _timed(measure)
+            _, cpu_s = _measure_time(measure)
             total += cpu_s
-            result.append(_row(f"{name}: CPU time", cpu_s, "CPU-s", "limit, all checks", CPU_LIMIT_S))
+            result.append(_make_row(f"{name}: CPU time", cpu_s, "CPU-s", "limit, all checks", CPU_LIMIT_S))
         totals[kind] = total
     return result + [
-        _row(f"all checks of {kind}: CPU time", cpu_s, "CPU-s", "limit", CPU_LIMIT_S)
+        _make_row(f"all checks of {kind}: CPU time", cpu_s, "CPU-s", "limit", CPU_LIMIT_S)
         for kind, cpu_s in totals.items()
     ]
 
 
 def _feature_checks(clip: Clip) -> dict[str, Callable[[], object]]:
-    """What is asked of a clip with a road feature besides: the edit, and the likeness to the flat twin around it."""
-    targets = _targets(clip)
+    """Measure the further checks of a clip with a road feature: the edit, and the likeness to its flat twin."""
+    targets = _find_targets(clip)
     shown = clip.frames.copy()
     shown[targets] -= np.minimum(shown[targets], SHADE)
     kept = np.flatnonzero(targets.any(axis=(1, 2)))
@@ -96,11 +96,11 @@ def _feature_checks(clip: Clip) -> dict[str, Callable[[], object]]:
     return {
         "road edit": lambda: score_road_edit(list(shown), list(clip.frames), list(targets)),
         "twin SSIM": lambda: twins(ssim),
-        "twin FLIP": lambda: twins(flip),
+        "twin FLIP": lambda: twins(flip_error),
     }
 
 
-def _targets(clip: Clip) -> NDArray[np.bool_]:
+def _find_targets(clip: Clip) -> NDArray[np.bool_]:
     """Road pixels on the feature while the car has not passed it, bool [F, H, W]."""
     masks = np.zeros(clip.depth.shape, bool)
     poses = clip.T_world_rig @ clip.T_rig_camera
@@ -114,23 +114,25 @@ def _targets(clip: Clip) -> NDArray[np.bool_]:
 
 
 def _error_rows(name: str, seen: RecoveredMotion, clip: Clip) -> list[dict[str, Any]]:
-    pitch_deg = _rms(np.rad2deg(seen.pitch - clip.pitch))
-    result = [_row(f"{name}: pitch RMSE", pitch_deg, "deg", "limit", PITCH_LIMITS_DEG[name])]
+    pitch_deg = _compute_rms(np.rad2deg(seen.pitch - clip.pitch))
+    result = [_make_row(f"{name}: pitch RMSE", pitch_deg, "deg", "limit", PITCH_LIMITS_DEG[name])]
     if name in PROTOTYPE_PROGRESS_M:
-        progress = _rms(seen.progress - clip.station)
-        result.append(_row(f"{name}: progress RMSE", progress, "m", "prototype", PROTOTYPE_PROGRESS_M[name]))
-    normalised = _rms(seen.normalised_path[:, 0] - clip.station / clip.station[-1])
+        progress = _compute_rms(seen.progress - clip.station)
+        result.append(
+            _make_row(f"{name}: progress RMSE", progress, "m", "prototype", PROTOTYPE_PROGRESS_M[name])
+        )
+    normalised = _compute_rms(seen.normalised_path[:, 0] - clip.station / clip.station[-1])
     result.append(
-        _row(f"{name}: normalised progress RMSE", normalised, "1", "prototype", PROTOTYPE_NORMALISED)
+        _make_row(f"{name}: normalised progress RMSE", normalised, "1", "prototype", PROTOTYPE_NORMALISED)
     )
     return result
 
 
-def _rms(error: np.ndarray) -> float:
+def _compute_rms(error: np.ndarray) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def _timed(check: Callable[[], T]) -> tuple[T, float]:
+def _measure_time(check: Callable[[], T]) -> tuple[T, float]:
     """A check's result and its median CPU time, after a run that compiles or loads what it needs [CPU-s]."""
     seen = check()
     times = []
@@ -141,10 +143,10 @@ def _timed(check: Callable[[], T]) -> tuple[T, float]:
     return seen, median(times)
 
 
-def _row(name: str, value: float, unit: str, peer: str, peer_value: float) -> dict[str, Any]:
+def _make_row(name: str, value: float, unit: str, peer: str, peer_value: float) -> dict[str, Any]:
     return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": value / peer_value}
 
 
 if __name__ == "__main__":
-    for row in rows():
+    for row in measure_rows():
         print(f"{row['name']:44} {row['value']:10.5f} {row['unit']:8} {row['ratio']:.4f} of {row['peer']}")

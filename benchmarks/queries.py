@@ -15,7 +15,7 @@ import pandas as pd
 import yaml
 
 import musync
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 
 CLIPS = 1000
 LEVELS = 10
@@ -47,7 +47,7 @@ def grid_of(clips: int) -> dict[str, Any]:
     }
 
 
-def rows(clips: int = CLIPS) -> list[dict[str, Any]]:
+def measure_rows(clips: int = CLIPS) -> list[dict[str, Any]]:
     """Make the dataset and the CSV, and time the same questions on both.
 
     Returns
@@ -57,20 +57,22 @@ def rows(clips: int = CLIPS) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         (place / "grid.yaml").write_text(yaml.safe_dump(grid_of(clips), sort_keys=False))
-        making, _, report = _timed(
-            lambda: generate(
+        making, _, report = _measure_time(
+            lambda: generate_dataset(
                 str(place / "grid.yaml"), str(place / "data"), runner="threads", workers=1, pictures=False
             )
         )
-        opening, opening_cpu, data = _timed(lambda: _opened(place / "data"))
+        opening, opening_cpu, data = _measure_time(lambda: _open_dataset(place / "data"))
         wanted = ", ".join(COLUMNS)
         data.connection.execute(f"COPY (SELECT {wanted} FROM ticks) TO '{place / 'ticks.csv'}'")
         clip = data.manifest["clips"][report.clips // 2]["clip_id"]
         one = f"SELECT max(braking_slip_f) FROM ticks WHERE clip_id = '{clip}'"
-        first, first_cpu, answer = _timed(lambda: data.sql(AGGREGATE).fetchall())
-        again, again_cpu, _ = min(_timed(lambda: data.sql(AGGREGATE).fetchall()) for _ in range(REPEATS))
-        single, single_cpu, [(slip,)] = _timed(lambda: data.sql(one).fetchall())
-        csv, csv_cpu, (table, theirs) = _timed(lambda: _with_pandas(place / "ticks.csv", clip))
+        first, first_cpu, answer = _measure_time(lambda: data.sql(AGGREGATE).fetchall())
+        again, again_cpu, _ = min(
+            _measure_time(lambda: data.sql(AGGREGATE).fetchall()) for _ in range(REPEATS)
+        )
+        single, single_cpu, [(slip,)] = _measure_time(lambda: data.sql(one).fetchall())
+        csv, csv_cpu, (table, theirs) = _measure_time(lambda: _with_pandas(place / "ticks.csv", clip))
         same = (
             all(abs(a[1] - b) < 1e-9 for a, b in zip(answer, table, strict=True))
             and abs(slip - theirs) < 1e-12
@@ -81,30 +83,30 @@ def rows(clips: int = CLIPS) -> list[dict[str, Any]]:
     peer = "pandas over CSV, both questions"
     limit = f"limit {LIMIT_S}"
     return [
-        _row("clips made", making / report.clips * 1000, "ms/clip"),
-        _row("clips", report.clips, "1"),
-        _row("open and connect", opening, "s"),
-        _row("aggregate, first time", first, "s", peer, csv),
-        _row("aggregate, again", again, "s", limit, LIMIT_S),
-        _row("one clip", single, "s", peer, csv),
-        _row("pandas over CSV", csv, "s"),
+        _make_row("clips made", making / report.clips * 1000, "ms/clip"),
+        _make_row("clips", report.clips, "1"),
+        _make_row("open and connect", opening, "s"),
+        _make_row("aggregate, first time", first, "s", peer, csv),
+        _make_row("aggregate, again", again, "s", limit, LIMIT_S),
+        _make_row("one clip", single, "s", peer, csv),
+        _make_row("pandas over CSV", csv, "s"),
         # of all threads together, which says the same on a busy machine
-        _row("open and connect, CPU", opening_cpu, "s"),
-        _row("aggregate, first time, CPU", first_cpu, "s", peer, csv_cpu),
-        _row("aggregate, again, CPU", again_cpu, "s", limit, LIMIT_S),
-        _row("one clip, CPU", single_cpu, "s", peer, csv_cpu),
-        _row("pandas over CSV, CPU", csv_cpu, "s"),
+        _make_row("open and connect, CPU", opening_cpu, "s"),
+        _make_row("aggregate, first time, CPU", first_cpu, "s", peer, csv_cpu),
+        _make_row("aggregate, again, CPU", again_cpu, "s", limit, LIMIT_S),
+        _make_row("one clip, CPU", single_cpu, "s", peer, csv_cpu),
+        _make_row("pandas over CSV, CPU", csv_cpu, "s"),
     ]
 
 
-def _row(
+def _make_row(
     name: str, value: float, unit: str, peer: str | None = None, held_against: float | None = None
 ) -> dict[str, Any]:
     ratio = None if held_against is None else value / held_against
     return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": ratio}
 
 
-def _opened(folder: Path) -> musync.Dataset:
+def _open_dataset(folder: Path) -> musync.Dataset:
     data = musync.open(folder)
     data.connection.execute("SELECT 1")
     return data
@@ -116,7 +118,7 @@ def _with_pandas(path: Path, clip: str) -> tuple[list[float], float]:
     return means.tolist(), float(frame.loc[frame.clip_id == clip, "braking_slip_f"].max())
 
 
-def _timed(call: Callable[[], Any]) -> tuple[float, float, Any]:
+def _measure_time(call: Callable[[], Any]) -> tuple[float, float, Any]:
     """By the clock and of the processor [s], and what came back."""
     clock, processor = time.perf_counter(), time.process_time()
     result = call()
@@ -124,6 +126,6 @@ def _timed(call: Callable[[], Any]) -> tuple[float, float, Any]:
 
 
 if __name__ == "__main__":
-    for row in rows(int(sys.argv[1]) if len(sys.argv) > 1 else CLIPS):
+    for row in measure_rows(int(sys.argv[1]) if len(sys.argv) > 1 else CLIPS):
         ratio = "" if row["ratio"] is None else f"{row['ratio']:.3f} of {row['peer']}"
         print(f"{row['name']:28} {row['value']:10.4f} {row['unit']:8} {ratio}")

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.corridor import corridor, driver_view
-from tasks.render.rasterise.rasteriser import prepare, rasterise, splat_back
+from benchmarks.corridor import driver_view, make_corridor
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise, splat_back
 from tasks.render.rasterise.reference_rasteriser import rasterise_reference
 
 STATION = 5.0
@@ -29,7 +29,7 @@ NUMPY_LIMIT = 200_000
 MEMORY_LIMIT_MIB = 1536.0
 
 
-def rows() -> list[dict[str, Any]]:
+def measure_rows() -> list[dict[str, Any]]:
     """Measure rendering, its transpose, preparation and a worker's peak memory.
 
     Returns
@@ -40,33 +40,35 @@ def rows() -> list[dict[str, Any]]:
     command = (sys.executable, "-m", __spec__.name, "memory")
     memory = float(subprocess.run(command, capture_output=True, check=True).stdout)
     name = f"peak memory of a worker, {VIEWS[1][0] // 1000}k Gaussians"
-    result.append(_row(name, memory, "MiB", f"limit {MEMORY_LIMIT_MIB:g}", MEMORY_LIMIT_MIB))
+    result.append(_make_row(name, memory, "MiB", f"limit {MEMORY_LIMIT_MIB:g}", MEMORY_LIMIT_MIB))
     return result
 
 
 def _view_rows(count: int, width: int, height: int, limit_ms: float | None) -> list[dict[str, Any]]:
     """Rows of one view; with its limit also those of what surrounds a frame."""
-    gaussians, (viewmat, K) = corridor(count), driver_view(STATION, width, height)
-    prepared = prepare(gaussians)
+    gaussians, (viewmat, K) = make_corridor(count), driver_view(STATION, width, height)
+    prepared = prepare_gaussians(gaussians)
     label = f"{count // 1000}k Gaussians, {width}x{height}"
     frame_ms = _cpu_ms(lambda: rasterise(prepared, viewmat, K, width, height))
     if limit_ms is None:
-        return [_row(f"frame, {label}", frame_ms, "CPU-ms", None, None)]
+        return [_make_row(f"frame, {label}", frame_ms, "CPU-ms", None, None)]
     residual = np.ones((height, width, 3), dtype=np.float32)
     back_ms = _cpu_ms(lambda: splat_back(prepared, viewmat, K, width, height, residual))
-    prepare_ms = _cpu_ms(lambda: prepare(gaussians), repeats=3)
+    prepare_ms = _cpu_ms(lambda: prepare_gaussians(gaussians), repeats=3)
     result = [
-        _row(f"frame, {label}", frame_ms, "CPU-ms", f"limit {limit_ms:g}", limit_ms),
-        _row(f"transpose, {label}", back_ms, "CPU-ms", "frame", frame_ms),
-        _row(f"preparation, {label}", prepare_ms, "CPU-ms", "frame", frame_ms),
+        _make_row(f"frame, {label}", frame_ms, "CPU-ms", f"limit {limit_ms:g}", limit_ms),
+        _make_row(f"transpose, {label}", back_ms, "CPU-ms", "frame", frame_ms),
+        _make_row(f"preparation, {label}", prepare_ms, "CPU-ms", "frame", frame_ms),
     ]
     if count <= NUMPY_LIMIT:
         numpy_ms = _cpu_ms(lambda: rasterise_reference(gaussians, viewmat, K, width, height), repeats=1)
-        result.append(_row(f"frame, {label}", frame_ms, "CPU-ms", "NumPy twin", numpy_ms))
+        result.append(_make_row(f"frame, {label}", frame_ms, "CPU-ms", "NumPy twin", numpy_ms))
     return result
 
 
-def _row(name: str, value: float, unit: str, peer: str | None, peer_value: float | None) -> dict[str, Any]:
+def _make_row(
+    name: str, value: float, unit: str, peer: str | None, peer_value: float | None
+) -> dict[str, Any]:
     ratio = None if peer_value is None else value / peer_value
     return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": ratio}
 
@@ -84,10 +86,10 @@ def _cpu_ms(work: Callable[[], object], repeats: int = FRAMES) -> float:
 
 
 def _peak_memory_mib() -> float:
-    """What this process has held at most, after drawing the largest cloud [MiB]."""
+    """Return the peak memory of this process after drawing the largest cloud [MiB]."""
     count, width, height, _ = VIEWS[1]
     viewmat, K = driver_view(STATION, width, height)
-    prepared = prepare(corridor(count))
+    prepared = prepare_gaussians(make_corridor(count))
     for _ in range(3):
         rasterise(prepared, viewmat, K, width, height)
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -97,6 +99,6 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["memory"]:
         print(_peak_memory_mib())
     else:
-        for row in rows():
+        for row in measure_rows():
             ratio = "" if row["ratio"] is None else f"{row['ratio']:.4f} of {row['peer']}"
             print(f"{row['name']:44} {row['value']:10.1f} {row['unit']:8} {ratio}")

@@ -57,7 +57,7 @@ def main() -> int:
                 finished = sorted(place.glob("runs/watched-*/manifest.json"))
                 begun = len(list(place.glob("runs/watched-*")))
                 if len(finished) >= FIRES and not shown:
-                    shown = _artifacts((place / "log").read_text())
+                    shown = _list_artifacts((place / "log").read_text())
         finally:
             serving.send_signal(signal.SIGTERM)
             serving.wait(90)
@@ -67,12 +67,12 @@ def main() -> int:
             print(f"finished: {manifest.parent.name}")
         print(f"{len(finished)} of {FIRES} runs finished after {time.monotonic() - started:.0f} s")
         print(f"artifacts: {', '.join(sorted(shown))}")
-        print(f"stopped in the middle of another: {begun > len(finished)}; reports: {_reports(place)}")
+        print(f"stopped in the middle of another: {begun > len(finished)}; reports: {_count_reports(place)}")
         print(f"processes left: {len(left)} {left}")
         return 0 if len(finished) >= FIRES and shown == ARTIFACTS and not left else 1
 
 
-def _artifacts(log: str) -> set[str]:
+def _list_artifacts(log: str) -> set[str]:
     """Keys of the artifacts that the schedule's own server shows."""
     found = re.search(r"http://127\.0\.0\.1:\d+", log)
     assert found is not None
@@ -83,7 +83,7 @@ def _artifacts(log: str) -> set[str]:
         return {artifact["key"] for artifact in json.load(answer)}
 
 
-def _reports(place: Path) -> int:
+def _count_reports(place: Path) -> int:
     return len(list(place.glob("runs/reports/*")))
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from catalogs.grids import load_grid
-from flows.making.clip import frame_rows, load_catalogue, picture, rig_of
-from flows.making.driving import drive
+from flows.making.clip import frame_rows, load_catalogue, render_frames, rig_of
+from flows.making.driving import simulate_drive
 from flows.making.plan import freeze_grid
 from flows.store.layout import write_atomically
 from tasks.conventions import ROAD_CLASSES
@@ -22,7 +22,9 @@ FRAMES, FRAME_RATE_HZ = 5, 2.0
 """Frames of each clip and their rate: 2 s from 60 km/h, braked from one second on."""
 
 
-def rows(scenes: tuple[str, ...] = ("street",), seeds: tuple[int, ...] = SEEDS) -> Iterator[dict[str, Any]]:
+def measure_rows(
+    scenes: tuple[str, ...] = ("street",), seeds: tuple[int, ...] = SEEDS
+) -> Iterator[dict[str, Any]]:
     """Render the severity grid and rank every statistic against the rate.
 
     Parameters
@@ -37,7 +39,7 @@ def rows(scenes: tuple[str, ...] = ("street",), seeds: tuple[int, ...] = SEEDS) 
     """
     for scene in scenes:
         for seed in seeds:
-            rates, values = _clips(scene, seed)
+            rates, values = _measure_clips(scene, seed)
             for branch in ("rain", "snow"):
                 levels = {label: rate for label, rate in rates.items() if label.startswith((branch, "sunny"))}
                 order = sorted(levels, key=lambda label: levels[label])
@@ -50,7 +52,7 @@ def rows(scenes: tuple[str, ...] = ("street",), seeds: tuple[int, ...] = SEEDS) 
                     }  # fmt: skip
 
 
-def _clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+def _measure_clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
     """Rate and statistics of each clip of the severity grid, by its label."""
     grid = load_grid("severity")
     short = {"scene": scene, "seed": seed, "frames": FRAMES, "frame_rate_hz": FRAME_RATE_HZ}
@@ -62,19 +64,19 @@ def _clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, dict[str,
         catalogue = load_catalogue(Path(folder), scene)
     rates, values = {}, {}
     for clip in plan.clips:
-        facts, ride = drive(
+        state, ride = simulate_drive(
             clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
         )
         frames = frame_rows(ride, plan, catalogue)
         rig_at = rig_of(ride, frames, catalogue)
-        shown = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed), rig_at)
+        shown = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)
         rates[clip.label] = clip.scenario.precipitation_mm_h
         values[clip.label] = image_statistics(shown["rgb"], np.isin(shown["class"], ROAD_CLASSES))
     return rates, values
 
 
 if __name__ == "__main__":
-    for row in rows(tuple(sys.argv[1:]) or ("street",)):
+    for row in measure_rows(tuple(sys.argv[1:]) or ("street",)):
         levels = " ".join(f"{value:.4f}" for value in row["values"])
         print(
             f"{row['scene']:8} seed {row['seed']} {row['branch']} {row['statistic']:17} rho {row['spearman']:+.2f}"

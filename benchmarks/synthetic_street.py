@@ -5,6 +5,7 @@ that nothing else here produced.
 """
 
 from dataclasses import dataclass
+from typing import TypedDict, Unpack
 
 import numba
 import numpy as np
@@ -34,7 +35,7 @@ def camera_matrix(width: int = 480, height: int = 320, focal: float = 400.0) -> 
     return np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1.0]])
 
 
-def mount(x: float = -0.6, z: float = 1.4, tilt: float = np.deg2rad(3.0)) -> NDArray[np.float64]:
+def make_mount(x: float = -0.6, z: float = 1.4, tilt: float = np.deg2rad(3.0)) -> NDArray[np.float64]:
     """T_rig_camera of a camera above the rig origin, looking ahead and `tilt` down."""
     c, s = np.cos(tilt), np.sin(tilt)
     T = np.eye(4)
@@ -85,6 +86,17 @@ def hump_drive(
     return station, heave, pitch
 
 
+class CameraSize(TypedDict):
+    """Size and focal length of a camera, all [px]."""
+
+    width: int
+    height: int
+    focal: float
+
+
+LARGE_CAMERA: CameraSize = {"width": 480, "height": 320, "focal": 400.0}
+
+
 def drive_clip(
     *,
     frames: int = 81,
@@ -93,14 +105,15 @@ def drive_clip(
     deceleration: float = 0.0,
     hump_at: float = 1.2,
     curvature: float = 0.0,
-    width: int = 480,
-    height: int = 320,
-    focal: float = 400.0,
     seed: int = 1,
+    **size: Unpack[CameraSize],
 ) -> Clip:
+    """Return a clip of a drive over a hump; ``size`` is the camera's, `LARGE_CAMERA` where it is not given."""
+    camera = size or LARGE_CAMERA
+    width, height = camera["width"], camera["height"]
     station, heave, pitch = hump_drive(frames, frame_rate, speed, deceleration, hump_at)
     return render_clip(
-        station, heave, pitch, K=camera_matrix(width, height, focal), width=width, height=height,
+        station, heave, pitch, K=camera_matrix(width, height, camera["focal"]), width=width, height=height,
         curvature=curvature, seed=seed,
     )  # fmt: skip
 
@@ -117,15 +130,15 @@ def render_clip(
     seed: int = 1,
 ) -> Clip:
     T_world_rig = rig_poses(station, heave, pitch, curvature)
-    T_rig_camera = mount()
-    textures = [_mipmaps(_noise_texture(seed + i)) for i in range(2)]
+    T_rig_camera = make_mount()
+    textures = [_make_mipmaps(_noise_texture(seed + i)) for i in range(2)]
     n = len(station)
     rgb = np.empty((n, height, width, 3), np.uint8)
     depth = np.empty((n, height, width), np.float32)
     class_id = np.empty((n, height, width), np.uint8)
     for k in range(n):
         T = T_world_rig[k] @ T_rig_camera
-        _cast(T, np.linalg.inv(K), curvature, *textures, rgb[k], depth[k], class_id[k])
+        _cast_rays(T, np.linalg.inv(K), curvature, *textures, rgb[k], depth[k], class_id[k])
     return Clip(
         frames=rgb, depth=depth, class_id=class_id, K=K, T_rig_camera=T_rig_camera, T_world_rig=T_world_rig,
         pitch=pitch, heave=heave, station=station,
@@ -141,7 +154,7 @@ def _noise_texture(seed: int, size: int = 1024) -> NDArray[np.float32]:
     return np.clip(0.5 + 0.16 * texture / texture.std(), 0, 1).astype(np.float32)
 
 
-def _mipmaps(texture: NDArray[np.float32]) -> NDArray[np.float32]:
+def _make_mipmaps(texture: NDArray[np.float32]) -> NDArray[np.float32]:
     """[L, S, S]: each level box-filtered by two and stored in the corner of a full-size plane."""
     size = texture.shape[0]
     levels = [texture]
@@ -155,7 +168,7 @@ def _mipmaps(texture: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @numba.njit(cache=True)
-def _sample(mips, u, v, level):
+def _sample_texture(mips, u, v, level):
     top = mips.shape[0] - 1.001
     level = min(max(level, 0.0), top)
     l0 = int(level)
@@ -175,7 +188,7 @@ def _sample(mips, u, v, level):
 
 
 @numba.njit(cache=True)
-def _intersect(ox, oy, oz, dx, dy, dz, curvature):
+def _intersect_ray(ox, oy, oz, dx, dy, dz, curvature):
     """Depth along the ray, what it meets, and the cosine-like slant of the meeting."""
     z, kind, slant = np.inf, SKY, 1.0
     if dz < 0:
@@ -198,7 +211,7 @@ def _intersect(ox, oy, oz, dx, dy, dz, curvature):
 
 
 @numba.njit(cache=True)
-def _cast(T, K_inv, curvature, road, wall, rgb, depth, class_id):
+def _cast_rays(T, K_inv, curvature, road, wall, rgb, depth, class_id):
     """One ray at each pixel's centre for depth and class, 2 x 2 rays for colour."""
     H, W = depth.shape
     tile = road.shape[1] / TEXELS_PER_METRE
@@ -213,7 +226,7 @@ def _cast(T, K_inv, curvature, road, wall, rgb, depth, class_id):
                 dx = T[0, 0] * cx + T[0, 1] * cy + T[0, 2]
                 dy = T[1, 0] * cx + T[1, 1] * cy + T[1, 2]
                 dz = T[2, 0] * cx + T[2, 1] * cy + T[2, 2]
-                z, kind, slant = _intersect(ox, oy, oz, dx, dy, dz, curvature)
+                z, kind, slant = _intersect_ray(ox, oy, oz, dx, dy, dz, curvature)
                 if sub == 4:
                     depth[y, x] = z if kind != SKY else np.nan
                     class_id[y, x] = kind
@@ -224,11 +237,11 @@ def _cast(T, K_inv, curvature, road, wall, rgb, depth, class_id):
                     footprint = TEXELS_PER_METRE * z * K_inv[0, 0] / 2 / np.sqrt(max(slant, 1e-3))
                     level = np.log2(max(footprint, 1e-6))
                     if kind == ROAD:
-                        g = 0.8 * _sample(road, X / tile, Y / tile, level)
+                        g = 0.8 * _sample_texture(road, X / tile, Y / tile, level)
                         red, green, blue = red + g, green + g, blue + 1.02 * g
                     else:
                         along = X if curvature == 0.0 else np.arctan2(X, 1 / curvature - Y) / curvature
-                        g = _sample(wall, along / tile, Z / tile, level)
+                        g = _sample_texture(wall, along / tile, Z / tile, level)
                         red, green, blue = red + g, green + 0.85 * g, blue + 0.7 * g
             rgb[y, x, 0] = np.uint8(red / 4 * 255 + 0.5)
             rgb[y, x, 1] = np.uint8(green / 4 * 255 + 0.5)

@@ -10,9 +10,9 @@ from catalogs.studies import load_conditions
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.studies.mode_comparison import ModeDifference, mode_difference
-from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
@@ -24,19 +24,21 @@ HEADER = (
 )  # fmt: skip
 
 
-def differences() -> dict[str, ModeDifference]:
+def compute_differences() -> dict[str, ModeDifference]:
     """The modes' difference on each condition, by its name."""
     vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     return {
         condition.name: mode_difference(
-            drive(vehicle, surface, condition.scenario, "paper"),
-            drive(vehicle, surface, condition.scenario, "coupled"),
+            simulate_condition(vehicle, surface, condition.scenario, "paper"),
+            simulate_condition(vehicle, surface, condition.scenario, "coupled"),
         )
         for condition in load_conditions()
     }
 
 
-def drive(vehicle: Vehicle, surface: SurfaceParameters, scenario: Scenario, mode: Mode) -> Rollout:
+def simulate_condition(
+    vehicle: Vehicle, surface: SurfaceParameters, scenario: Scenario, mode: Mode
+) -> Rollout:
     """One condition in one mode; where it brakes, the speed is held until then."""
     weather = Weather(
         kind=scenario.weather,
@@ -53,8 +55,7 @@ def drive(vehicle: Vehicle, surface: SurfaceParameters, scenario: Scenario, mode
     )
     return rollout(
         vehicle,
-        scenario.weather,
-        surface_friction(weather, surface_state(weather, surface), surface),
+        surface_state(weather, surface),
         Controls(
             initial_speed=scenario.initial_speed_km_h / 3.6,
             brake=brake,
@@ -70,7 +71,7 @@ def drive(vehicle: Vehicle, surface: SurfaceParameters, scenario: Scenario, mode
     )
 
 
-def table(rows: dict[str, ModeDifference]) -> list[str]:
+def format_table(rows: dict[str, ModeDifference]) -> list[str]:
     """The differences as lines of a Markdown table."""
     digits = (2, 2, 3, 3, 2, 2, 4, 1)
     lines = ["| " + " | ".join(HEADER) + " |", "| --- |" + " ---: |" * len(digits)]
@@ -84,4 +85,4 @@ def table(rows: dict[str, ModeDifference]) -> list[str]:
 
 
 if __name__ == "__main__":
-    print("\n".join(table(differences())))
+    print("\n".join(format_table(compute_differences())))

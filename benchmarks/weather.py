@@ -1,4 +1,4 @@
-"""What weather adds to a frame, stage by stage, against the clear frame of the same run."""
+"""Cost that weather adds to a frame, stage by stage, beside the clear frame of the same run."""
 
 import time
 from collections.abc import Callable
@@ -9,23 +9,23 @@ import numpy as np
 from catalogs.cameras import load_camera
 from catalogs.scenes import load_scene
 from catalogs.weather import load_weather
-from tasks.render.camera import viewmat
-from tasks.render.composition import compose
+from tasks.render.camera import world_to_camera
+from tasks.render.composition import compose_over_sky
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.atmosphere import air_layer, light_layer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import ClipWeather, apply_weather, particle_layer, pixel_rays, weather_scene
-from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.wet.wet_road import wet_layer
+from tasks.surface.state import SurfaceState
 
 STATES = {
-    "rain 10": WeatherState(kind="rain", precipitation_mm_h=10, film_depth_mm=0.489),
-    "rain 50": WeatherState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263),
-    "snow 1": WeatherState(kind="snow", precipitation_mm_h=1, snow_depth_mm=10, snow_coverage=0.5),
-    "snow 3": WeatherState(kind="snow", precipitation_mm_h=3, snow_depth_mm=30, snow_coverage=1.0),
+    "rain 10": SurfaceState(kind="rain", precipitation_mm_h=10, film_depth_mm=0.489),
+    "rain 50": SurfaceState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263),
+    "snow 1": SurfaceState(kind="snow", precipitation_mm_h=1, snow_depth_mm=10, snow_coverage=0.5),
+    "snow 3": SurfaceState(kind="snow", precipitation_mm_h=3, snow_depth_mm=30, snow_coverage=1.0),
 }
 LIMIT = {"rain": 1.2, "snow": 0.6}
 """What a weather may add, as a share of the clear frame's CPU time."""
@@ -35,7 +35,7 @@ STATION = 40
 REPEATS = 9
 
 
-def rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> list[dict[str, Any]]:
+def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> list[dict[str, Any]]:
     """Measure a clear frame and the same frame in four weathers.
 
     Returns
@@ -46,17 +46,17 @@ def rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> li
     scene, camera, parameters = load_scene(scene_name), load_camera(camera_name), load_weather()
     pose = scene.route.T_world_rig[STATION] @ camera.T_rig_camera
     K = np.asarray(camera.K, dtype=np.float64)
-    view = viewmat(pose)
+    view = world_to_camera(pose)
     size = (camera.width, camera.height)
     shutter = Shutter(
         T_world_camera=pose, K=K, width=camera.width, height=camera.height, velocity=SPEED * pose[:3, 2],
         time_s=2.0, exposure_s=camera.exposure_s,
     )  # fmt: skip
-    clear_cloud = prepare(scene.gaussians)
+    clear_cloud = prepare_gaussians(scene.gaussians)
     clear_sky = environment_view(scene.environment, view, K, *size)
 
     def clear() -> None:
-        compose(rasterise(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded)
+        compose_over_sky(rasterise(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded)
 
     clear_ms = _cpu_ms(clear)
     found = [{"name": "clear frame", "value": clear_ms, "unit": "CPU-ms", "peer": None, "ratio": None}]
@@ -66,47 +66,50 @@ def rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> li
             scene.gaussians, scene.environment, state, parameters, float(K[0, 0]), 1, scene.route
         )
         once_s = time.process_time() - started
-        cloud = prepare(gaussians)
+        cloud = prepare_gaussians(gaussians)
         gbuffer = rasterise(cloud, view, K, *size)
-        picture = compose(gbuffer, clear_sky, gaussians.display_encoded)
+        picture = compose_over_sky(gbuffer, clear_sky, gaussians.display_encoded)
         raster_ms = _cpu_ms(rasterise, cloud, view, K, *size)
         bare_ms = _cpu_ms(rasterise, clear_cloud, view, K, *size)
-        stages = _stages(weather, picture, gbuffer, shutter)
+        stages = _list_stages(weather, picture, gbuffer, shutter)
         whole_ms = _cpu_ms(apply_weather, weather, picture, gbuffer, shutter)
         added = whole_ms + max(raster_ms - bare_ms, 0)
         for stage, call in stages.items():
-            found.append(_row(f"{name}: {stage}", _cpu_ms(call), clear_ms))
-        found.append(_row(f"{name}: snow layer in the rasteriser", max(raster_ms - bare_ms, 0), clear_ms))
-        found.append(_row(f"{name}: added", added, clear_ms) | {"limit": LIMIT[state.kind]})
+            found.append(_make_row(f"{name}: {stage}", _cpu_ms(call), clear_ms))
+        found.append(
+            _make_row(f"{name}: snow layer in the rasteriser", max(raster_ms - bare_ms, 0), clear_ms)
+        )
+        found.append(_make_row(f"{name}: added", added, clear_ms) | {"limit": LIMIT[state.kind]})
         found.append(
             {"name": f"{name}: once a clip", "value": once_s, "unit": "CPU-s", "peer": None, "ratio": None}
         )
     return found
 
 
-def _stages(
+def _list_stages(
     weather: ClipWeather, picture: np.ndarray, gbuffer: GBuffer, shutter: Shutter
 ) -> dict[str, Callable[[], object]]:
     """The layers of one frame, each to be called alone."""
-    falling = weather.falling
-    assert falling is not None
+    overcast = weather.overcast
+    assert overcast is not None and overcast.population is not None
+    film, falling = overcast.look.film, overcast.population
     rays = pixel_rays(shutter)
-    cloudy, sky, air = falling.environment, falling.sky, falling.air
+    cloudy, sky, air = overcast.environment, overcast.sky, overcast.air
     lit = recompose(picture, [light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays)])
     stages: dict[str, Callable[[], object]] = {
         "light": lambda: light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays),
         "air": lambda: air_layer(gbuffer, cloudy, air, sky, rays),
-        "particles": lambda: particle_layer(weather, falling, gbuffer.depth, shutter),
+        "particles": lambda: particle_layer(weather, falling, sky, gbuffer.depth, shutter),
     }
-    if weather.state.kind == "rain":
+    if film is not None:
         stages["wet road with reflection"] = lambda: wet_layer(
             lit, gbuffer, cloudy, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
-            weather.state.film_depth_mm, weather.parameters.wet_road, weather.seed,
+            weather.state.film_depth_mm, film, weather.seed,
         )  # fmt: skip
     return stages
 
 
-def _row(name: str, value: float, clear_ms: float) -> dict[str, Any]:
+def _make_row(name: str, value: float, clear_ms: float) -> dict[str, Any]:
     return {"name": name, "value": value, "unit": "CPU-ms", "peer": "clear frame", "ratio": value / clear_ms}
 
 
@@ -122,7 +125,7 @@ def _cpu_ms(call: Callable[..., object], *arguments: object) -> float:
 
 
 if __name__ == "__main__":
-    for row in rows():
+    for row in measure_rows():
         ratio = "" if row["ratio"] is None else f"{row['ratio']:6.1%} of {row['peer']}"
         limit = f" (limit {row['limit']:.0%})" if "limit" in row else ""
         print(f"{row['name']:42} {row['value']:9.2f} {row['unit']:7} {ratio}{limit}")

@@ -6,8 +6,10 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 
+from catalogs.names import WeatherName
 from catalogs.quantities import CatalogueEntry, Number, Text, read_entry
 from catalogs.scenario import Scenario
+from tasks.surface.weather import WEATHERS
 
 CALIBRATED_RANGE = Path(__file__).with_name("calibrated_range.yaml")
 CalibrationTag = Literal["in-grid", "interpolated", "off-grid", "beyond-calibration"]
@@ -30,15 +32,14 @@ class DrivenLevels(CatalogueEntry):
         return self
 
     def leaves_range(self, value: float) -> bool:
-        """Whether the value lies beyond everything that was driven."""
+        """Whether the value lies outside every driven value."""
         return self.range is not None and not self.range[0] <= value <= self.range[1]
 
 
 class CalibratedRange(CatalogueEntry):
-    """What the calibration was fitted on."""
+    """Ranges of the data on which the calibration was fitted."""
 
-    rain_rate: DrivenLevels
-    snow_rate: DrivenLevels
+    rate: dict[WeatherName, DrivenLevels]
     snow_accumulation: DrivenLevels
     speed_on_flat_road: DrivenLevels
     speed_on_road_feature: DrivenLevels
@@ -67,7 +68,8 @@ def calibration_tag(scenario: Scenario, driven: CalibratedRange) -> CalibrationT
 
     Returns
     -------
-    ``beyond-calibration`` where a control leaves the range of what was driven; else ``off-grid`` where one other than
+    ``beyond-calibration`` where a control leaves the range of what was driven, or no run was driven in its kind of
+    weather; else ``off-grid`` where one other than
     the weather's rate is at no driven level; else ``interpolated`` where the rate lies between levels of its own
     weather; else ``in-grid``
     """
@@ -92,11 +94,11 @@ def calibration_tag(scenario: Scenario, driven: CalibratedRange) -> CalibrationT
             (s.hazard_height_m, driven.depression_height),
             (s.hazard_length_m, driven.depression_length),
         ]
-    rate = []
-    if s.weather == "rain":
-        rate = [(s.precipitation_mm_h, driven.rain_rate)]
-    if s.weather == "snow":
-        rate = [(s.precipitation_mm_h, driven.snow_rate)]
+    kind = WEATHERS.get(s.weather)
+    if kind and kind.name not in driven.rate:
+        return "beyond-calibration"
+    rate = [(s.precipitation_mm_h, driven.rate[kind.name])] if kind else []
+    if kind and kind.accumulates:
         others.append((s.snow_accumulation_h, driven.snow_accumulation))
     if any(control.leaves_range(value) for value, control in (*others, *rate)):
         return "beyond-calibration"

@@ -18,8 +18,9 @@ from catalogs.channel_maps import HIGHEST_RATE
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.names import name_problem
 from catalogs.quantities import Text
-from catalogs.sentences import brief, shorten
+from catalogs.sentences import shorten, shorten_value
 from tasks.errors import InputError
+from tasks.surface.weather import weather_problem
 
 LARGEST_TABLE = 64 * 2**20
 """Bytes of runs.csv [1]: a line of 200 bytes for each of 300,000 runs."""
@@ -27,7 +28,6 @@ LARGEST_RUN = 2**31
 """Bytes of a run's Parquet [1]."""
 MOST_SAMPLES = 20_000_000
 """Samples of a run [1]: five hours at 1 kHz; a few bytes of Parquet can claim billions."""
-WEATHERS = ("dry", "rain", "snow")
 
 
 class CampaignHeader(BaseModel):
@@ -91,7 +91,7 @@ def parse_rows(content: bytes, needed: Collection[str], numbers: Collection[str]
         raise InputError(f"runs.csv must be CSV; {shorten(error)}") from None
     problems = [f"runs.csv needs the column {name}" for name in needed if name not in names]
     problems += [
-        f"runs.csv must have distinct columns; {brief(name)} stands there twice"
+        f"runs.csv must have distinct columns; {shorten_value(name)} stands there twice"
         for name in dict.fromkeys(names)
         if names.count(name) > 1
     ]
@@ -117,11 +117,11 @@ def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, see
     if name in seen:
         problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
     seen.add(name)
-    if row["weather"] not in WEATHERS:
-        problems.append(f"{name}: weather must be dry, rain or snow; it is {brief(row['weather'])}")
+    if problem := weather_problem(row["weather"]):
+        problems.append(f"{name}: weather {problem}")
     for key in numbers:
         if not _is_number(row[key]):
-            problems.append(f"{name}: {key} must be a finite number; it is {brief(row[key])}")
+            problems.append(f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}")
     return problems
 
 
@@ -157,7 +157,7 @@ def parse_columns(
                 raise InputError(problems)
             table = parquet.read(columns=found)
             columns = {name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in found}
-            units = {name: _unit(schema.field(name)) for name in found}
+            units = {name: _read_unit(schema.field(name)) for name in found}
     except InputError:
         raise
     except (pa.ArrowException, OSError, ValueError, TypeError, KeyError, OverflowError) as error:
@@ -183,6 +183,6 @@ def _column_problems(schema: pa.Schema, found: Sequence[str], count: int, file: 
     return problems
 
 
-def _unit(field: pa.Field) -> str | None:
+def _read_unit(field: pa.Field) -> str | None:
     metadata = field.metadata or {}
     return metadata[b"units"].decode("utf-8", "replace") if b"units" in metadata else None

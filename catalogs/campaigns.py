@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from catalogs.campaign_files import (
     LARGEST_RUN,
@@ -15,9 +15,9 @@ from catalogs.campaign_files import (
     read_header_bytes,
 )
 from catalogs.channel_maps import Tolerances as TolerancesEntry
-from catalogs.documents import parse_yaml, read_content
-from catalogs.quantities import Text
-from catalogs.sentences import cap_problems, describe_rules, shorten
+from catalogs.documents import read_content
+from catalogs.quantities import Text, parse_entry
+from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign, Run, Tolerances
 from tasks.campaign.run_validation import COLUMN_UNITS, run_problems
 from tasks.errors import InputError
@@ -47,7 +47,7 @@ class Split(BaseModel):
 
 
 class MeasuredHeader(CampaignHeader):
-    """campaign.yaml of a campaign that the model is held against."""
+    """campaign.yaml of a campaign with which the model is compared."""
 
     split: Split
     tolerances_1sigma: TolerancesEntry
@@ -71,7 +71,7 @@ def read_campaign(folder: str | Path) -> Campaign:
     """
     folder = Path(folder)
     header_bytes, table_bytes = read_header_bytes(folder)
-    header, rows = _checked(folder, header_bytes, table_bytes)
+    header, rows = _read_header_and_runs(folder, header_bytes, table_bytes)
     train, held_out = header.split.train, header.split.held_out
     problems = _split_problems([row["run"] for row in rows], train, held_out)
     digest = hashlib.sha256(header_bytes + table_bytes)
@@ -91,7 +91,7 @@ def read_campaign(folder: str | Path) -> Campaign:
             found = list(error.problems)
         problems += [f"{row['run']}: {problem}" for problem in found]
         if not found:
-            runs.append(_run(row, columns, row["run"] in judged, interval))
+            runs.append(_make_run(row, columns, row["run"] in judged, interval))
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])
@@ -99,21 +99,20 @@ def read_campaign(folder: str | Path) -> Campaign:
         name=header.campaign,
         vehicle=header.vehicle,
         runs=tuple(runs),
-        tolerances=_tolerances(header.tolerances_1sigma),
+        tolerances=_make_tolerances(header.tolerances_1sigma),
         content_hash=digest.hexdigest(),
         split_hash=hashlib.sha256(split.encode()).hexdigest(),
     )
 
 
-def _checked(folder: Path, header: bytes, table: bytes) -> tuple[MeasuredHeader, list[dict[str, str]]]:
+def _read_header_and_runs(
+    folder: Path, header: bytes, table: bytes
+) -> tuple[MeasuredHeader, list[dict[str, str]]]:
     """Header and runs, or the problems of both at once."""
     problems: list[str] = []
     checked, rows = None, []
     try:
-        content = parse_yaml(header, folder / "campaign.yaml", "campaign's header", finite=False)
-        checked = MeasuredHeader.model_validate(content)
-    except ValidationError as error:
-        problems += describe_rules(error, "campaign.yaml")
+        checked = parse_entry(MeasuredHeader, header, "campaign.yaml", "campaign's header")
     except InputError as error:
         problems += error.problems
     try:
@@ -132,8 +131,7 @@ def _checked(folder: Path, header: bytes, table: bytes) -> tuple[MeasuredHeader,
 
 def _split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequence[str]) -> list[str]:
     problems = [
-        f"{shorten(name, 60)}: stands in both parts of the split"
-        for name in sorted(set(train) & set(held_out))
+        f"{shorten(name, 60)}: is in both parts of the split" for name in sorted(set(train) & set(held_out))
     ]
     problems += [
         f"{shorten(name, 60)}: is in neither part of the split"
@@ -152,7 +150,7 @@ def _split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequen
     return problems
 
 
-def _run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: bool, interval: float) -> Run:
+def _make_run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: bool, interval: float) -> Run:
     return Run(
         name=row["run"],
         held_out=held_out,
@@ -170,7 +168,7 @@ def _run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: bool, in
     )
 
 
-def _tolerances(entry: TolerancesEntry) -> Tolerances:
+def _make_tolerances(entry: TolerancesEntry) -> Tolerances:
     assert len(TOLERANCE_KEYS) == len(SESSION)
     run = entry.run
     return Tolerances(

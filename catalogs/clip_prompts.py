@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
-from catalogs.quantities import CatalogueEntry, Text, read_entry
+from pydantic import TypeAdapter
+
+from catalogs.names import WeatherName
+from catalogs.quantities import CatalogueEntry, Text, read_entries
 
 CLIP_PROMPTS = Path(__file__).with_name("clip_prompts.yaml")
 
@@ -14,15 +17,11 @@ class Prompts(CatalogueEntry):
     source: Text
 
 
-class PromptFile(CatalogueEntry):
-    """What the file holds, in the order of the rows of `text_features`."""
-
-    dry: Prompts
-    rain: Prompts
-    snow: Prompts
+PROMPT_FILE = TypeAdapter(dict[WeatherName, Prompts])
+"""What the file holds, in the order of the rows of `text_features`."""
 
 
 def load_prompts() -> dict[str, tuple[str, ...]]:
-    """Sentences by weather, in the order of the rows of `text_features`: dry, rain, snow."""
-    file = read_entry(PromptFile, CLIP_PROMPTS, "list of prompts")
-    return {weather: getattr(file, weather).value for weather in PromptFile.model_fields}
+    """Sentences by kind of weather, in the order of the rows of `text_features`."""
+    file = read_entries(PROMPT_FILE, CLIP_PROMPTS, "list of prompts")
+    return {weather: prompts.value for weather, prompts in file.items()}

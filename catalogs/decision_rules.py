@@ -3,14 +3,14 @@
 from pathlib import Path
 from typing import Annotated
 
-from catalogs.quantities import CatalogueEntry, Scalar, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, read_entry, require_quantity
 from tasks.identification.rules import DecisionRules
 
 DECISION_RULES = Path(__file__).with_name("decision_rules.yaml")
 
-Count = Annotated[Scalar, checked("1", minimum=1)]
-Share = Annotated[Scalar, checked("1", above=0, below=1)]
-Level = Annotated[Scalar, checked("1", above=0)]
+Count = Annotated[Scalar, require_quantity("1", minimum=1)]
+Share = Annotated[Scalar, require_quantity("1", above=0, below=1)]
+Level = Annotated[Scalar, require_quantity("1", above=0)]
 
 
 class DecisionRulesEntry(CatalogueEntry):
@@ -39,7 +39,7 @@ class DecisionRulesEntry(CatalogueEntry):
     retune_widening: Level
     error_resamples: Count
     worse_limit: Level
-    longest_lag: Annotated[Scalar, checked("s", above=0)]
+    longest_lag: Annotated[Scalar, require_quantity("s", above=0)]
     profile_points: Count
     profile_tolerance: Share
     forked_misfit: Level

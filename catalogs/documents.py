@@ -1,4 +1,4 @@
-"""YAML and JSON text becomes plain values here and nowhere else: bounded, of one meaning, every fault told at once.
+"""YAML and JSON text becomes plain values here and nowhere else: bounded, unambiguous, all faults reported at once.
 
 What comes out holds text, finite numbers, booleans, nulls, lists, and tables whose keys are distinct text.
 """
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.sentences import brief, cap_problems, is_encodable, shorten
+from catalogs.sentences import cap_problems, is_encodable, shorten, shorten_value
 from catalogs.yaml_text import DEEPEST, LARGEST_INTEGER, load_yaml
 from tasks.errors import InputError
 
@@ -98,7 +98,7 @@ def parse_yaml(content: bytes, place: object, kind: str, *, finite: bool = True)
     value = parse_yaml_value(content, place, kind, finite=finite)
     if not isinstance(value, dict):
         raise InputError(
-            f"{shorten(place)}: a {kind} must be a table of keys and values; it is {brief(value)}"
+            f"{shorten(place)}: a {kind} must be a table of keys and values; it is {shorten_value(value)}"
         )
     return value
 
@@ -119,7 +119,7 @@ def parse_yaml_value(content: bytes, place: object, kind: str, *, finite: bool =
         One sentence for each fault.
     """
     start = f"{shorten(place)}: a {kind} must"
-    text = _decode(content, start, LARGEST_YAML)
+    text = _decode_text(content, start, LARGEST_YAML)
     return load_yaml(text, start, finite=finite)
 
 
@@ -158,7 +158,7 @@ def parse_json(content: bytes, place: object, kind: str, *, large_integers: bool
         is not finite or too large, half of a surrogate pair.
     """
     start = f"{shorten(place)}: a {kind} must"
-    text = _decode(content, start, LARGEST_JSON)
+    text = _decode_text(content, start, LARGEST_JSON)
     if (depth := _measure_depth(content)) > DEEPEST:
         raise InputError(f"{start} have at most {DEEPEST} tables and lists inside each other; it has {depth}")
     problems: list[str] = []
@@ -167,7 +167,9 @@ def parse_json(content: bytes, place: object, kind: str, *, large_integers: bool
     def build_table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         table = dict(pairs)
         if len(table) != len(pairs):
-            problems.append(f"have distinct keys in a table; {_repeated([key for key, _ in pairs])} twice")
+            problems.append(
+                f"have distinct keys in a table; {_name_repeated([key for key, _ in pairs])} twice"
+            )
         return table
 
     def build_integer(digits: str) -> int:
@@ -199,7 +201,7 @@ def parse_json(content: bytes, place: object, kind: str, *, large_integers: bool
     return value
 
 
-def _decode(content: bytes, start: str, largest: int) -> str:
+def _decode_text(content: bytes, start: str, largest: int) -> str:
     if len(content) > largest:
         raise InputError(f"{start} have at most {largest} bytes; it has {len(content)}")
     try:
@@ -218,6 +220,6 @@ def _measure_depth(content: bytes) -> int:
     return int(steps.cumsum(dtype=np.int64).max(initial=0))
 
 
-def _repeated(keys: list[str]) -> str:
+def _name_repeated(keys: list[str]) -> str:
     twice = sorted({key for key in keys if keys.count(key) > 1})
-    return f"{', '.join(brief(key) for key in twice[:10])} {'stands' if len(twice) == 1 else 'stand'} there"
+    return f"{', '.join(shorten_value(key) for key in twice[:10])} {'stands' if len(twice) == 1 else 'stand'} there"

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydantic import ValidationError
 
 from catalogs.campaign_files import LARGEST_RUN, CampaignHeader, parse_columns, parse_rows, read_header_bytes
-from catalogs.documents import parse_yaml, read_content
-from catalogs.sentences import cap_problems, describe_rules, shorten
+from catalogs.documents import read_content
+from catalogs.quantities import parse_entry
+from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.channels import CHANNELS_BY_NAME
-from tasks.campaign.events import Drive
+from tasks.campaign.events import RecordedRun
 from tasks.errors import InputError
-from tasks.surface.state import Weather
+from tasks.surface.weather import Weather
 
 NEEDED = ("brake_pressure", "speed", "pitch", "longitudinal_acceleration")
 WEATHER = ("weather", "precipitation_mm_h", "snow_accumulation_h")
@@ -20,7 +20,7 @@ WEATHER = ("weather", "precipitation_mm_h", "snow_accumulation_h")
 
 @dataclass(frozen=True, kw_only=True)
 class DriveCampaign:
-    """What a protocol needs of a campaign.
+    """The parts of a campaign that a protocol needs.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class DriveCampaign:
 
     name: str
     vehicle: str
-    drives: tuple[Drive, ...]
+    drives: tuple[RecordedRun, ...]
 
 
 def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> DriveCampaign:
@@ -47,10 +47,10 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
         Listing missing files, keys and channels.
     """
     folder = Path(folder)
-    header, rows = _checked(folder)
+    header, rows = _read_header_and_runs(folder)
     interval = 1.0 / header.sample_rate_hz
     problems: list[str] = []
-    drives: list[Drive] = []
+    drives: list[RecordedRun] = []
     for row in rows:
         path = folder / "runs" / f"{row['run']}.parquet"
         if not path.is_file():
@@ -68,13 +68,13 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
             if not np.isfinite(values).all()
         ]
         drives.append(
-            Drive(
+            RecordedRun(
                 name=row["run"],
                 drive=row.get("drive") or row["run"],
                 interval=interval,
                 columns=columns,
                 weather=Weather(
-                    kind=row["weather"],  # type: ignore[arg-type]
+                    kind=row["weather"],
                     precipitation_mm_h=float(row["precipitation_mm_h"]),
                     snow_accumulation_h=float(row["snow_accumulation_h"]),
                 ),
@@ -85,18 +85,14 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
     return DriveCampaign(name=header.campaign, vehicle=header.vehicle, drives=tuple(drives))
 
 
-def _checked(folder: Path) -> tuple[CampaignHeader, list[dict[str, str]]]:
+def _read_header_and_runs(folder: Path) -> tuple[CampaignHeader, list[dict[str, str]]]:
     """Header and runs, or the problems of both at once."""
     header_bytes, table = read_header_bytes(folder)
     problems: list[str] = []
     checked, rows = None, []
     path = folder / "campaign.yaml"
     try:
-        checked = CampaignHeader.model_validate(
-            parse_yaml(header_bytes, path, "campaign's header", finite=False)
-        )
-    except ValidationError as error:
-        problems += describe_rules(error, path)
+        checked = parse_entry(CampaignHeader, header_bytes, path, "campaign's header")
     except InputError as error:
         problems += error.problems
     try:

@@ -1,4 +1,4 @@
-"""Finding a catalogue entry by name or by file."""
+"""Finding a catalogue entry by name or by file: one folder and one form of file for each kind of entry."""
 
 import os
 import re
@@ -9,31 +9,60 @@ from tasks.errors import InputError
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 """A name that is one file name on any system, and never a path."""
+CATALOGUE = Path(__file__).parent
+FOLDERS = {
+    "bump study": "bump_studies",
+    "bus": "buses",
+    "calibration procedure": "calibration",
+    "camera": "cameras",
+    "channel map": "channel_maps",
+    "grid": "grids",
+    "hazard marking": "hazard_markings",
+    "protocol": "protocols",
+    "stop study": "stop_studies",
+    "surface": "surfaces",
+    "tyre": "tyres",
+    "vehicle": "vehicles",
+}
+"""Folder of each kind of entry."""
+YAML = (".yaml", ".yml")
+SUFFIXES = {"tyre": (".tir",)}
+"""Suffixes of the files of a kind that is not written in YAML; the first is that of the catalogue."""
 
 
-def find_entry(
-    folder: Path, name_or_path: str | Path, kind: str, *, suffixes: tuple[str, ...] = (".yaml", ".yml")
-) -> Path:
-    """The file of an entry: a path with its suffix is taken as it is, a name is looked up in ``folder``.
+def entry_folder(kind: str) -> Path:
+    """Return the catalogue's folder of a kind of entry."""
+    return CATALOGUE / FOLDERS[kind]
+
+
+def entry_names(kind: str) -> tuple[str, ...]:
+    """Return the names of the entries of a kind in the catalogue, sorted."""
+    suffix = SUFFIXES.get(kind, YAML)[0]
+    return tuple(sorted(entry.stem for entry in entry_folder(kind).glob(f"*{suffix}")))
+
+
+def find_entry(kind: str, name_or_path: str | Path) -> Path:
+    """Return the file of an entry: a path with its suffix as it is, a name from the catalogue.
 
     Parameters
     ----------
-    folder : of the catalogue
+    kind : of `FOLDERS`
     name_or_path : of the entry
-    kind : what it is called in the sentence
-    suffixes : of such files, first that of the catalogue
 
     Raises
     ------
     InputError
         If there is no such entry; the sentence lists those that exist.
     """
+    suffixes = SUFFIXES.get(kind, YAML)
     path = Path(name_or_path)
-    named = path.suffix not in suffixes
-    if named:
-        path = folder / f"{name_or_path}{suffixes[0]}"
-    if (named and not NAME.fullmatch(str(name_or_path))) or not os.path.isfile(path):
-        known = ", ".join(sorted(entry.stem for entry in folder.glob(f"*{suffixes[0]}")))
-        form = "YAML" if suffixes[0] == ".yaml" else suffixes[0]
-        raise InputError(f"{shorten(name_or_path)}: no such {kind}; give a {form} file or one of: {known}")
+    is_name = path.suffix not in suffixes
+    if is_name:
+        path = entry_folder(kind) / f"{name_or_path}{suffixes[0]}"
+    if (is_name and not NAME.fullmatch(str(name_or_path))) or not os.path.isfile(path):
+        form = "YAML" if suffixes == YAML else suffixes[0]
+        raise InputError(
+            f"{shorten(name_or_path)}: no such {kind}; give a {form} file or one of:"
+            f" {', '.join(entry_names(kind))}"
+        )
     return path

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from catalogs.quantities import CatalogueEntry, Scalar, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, read_entry, require_quantity
 from tasks.eval.motion_agreement import PoseThresholds
 
 GATES = Path(__file__).with_name("gates.yaml")
@@ -11,20 +11,20 @@ FOREIGN_GATES = Path(__file__).with_name("foreign_gates.yaml")
 
 
 class ForeignGateEntry(CatalogueEntry):
-    """What a gate file for any video must hold; the meanings stand at ``PoseThresholds``."""
+    """Content of a gate file for any video; `PoseThresholds` gives the meanings."""
 
-    pitch_relative_error: Annotated[Scalar, checked("1", above=0)]
-    pitch_correlation: Annotated[Scalar, checked("1", minimum=-1, maximum=1)]
-    response_deg: Annotated[Scalar, checked("deg", minimum=0)]
-    normalised_progress_rmse: Annotated[Scalar, checked("1", above=0)]
-    failed_share: Annotated[Scalar, checked("1", minimum=0, maximum=1)]
+    pitch_relative_error: Annotated[Scalar, require_quantity("1", above=0)]
+    pitch_correlation: Annotated[Scalar, require_quantity("1", minimum=-1, maximum=1)]
+    response_deg: Annotated[Scalar, require_quantity("deg", minimum=0)]
+    normalised_progress_rmse: Annotated[Scalar, require_quantity("1", above=0)]
+    failed_share: Annotated[Scalar, require_quantity("1", minimum=0, maximum=1)]
 
 
 class GateEntry(ForeignGateEntry):
-    """What a gate file for generated clips must hold: with depth, degrees and metres are judged too."""
+    """Content of a gate file for generated clips: with depth, degrees and metres are judged too."""
 
-    pitch_rmse_deg: Annotated[Scalar, checked("deg", above=0)]
-    progress_rmse_m: Annotated[Scalar, checked("m", above=0)]
+    pitch_rmse_deg: Annotated[Scalar, require_quantity("deg", above=0)]
+    progress_rmse_m: Annotated[Scalar, require_quantity("m", above=0)]
 
 
 def load_gates(path: Path = GATES) -> PoseThresholds:
@@ -35,20 +35,20 @@ def load_gates(path: Path = GATES) -> PoseThresholds:
     InputError
         Listing every problem of the file.
     """
-    return PoseThresholds(**_values(read_entry(GateEntry, path, "gate file")))
+    return PoseThresholds(**_read_values(read_entry(GateEntry, path, "gate file")))
 
 
 def load_foreign_gates(path: Path = FOREIGN_GATES) -> PoseThresholds:
-    """Read the limits for any video: what only depth can tell is left unjudged.
+    """Read the limits for any video: figures that need depth are not judged.
 
     Raises
     ------
     InputError
         Listing every problem of the file.
     """
-    values = _values(read_entry(ForeignGateEntry, path, "gate file"))
+    values = _read_values(read_entry(ForeignGateEntry, path, "gate file"))
     return PoseThresholds(pitch_rmse_deg=float("inf"), progress_rmse_m=None, **values)
 
 
-def _values(entry: ForeignGateEntry) -> dict[str, float]:
+def _read_values(entry: ForeignGateEntry) -> dict[str, float]:
     return {name: getattr(entry, name).value for name in type(entry).model_fields}

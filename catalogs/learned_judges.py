@@ -5,7 +5,8 @@
     clip: {checkpoint: ViT-B-32.pt, text_features: prompts.npy, source: openai/CLIP}
     dover: {checkpoint: dover.pt, source: VQAssessment/DOVER}
 
-`text_features` is float [3, D]: the mean features of the paper's prompts (Appendix D) for dry, rain and snow.
+`text_features` is float [N, D]: the mean features of the prompts in clip_prompts.yaml (paper, Appendix D: dry, rain and
+snow), a row a kind of weather in the file's order.
 """
 
 import os
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.clip_prompts import load_prompts
 from catalogs.quantities import CatalogueEntry, Text, read_entry
 from catalogs.sentences import shorten
 from tasks.errors import InputError
@@ -38,7 +40,7 @@ class ClipCheckpoint(Checkpoint):
 
 
 class JudgeFile(CatalogueEntry):
-    """What the YAML may hold."""
+    """Content of the YAML file."""
 
     clip: ClipCheckpoint | None = None
     dover: Checkpoint | None = None
@@ -48,12 +50,12 @@ class JudgeFile(CatalogueEntry):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedJudge:
-    """A judge, or why there is none.
+    """A judge, or the reason why it is missing.
 
     Parameters
     ----------
     network : TorchScript module; None where it is missing
-    text_features : float [3, D] of dry, rain and snow; None but for CLIP
+    text_features : float [N, D], a row a kind of weather in the order of the prompts; None but for CLIP
     note : where the weights come from, or why there are none
     """
 
@@ -63,7 +65,7 @@ class LoadedJudge:
 
 
 def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
-    """Every judge by its name, those that are missing with the reason.
+    """Return every judge by its name; a missing judge has the reason.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
         The YAML is wrong, or a file that is there is no TorchScript module or holds no such features.
     """
     if path is None:
-        return {name: _missing("not run: checkpoint missing") for name in JUDGES}
+        return {name: _make_missing("not run: checkpoint missing") for name in JUDGES}
     file = read_entry(JudgeFile, Path(path), "list of learned judges")
     judges: dict[str, LoadedJudge] = {}
     problems: list[str] = []
@@ -83,7 +85,9 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
         entry: Checkpoint | None = getattr(file, name)
         try:
             judges[name] = (
-                _missing("not run: checkpoint missing") if entry is None else _load(Path(path), entry)
+                _make_missing("not run: checkpoint missing")
+                if entry is None
+                else _load_judge(Path(path), entry)
             )
         except InputError as error:
             problems += [f"{path}: {name}: {problem}" for problem in error.problems]
@@ -92,7 +96,7 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
     return judges
 
 
-def _load(path: Path, entry: Checkpoint) -> LoadedJudge:
+def _load_judge(path: Path, entry: Checkpoint) -> LoadedJudge:
     try:
         import torch
     except ImportError:
@@ -101,7 +105,7 @@ def _load(path: Path, entry: Checkpoint) -> LoadedJudge:
     needed = [entry.checkpoint, *([entry.text_features] if isinstance(entry, ClipCheckpoint) else [])]
     for name in needed:
         if not os.path.isfile(path.parent / name):
-            return _missing(f"not run: checkpoint missing: {name}")
+            return _make_missing(f"not run: checkpoint missing: {name}")
     try:
         network = torch.jit.load(path.parent / entry.checkpoint, map_location="cpu").eval()
     except (RuntimeError, ValueError, OSError, EOFError) as error:
@@ -118,13 +122,14 @@ def _load(path: Path, entry: Checkpoint) -> LoadedJudge:
             ) from None
         if not isinstance(features, np.ndarray) or not np.issubdtype(features.dtype, np.floating):
             raise InputError(f"{shorten(entry.text_features)} must be one array of floats; it is not")
-        if features.ndim != 2 or len(features) != 3 or not np.isfinite(features).all():
+        kinds = list(load_prompts())
+        if features.ndim != 2 or len(features) != len(kinds) or not np.isfinite(features).all():
             raise InputError(
-                f"{shorten(entry.text_features)} must hold finite features [3, D] of dry, rain and snow; it is"
-                f" {features.shape}"
+                f"{shorten(entry.text_features)} must hold finite features [{len(kinds)}, D] of"
+                f" {', '.join(kinds[:-1])} and {kinds[-1]}; it is {features.shape}"
             )
     return LoadedJudge(network=network, text_features=features, note=entry.source)
 
 
-def _missing(note: str) -> LoadedJudge:
+def _make_missing(note: str) -> LoadedJudge:
     return LoadedJudge(network=None, text_features=None, note=note)

@@ -2,9 +2,10 @@
 
 from typing import Annotated
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field, WithJsonSchema
 
-from catalogs.sentences import brief, is_encodable
+from catalogs.sentences import is_encodable, shorten_value
+from tasks.surface.weather import WEATHERS, weather_problem
 
 LONGEST_NAME = 100
 """Characters of a name [1]: a label of several names still fits a file name of 255 bytes."""
@@ -20,9 +21,9 @@ def name_problem(name: str) -> str | None:
     if not 0 < len(name) <= LONGEST_NAME:
         return f"have 1 to {LONGEST_NAME} characters; it has {len(name)}"
     if not name.isprintable() or not is_encodable(name) or name != name.strip():
-        return f"be printable characters without blanks at its ends; it is {brief(name)}"
+        return f"be printable characters without blanks at its ends; it is {shorten_value(name)}"
     if "/" in name or "\\" in name or name in (".", ".."):
-        return f"be no path; it is {brief(name)}"
+        return f"be no path; it is {shorten_value(name)}"
     return None
 
 
@@ -49,5 +50,18 @@ def _check_label(label: str) -> str:
     return label
 
 
+def _check_weather(name: str) -> str:
+    if problem := weather_problem(name):
+        raise ValueError(problem)
+    return name
+
+
 Name = Annotated[str, AfterValidator(_check_name)]
 Label = Annotated[str, AfterValidator(_check_label)]
+WeatherName = Annotated[
+    str,
+    Field(strict=True),
+    AfterValidator(_check_weather),
+    WithJsonSchema({"type": "string", "enum": list(WEATHERS)}),
+]
+"""Name of a kind of weather: of a row of the table."""

@@ -1,16 +1,16 @@
-"""What no scenario and no clip may exceed."""
+"""Physical limits that no scenario and no clip may exceed."""
 
 from functools import cache
 from pathlib import Path
 from typing import Annotated
 
-from catalogs.quantities import CatalogueEntry, Scalar, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, read_entry, require_quantity
 
 PHYSICAL_LIMITS = Path(__file__).with_name("physical_limits.yaml")
 
-Seconds = Annotated[Scalar, checked("s", above=0)]
-Metres = Annotated[Scalar, checked("m", above=0)]
-Rate = Annotated[Scalar, checked("mm h-1", above=0)]
+Seconds = Annotated[Scalar, require_quantity("s", above=0)]
+Metres = Annotated[Scalar, require_quantity("m", above=0)]
+Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class PhysicalLimits(CatalogueEntry):
@@ -18,17 +18,17 @@ class PhysicalLimits(CatalogueEntry):
 
     rain_rate: Rate
     snow_rate: Rate
-    snow_accumulation: Annotated[Scalar, checked("h", above=0)]
-    snow_water_equivalent: Annotated[Scalar, checked("mm", above=0)]
-    initial_speed: Annotated[Scalar, checked("km h-1", above=0)]
-    peak_pressure: Annotated[Scalar, checked("MPa", above=0)]
+    snow_accumulation: Annotated[Scalar, require_quantity("h", above=0)]
+    snow_water_equivalent: Annotated[Scalar, require_quantity("mm", above=0)]
+    initial_speed: Annotated[Scalar, require_quantity("km h-1", above=0)]
+    peak_pressure: Annotated[Scalar, require_quantity("MPa", above=0)]
     brake_time: Seconds
     position: Metres
     hazard_length: Metres
     hazard_height: Metres
     duration: Seconds
-    frame_rate: Annotated[Scalar, checked("Hz", above=0)]
-    frames: Annotated[Scalar, checked("1", minimum=2)]
+    frame_rate: Annotated[Scalar, require_quantity("Hz", above=0)]
+    frames: Annotated[Scalar, require_quantity("1", minimum=2)]
 
 
 @cache

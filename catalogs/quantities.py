@@ -42,12 +42,12 @@ class Table(CatalogueEntry):
     source: Text
 
 
-Entry = TypeVar("Entry", bound=CatalogueEntry)
+Entry = TypeVar("Entry", bound=BaseModel)
 Form = TypeVar("Form")
 Value = TypeVar("Value", Scalar, Bounded, Table)
 
 
-def checked(
+def require_quantity(
     unit: str,
     *,
     above: float | None = None,
@@ -117,7 +117,7 @@ def parse_entry(model: type[Entry], content: bytes, place: object, kind: str) ->
     InputError
         One sentence per problem, all of them at once.
     """
-    return _checked(model.model_validate, parse_yaml(content, place, kind, finite=False), place)
+    return _check_form(model.model_validate, parse_yaml(content, place, kind, finite=False), place)
 
 
 def read_entries(form: TypeAdapter[Form], path: Path, kind: str) -> Form:
@@ -135,10 +135,10 @@ def read_entries(form: TypeAdapter[Form], path: Path, kind: str) -> Form:
         One sentence per problem, all of them at once.
     """
     content = read_content(path, kind, LARGEST_YAML)
-    return _checked(form.validate_python, parse_yaml_value(content, path, kind, finite=False), path)
+    return _check_form(form.validate_python, parse_yaml_value(content, path, kind, finite=False), path)
 
 
-def _checked(check: Callable[[Any], Form], content: object, place: object) -> Form:
+def _check_form(check: Callable[[Any], Form], content: object, place: object) -> Form:
     try:
         return check(content)
     except ValidationError as error:

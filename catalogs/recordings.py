@@ -28,7 +28,7 @@ LARGEST_FILE = 2**30
 
 
 def recording_files(source: Path, channel_map: ChannelMap) -> tuple[Path, ...]:
-    """The files that a map asks for: those its runs name, else all in the folder, or the one file.
+    """Return the files that a map reads: those its runs name, otherwise all in the folder, or the one file.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def _read_parquet(
 ) -> tuple[dict[str, NDArray[np.float64]], dict[str, str]]:
     content = read_content(path, "recording", LARGEST_FILE)
     columns, units = parse_columns(content, path.name, wanted)
-    if problems := _missing(path, wanted, columns, pq.read_schema(pa.BufferReader(content)).names):
+    if problems := _describe_missing(path, wanted, columns, pq.read_schema(pa.BufferReader(content)).names):
         raise InputError(problems)
     return columns, units
 
@@ -119,7 +119,7 @@ def _read_csv(
     except (ValueError, TypeError, OverflowError, re.error) as error:
         raise InputError(f"{path}: must be a table of text; {shorten(error)}") from None
     names = [str(name).strip() for name in frame.columns]
-    problems = _missing(path, wanted, names, names)
+    problems = _describe_missing(path, wanted, names, names)
     arrays: dict[str, NDArray[np.float64]] = {}
     for name in wanted:
         if names.count(name) > 1:
@@ -143,7 +143,7 @@ def _read_bus(path: Path, names: tuple[str, ...], time_unit: str) -> dict[str, S
     )
     if not isinstance(content, dict):
         raise InputError(f"{path}: must be a table of signals, each with values of [time, value]")
-    problems = _missing(path, names, content, content)
+    problems = _describe_missing(path, names, content, content)
     signals = {}
     for name in names:
         if name not in content:
@@ -166,7 +166,7 @@ def _read_bus(path: Path, names: tuple[str, ...], time_unit: str) -> dict[str, S
 
 
 def _read_mdf(path: Path, names: tuple[str, ...]) -> dict[str, Signal]:
-    asammdf = _asammdf()
+    asammdf = _import_asammdf()
     try:
         with asammdf.MDF(path) as recording:
             return _mdf_signals(path, recording, names)
@@ -177,13 +177,13 @@ def _read_mdf(path: Path, names: tuple[str, ...]) -> dict[str, Signal]:
 
 
 def _mdf_signals(path: Path, recording: Any, names: tuple[str, ...]) -> dict[str, Signal]:
-    problems = _missing(path, names, recording.channels_db, recording.channels_db)
+    problems = _describe_missing(path, names, recording.channels_db, recording.channels_db)
     signals = {}
     for name in names:
         places = recording.channels_db.get(name, ())
         if len(places) > 1:
             problems.append(
-                f"{path.name}: signal {name} stands in {len(places)} groups; export the group that you mean"
+                f"{path.name}: signal {name} is in {len(places)} groups; export only the group to be read"
             )
         elif places:
             channel = recording.get(name, group=places[0][0], index=places[0][1])
@@ -200,7 +200,7 @@ def _mdf_signals(path: Path, recording: Any, names: tuple[str, ...]) -> dict[str
     return signals
 
 
-def _asammdf() -> ModuleType:
+def _import_asammdf() -> ModuleType:
     try:
         import asammdf
     except ImportError:
@@ -211,8 +211,10 @@ def _asammdf() -> ModuleType:
     return module
 
 
-def _missing(path: Path, names: tuple[str, ...], there: Collection[str], known: Iterable[str]) -> list[str]:
-    """A sentence for each name that is not there, with those of the file that come near."""
+def _describe_missing(
+    path: Path, names: tuple[str, ...], there: Collection[str], known: Iterable[str]
+) -> list[str]:
+    """Return a sentence for each missing name, with similar names of the file."""
     listed = [str(name) for name in known]
     problems = []
     for name in names:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,9 @@ from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
 
 from catalogs.campaign_files import parse_columns
 from catalogs.documents import LARGEST_YAML, parse_json, read_content
-from catalogs.names import Name
+from catalogs.names import Name, WeatherName
 from catalogs.physical_limits import limit_problem, load_physical_limits
-from catalogs.sentences import brief, cap_problems, describe_rules
+from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from tasks.errors import InputError
 from tasks.eval.state_agreement import REFERENCE_COLUMNS, CaseFacts
 from tasks.surface.road_profile import RoadHazard
@@ -38,7 +38,7 @@ class ReferenceCase(BaseModel):
 
     case: Name
     split: str = "all"
-    weather: Literal["dry", "rain", "snow"]
+    weather: WeatherName
     surface_coefficient: Annotated[float, Field(gt=0, le=2)]
     initial_speed_km_h: Annotated[float, Field(gt=0)]
     peak_pressure_mpa: Annotated[float, Field(ge=0)] | None = None
@@ -102,7 +102,7 @@ class ReferenceCase(BaseModel):
         )
 
     def facts(self, wheelbase: float) -> CaseFacts:
-        """What the judge is told of the case, beside its trace; the wheelbase is the model's [m]."""
+        """Return the facts that the judge gets of the case, beside its trace; the wheelbase is the model's [m]."""
         return CaseFacts(
             case=self.case,
             hazard_height=self.hazard_height_m,
@@ -137,7 +137,7 @@ def read_reference(folder: Path, split: str | None = None) -> list[tuple[Referen
         raise InputError(f"{path}: no such file; a folder of traces holds cases.json and one Parquet a case")
     rows = parse_json(read_content(path, "list of cases", LARGEST_YAML), path, "list of cases")
     if not isinstance(rows, list) or not rows:
-        raise InputError(f"{path}: must be a list of at least one case; it is {brief(rows)}")
+        raise InputError(f"{path}: must be a list of at least one case; it is {shorten_value(rows)}")
     problems: list[str] = []
     cases = []
     splits: set[str] = set()
@@ -153,7 +153,7 @@ def read_reference(folder: Path, split: str | None = None) -> list[tuple[Referen
                 cases.append(_with_trace(folder, case))
         except ValidationError as error:
             name = row.get("case", "?") if isinstance(row, dict) else row
-            problems += describe_rules(error, f"{path}: case {brief(name)}")
+            problems += describe_rules(error, f"{path}: case {shorten_value(name)}")
         except InputError as error:
             problems += error.problems
     if not problems and not cases:
@@ -198,11 +198,11 @@ def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Trace
     if problems:
         raise InputError(problems)
     if case.peak_pressure_mpa and case.brake_onset_s is None and case.brake_onset_m is None:
-        case = case.model_copy(update={"brake_onset_s": _onset(path, case.case, held)})
+        case = case.model_copy(update={"brake_onset_s": _find_onset(path, case.case, held)})
     return case, columns
 
 
-def _onset(path: Path, case: str, columns: Traces) -> float:
+def _find_onset(path: Path, case: str, columns: Traces) -> float:
     braking = np.flatnonzero(columns.get(PRESSURE, np.zeros(1)) > 0)
     if len(braking) == 0:
         raise InputError(

@@ -3,12 +3,12 @@
 from collections.abc import Collection
 from dataclasses import dataclass, fields
 from math import isfinite
-from typing import Any, Literal
+from typing import Any
 
+from catalogs.names import WeatherName
 from catalogs.physical_limits import PhysicalLimits, limit_problem, load_physical_limits
 from catalogs.quantities import Scalar
-
-Weather = Literal["dry", "rain", "snow"]
+from tasks.surface.weather import DRY, WEATHERS, find_weather
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,7 @@ class Scenario:
 
     Parameters
     ----------
-    weather : dry, rain or snow
+    weather : name of the kind of weather
     precipitation_mm_h : rain rate, or water-equivalent snow rate [mm/h]
     snow_accumulation_h : time over which the snow has fallen [h]
     initial_speed_km_h : speed at the start of the clip [km/h]
@@ -31,7 +31,7 @@ class Scenario:
     hazard_height_m : positive a hump, negative a depression, 0 a flat road [m]
     """
 
-    weather: Weather = "dry"
+    weather: WeatherName = DRY
     precipitation_mm_h: float = 0.0
     snow_accumulation_h: float = 0.0
     initial_speed_km_h: float = 60.0
@@ -58,7 +58,7 @@ NOT_NEGATIVE = (
     "brake_onset_s", "brake_onset_m", "hold_s",
 )  # fmt: skip
 UNKNOWN_WEATHER = "unknown"
-"""Stands for a weather that could not be read, as NaN does for a number: no rule is held against either."""
+"""Replaces a weather that could not be read, as NaN replaces a number: no rule applies to either."""
 
 
 def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list[str]:
@@ -76,26 +76,37 @@ def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list
         if (value := getattr(s, name)) is not None and not isfinite(value) and name not in unknown
     ]
     problems += range_problems(s)
-    if s.weather == "dry" and s.precipitation_mm_h > 0:
-        problems.append(
-            f"weather dry has no precipitation; precipitation_mm_h is {s.precipitation_mm_h:g}: name rain or snow"
-        )
-    if s.weather in ("rain", "snow") and s.precipitation_mm_h == 0:
-        problems.append(f"weather {s.weather} needs precipitation_mm_h above 0; it is 0")
-    if s.weather == "snow" and s.snow_accumulation_h == 0:
-        problems.append(
-            "weather snow needs an accumulation time; snow_accumulation_h is 0: give the hours of snowfall"
-        )
-    if s.weather in ("dry", "rain") and s.snow_accumulation_h > 0:
-        problems.append(
-            f"snow_accumulation_h belongs to snow; the weather is {s.weather} and it is {s.snow_accumulation_h:g}"
-        )
+    problems += _weather_problems(s)
     if s.peak_pressure_mpa > 0 and (s.brake_onset_s is None) == (s.brake_onset_m is None):
         problems.append(
             "braking (peak_pressure_mpa above 0) needs exactly one of brake_onset_s and brake_onset_m"
         )
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
+    return problems
+
+
+def _weather_problems(s: Scenario) -> list[str]:
+    """Rules of the row of its kind of weather that the scenario breaks."""
+    if s.weather == UNKNOWN_WEATHER:
+        return []
+    kind, problems = find_weather(s.weather), []
+    if kind.rate_limit is None and s.precipitation_mm_h > 0:
+        falling = " or ".join(name for name, row in WEATHERS.items() if row.rate_limit)
+        problems.append(
+            f"weather {s.weather} has no precipitation; precipitation_mm_h is {s.precipitation_mm_h:g}: name {falling}"
+        )
+    if kind.rate_limit and s.precipitation_mm_h == 0:
+        problems.append(f"weather {s.weather} needs precipitation_mm_h above 0; it is 0")
+    if kind.accumulates and s.snow_accumulation_h == 0:
+        problems.append(
+            f"weather {s.weather} needs an accumulation time; snow_accumulation_h is 0: give the hours of snowfall"
+        )
+    if not kind.accumulates and s.snow_accumulation_h > 0:
+        lying = " or ".join(name for name, row in WEATHERS.items() if row.accumulates)
+        problems.append(
+            f"snow_accumulation_h belongs to {lying}; the weather is {s.weather} and it is {s.snow_accumulation_h:g}"
+        )
     return problems
 
 
@@ -110,11 +121,11 @@ def range_problems(scenario: Scenario) -> list[str]:
     problems = [f"{name} must not be negative; it is {value:g}" for name, value in given.items() if value < 0]
     if scenario.initial_speed_km_h <= 0:
         problems.append(f"initial_speed_km_h must be positive; it is {scenario.initial_speed_km_h:g}")
-    limited = _limited(scenario, load_physical_limits())
+    limited = _list_limits(scenario, load_physical_limits())
     return problems + [problem for one in limited if (problem := limit_problem(*one)) is not None]
 
 
-def _limited(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
+def _list_limits(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
     """Each number with its name and its limit."""
     by_name = {
         "snow_accumulation_h": limits.snow_accumulation,
@@ -124,7 +135,8 @@ def _limited(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scal
         **dict.fromkeys(("brake_onset_m", "hazard_center_m"), limits.position),
         "hazard_length_m": limits.hazard_length,
     }
-    rate = limits.snow_rate if s.weather == "snow" else limits.rain_rate
+    kind = WEATHERS.get(s.weather)
+    rate = getattr(limits, kind.rate_limit) if kind and kind.rate_limit else limits.rain_rate
     limited = [
         ("precipitation_mm_h", s.precipitation_mm_h, rate),
         ("the size of hazard_height_m", abs(s.hazard_height_m), limits.hazard_height),
@@ -132,7 +144,7 @@ def _limited(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scal
     limited += [
         (name, value, limit) for name, limit in by_name.items() if (value := getattr(s, name)) is not None
     ]
-    if s.weather == "snow" and not any(limit_problem(*one) for one in limited):
+    if kind and kind.accumulates and not any(limit_problem(*one) for one in limited):
         fallen = s.precipitation_mm_h * s.snow_accumulation_h
         limited.append(("precipitation_mm_h times snow_accumulation_h", fallen, limits.snow_water_equivalent))
     return limited

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 Place = tuple[int | str, ...]
 """Keys and numbers that lead to a value of a document."""
 MOST_PROBLEMS = 20
-"""Problems told of one document [1]: more do not fit on a screen, and a mended start often mends the rest."""
+"""Problems reported of one document [1]: more do not fit on a screen, and the first ones often cause the rest."""
 
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
@@ -33,7 +33,7 @@ def shorten(text: object, most: int = 200) -> str:
     return f"{line[: most - len(tail) - 3]}...{tail}"
 
 
-def brief(value: object, most: int = 60) -> str:
+def shorten_value(value: object, most: int = 60) -> str:
     """A value as code shows it, cut to a few words.
 
     Parameters
@@ -100,7 +100,7 @@ def _describe_rule(problem: Any, known: Callable[[Place], Iterable[str]]) -> str
             rule = shorten(problem["msg"].removeprefix("Value error, "), 1000)
             return f"{place}: {rule}" if parts else rule
         case "dict_type" | "model_type" | "model_attributes_type":
-            return f"{place}: must be a table of keys and values; it is {brief(problem['input'])}"
+            return f"{place}: must be a table of keys and values; it is {shorten_value(problem['input'])}"
         case _:
             rule = problem["msg"].replace("Input should be", "must be")
-            return f"{place}: {rule}; it is {brief(problem['input'])}"
+            return f"{place}: {rule}; it is {shorten_value(problem['input'])}"

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import yaml
 
-from catalogs.sentences import brief, cap_problems, is_encodable, shorten
+from catalogs.sentences import cap_problems, is_encodable, shorten, shorten_value
 from tasks.errors import InputError
 
 MOST_VALUES = 500_000
@@ -85,7 +85,7 @@ def _check_shape(text: str, start: str) -> None:
         elif isinstance(event, yaml.AliasEvent):
             if any(anchor == event.anchor for anchor, _ in opened):
                 raise InputError(
-                    f"{start} not hold itself; line {line}: *{brief(event.anchor)} stands inside"
+                    f"{start} not hold itself; line {line}: *{shorten_value(event.anchor)} stands inside"
                     " what it names"
                 )
             total += sizes.get(event.anchor or "", 1) - 1
@@ -132,7 +132,9 @@ def _key_problems(node: yaml.MappingNode) -> list[tuple[int, str]]:
             shown = shorten(key.value, 40) if isinstance(key, yaml.ScalarNode) else "a table or list"
             found.append((line, f"have text as keys; one is {shown}: put it in quotes"))
         elif key.value in keys:
-            found.append((line, f"have distinct keys in a table; {brief(key.value)} stands there twice"))
+            found.append(
+                (line, f"have distinct keys in a table; {shorten_value(key.value)} stands there twice")
+            )
         else:
             keys.add(key.value)
     return found
@@ -153,7 +155,7 @@ def _value_problem(loader: Any, node: yaml.Node, finite: bool) -> str | None:
     try:
         value = loader.construct_object(node)
     except (ValueError, KeyError, IndexError, OverflowError, yaml.YAMLError):
-        return f"have values that keep to their tag; {brief(node.value)} is no {node.tag.removeprefix(_TAG)}"
+        return f"have values that keep to their tag; {shorten_value(node.value)} is no {node.tag.removeprefix(_TAG)}"
     if finite and isinstance(value, float) and not isfinite(value):
         return f"have finite numbers; one is {shorten(node.value, 40)}"
     if isinstance(value, int) and not -LARGEST_INTEGER <= value <= LARGEST_INTEGER:

@@ -5,10 +5,10 @@ import sys
 
 from flows.parser import build_parser
 from flows.running.failures import INTERRUPTED, explain_end
-from flows.running.terminal import say
+from flows.running.terminal import print_lines
 
 QUIET = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "ERROR"}
-"""OpenCV writes names and tags of a video to the terminal as they are; what is wrong with it, we say."""
+"""OpenCV would print names and tags of a video unescaped; muSync reports faults of a video itself."""
 
 app = build_parser()
 
@@ -24,16 +24,16 @@ def main() -> None:
     except SystemExit as end:
         if end.code != INTERRUPTED:
             raise
-        _end(KeyboardInterrupt())
+        _end_with(KeyboardInterrupt())
     except BaseException as error:
-        _end(error)
+        _end_with(error)
 
 
-def _end(error: BaseException) -> None:
+def _end_with(error: BaseException) -> None:
     code, sentences = explain_end(error, sys.argv[1:])
     for sentence in sentences:
         # a sentence of several lines is indented, so that no line of it looks like one of its own
-        say("musync: " + sentence.replace("\n", "\n  "), error=True)
+        print_lines("musync: " + sentence.replace("\n", "\n  "), error=True)
     sys.exit(code)
 
 

@@ -12,8 +12,8 @@ NO_SCRIPTS = (
 """For the head of a page without scripts: none runs and nothing is fetched, even if a text got in unescaped."""
 
 
-def literal(text: str) -> str:
-    """Text of users and datasets for a figure, in which no dollar begins a formula."""
+def escape_formulas(text: str) -> str:
+    """Return text of users and datasets for a figure, in which no dollar sign starts a formula."""
     return text.replace("$", r"\$")
 
 

@@ -13,7 +13,7 @@ from flows.commands.command import REQUIRED, Command, Option
 from flows.printing import print_json, print_result
 from flows.registry import COMMANDS, flow_name, import_function
 from flows.running.failures import CHECK_FAILED
-from flows.running.terminal import say
+from flows.running.terminal import print_lines
 from tasks.errors import InputError
 
 SUBCOMMANDS = {"scene": "Build a scene from recordings or from other tools."}
@@ -32,7 +32,7 @@ def build_parser() -> typer.Typer:
         help="Make driving video whose weather, grip, motion and camera agree; audit it, judge it, and learn from"
         " measured drives.",
     )
-    app.callback()(_main)
+    app.callback()(_accept_version)
     words: dict[str, typer.Typer] = {}
     for command in COMMANDS:
         word, _, name = command.name.rpartition(" ")
@@ -97,11 +97,11 @@ def _print_version(wanted: bool) -> None:
     checkout = git_commit()
     changed = ", changed since" if checkout and checkout["changed"] else ""
     commit = f" (commit {checkout['commit'][:12]}{changed})" if checkout else ""
-    say(f"musync {version('musync')}{commit}")
+    print_lines(f"musync {version('musync')}{commit}")
     raise typer.Exit
 
 
-def _main(
+def _accept_version(
     _version: Annotated[
         bool,
         typer.Option(
@@ -138,7 +138,7 @@ def _make_callback(command: Command) -> Callable[..., None]:
 def _make_parameter(option: Option) -> Parameter:
     details: dict[str, Any] = {"help": option.help, "min": option.minimum, "max": option.maximum}
     if option.known:
-        details["autocompletion"] = lambda incomplete: _complete(option, incomplete)
+        details["autocompletion"] = lambda incomplete: _complete_value(option, incomplete)
     if option.positional:
         declared = typer.Argument(**details)
     elif option.kind is bool and option.default is False:
@@ -150,7 +150,7 @@ def _make_parameter(option: Option) -> Parameter:
     return Parameter(option.keyword, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
 
-def _complete(option: Option, incomplete: str) -> list[str]:
+def _complete_value(option: Option, incomplete: str) -> list[str]:
     """Return the known values of an option that begin with the text typed so far."""
     from manifests.provenance import SOURCE_ROOT
 
@@ -166,6 +166,6 @@ def _print_as_asked(command: Command, result: Any, as_json: bool) -> None:
         print_json(result)
     elif command.output == "sentences":
         module = sys.modules[import_function(command).__module__]
-        say(module.format_text(result).removesuffix("\n"))
+        print_lines(module.format_text(result).removesuffix("\n"))
     else:
         print_result(command.brief(result))

@@ -14,7 +14,7 @@ QUIET_AND_LOCAL = {
     "DO_NOT_TRACK": "1",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
     "PREFECT_LOGGING_LEVEL": "WARNING",
-    # what ended a run is told in a sentence by the command; the traceback stands in the run's log on the server
+    # the command says in a sentence why a run ended; the traceback is in the run's log on the server
     "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",
     "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
     "PREFECT_HOME": str(Path.cwd() / ".musync" / "prefect"),

@@ -4,12 +4,12 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flows.running.terminal import open_console, say, visible
+from flows.running.terminal import escape_controls, open_console, print_lines
 
 
 def print_json(value: dict[str, Any]) -> None:
     """Print a result as JSON."""
-    say(json.dumps(value, indent=1))
+    print_lines(json.dumps(value, indent=1))
 
 
 def print_result(value: dict[str, Any]) -> None:
@@ -18,7 +18,7 @@ def print_result(value: dict[str, Any]) -> None:
         if isinstance(entry, list) and entry and isinstance(entry[0], dict):
             _print_table(key, entry)
         else:
-            say(f"{key}: {_format_value(entry)}")
+            print_lines(f"{key}: {_format_value(entry)}")
 
 
 def _print_table(title: str, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -27,7 +27,7 @@ def _print_table(title: str, rows: Sequence[Mapping[str, Any]]) -> None:
 
     table = Table(title=title, title_justify="left")
     for column in rows[0]:
-        table.add_column(visible(column), overflow="fold")
+        table.add_column(escape_controls(column), overflow="fold")
     for row in rows:
         table.add_row(*(_format_value(row.get(column)) for column in rows[0]))
     open_console().print(table)
@@ -38,4 +38,4 @@ def _format_value(value: Any) -> str:
         return f"{value:.5g}"
     if isinstance(value, list):
         return ", ".join(_format_value(item) for item in value)
-    return "-" if value is None else visible(str(value))
+    return "-" if value is None else escape_controls(str(value))

@@ -1,1 +1,1 @@
-"""What was made: canonical JSON, content ids, provenance, frozen manifests, and comparing two of them."""
+"""Records of datasets: canonical JSON, content ids, provenance, frozen manifests, and their comparison."""

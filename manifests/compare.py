@@ -21,8 +21,13 @@ def first_row_difference(
     for channel in channels:
         a, b = recorded.get(channel), remade.get(channel)
         if a is None or b is None or a.shape != b.shape:
-            return {"channel": channel, "tick": 0, "recorded": _shape(a), "remade": _shape(b)}
-        unequal = _differs(a, b)
+            return {
+                "channel": channel,
+                "tick": 0,
+                "recorded": _describe_shape(a),
+                "remade": _describe_shape(b),
+            }
+        unequal = _mark_differences(a, b)
         if unequal.any():
             tick = int(np.argmax(unequal))
             if first is None or tick < first["tick"]:
@@ -38,10 +43,17 @@ def first_row_difference(
 def first_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[Any]) -> dict[str, Any] | None:
     """The earliest frame in which two pictures differ and the first such pixel; None when they are equal."""
     if recorded.shape != remade.shape:
-        return {"channel": array, "tick": 0, "recorded": _shape(recorded), "remade": _shape(remade)}
+        return {
+            "channel": array,
+            "tick": 0,
+            "recorded": _describe_shape(recorded),
+            "remade": _describe_shape(remade),
+        }
     for frame, (a, b) in enumerate(zip(recorded, remade, strict=True)):
         if (a.view(np.uint8) != b.view(np.uint8)).any():
-            unequal = _differs(a.reshape(a.shape[0] * a.shape[1], -1), b.reshape(a.shape[0] * a.shape[1], -1))
+            unequal = _mark_differences(
+                a.reshape(a.shape[0] * a.shape[1], -1), b.reshape(a.shape[0] * a.shape[1], -1)
+            )
             row, column = divmod(int(np.argmax(unequal)), a.shape[1])
             return {
                 "channel": array,
@@ -53,12 +65,12 @@ def first_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[A
     return None
 
 
-def _differs(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
+def _mark_differences(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
     unequal = a != b
     if np.issubdtype(a.dtype, np.floating):
         unequal &= ~(np.isnan(a) & np.isnan(b))
     return unequal.reshape(len(a), -1).any(axis=1)
 
 
-def _shape(values: NDArray[Any] | None) -> str:
+def _describe_shape(values: NDArray[Any] | None) -> str:
     return "absent" if values is None else f"shape {values.shape}"

@@ -1,4 +1,4 @@
-"""The installed distributions as a CycloneDX list: what has to be installed to make the bytes again."""
+"""The installed distributions as a CycloneDX list, from which the environment can be installed again."""
 
 import importlib.metadata
 import json
@@ -24,14 +24,14 @@ def environment_bom() -> dict[str, Any]:
     """
     components: dict[str, Component] = {}
     for distribution in importlib.metadata.distributions():
-        component = _describe(distribution)
+        component = _describe_component(distribution)
         if component is not None:
             components.setdefault(component.name, component)  # of two, the first is imported
     document: dict[str, Any] = json.loads(JsonV1Dot6(Bom(components=components.values())).output_as_string())
     return {key: value for key, value in document.items() if key not in LEFT_OUT}
 
 
-def _describe(distribution: importlib.metadata.Distribution) -> Component | None:
+def _describe_component(distribution: importlib.metadata.Distribution) -> Component | None:
     try:
         facts = distribution.metadata
     except (TypeError, FileNotFoundError):  # a folder without METADATA, which a broken installation leaves

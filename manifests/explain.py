@@ -5,11 +5,13 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from catalogs.documents import parse_yaml_value
-from manifests.provenance import code_version, library_versions, processor
+from catalogs.tyres import tyre_entries
+from manifests.provenance import code_version, describe_processor, library_versions
 
 VEHICLE, RENDER, JUDGING = "vehicle", "render", "judging"
 REACHES = {
     "vehicle.yaml": (VEHICLE, RENDER),
+    "tyre": (VEHICLE, RENDER),
     "surface.yaml": (VEHICLE, RENDER),
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
@@ -52,19 +54,19 @@ def input_differences(
     rows: list[dict[str, Any]] = []
     for name in sorted(a["inputs"].keys() | b["inputs"].keys()):
         if a["inputs"].get(name) != b["inputs"].get(name):
-            key = "weather" if PurePosixPath(name).parts[0] == "weather" else name
+            key = kind_of_input(name)
             known = all(
                 name in files or name not in m["inputs"] for m, files in ((a, inputs_a), (b, inputs_b))
             )
             rows += (
-                _rows(name, key, _parsed(inputs_a.get(name)), _parsed(inputs_b.get(name)))
+                _list_rows(name, key, *(parse_input(name, files.get(name)) for files in (inputs_a, inputs_b)))
                 if known
-                else _rows(name, key, a["inputs"].get(name, ABSENT), b["inputs"].get(name, ABSENT))
+                else _list_rows(name, key, a["inputs"].get(name, ABSENT), b["inputs"].get(name, ABSENT))
             )
-    rows += _rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
-    rows += _rows("backend", "backend", a["backend"], b["backend"])
+    rows += _list_rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
+    rows += _list_rows("backend", "backend", a["backend"], b["backend"])
     for name in ("vehicle_mode", "composition", "frames", "frame_rate_hz", "seed"):
-        rows += _rows(name, name, a["grid"].get(name), b["grid"].get(name))
+        rows += _list_rows(name, name, a["grid"].get(name), b["grid"].get(name))
     return rows + tool_differences(a, b)
 
 
@@ -76,17 +78,17 @@ def tool_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[dict[st
     a, b : manifests, or `tools_here`
     """
     rows = [
-        _rows(name, name, a["made_with"].get(name), b["made_with"].get(name))
+        _list_rows(name, name, a["made_with"].get(name), b["made_with"].get(name))
         for name in ("code", "libraries")
     ]
-    return [*rows[0], *rows[1], *_rows("processor", "processor", a.get("processor"), b.get("processor"))]
+    return [*rows[0], *rows[1], *_list_rows("processor", "processor", a.get("processor"), b.get("processor"))]
 
 
 def tools_here() -> dict[str, Any]:
-    """What a manifest records of code, libraries and processor, of here and now."""
+    """Return the code, libraries and processor of this machine as a manifest records them."""
     return {
         "made_with": {"code": code_version(), "libraries": library_versions()},
-        "processor": processor(),
+        "processor": describe_processor(),
     }
 
 
@@ -100,23 +102,24 @@ def parameter_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[di
     asked = [
         {clip["label"]: {"seed": clip["seed"], **clip["scenario"]} for clip in m["clips"]} for m in (a, b)
     ]
-    return _rows("parameters", "parameters", *asked)
+    return _list_rows("parameters", "parameters", *asked)
 
 
 def as_sentences(differences: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Each row of differences between what made a dataset (a) and what is here (b), in words."""
+    """Return a sentence for each difference between the tools that made a dataset (a) and those at hand (b)."""
     return [
-        f"{row['input']} {row['path']}".strip() + f": {shown(row['a'])} made it, {shown(row['b'])} is here"
+        f"{row['input']} {row['path']}".strip()
+        + f": {format_value(row['a'])} made it, {format_value(row['b'])} is here"
         for row in differences
     ]
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     """A value in a sentence, cut where it is long."""
     return (value if isinstance(value, str) else repr(value))[:80]
 
 
-def reasons(changed: Sequence[str], differences: Sequence[Mapping[str, Any]]) -> list[str]:
+def find_reasons(changed: Sequence[str], differences: Sequence[Mapping[str, Any]]) -> list[str]:
     """Inputs that can have caused a clip's earliest change, by name; empty if no recorded input can.
 
     Parameters
@@ -147,7 +150,7 @@ def value_differences(a: Any, b: Any, place: str = "") -> list[tuple[str, Any, A
     return [row for key, x, y in pairs for row in value_differences(x, y, f"{place}.{key}" if place else key)]
 
 
-def _rows(name: str, key: str, a: Any, b: Any) -> list[dict[str, Any]]:
+def _list_rows(name: str, key: str, a: Any, b: Any) -> list[dict[str, Any]]:
     reaches = list(REACHES.get(key, (VEHICLE, RENDER, JUDGING)))
     return [
         {"input": name, "path": path, "a": x, "b": y, "reaches": reaches}
@@ -155,5 +158,34 @@ def _rows(name: str, key: str, a: Any, b: Any) -> list[dict[str, Any]]:
     ]
 
 
-def _parsed(content: bytes | None) -> Any:
-    return ABSENT if content is None else parse_yaml_value(content, "a recorded input", "catalogue entry")
+def kind_of_input(name: str) -> str:
+    """The key of `REACHES` for a file under ``inputs/``.
+
+    Parameters
+    ----------
+    name : path below ``inputs/``
+    """
+    path = PurePosixPath(name)
+    if path.suffix == ".tir":
+        return "tyre"
+    return "weather" if path.parts[0] == "weather" else name
+
+
+def parse_input(name: str, content: bytes | None) -> Any:
+    """The values of a file under ``inputs/``; `ABSENT` where there is none.
+
+    Parameters
+    ----------
+    name : path below ``inputs/``
+    content : of the file
+
+    Raises
+    ------
+    InputError
+        If it is no YAML.
+    """
+    if content is None:
+        return ABSENT
+    if kind_of_input(name) == "tyre":
+        return tyre_entries(content)
+    return parse_yaml_value(content, name, "catalogue entry")

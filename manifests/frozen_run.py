@@ -5,11 +5,12 @@ every input. A frozen run says what has to come out again; the code's state is r
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from catalogs.documents import read_json_document
-from manifests.explain import REACHES, VEHICLE, shown, value_differences
+from catalogs.weather.grip import GRIP_SECTIONS
+from manifests.explain import REACHES, VEHICLE, format_value, kind_of_input, value_differences
 from manifests.manifest import seal_of
 from manifests.records import FrozenRun, check_record
 from tasks.errors import InputError
@@ -26,7 +27,7 @@ def frozen_names() -> tuple[str, ...]:
 
 
 def frozen_source(name_or_path: str | Path) -> Path:
-    """The file of a frozen run: a path ending in .json is taken as it is, a name is looked up among those that ship.
+    """Return the file of a frozen run: a path ending in .json as it is, a name from those that ship.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def read_frozen(name_or_path: str | Path) -> FrozenRun:
     return check_record(FrozenRun, frozen, path)
 
 
-def sealed(run: Mapping[str, Any]) -> dict[str, Any]:
+def seal_run(run: Mapping[str, Any]) -> dict[str, Any]:
     """A frozen run with its format and seal.
 
     Parameters
@@ -83,17 +84,14 @@ def parameters_that_matter(inputs: Mapping[str, Any], pictures: bool) -> dict[st
     inputs : parsed entries by their name under ``inputs/``
     pictures : whether frames are made
     """
-    return {
-        name: _deciding(entry)
-        for name, entry in inputs.items()
-        if pictures or VEHICLE in REACHES.get(name, ())
-    }
+    kept = inputs if pictures else {name: _keep_motion(name, entry) for name, entry in inputs.items()}
+    return {name: _keep_deciding(entry) for name, entry in kept.items() if entry is not None}
 
 
-def differences(
+def find_differences(
     frozen: Mapping[str, Any], parameters: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]
 ) -> list[str]:
-    """What here is not as it was frozen, value by value; hashes of telemetry are left to the outcome.
+    """List the values at hand that differ from the frozen ones; hashes of telemetry are compared elsewhere.
 
     Parameters
     ----------
@@ -105,7 +103,8 @@ def differences(
     asked = {clip["label"]: _without_hash(clip) for clip in frozen["clips"]}
     rows += value_differences(asked, {clip["label"]: _without_hash(clip) for clip in clips}, "clips")
     return [
-        f"{place} is {shown(there)} in the manifest and {shown(here)} here" for place, there, here in rows
+        f"{place} is {format_value(there)} in the manifest and {format_value(here)} here"
+        for place, there, here in rows
     ]
 
 
@@ -124,7 +123,14 @@ def _without_hash(clip: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in clip.items() if key != "ticks"}
 
 
-def _deciding(entry: Any) -> Any:
+def _keep_motion(name: str, entry: Any) -> Any:
+    """Return what of an entry reaches the vehicle's motion: of a kind of weather its grip alone."""
+    if PurePosixPath(name).parts[0] == "weather":
+        return {section: entry[section] for section in GRIP_SECTIONS if section in entry} or None
+    return entry if VEHICLE in REACHES.get(kind_of_input(name), ()) else None
+
+
+def _keep_deciding(entry: Any) -> Any:
     if isinstance(entry, dict):
-        return {str(key): _deciding(value) for key, value in entry.items() if key not in NEVER_DECIDES}
-    return [_deciding(value) for value in entry] if isinstance(entry, list) else entry
+        return {str(key): _keep_deciding(value) for key, value in entry.items() if key not in NEVER_DECIDES}
+    return [_keep_deciding(value) for value in entry] if isinstance(entry, list) else entry

@@ -1,4 +1,4 @@
-"""The frozen manifest of a dataset: what was asked, what it was made with, and every hash."""
+"""The frozen manifest of a dataset: the request, the tools that made it, and every hash."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from tasks.errors import InputError
 MANIFEST_FORMAT = "musync-manifest/3"
 
 
-def freeze(
+def freeze_manifest(
     plan: Mapping[str, Any],
     clips: Sequence[Mapping[str, Any]],
     artifacts: Mapping[str, str],
@@ -45,12 +45,12 @@ def is_quarantined(clip: Mapping[str, Any]) -> bool:
 
 
 def seal_of(manifest: Mapping[str, Any]) -> str:
-    """SHA-256 of the canonical form of all but the seal itself: what tells a changed manifest from its own."""
+    """Return the SHA-256 of the canonical form without the seal, by which a changed manifest is recognised."""
     return sha256_of([canonical_bytes({key: value for key, value in manifest.items() if key != "seal"})])
 
 
 def manifest_damage(content: bytes) -> str | None:
-    """What is wrong with a manifest's bytes; None when they are those that were frozen.
+    """Return a sentence on what is wrong with a manifest's bytes; None when they are those that were frozen.
 
     Parameters
     ----------

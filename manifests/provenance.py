@@ -1,4 +1,4 @@
-"""What code, on what libraries and processor, makes the data: recorded so that a difference can be named."""
+"""Code, libraries and processor that make the data, recorded so that a difference can be named."""
 
 import importlib.metadata
 import os
@@ -27,7 +27,7 @@ def source_hashes() -> dict[str, str]:
         path.relative_to(SOURCE_ROOT).as_posix(): sha256_of_file(path)
         for package in SOURCE_PACKAGES
         for path in sorted((SOURCE_ROOT / package).rglob("*"))
-        if path.suffix in {".py", ".yaml"} and "__pycache__" not in path.parts
+        if path.suffix in {".py", ".yaml", ".tir"} and "__pycache__" not in path.parts
     }
 
 
@@ -83,8 +83,8 @@ def library_versions() -> dict[str, str]:
     }
 
 
-def processor() -> dict[str, str]:
-    """Architecture and, where the kernel tells, the model and vector extensions of the processor."""
+def describe_processor() -> dict[str, str]:
+    """Return the architecture and, where the kernel reports them, the model and vector extensions of the processor."""
     facts = {"architecture": platform.machine()}
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():

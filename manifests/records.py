@@ -1,4 +1,4 @@
-"""The forms of what is recorded: plans, receipts, manifests and frozen runs, checked once, where they are read.
+"""The forms of plans, receipts, manifests and frozen runs, checked once, when they are read.
 
 A dataset may come from a stranger. What passes here needs no second check: an id has the form of an id, and a recorded
 path is one of those that muSync writes, below the dataset's folder.
@@ -12,7 +12,7 @@ from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationE
 from typing_extensions import TypedDict
 
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
-from catalogs.sentences import brief, cap_problems, describe_rules
+from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from manifests.canonical import ID_LENGTH
 from tasks.conventions import CLIP_CHANNELS
 from tasks.errors import InputError
@@ -38,7 +38,7 @@ RecordedPath = Annotated[
 def _refuse_way_out(name: str) -> str:
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts:
-        raise ValueError(f"must not lead out of the folder of the run; it is {brief(name)}")
+        raise ValueError(f"must not lead out of the folder of the run; it is {shorten_value(name)}")
     return name
 
 
@@ -52,7 +52,9 @@ if TYPE_CHECKING:  # their keys follow from what they record
     FiguresRecord = dict[str, Any]
     VerdictRecord = dict[str, Any]
 else:
-    ScenarioRecord = with_config(STRICT)(TypedDict("ScenarioRecord", get_type_hints(Scenario)))
+    ScenarioRecord = with_config(STRICT)(
+        TypedDict("ScenarioRecord", get_type_hints(Scenario, include_extras=True))
+    )
     _figures = {c.name: float | None for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
     FiguresRecord = with_config(STRICT)(
         TypedDict("FiguresRecord", {**_figures, "calibration_extrapolated": bool})

@@ -1,4 +1,4 @@
-"""Counterfactual pairs: clips of one dataset that differ in exactly one control, and what it changes."""
+"""Counterfactual pairs: clips of one dataset that differ in exactly one control, and the changes it causes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, pairwise
@@ -39,14 +39,14 @@ def sibling_pairs(clips: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     places = [
         (i, j, control)
         for control in CONTROLS
-        for group in _groups(clips, control)
-        for i, j in _chosen(group)
-        if _differing(clips[i], clips[j], control)
+        for group in _group_clips(clips, control)
+        for i, j in _choose_pairs(group)
+        if _list_differing(clips[i], clips[j], control)
     ]
-    return [_pair(clips[i], clips[j], control) for i, j, control in sorted(places)]
+    return [_make_pair(clips[i], clips[j], control) for i, j, control in sorted(places)]
 
 
-def _groups(clips: Sequence[Mapping[str, Any]], control: str) -> Iterator[list[int]]:
+def _group_clips(clips: Sequence[Mapping[str, Any]], control: str) -> Iterator[list[int]]:
     """Clips that are alike in all other controls."""
     others = [name for other, names in CONTROLS.items() if other != control for name in names]
     groups: dict[tuple[Any, ...], list[int]] = {}
@@ -55,28 +55,28 @@ def _groups(clips: Sequence[Mapping[str, Any]], control: str) -> Iterator[list[i
     yield from groups.values()
 
 
-def _chosen(group: Sequence[int]) -> list[tuple[int, int]]:
+def _choose_pairs(group: Sequence[int]) -> list[tuple[int, int]]:
     if len(group) <= ALL_PAIRS_UP_TO:
         return list(combinations(group, 2))
     return sorted({(group[0], other) for other in group[1:]} | set(pairwise(group)))
 
 
-def _differing(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> list[str]:
+def _list_differing(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> list[str]:
     return [name for name in CONTROLS[control] if a["scenario"][name] != b["scenario"][name]]
 
 
-def _pair(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> dict[str, Any]:
+def _make_pair(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> dict[str, Any]:
     names = {
         "clip_id_a": a["clip_id"],
         "clip_id_b": b["clip_id"],
         "label_a": a["label"],
         "label_b": b["label"],
         "control": control,
-        "differs": ", ".join(_differing(a, b, control)),
+        "differs": ", ".join(_list_differing(a, b, control)),
     }
-    changes = {f"{name}_change": _change(a["figures"][name], b["figures"][name]) for name in FIGURES}
+    changes = {f"{name}_change": _compute_change(a["figures"][name], b["figures"][name]) for name in FIGURES}
     return names | changes
 
 
-def _change(a: float | None, b: float | None) -> float:
+def _compute_change(a: float | None, b: float | None) -> float:
     return nan if a is None or b is None else float(b) - float(a)

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 
 class SemanticClass(IntEnum):
-    """What a Gaussian, and so a pixel, belongs to. 0 is a pixel that no Gaussian covers."""
+    """Class of a Gaussian, and so of a pixel. 0 is a pixel that no Gaussian covers."""
 
     SKY = 0
     ROAD = 1
@@ -26,7 +26,7 @@ class SemanticClass(IntEnum):
 
 
 ROAD_CLASSES = (SemanticClass.ROAD, SemanticClass.MARKING)
-"""Classes that carry the water film and the snow cover, and that follow the road profile."""
+"""Classes that hold the water film and the snow cover, and that follow the road profile."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +95,7 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="hazard_center_m", unit="m", symbol="s_g", description="route coordinate of the road feature's centre"),
     Channel(name="hazard_length_m", unit="m", symbol="L_g", description="length of the road feature"),
     Channel(name="hazard_height_m", unit="m", symbol="A_g", description="height of the road feature; negative is a depression"),
-    Channel(name="film_depth_mm", unit="mm", symbol="h_t", description="total water-film depth"),
+    Channel(name="film_depth_mm", unit="mm", symbol="h_t", description="total depth of the film of water or ice"),
     Channel(name="snow_depth_mm", unit="mm", symbol="h_s", description="snow depth"),
     Channel(name="snow_coverage", unit="1", symbol="c_s", description="snow coverage of the road"),
     Channel(name="surface_friction", unit="1", symbol="mu_c", description="reference surface coefficient"),
@@ -122,7 +122,7 @@ IDENTITY_CHANNELS: tuple[Channel, ...] = (
     Channel(name="seed", unit="", symbol="", description="visual seed, 64 bit, as text"),
     Channel(name="split", unit="", symbol="", description="the grid's split that the clip belongs to; empty where it names none"),
     Channel(name="calibration", unit="", symbol="", description="in-grid, interpolated, off-grid or beyond-calibration, as the paper's Appendix C says it"),
-    Channel(name="weather", unit="", symbol="w", description="dry, rain or snow; also the tyre family"),
+    Channel(name="weather", unit="", symbol="w", description="kind of weather; also the name of the tyre family"),
     Channel(name="calibration_extrapolated", unit="", symbol="", description="mu_c lies outside the calibrated knots, whose end values hold"),
 )  # fmt: skip
 

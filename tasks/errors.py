@@ -1,4 +1,4 @@
-"""The one exception for a user's mistake: every problem of one input, each a full sentence."""
+"""The exception for user errors: all problems of one input, each a full sentence."""
 
 from collections.abc import Sequence
 

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.conventions import CHANNELS_BY_NAME
 from tasks.render.camera import Camera, body_poses
 from tasks.scene.route import Route
-from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard, road_slope
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import Weather, find_weather, surface_state
 from tasks.vehicle.model.axle_ports import signed_slip
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, surface_response
 from tasks.vehicle.tyres.contract import braking_slip, tyre_friction
@@ -71,48 +72,20 @@ def surface_steps(
     vehicle : holds the tyre's tables
     row : the stored frame
     """
-    s = surface
-    state = surface_state(weather, s)
-    mu_c = surface_friction(weather, state, s)
-    response = surface_response(vehicle, weather.kind, mu_c)
+    state = surface_state(weather, surface)
+    response = surface_response(vehicle, state.kind, state.friction)
     steps = []
-    if weather.kind == "rain":
-        r_f = s.flooded_friction / s.dry_friction
+    for one in find_weather(state.kind).derive(weather, state, surface):
+        column = "surface_friction" if one.field == "friction" else one.field
         steps.append(Step(
-            quantity="water film", symbol="h_t", equation="3, S21", unit="mm",
-            formula=f"{s.film_coefficient:g} * {s.texture_depth_mm:g}^{s.film_texture_exponent:g}"
-            f" * {s.drainage_length:g}^{s.film_length_exponent:g}"
-            f" * {weather.precipitation_mm_h:g}^{s.film_rate_exponent:g}"
-            f" * {s.crossfall:g}^{s.film_crossfall_exponent:g}",
-            recomputed=state.film_depth_mm, stored=float(row["film_depth_mm"]),
+            quantity=one.quantity, symbol=one.symbol, equation=one.equation, formula=one.formula,
+            unit=CHANNELS_BY_NAME[column].unit, recomputed=getattr(state, one.field), stored=float(row[column]),
         ))  # fmt: skip
-        decay = f"exp(-{state.film_depth_mm:.4g} / {s.film_decay_mm:g})"
-        formula = f"{s.dry_friction:g} * ({r_f:.4g} + (1 - {r_f:.4g}) * {decay})"
-        equation = "5, S22"
-    elif weather.kind == "snow":
-        steps.append(Step(
-            quantity="snow depth", symbol="h_s", equation="3, S23", unit="mm",
-            formula=f"{weather.precipitation_mm_h:g} * {weather.snow_accumulation_h:g}"
-            f" * {s.water_density:g} / {s.fresh_snow_density:g}",
-            recomputed=state.snow_depth_mm, stored=float(row["snow_depth_mm"]),
-        ))  # fmt: skip
-        steps.append(Step(
-            quantity="snow coverage", symbol="c_s", equation="3, S23", unit="1",
-            formula=f"min(1, {state.snow_depth_mm:.4g} / {s.full_cover_depth_mm:g})",
-            recomputed=state.snow_coverage, stored=float(row["snow_coverage"]),
-        ))  # fmt: skip
-        lost = f"({s.bare_wet_friction:g} - {s.snow_friction:g})"
-        formula = f"{s.bare_wet_friction:g} - {lost} * {state.snow_coverage:.4g}"
-        equation = "5, S23"
-    else:
-        formula, equation = f"dry pavement: {s.dry_friction:g}", "5"
-    efficiency = response.tyre.peak / mu_c
+    efficiency = response.tyre.peak / state.friction
     return [
         *steps,
-        Step(quantity="surface friction", symbol="mu_c", equation=equation, unit="1", formula=formula,
-             recomputed=mu_c, stored=float(row["surface_friction"])),
         Step(quantity="tyre peak", symbol="mu_eff", equation="8", unit="1",
-             formula=f"eta_tire * mu_c = {efficiency:.6g} * {mu_c:.6g}",
+             formula=f"eta_tire * mu_c = {efficiency:.6g} * {state.friction:.6g}",
              recomputed=response.tyre.peak, stored=float(row["tyre_peak"])),
     ]  # fmt: skip
 
@@ -133,6 +106,9 @@ def force_steps(
     steps, forces = [], []
     speed, radius = float(row["speed"]), vehicle.wheel_radius
     standing = speed <= 0
+    law = f"mu_B({response.slip_stiffness:.4g} * {{kappa:.4g}})"
+    if vehicle.tyre is not None:
+        law = "mu_MF({kappa:.4g}, {load:.6g})"
     for axle, name in (("f", "front"), ("r", "rear")):
         omega, load = float(row[f"wheel_speed_{axle}"]), float(row[f"tyre_load_{axle}"])
         kappa = slip_of(speed, radius * omega, vehicle.slip_speed_floor)
@@ -144,7 +120,7 @@ def force_steps(
                  f" {vehicle.slip_speed_floor:g}), {lowest}, 1)",
                  recomputed=kappa, stored=float(row[f"braking_slip_{axle}"])),
             Step(quantity=f"{name} tyre force", symbol=f"F_x,{axle}", equation="8, S7", unit="N",
-                 formula=f"mu_B({response.slip_stiffness:.4g} * {kappa:.4g}) * F_z = {mu:.5g} * {load:.6g}",
+                 formula=f"{law.format(kappa=kappa, load=load)} * F_z = {mu:.5g} * {load:.6g}",
                  recomputed=mu * load, stored=float(row[f"tyre_force_{axle}"])),
         ]  # fmt: skip
     station = float(row["station"])

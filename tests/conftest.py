@@ -1,5 +1,6 @@
 """Where test data outside the repository lies, one thread for linear algebra, and a small finished dataset."""
 
+import fcntl
 import os
 from pathlib import Path
 
@@ -28,9 +29,11 @@ def toy_dataset(tmp_path_factory):
 
     Beside it lie its ``grid.yaml``, ``camera.yaml`` and ``scene``.
     """
-    from flows.making.generate import generate
+    from flows.making.generate import generate_dataset
     from tests.toy_street import write_toy_grid
 
     folder = tmp_path_factory.mktemp("toy")
     grid = write_toy_grid(folder, frames=11)
-    return generate(grid, str(folder / "data"), runner="threads", workers=2).layout
+    with (tmp_path_factory.getbasetemp().parent / "toy.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # of two workers the second finds the kernels compiled
+        return generate_dataset(grid, str(folder / "data"), runner="threads", workers=2).layout

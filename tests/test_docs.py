@@ -10,7 +10,7 @@ from catalogs.grids import load_grid
 from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 
-DOCUMENTS = sorted([*SOURCE_ROOT.glob("*.md"), *(SOURCE_ROOT / "docs").glob("*.md")])
+DOCUMENTS = sorted([*SOURCE_ROOT.glob("*.md"), *(SOURCE_ROOT / "docs").rglob("*.md")])
 COMMANDS = sorted(
     {
         match

@@ -70,11 +70,14 @@ def test_a_file_without_kernels_changes_nothing(package):
     assert sources_hash(package) == before
 
 
-def test_old_states_are_forgotten(package):
-    for offset in range(KEPT + 3):
-        (package / "level.py").write_text(f"LEVEL = {offset}.0\n")
-        result(package)
-    assert len(list((package.parent / "cache" / "kernels").iterdir())) == KEPT
+def test_a_new_state_makes_the_old_forgotten(package):
+    kernels = package.parent / "cache" / "kernels"
+    old = {f"{number:016x}" for number in range(KEPT + 2)}
+    for name in old:
+        (kernels / name).mkdir(parents=True)
+    result(package)
+    left = {path.name for path in kernels.iterdir()}
+    assert len(left) == KEPT and len(left - old) == 1
 
 
 def test_only_states_are_forgotten_and_no_link_is_followed(tmp_path):

@@ -39,12 +39,12 @@ def full_disk_study(grid: Path, place: Path, whole: Path, disks: int, seed: int 
         # half of them below 300 kB, where plan, inputs and metadata are written
         bound = 300_000 if turn % 2 else size
         with _small_disk(place / f"disk-{turn}", draw.randrange(4096, bound)) as disk:
-            code, said = _generate(grid, disk / "data")
+            code, said = _run_generate(grid, disk / "data")
             told = code == 2 and "the disk is full" in said and "Traceback" not in said
             found["told"] += told
             found["plans"] += (disk / "data" / "plan.json").is_file()
-            _remount(disk, ROOM)
-            again, said_again = _generate(grid, disk / "data")
+            _remount_disk(disk, ROOM)
+            again, said_again = _run_generate(grid, disk / "data")
             equal = again == 0 and files_of(disk / "data") == wanted
             found["equal"] += equal
             print(f"disk {turn + 1} of {disks}: {'told' if told else said}, {'equal' if equal else said_again}",
@@ -52,7 +52,7 @@ def full_disk_study(grid: Path, place: Path, whole: Path, disks: int, seed: int 
     return found
 
 
-def _generate(grid: Path, folder: Path) -> tuple[int, str]:
+def _run_generate(grid: Path, folder: Path) -> tuple[int, str]:
     command = [
         sys.executable,
         "-m",
@@ -79,5 +79,5 @@ def _small_disk(place: Path, size: int) -> Iterator[Path]:
         subprocess.run(["/bin/umount", str(place)], check=True)
 
 
-def _remount(place: Path, size: int) -> None:
+def _remount_disk(place: Path, size: int) -> None:
     subprocess.run(["/bin/mount", "-o", f"remount,size={size}", str(place)], check=True)

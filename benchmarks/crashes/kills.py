@@ -15,7 +15,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-from benchmarks.crashes.processes import Cluster, Process, children, kill_group, start_run
+from benchmarks.crashes.processes import Cluster, Process, kill_group, list_children, start_run
 from flows.auditing.verify import compare_files
 from flows.store.layout import STAGED_TABLES, Layout
 from flows.store.sealed import read_manifest, read_receipt
@@ -127,7 +127,7 @@ def _kill_after(
         run.kill()  # its workers go on with the clips that they have
         run.wait()
     elif victim == WORKER:
-        pids = children(run)
+        pids = list_children(run)
         if not pids:
             run.wait()
             return False

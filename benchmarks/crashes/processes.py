@@ -25,10 +25,10 @@ def start_run(grid: Path, folder: Path, scheduler: str | None = None) -> Process
     """
     place = ["--scheduler", scheduler] if scheduler else ["--runner", "processes", "--workers", "2"]
     command = [sys.executable, "-m", "flows.cli", "generate", str(grid), "--out", str(folder), *place]
-    return _start(command)
+    return _start_process(command)
 
 
-def children(process: Process) -> list[int]:
+def list_children(process: Process) -> list[int]:
     """Process ids of a run's workers: the children that run Python for it."""
     found = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     pids = [int(pid) for pid in found.read_text().split()] if found.exists() else []
@@ -54,7 +54,7 @@ class Cluster:
         folder.mkdir(parents=True)
         file = folder / "scheduler.json"
         dask = [sys.executable, "-m", "dask"]
-        self.scheduler = _start(
+        self.scheduler = _start_process(
             [
                 *dask,
                 "scheduler",
@@ -69,7 +69,7 @@ class Cluster:
         )
         worker = [*dask, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard", "--no-nanny",
                   "--local-directory", str(folder)]  # fmt: skip
-        self.workers = [_start(worker) for _ in range(2)]
+        self.workers = [_start_process(worker) for _ in range(2)]
         self.address = _address_in(file)
 
     @property
@@ -83,7 +83,7 @@ class Cluster:
             kill_group(process)
 
 
-def _start(command: list[str]) -> Process:
+def _start_process(command: list[str]) -> Process:
     clean = {key: value for key, value in os.environ.items() if key != "PREFECT_API_URL"}
     return subprocess.Popen(
         command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=clean

@@ -3,7 +3,7 @@
 import random
 from pathlib import Path
 
-from flows.auditing.verify import verify
+from flows.auditing.verify import verify_dataset
 
 
 def flip_study(dataset: Path, flips: int, seed: int = 6) -> dict[str, int]:
@@ -30,7 +30,7 @@ def flip_study(dataset: Path, flips: int, seed: int = 6) -> dict[str, int]:
         content[bit // 8] ^= 1 << bit % 8
         path.write_bytes(content)
         try:
-            result = verify(str(dataset))
+            result = verify_dataset(str(dataset))
         finally:
             path.write_bytes(original)
         damaged = [row["path"] for row in result["damaged"]]

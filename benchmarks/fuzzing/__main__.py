@@ -9,25 +9,33 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 from benchmarks.fuzzing.parsers import BY_NAME, PARSERS, Parser
-from benchmarks.fuzzing.watched import FINDINGS, Desk, Reading, counted, lay_out, prepare, read_watched
+from benchmarks.fuzzing.watched import (
+    FINDINGS,
+    Desk,
+    Reading,
+    count_outcomes,
+    lay_out,
+    read_watched,
+    write_documents,
+)
 
 SEED = 2025
 
 
-def planned(parsers: list[Parser], count: int) -> list[tuple[str, range]]:
+def plan_inputs(parsers: list[Parser], count: int) -> list[tuple[str, range]]:
     """How many inputs each parser reads: by its share, at least ``count`` in all."""
     whole = sum(parser.share for parser in parsers)
     return [(parser.name, range(-int(-count * parser.share // whole))) for parser in parsers]
 
 
-def study(
+def run_study(
     parsers: list[Parser], count: int, *, seed: int = SEED, workers: int = 2
 ) -> dict[str, list[Reading]]:
     """Readings of at least ``count`` inputs, by parser."""
     readings: dict[str, list[Reading]] = {parser.name: [] for parser in parsers}
     with tempfile.TemporaryDirectory() as shelf:
-        prepare(parsers, Path(shelf))
-        plan = planned(parsers, count)
+        write_documents(parsers, Path(shelf))
+        plan = plan_inputs(parsers, count)
         for number, reading in enumerate(read_watched(plan, Path(shelf), seed, workers), start=1):
             readings[reading.parser].append(reading)
             if number % 5_000 == 0:
@@ -35,15 +43,15 @@ def study(
     return readings
 
 
-def findings(readings: dict[str, list[Reading]]) -> list[Reading]:
+def list_findings(readings: dict[str, list[Reading]]) -> list[Reading]:
     """The readings that must not be."""
     return [reading for rows in readings.values() for reading in rows if reading.outcome in FINDINGS]
 
 
-def reproduce(name: str, number: int, seed: int, keep: str | None) -> int:
+def reproduce_input(name: str, number: int, seed: int, keep: str | None) -> int:
     """Make and read one input, and tell of it; 1 if it is a finding."""
     with tempfile.TemporaryDirectory() as shelf, tempfile.TemporaryDirectory() as place:
-        prepare([BY_NAME[name]], Path(shelf))
+        write_documents([BY_NAME[name]], Path(shelf))
         made, outcome, detail = Desk(Path(shelf), Path(place)).read(name, seed, number)
         print(f"{name} {number}: {made.what}; {outcome}: {detail}")
         for file, content in made.changed.items():
@@ -65,20 +73,20 @@ def main() -> int:
     asked = options.parse_args()
     chosen = [BY_NAME[name] for name in asked.parser] if asked.parser else list(PARSERS)
     if asked.input is not None:
-        return reproduce(chosen[0].name, asked.input, asked.seed, asked.keep)
+        return reproduce_input(chosen[0].name, asked.input, asked.seed, asked.keep)
     begun = time.monotonic()
-    readings = study(chosen, asked.count, seed=asked.seed, workers=asked.workers)
-    table = {name: counted(rows) for name, rows in readings.items()}
-    table["all"] = counted([reading for rows in readings.values() for reading in rows])
+    readings = run_study(chosen, asked.count, seed=asked.seed, workers=asked.workers)
+    table = {name: count_outcomes(rows) for name, rows in readings.items()}
+    table["all"] = count_outcomes([reading for rows in readings.values() for reading in rows])
     columns = list(table["all"])
     print(f"{'parser':22}" + "".join(f"{column:>12}" for column in columns))
     for name, row in table.items():
         print(f"{name:22}" + "".join(f"{row[column]:>12}" for column in columns))
     print(f"{time.monotonic() - begun:.0f} s with {asked.workers} processes")
-    found = findings(readings)
+    found = list_findings(readings)
     kinds: dict[tuple[str, str, str], list[int]] = defaultdict(list)
     for reading in found:
-        kinds[reading.parser, reading.outcome, _kind(reading.detail)].append(reading.number)
+        kinds[reading.parser, reading.outcome, _name_kind(reading.detail)].append(reading.number)
     for (name, outcome, detail), numbers in sorted(kinds.items()):
         print(f"{name}: {outcome}: {detail} ({len(numbers)} times, such as input {numbers[0]})")
     if asked.out:
@@ -90,7 +98,7 @@ def main() -> int:
     return int(bool(found))
 
 
-def _kind(detail: str) -> str:
+def _name_kind(detail: str) -> str:
     """Place and exception, without what differs from input to input."""
     place, _, rest = detail.partition(" ")
     return f"{place} {rest.split(':')[0]}" if ".py:" in place else detail

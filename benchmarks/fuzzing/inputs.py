@@ -12,7 +12,7 @@ import yaml
 
 from benchmarks.fuzzing import payloads, trees
 from benchmarks.fuzzing.parsers import Parser
-from benchmarks.fuzzing.rules import Rule, place
+from benchmarks.fuzzing.rules import Rule, format_place
 from benchmarks.fuzzing.seals import Files
 
 KNOWINGLY = 0.35
@@ -84,7 +84,7 @@ def make_input(documents: Documents, seed: int, number: int) -> Input:
     files = documents.files[document]
     file = rng.choice([name for name in files if parser.mutates(name)])
     knowing = _break_knowingly(rng, documents, document, file) if rng.random() < KNOWINGLY else None
-    content, what, rule = knowing or (*_change(rng, documents, document, file), None)
+    content, what, rule = knowing or (*_change_content(rng, documents, document, file), None)
     changed: Files = {file: content}
     if rule is None and content != files[file] and re.fullmatch(parser.sealed or "", file):
         rule = SEALED
@@ -112,7 +112,10 @@ def _break_knowingly(
         tree = documents.tree(document, file)
 
         def known(path: tuple[Any, ...]) -> bool:
-            return parser.known_keys is not None and re.fullmatch(parser.known_keys, place(path)) is not None
+            return (
+                parser.known_keys is not None
+                and re.fullmatch(parser.known_keys, format_place(path)) is not None
+            )
 
         match rng.randrange(5):
             case 0:
@@ -122,20 +125,20 @@ def _break_knowingly(
                     return None
                 made, rule = trees.with_unknown_key(rng, tree, known), "no key is unknown"
             case 2:
-                text = trees.written(tree, yaml_form).encode()
-                return payloads.truncated(rng, text) or b"{", "truncated", WHOLE
+                text = trees.format_tree(tree, yaml_form).encode()
+                return payloads.truncate_content(rng, text) or b"{", "truncated", WHOLE
             case _:
                 if not rules:
                     return None
                 picked = rng.choice(rules)
-                made, rule = trees.broken(rng, tree, picked), picked.name
+                made, rule = trees.break_rule(rng, tree, picked), picked.name
         return (
             None
             if made is None
-            else (trees.written(made, yaml_form).encode(errors="surrogatepass"), rule, rule)
+            else (trees.format_tree(made, yaml_form).encode(errors="surrogatepass"), rule, rule)
         )
     if file.endswith(WHOLE_FILES) and rng.random() < 0.4:
-        return payloads.truncated(rng, content), "truncated", WHOLE
+        return payloads.truncate_content(rng, content), "truncated", WHOLE
     picked = rng.choice(rules) if rules else None
     made_bytes = None if picked is None else _broken_payload(rng, file, content, picked)
     return None if made_bytes is None or picked is None else (made_bytes, picked.name, picked.name)
@@ -149,7 +152,7 @@ def _broken_payload(rng: Random, file: str, content: bytes, rule: Rule) -> bytes
     return payloads.broken_column(rng, content, rule) if file.endswith(".parquet") else None
 
 
-def _change(rng: Random, documents: Documents, document: str, file: str) -> tuple[bytes, str]:
+def _change_content(rng: Random, documents: Documents, document: str, file: str) -> tuple[bytes, str]:
     """Content that may or may not break a rule, and what was done to it."""
     content = documents.files[document][file]
     if rng.random() < 0.1:
@@ -158,7 +161,7 @@ def _change(rng: Random, documents: Documents, document: str, file: str) -> tupl
         if rng.random() < 0.25:
             return payloads.odd_text(rng, content.decode()), "text changed"
         yaml_form, tree = file.endswith(".yaml"), documents.tree(document, file)
-        text = trees.written(trees.odd(rng, tree, yaml_form), yaml_form)
+        text = trees.format_tree(trees.change_oddly(rng, tree, yaml_form), yaml_form)
         return text.encode(errors="surrogatepass"), "a value changed"
     if file.endswith((".csv", ".txt")):
         return payloads.odd_text(rng, content.decode()), "text changed"

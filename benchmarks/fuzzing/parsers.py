@@ -17,7 +17,7 @@ from benchmarks.fuzzing.rules import (
     files_inside,
     hashes_keep_their_form,
     ids_keep_their_form,
-    limits,
+    limit_values,
 )
 from catalogs.bump_studies import load_bump_study
 from catalogs.buses import load_bus
@@ -47,16 +47,16 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
 from flows.auditing.signing import signature_findings
-from flows.auditing.verify import verify
+from flows.auditing.verify import verify_dataset
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
 from flows.judging.physics import clip_columns, clip_facts, read_constants
 from flows.judging.trajectories import read_trajectory
 from flows.making.plan import read_plan
 from flows.making.scenes import scene_import
-from flows.making.seal import seal
-from flows.reading.describe import describe, validate
-from flows.reading.query import VIEWS, sql
+from flows.making.seal import seal_dataset
+from flows.reading.describe import describe_dataset, validate_grid
+from flows.reading.query import VIEWS, query_dataset
 from flows.store.layout import Layout
 from flows.store.outputs import read_marker
 from flows.store.sealed import read_manifest
@@ -98,7 +98,7 @@ class Parser:
         return any(re.fullmatch(target, file) for target in self.targets)
 
 
-def entry(
+def parse_entries(
     name: str,
     pattern: str,
     load: Callable[[Path], object],
@@ -109,17 +109,17 @@ def entry(
 ) -> Parser:
     """A parser of catalogue files: everything has a unit and nothing is unknown or infinite."""
     return Parser(
-        name=name, write=sound.entries(pattern), read=lambda folder: load(folder / "entry.yaml"), share=share,
+        name=name, write=sound.copy_entries(pattern), read=lambda folder: load(folder / "entry.yaml"), share=share,
         rules=(FINITE, UNITS, *rules), known_keys=".*", reseal=reseal,
     )  # fmt: skip
 
 
 def read_dataset(folder: Path) -> None:
     """Verify, describe and query a dataset, as a reader does first."""
-    result = verify(str(folder))
-    describe(str(folder))
+    result = verify_dataset(str(folder))
+    describe_dataset(str(folder))
     for view in VIEWS:
-        sql(
+        query_dataset(
             str(folder),
             f"SELECT * FROM {view} ORDER BY clip_id LIMIT 5" if view != "pairs" else "SELECT * FROM pairs",
         )
@@ -147,18 +147,18 @@ def import_scene(folder: Path) -> None:
     scene_import(str(files["cloud"]), str(files["route"]), str(folder / "scene"), camera_height=1.65)
 
 
-def uncached(function: Callable[..., Any]) -> Callable[..., Any]:
+def remove_cache(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function without its cache, in which another document of the same place would be found."""
     return getattr(function, "__wrapped__", function)
 
 
 NUMBERS_OF_A_GRID = (
-    limits("precipitation_mm_h", -1, 50_000, 1e308),
-    limits("initial_speed_km_h", -1, 5_000, 1e308),
-    limits("peak_pressure_mpa", -1, 300, 1e300),
-    limits("frames", -1, 0, 1, 2**31, 2**70),
-    limits("frame_rate_hz", -1, 0, 1e9),
-    limits("seed", -1, 2**53),
+    limit_values("precipitation_mm_h", -1, 50_000, 1e308),
+    limit_values("initial_speed_km_h", -1, 5_000, 1e308),
+    limit_values("peak_pressure_mpa", -1, 300, 1e300),
+    limit_values("frames", -1, 0, 1, 2**31, 2**70),
+    limit_values("frame_rate_hz", -1, 0, 1e9),
+    limit_values("seed", -1, 2**53),
 )
 RECORDED_FILES = r"(clips\|\d+\|)?artifacts\|[^|]+"
 PLANNED = (
@@ -175,70 +175,71 @@ RECORDED = (
 
 PARSERS: tuple[Parser, ...] = (
     Parser(
-        name="grid", write=sound.grids, read=lambda folder: load_grid(folder / "grid.yaml"), share=8,
+        name="grid", write=sound.write_grids, read=lambda folder: load_grid(folder / "grid.yaml"), share=8,
         rules=(FINITE, *NUMBERS_OF_A_GRID), known_keys=r"|base|latin_hypercube|(axes\|[^|]+|scenarios)\|[^|]+",
     ),
     Parser(
         name="planned grid", write=sound.planned_grids, targets=("grid.yaml",), share=1,
-        read=lambda folder: validate(str(folder / "grid.yaml")), rules=(FINITE, *NUMBERS_OF_A_GRID),
+        read=lambda folder: validate_grid(str(folder / "grid.yaml")), rules=(FINITE, *NUMBERS_OF_A_GRID),
         known_keys=r"|base|axes\|[^|]+\|[^|]+",
     ),
-    entry("vehicle", "vehicles/[bp]*.yaml", load_vehicle, share=4),
-    entry("frozen vehicle", "vehicles/m*.yaml", load_vehicle, share=1, reseal=seals.sealed_vehicle),
-    entry("surface", "surfaces/*.yaml", load_surface, share=3),
-    entry("camera", "cameras/*.yaml", load_camera, share=4),
-    entry("gates", "gates.yaml", load_gates, share=2),
-    entry("foreign gates", "foreign_gates.yaml", load_foreign_gates, share=2),
-    entry("hazard marking", "hazard_markings/*.yaml", load_marking, share=2),
-    entry("bus", "buses/*.yaml", load_bus, share=2),
-    entry("calibration procedure", "calibration/*.yaml", load_procedure, share=2),
-    entry("protocol", "protocols/*.yaml", load_protocol, share=2),
-    entry("stop study", "stop_studies/*.yaml", load_stop_study, share=2),
-    entry("bump study", "bump_studies/*.yaml", load_bump_study, share=2),
-    entry("sensitivity study", "studies/surface-sensitivity.yaml", load_sensitivity_study, share=1),
-    entry("closing study", "studies/closing.yaml", load_closing_study, share=2),
-    entry("street", "scenes/street.yaml", load_street_layout, share=2),
-    entry("effects library", "effects/library.yaml", load_effects, share=0.5),
-    entry("truths", "effects/truths.yaml", lambda path: (load_truths(path), load_sizes(path)), share=1),
-    entry(
+    parse_entries("vehicle", "vehicles/[bp]*.yaml", load_vehicle, share=4),
+    parse_entries("frozen vehicle", "vehicles/m*.yaml", load_vehicle, share=1, reseal=seals.sealed_vehicle),
+    parse_entries("surface", "surfaces/*.yaml", load_surface, share=3),
+    parse_entries("camera", "cameras/*.yaml", load_camera, share=4),
+    parse_entries("gates", "gates.yaml", load_gates, share=2),
+    parse_entries("foreign gates", "foreign_gates.yaml", load_foreign_gates, share=2),
+    parse_entries("hazard marking", "hazard_markings/*.yaml", load_marking, share=2),
+    parse_entries("bus", "buses/*.yaml", load_bus, share=2),
+    parse_entries("calibration procedure", "calibration/*.yaml", load_procedure, share=2),
+    parse_entries("protocol", "protocols/*.yaml", load_protocol, share=2),
+    parse_entries("stop study", "stop_studies/*.yaml", load_stop_study, share=2),
+    parse_entries("bump study", "bump_studies/*.yaml", load_bump_study, share=2),
+    parse_entries("sensitivity study", "studies/surface-sensitivity.yaml", load_sensitivity_study, share=1),
+    parse_entries("closing study", "studies/closing.yaml", load_closing_study, share=2),
+    parse_entries("street", "scenes/street.yaml", load_street_layout, share=2),
+    parse_entries("effects library", "effects/library.yaml", load_effects, share=0.5),
+    parse_entries("truths", "effects/truths.yaml", lambda path: (load_truths(path), load_sizes(path)), share=1),
+    parse_entries(
         "channel map", "channel_maps/*.yaml", load_channel_map, share=3, rules=(files_inside(r"runs\|\d+\|file"),),
     ),
     Parser(
-        name="weather", write=sound.weather, read=load_weather, share=1, rules=(FINITE,), known_keys=".*",
+        name="weather", write=sound.write_weather, read=load_weather, share=1, rules=(FINITE,), known_keys=".*",
     ),
     Parser(
         name="learned judges", share=1, known_keys=".*", read=lambda folder: load_judges(folder / "judges.yaml"),
-        write=sound.texts({"judges.yaml": "clip: {checkpoint: a.pt, text_features: b.npy, source: c}\n"
+        write=sound.write_texts({"judges.yaml": "clip: {checkpoint: a.pt, text_features: b.npy, source: c}\n"
                                           "dover: {checkpoint: dover.pt, source: d}\n"}),
     ),
     Parser(
-        name="manifest", write=sound.dataset, targets=(r"manifest\.json",), read=read_dataset, share=2,
+        name="manifest", write=sound.write_dataset, targets=(r"manifest\.json",), read=read_dataset, share=2,
         sealed=r".*",
         rules=RECORDED, reseal=seals.sealed_json,
     ),
     Parser(
-        name="manifest alone", write=sound.dataset, targets=(r"manifest\.json",), share=4, rules=RECORDED,
+        name="manifest alone", write=sound.write_dataset, targets=(r"manifest\.json",), share=4, rules=RECORDED,
         read=lambda folder: read_manifest(Layout(folder)), reseal=seals.sealed_json,
     ),
     Parser(
-        name="telemetry", write=sound.dataset, targets=(r"telemetry/.*\.parquet",), read=read_dataset, share=0.5,
+        name="telemetry", write=sound.write_dataset, targets=(r"telemetry/.*\.parquet",), read=read_dataset, share=0.5,
         sealed=r".*",
         reseal=seals.sealed_dataset,
     ),
     Parser(
-        name="telemetry tables", write=sound.dataset, read=read_tables, share=1,
+        name="telemetry tables", write=sound.write_dataset, read=read_tables, share=1,
         targets=(r"telemetry/clips\.parquet", r"telemetry/(ticks|frames)/.*"),
     ),
     Parser(
-        name="frozen inputs", write=sound.dataset, targets=(r"inputs/(vehicle|surface)\.yaml", r"plan\.json"), share=1,
-        read=read_constants,
+        name="frozen inputs", write=sound.write_dataset, share=1, read=read_constants,
+        targets=(r"inputs/(vehicle|surface)\.yaml", r"plan\.json"),
     ),
     Parser(
-        name="plan", write=sound.dataset, targets=(r"plan\.json",), read=uncached(read_plan), share=5, rules=PLANNED,
+        name="plan", write=sound.write_dataset, targets=(r"plan\.json",), read=remove_cache(read_plan), share=5,
+        rules=PLANNED,
     ),
     Parser(
         name="receipt", write=sound.unfinished_dataset, targets=(r"\.staging/.*\.json",), share=1, writes=True,
-        read=lambda folder: seal(Layout(folder), uncached(read_plan)(folder)),
+        read=lambda folder: seal_dataset(Layout(folder), remove_cache(read_plan)(folder)),
         rules=(ids_keep_their_form("clip_id"), files_inside(r"artifacts\|[^|]+", of_keys=True), FINITE,
                hashes_keep_their_form(r"artifacts\|[^|]+")),
     ),
@@ -257,58 +258,59 @@ PARSERS: tuple[Parser, ...] = (
     Parser(
         name="marker of outputs", share=2, read=lambda folder: read_marker(folder), targets=(r"\.musync-written",),
         rules=(files_inside(r"files\|[^|]+", of_keys=True),),
-        write=sound.texts({".musync-written": '{"files": {"a.csv": "sheets", "b/c.png": "report"},'
+        write=sound.write_texts({".musync-written": '{"files": {"a.csv": "sheets", "b/c.png": "report"},'
                                               ' "format": "musync-written/1"}'}),
     ),
     Parser(
-        name="campaign", write=recorded.campaigns, read=read_campaign, share=5,
+        name="campaign", write=recorded.write_campaign, read=read_campaign, share=5,
         rules=(FINITE, CELLS_FINITE, files_inside("run")),
     ),
     Parser(
-        name="drives", write=recorded.campaigns, read=read_drives, share=3,
+        name="drives", write=recorded.write_campaign, read=read_drives, share=3,
         rules=(Rule(name="numbers are finite", where="sample_rate_hz", values=(NAN, INF)),
                Rule(name="numbers are finite", where="precipitation_mm_h|snow_accumulation_h", numbers_only=True,
                     values=("nan", "inf")), files_inside("run")),
     ),
     Parser(
-        name="recording", write=recorded.recordings, targets=(r"log\..*",), share=4,
+        name="recording", write=recorded.write_recordings, targets=(r"log\..*",), share=4,
         read=lambda folder: read_signals(next(folder.glob("log.*")), load_channel_map(folder / "map.yaml")[0]),
     ),
     Parser(
-        name="reference", write=recorded.references, read=read_reference, share=4,
+        name="reference", write=recorded.write_references, read=read_reference, share=4,
         rules=(FINITE, files_inside(r"\d+\|case"), Rule(name="cases are names", where=r"\d+\|case", values=("*", "?"))),
     ),
     Parser(
         name="Gaussians", write=recorded.gaussian_files, share=8,
         read=lambda folder: read_gaussians(next(folder.glob("cloud.*"))),
     ),
-    Parser(name="scene import", write=recorded.imports, read=import_scene, share=1, writes=True),
+    Parser(name="scene import", write=recorded.write_import, read=import_scene, share=1, writes=True),
     Parser(
         name="scene folder", write=sound.scene_folders, read=read_scene, share=6, reseal=seals.sealed_scene,
         sealed=r".*\.npy",
         rules=(FINITE, files_inside(r"sha256\|.*", of_keys=True), hashes_keep_their_form(r"sha256\|.*")),
     ),
     Parser(
-        name="route", write=recorded.routes, share=6, rules=(FINITE, CELLS_FINITE),
+        name="route", write=recorded.write_routes, share=6, rules=(FINITE, CELLS_FINITE),
         read=lambda folder: read_route(next(folder.glob("route.*")), 1.65),
     ),
     Parser(
         name="stereo folder", write=recorded.stereo_folders, share=2, rules=(CELLS_FINITE,), read=read_stereo_folder
     ),
     Parser(
-        name="trajectory", write=sound.texts({"t.txt": recorded.trajectory_text()}), share=2, rules=(CELLS_FINITE,),
-        read=lambda folder: read_trajectory(folder / "t.txt"),
+        name="trajectory", write=sound.write_texts({"t.txt": recorded.trajectory_text()}), share=2,
+        rules=(CELLS_FINITE,), read=lambda folder: read_trajectory(folder / "t.txt"),
     ),
     Parser(
-        name="video", write=recorded.videos, read=lambda folder: read_footage(next(folder.glob("video.*"))), share=0.5,
+        name="video", write=recorded.write_videos, share=0.5,
+        read=lambda folder: read_footage(next(folder.glob("video.*"))),
     ),
     Parser(
-        name="claim", write=recorded.claims, read=lambda folder: read_claim(folder / "claim.parquet"), share=3,
+        name="claim", write=recorded.write_claims, read=lambda folder: read_claim(folder / "claim.parquet"), share=3,
         rules=(FINITE,),
     ),
     Parser(
         name="video's camera", share=2, read=lambda folder: read_camera(folder / "camera.yaml"), rules=(FINITE,),
-        write=sound.texts({"camera.yaml": "width: 640\nheight: 360\nfocal_length: 500\n"},
+        write=sound.write_texts({"camera.yaml": "width: 640\nheight: 360\nfocal_length: 500\n"},
                           {"camera.yaml": "width: 640\nheight: 360\nfx: 500\nfy: 500\ncx: 320\ncy: 180\nk1: 0.1\n"
                                           "height_above_road: {value: 1.4, unit: m, source: measured}\n"}),
     ),

@@ -56,7 +56,7 @@ def broken_cell(rng: Random, text: str, rule: Rule) -> bytes | None:
         (i, j)
         for i, row in enumerate(rows[1:], start=1)
         for j, cell in enumerate(row)
-        if rule.holds_at((rows[0][j],), _number(cell))
+        if rule.holds_at((rows[0][j],), _parse_number(cell))
     ]
     if not under:
         return None
@@ -82,7 +82,7 @@ def broken_word(rng: Random, text: str, rule: Rule) -> bytes | None:
     return "\n".join(lines).encode()
 
 
-def _number(cell: str) -> Any:
+def _parse_number(cell: str) -> Any:
     try:
         return float(cell)
     except ValueError:
@@ -118,7 +118,7 @@ def odd_bytes(rng: Random, content: bytes) -> bytes:
     return bytes(data)
 
 
-def truncated(rng: Random, content: bytes) -> bytes:
+def truncate_content(rng: Random, content: bytes) -> bytes:
     """The beginning of a file, without its last byte or more."""
     return content[: rng.randrange(max(len(content.rstrip()) - 1, 1))]
 
@@ -220,7 +220,7 @@ def odd_table(rng: Random, content: bytes) -> bytes:
                 [np.nan, np.inf, 1e308, -1e308, 0.0]
             )
             table = table.set_column(k, field, [values])
-    return _stored(table)
+    return _store_table(table)
 
 
 def broken_column(rng: Random, content: bytes, rule: Rule) -> bytes | None:
@@ -236,10 +236,10 @@ def broken_column(rng: Random, content: bytes, rule: Rule) -> bytes | None:
     k = rng.choice(under)
     values = table.column(k).to_numpy().copy()
     values[rng.randrange(len(values))] = rng.choice(rule.values)
-    return _stored(table.set_column(k, table.schema.field(k), [values]))
+    return _store_table(table.set_column(k, table.schema.field(k), [values]))
 
 
-def _stored(table: pa.Table) -> bytes:
+def _store_table(table: pa.Table) -> bytes:
     out = io.BytesIO()
     pq.write_table(table, out)
     return out.getvalue()

@@ -18,7 +18,7 @@ from catalogs.scenes.gaussian_files import write_gaussians
 from tasks.campaign.campaign import CHANNELS
 
 
-def braking(samples: int = 120, rate: float = 100.0) -> dict[str, np.ndarray]:
+def make_stop(samples: int = 120, rate: float = 100.0) -> dict[str, np.ndarray]:
     """Measured columns of one stop, with a little noise."""
     draw = np.random.default_rng(5)
     t = np.arange(samples) / rate
@@ -38,7 +38,7 @@ def braking(samples: int = 120, rate: float = 100.0) -> dict[str, np.ndarray]:
     }
 
 
-def campaigns(folder: Path) -> None:
+def write_campaign(folder: Path) -> None:
     """A campaign of six runs."""
     names = [f"run-{k}" for k in range(6)]
     tolerances: dict[str, Any] = dict.fromkeys(
@@ -58,16 +58,16 @@ def campaigns(folder: Path) -> None:
         "hazard_height_m": 0.0,
     }  # fmt: skip
     write_file(folder / "0" / "campaign.yaml", yaml.safe_dump(header).encode())
-    write_file(folder / "0" / "runs.csv", _csv([{"run": name, **row} for name in names]))
+    write_file(folder / "0" / "runs.csv", _format_csv([{"run": name, **row} for name in names]))
     for name in names:
-        write_file(folder / "0" / "runs" / f"{name}.parquet", _parquet(braking()))
+        write_file(folder / "0" / "runs" / f"{name}.parquet", _format_parquet(make_stop()))
 
 
-def recordings(folder: Path) -> None:
+def write_recordings(folder: Path) -> None:
     """A log of each form with its channel map."""
     from catalogs.recordings import SUFFIXES
 
-    columns = braking()
+    columns = make_stop()
     units = {
         "brake_pressure": "MPa", "speed": "m/s", "longitudinal_acceleration": "m/s^2", "wheel_speed_front": "rad/s",
         "wheel_speed_rear": "rad/s", "pitch": "deg", "pitch_rate": "deg/s", "vertical_acceleration": "m/s^2",
@@ -82,14 +82,14 @@ def recordings(folder: Path) -> None:
         name: {"unit": units[name], "values": [[t, v] for t, v in zip(columns["time"], values, strict=True)]}
         for name, values in columns.items() if name != "time"
     }  # fmt: skip
-    forms = {"csv": _csv(rows), "parquet": _parquet(columns), "json": json.dumps(bus).encode()}
+    forms = {"csv": _format_csv(rows), "parquet": _format_parquet(columns), "json": json.dumps(bus).encode()}
     assert {f".{form}" for form in forms} <= set(SUFFIXES)
     for form, content in forms.items():
         write_file(folder / form / f"log.{form}", content)
         write_file(folder / form / "map.yaml", yaml.safe_dump(channel_map).encode())
 
 
-def references(folder: Path) -> None:
+def write_references(folder: Path) -> None:
     """Two reference traces with their conditions."""
     case = {
         "split": "development", "weather": "dry", "surface_coefficient": 0.8, "initial_speed_km_h": 40.0,
@@ -100,7 +100,7 @@ def references(folder: Path) -> None:
               for w in ("fl", "fr", "rl", "rr")}  # fmt: skip
     trace = {"time": t, "station": 10 * t, "speed": 11 - t, "pitch": 0.1 * t, **wheels}
     for name in ("a", "b"):
-        write_file(folder / "0" / f"{name}.parquet", _parquet(trace))
+        write_file(folder / "0" / f"{name}.parquet", _format_parquet(trace))
     write_file(
         folder / "0" / "cases.json", json.dumps([{"case": name} | case for name in ("a", "b")]).encode()
     )
@@ -120,13 +120,13 @@ def gaussian_files(folder: Path) -> None:
         )
 
 
-def imports(folder: Path) -> None:
+def write_import(folder: Path) -> None:
     """A cloud with a route of the same frame."""
     write_file(folder / "0" / "route.txt", trajectory_text().encode())
     write_gaussians(small_scene().gaussians, folder / "0" / "cloud.ply")
 
 
-def routes(folder: Path) -> None:
+def write_routes(folder: Path) -> None:
     """A straight route in every form."""
     poses = np.tile(np.eye(4), (6, 1, 1))
     poses[:, 2, 3] = np.arange(6) * 1.2
@@ -165,7 +165,7 @@ def stereo_folders(folder: Path) -> None:
             write_file(folder / "0" / side / f"{k:06d}.png", cv2.imencode(".png", picture)[1].tobytes())
 
 
-def videos(folder: Path) -> None:
+def write_videos(folder: Path) -> None:
     """Eight frames in two codecs."""
     draw = np.random.default_rng(3)
     for ending, codec in (("mp4", "mp4v"), ("avi", "MJPG")):
@@ -177,16 +177,16 @@ def videos(folder: Path) -> None:
         writer.release()
 
 
-def claims(folder: Path) -> None:
+def write_claims(folder: Path) -> None:
     """Claimed motion of a video, by station and by speed."""
     t = np.arange(20) * 0.05
     by_station = {"time": t, "pitch": 0.01 * t, "station": 10 * t}
     by_speed = {"t_ns": (t * 1e9).astype(np.int64), "pitch": 0.01 * t, "speed": 10 + t}
     for name, columns in (("station", by_station), ("speed", by_speed)):
-        write_file(folder / name / "claim.parquet", _parquet(columns))
+        write_file(folder / name / "claim.parquet", _format_parquet(columns))
 
 
-def _csv(rows: list[dict[str, Any]]) -> bytes:
+def _format_csv(rows: list[dict[str, Any]]) -> bytes:
     out = io.StringIO()
     writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
     writer.writeheader()
@@ -194,7 +194,7 @@ def _csv(rows: list[dict[str, Any]]) -> bytes:
     return out.getvalue().encode()
 
 
-def _parquet(columns: dict[str, np.ndarray]) -> bytes:
+def _format_parquet(columns: dict[str, np.ndarray]) -> bytes:
     out = io.BytesIO()
     pq.write_table(pa.table(columns), out)
     return out.getvalue()

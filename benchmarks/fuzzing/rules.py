@@ -32,10 +32,12 @@ class Rule:
     def holds_at(self, path: Path, value: Any) -> bool:
         """Whether a place of a sound document is under the rule."""
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        return (is_number or not self.numbers_only) and re.fullmatch(self.where, place(path)) is not None
+        return (is_number or not self.numbers_only) and re.fullmatch(
+            self.where, format_place(path)
+        ) is not None
 
 
-def place(path: Path) -> str:
+def format_place(path: Path) -> str:
     """A place in a document as text."""
     return "|".join(str(key) for key in path)
 
@@ -78,6 +80,6 @@ def hashes_keep_their_form(where: str) -> Rule:
     return Rule(name="hashes keep their form", where=where, values=WRONG_HASHES)
 
 
-def limits(where: str, *values: Any) -> Rule:
+def limit_values(where: str, *values: Any) -> Rule:
     """Numbers keep their physical limits; what a grid leaves out may lie beyond them."""
     return Rule(name="numbers keep their limits", where=rf"(?!exclude)(.*\|)?{where}", values=values)

@@ -12,9 +12,9 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 
 import catalogs
 from catalogs.scenes.folder import write_scene
-from flows.auditing.signing import sign
+from flows.auditing.signing import sign_dataset
 from flows.making import generate as making
-from manifests.frozen_run import sealed
+from manifests.frozen_run import seal_run
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians
@@ -86,7 +86,7 @@ def small_scene() -> Scene:
     )
 
 
-def entries(pattern: str, name: str = "entry.yaml") -> Writer:
+def copy_entries(pattern: str, name: str = "entry.yaml") -> Writer:
     """A writer of the catalogue files of one kind, each as the file of this name."""
 
     def write(folder: Path) -> None:
@@ -96,7 +96,7 @@ def entries(pattern: str, name: str = "entry.yaml") -> Writer:
     return write
 
 
-def texts(*variants: dict[str, str]) -> Writer:
+def write_texts(*variants: dict[str, str]) -> Writer:
     """A writer of documents given as text: file name to content."""
 
     def write(folder: Path) -> None:
@@ -107,13 +107,13 @@ def texts(*variants: dict[str, str]) -> Writer:
     return write
 
 
-def weather(folder: Path) -> None:
+def write_weather(folder: Path) -> None:
     for path in sorted((CATALOGUE / "weather").glob("*.yaml")):
         write_file(folder / "0" / path.name, path.read_bytes())
 
 
-def grids(folder: Path) -> None:
-    entries("grids/*.yaml", "grid.yaml")(folder)
+def write_grids(folder: Path) -> None:
+    copy_entries("grids/*.yaml", "grid.yaml")(folder)
     write_file(folder / "ways" / "grid.yaml", WAYS.encode())
 
 
@@ -125,26 +125,26 @@ def scene_folders(folder: Path) -> None:
     write_scene(small_scene(), folder / "0", {"held_out_psnr_db": 21.5})
 
 
-def dataset(folder: Path) -> None:
+def write_dataset(folder: Path) -> None:
     """A finished dataset without pictures."""
-    making.generate(str(_grid_beside(folder)), str(folder / "0"), runner="threads", workers=1)
+    making.generate_dataset(str(_grid_beside(folder)), str(folder / "0"), runner="threads", workers=1)
 
 
 def signed_dataset(folder: Path) -> None:
     """A finished dataset with a signature, and the key that made it."""
-    dataset(folder)
+    write_dataset(folder)
     key = Ed25519PrivateKey.from_private_bytes(bytes(range(32)))
     private = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     public = key.public_key().public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
     write_file(folder.parent / "key.pem", private)
-    sign(str(folder / "0"), key=str(folder.parent / "key.pem"))
+    sign_dataset(str(folder / "0"), key=str(folder.parent / "key.pem"))
     write_file(folder / "0" / "public.pem", public)
 
 
 def unfinished_dataset(folder: Path) -> None:
     """A dataset whose clips are made and not sealed."""
-    with patch.object(making, "seal", side_effect=InputError("stopped")), suppress(InputError):
-        making.generate(str(_grid_beside(folder)), str(folder / "0"), runner="threads", workers=1)
+    with patch.object(making, "seal_dataset", side_effect=InputError("stopped")), suppress(InputError):
+        making.generate_dataset(str(_grid_beside(folder)), str(folder / "0"), runner="threads", workers=1)
 
 
 def _grid_beside(folder: Path) -> Path:
@@ -161,7 +161,7 @@ def frozen_runs(folder: Path) -> None:
         run = json.loads((CATALOGUE.parent / "manifests" / "frozen" / f"{name}.json").read_bytes())
         run = {key: value for key, value in run.items() if key not in {"format", "seal"}}
         run["clips"] = run["clips"][:2]
-        write_file(folder / name / "run.json", json.dumps(sealed(run)).encode())
+        write_file(folder / name / "run.json", json.dumps(seal_run(run)).encode())
 
 
 def write_file(path: Path, content: bytes) -> None:

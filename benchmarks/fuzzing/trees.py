@@ -59,22 +59,26 @@ ODD_KEYS: tuple[Any, ...] = (
 )
 
 
-def written(tree: Any, yaml: bool) -> str:
+def format_tree(tree: Any, yaml: bool) -> str:
     """A tree as JSON, or as YAML in flow style."""
     if isinstance(tree, Raw):
         return tree
     if isinstance(tree, dict | Pairs):
         pairs = tree.items() if isinstance(tree, dict) else tree
-        return "{" + ", ".join(f"{_key(key, yaml)}: {written(value, yaml)}" for key, value in pairs) + "}"
+        return (
+            "{"
+            + ", ".join(f"{_format_key(key, yaml)}: {format_tree(value, yaml)}" for key, value in pairs)
+            + "}"
+        )
     if isinstance(tree, list):
-        return "[" + ", ".join(written(value, yaml) for value in tree) + "]"
+        return "[" + ", ".join(format_tree(value, yaml) for value in tree) + "]"
     if yaml and isinstance(tree, float):
         return _yaml_number(tree)
     return json.dumps(tree, default=str)
 
 
-def _key(key: Any, yaml: bool) -> str:
-    return written(key, yaml) if yaml or isinstance(key, str) else json.dumps(str(key))
+def _format_key(key: Any, yaml: bool) -> str:
+    return format_tree(key, yaml) if yaml or isinstance(key, str) else json.dumps(str(key))
 
 
 def _yaml_number(number: float) -> str:
@@ -85,40 +89,40 @@ def _yaml_number(number: float) -> str:
     return text if "." in text or "e" not in text else text.replace("e", ".0e")
 
 
-def places(tree: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+def list_places(tree: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     """Every place of a tree, its root first."""
     yield path, tree
     children = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
     for key, value in children:
-        yield from places(value, (*path, key))
+        yield from list_places(value, (*path, key))
 
 
-def changed(tree: Any, path: Path, change: Callable[[Any], Any]) -> Any:
+def change_value(tree: Any, path: Path, change: Callable[[Any], Any]) -> Any:
     """The tree with another value at one place."""
     if not path:
         return change(tree)
     key, rest = path[0], path[1:]
     if isinstance(tree, dict):
-        return {k: changed(v, rest, change) if k == key else v for k, v in tree.items()}
-    return [changed(v, rest, change) if k == key else v for k, v in enumerate(tree)]
+        return {k: change_value(v, rest, change) if k == key else v for k, v in tree.items()}
+    return [change_value(v, rest, change) if k == key else v for k, v in enumerate(tree)]
 
 
-def broken(rng: Random, tree: Any, rule: Rule) -> Any | None:
+def break_rule(rng: Random, tree: Any, rule: Rule) -> Any | None:
     """The tree with the rule broken at one place; None where it holds at none."""
-    under = [path for path, value in places(tree) if path and rule.holds_at(path, value)]
+    under = [path for path, value in list_places(tree) if path and rule.holds_at(path, value)]
     if not under:
         return None
     path, value = rng.choice(under), rng.choice(rule.values)
     if not rule.of_keys:
-        return changed(tree, path, lambda _: value)
-    return changed(
+        return change_value(tree, path, lambda _: value)
+    return change_value(
         tree, path[:-1], lambda node: {value if key == path[-1] else key: held for key, held in node.items()}
     )
 
 
 def with_key_twice(rng: Random, tree: Any) -> Any | None:
     """The tree with one key twice; None where there is no key."""
-    path = _mapping(rng, tree)
+    path = _pick_mapping(rng, tree)
     if path is None:
         return None
 
@@ -126,40 +130,42 @@ def with_key_twice(rng: Random, tree: Any) -> Any | None:
         key = rng.choice(list(node))
         return Pairs([*node.items(), (key, rng.choice([node[key], 1]))])
 
-    return changed(tree, path, double)
+    return change_value(tree, path, double)
 
 
 def with_unknown_key(rng: Random, tree: Any, maps: Callable[[Path], bool]) -> Any | None:
     """The tree with a key that nobody knows, in a mapping whose place ``maps`` takes."""
-    path = _mapping(rng, tree, maps)
-    return None if path is None else changed(tree, path, lambda node: {**node, "no_such_key": 1})
+    path = _pick_mapping(rng, tree, maps)
+    return None if path is None else change_value(tree, path, lambda node: {**node, "no_such_key": 1})
 
 
-def odd(rng: Random, tree: Any, yaml: bool) -> Any:
+def change_oddly(rng: Random, tree: Any, yaml: bool) -> Any:
     """The tree with something unexpected at one place."""
-    path, value = rng.choice(list(places(tree)))
+    path, value = rng.choice(list(list_places(tree)))
     match rng.randrange(8):
         case 0 if isinstance(value, dict) and value:
             gone = rng.choice(list(value))
-            return changed(tree, path, lambda node: {k: v for k, v in node.items() if k != gone})
+            return change_value(tree, path, lambda node: {k: v for k, v in node.items() if k != gone})
         case 1 if isinstance(value, dict) and value:
             old, new = rng.choice(list(value)), rng.choice(ODD_KEYS)
-            return changed(tree, path, lambda node: {new if k == old else k: v for k, v in node.items()})
+            return change_value(tree, path, lambda node: {new if k == old else k: v for k, v in node.items()})
         case 2 if isinstance(value, list) and value:
-            return changed(tree, path, lambda node: node[: rng.randrange(len(node))])
+            return change_value(tree, path, lambda node: node[: rng.randrange(len(node))])
         case 3 if isinstance(value, list) and value:
-            return changed(tree, path, lambda node: [*node, *[rng.choice(node)] * rng.choice([1, 3, 300])])
+            return change_value(
+                tree, path, lambda node: [*node, *[rng.choice(node)] * rng.choice([1, 3, 300])]
+            )
         case 4 if isinstance(value, int | float):
-            return changed(
+            return change_value(
                 tree, path, lambda node: rng.choice([-node, node * 1e6, node * 1e-6, str(node), [node]])
             )
         case 5:
-            _, other = rng.choice(list(places(tree)))
-            return changed(tree, path, lambda _: other)
+            _, other = rng.choice(list(list_places(tree)))
+            return change_value(tree, path, lambda _: other)
     choice = rng.choice(ODD_IN_YAML if yaml and rng.random() < 0.3 else ODD)
-    return changed(tree, path, lambda _: choice)
+    return change_value(tree, path, lambda _: choice)
 
 
-def _mapping(rng: Random, tree: Any, maps: Callable[[Path], bool] = lambda _: True) -> Path | None:
-    found = [path for path, value in places(tree) if isinstance(value, dict) and value and maps(path)]
+def _pick_mapping(rng: Random, tree: Any, maps: Callable[[Path], bool] = lambda _: True) -> Path | None:
+    found = [path for path, value in list_places(tree) if isinstance(value, dict) and value and maps(path)]
     return rng.choice(found) if found else None

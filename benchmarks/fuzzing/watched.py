@@ -67,7 +67,7 @@ def read_input(documents: Documents, made: Input, folder: Path) -> tuple[Outcome
     try:
         for name, content in made.changed.items():
             (folder / name).write_bytes(content)
-        return _read(parser, folder, made.broken)
+        return _read_documents(parser, folder, made.broken)
     finally:
         if parser.writes:
             shutil.rmtree(folder)
@@ -76,7 +76,7 @@ def read_input(documents: Documents, made: Input, folder: Path) -> tuple[Outcome
             (folder / name).write_bytes(sound[name])
 
 
-def _read(parser: Parser, folder: Path, broken: str | None) -> tuple[Outcome, str]:
+def _read_documents(parser: Parser, folder: Path, broken: str | None) -> tuple[Outcome, str]:
     try:
         parser.read(folder)
     except InputError as error:
@@ -87,11 +87,14 @@ def _read(parser: Parser, folder: Path, broken: str | None) -> tuple[Outcome, st
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
-        return "traceback", f"{_place(error)} {type(error).__name__}: {' '.join(str(error).split())[:120]}"
+        return (
+            "traceback",
+            f"{_find_place(error)} {type(error).__name__}: {' '.join(str(error).split())[:120]}",
+        )
     return ("silent", f"accepted although {broken}") if broken else ("accepted", "")
 
 
-def _place(error: BaseException) -> str:
+def _find_place(error: BaseException) -> str:
     """File and line of the project from which an exception comes."""
     root = Path(__file__).parents[2]
     own = [
@@ -111,7 +114,7 @@ def lay_out(files: dict[str, bytes], folder: Path) -> None:
         (folder / name).write_bytes(content)
 
 
-def prepare(parsers: Sequence[Parser], shelf: Path) -> None:
+def write_documents(parsers: Sequence[Parser], shelf: Path) -> None:
     """Write the sound documents of the parsers, a folder each, and see that their loaders take them."""
     for parser in parsers:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
@@ -127,7 +130,7 @@ class Desk:
 
     Parameters
     ----------
-    shelf : where `prepare` wrote them
+    shelf : where `write_documents` wrote them
     place : scratch folder
     """
 
@@ -162,7 +165,7 @@ def read_watched(
     Parameters
     ----------
     plan : parser names and the numbers of their inputs
-    shelf : where `prepare` wrote the sound documents
+    shelf : where `write_documents` wrote the sound documents
     seed : of all inputs
     workers : processes
     """
@@ -178,7 +181,7 @@ def read_watched(
             while waiting and len(staff) < workers:
                 staff.append(_Worker(shelf, seed))
                 staff[-1].give(waiting.pop())
-            for worker in _ready(staff):
+            for worker in _list_ready(staff):
                 reading = worker.collect()
                 if reading is not None:
                     yield reading
@@ -196,7 +199,7 @@ def read_watched(
             worker.stop()
 
 
-def _ready(staff: "list[_Worker]") -> "list[_Worker]":
+def _list_ready(staff: "list[_Worker]") -> "list[_Worker]":
     """The workers that have something to tell, or are silent for too long."""
     speaking = wait([worker.line for worker in staff], timeout=1.0)
     return [worker for worker in staff if worker.line in speaking or worker.is_late]
@@ -208,7 +211,7 @@ class _Worker:
     def __init__(self, shelf: Path, seed: int):
         context = get_context(START)
         self.line, other = context.Pipe()
-        self._process = context.Process(target=_serve, args=(other, str(shelf), seed), daemon=True)
+        self._process = context.Process(target=_serve_inputs, args=(other, str(shelf), seed), daemon=True)
         self._process.start()
         other.close()
         self.alive, self.parser, self.left, self.peak_bytes = True, "", range(0), 0
@@ -272,7 +275,7 @@ def _cpu_seconds(process: int | None) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def _serve(line: Connection, shelf: str, seed: int) -> None:
+def _serve_inputs(line: Connection, shelf: str, seed: int) -> None:
     """Read inputs as they are asked for, until the line is closed."""
     silence = os.open(os.devnull, os.O_WRONLY)
     for channel in (1, 2):  # C libraries tell of damaged files there
@@ -286,7 +289,7 @@ def _serve(line: Connection, shelf: str, seed: int) -> None:
             desk.open(name)
             line.send(None)
             for number in numbers:
-                line.send(_reading(desk, name, seed, number))
+                line.send(_make_reading(desk, name, seed, number))
 
 
 def read_peak() -> int:
@@ -295,7 +298,7 @@ def read_peak() -> int:
     return int(re.findall(r"^VmHWM:\s+(\d+) kB$", status, flags=re.MULTILINE)[0]) * 1024
 
 
-def _reading(desk: Desk, name: str, seed: int, number: int) -> Reading:
+def _make_reading(desk: Desk, name: str, seed: int, number: int) -> Reading:
     before, cpu = time.monotonic(), time.process_time()
     _, outcome, detail = desk.read(name, seed, number)
     seconds, worked = time.monotonic() - before, time.process_time() - cpu
@@ -310,7 +313,7 @@ def _reading(desk: Desk, name: str, seed: int, number: int) -> Reading:
     )  # fmt: skip
 
 
-def counted(readings: Sequence[Reading]) -> dict[str, Any]:
+def count_outcomes(readings: Sequence[Reading]) -> dict[str, Any]:
     """Outcomes of one parser's inputs, their CPU time [s] and the largest process [MiB]."""
     outcomes = ("refused", "accepted", *FINDINGS)
     return {

@@ -51,15 +51,17 @@ def cheap_clips() -> Iterator[None]:
     """Clips whose motion is worked out once and whose pictures are noise keyed by the clip's seed."""
     with (
         mock.patch.object(flows.making.generate, "make_plan", lru_cache(make_plan)),
-        mock.patch.object(flows.making.clip, "drive", _memoised(flows.making.driving.drive)),
-        mock.patch.object(flows.making.clip, "ranges_of", _memoised(flows.making.driving.ranges_of)),
-        mock.patch.object(flows.making.clip, "picture", _draw_noise),
-        mock.patch.object(flows.making.clip, "judge", _judge_nothing),
+        mock.patch.object(
+            flows.making.clip, "simulate_drive", _memoise_function(flows.making.driving.simulate_drive)
+        ),
+        mock.patch.object(flows.making.clip, "ranges_of", _memoise_function(flows.making.driving.ranges_of)),
+        mock.patch.object(flows.making.clip, "render_frames", _draw_noise),
+        mock.patch.object(flows.making.clip, "check_poses", _judge_nothing),
     ):
         yield
 
 
-def _memoised(function: Any) -> Any:
+def _memoise_function(function: Any) -> Any:
     known: dict[Any, Any] = {}
 
     def remembered(scenario: Any, *rest: Any) -> Any:
@@ -80,11 +82,11 @@ def _draw_noise(
     seed: int,
     rig_at: Any,
 ) -> dict[str, Any]:
-    return _noise(seed, plan.settings.frames, catalogue.camera.height, catalogue.camera.width)
+    return _make_noise(seed, plan.settings.frames, catalogue.camera.height, catalogue.camera.width)
 
 
 @lru_cache
-def _noise(seed: int, frames: int, height: int, width: int) -> dict[str, Any]:
+def _make_noise(seed: int, frames: int, height: int, width: int) -> dict[str, Any]:
     draw = np.random.Generator(np.random.Philox(seed))
     shape = (frames, height, width)
     return {

@@ -17,12 +17,12 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from benchmarks.store_faults.clips import write_grid
 from benchmarks.store_faults.disk import FAULTS, FaultyDisk, Killed
-from flows.auditing.repair import repair
-from flows.auditing.verify import gc, verify
-from flows.making.generate import generate
+from flows.auditing.repair import repair_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
+from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
-from flows.reading.describe import describe
-from flows.reading.query import sql
+from flows.reading.describe import describe_dataset
+from flows.reading.query import query_dataset
 from flows.running.failures import ClipsFailed
 from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout
@@ -49,16 +49,16 @@ def inputs_folder() -> Path:
 
 
 @lru_cache(maxsize=1)
-def undisturbed() -> dict[str, bytes]:
+def make_undisturbed() -> dict[str, bytes]:
     """The files of a run that nothing disturbs."""
     folder = inputs_folder() / "undisturbed"
-    make(folder)
+    make_dataset(folder)
     return files_of(folder)
 
 
-def make(place: Path | str) -> None:
+def make_dataset(place: Path | str) -> None:
     """Make the dataset in a folder or at an address, or what is missing of it."""
-    generate(str(inputs_folder() / "grid.yaml"), str(place), runner="threads", workers=1)
+    generate_dataset(str(inputs_folder() / "grid.yaml"), str(place), runner="threads", workers=1)
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
@@ -82,15 +82,15 @@ class FolderMachine(RuleBasedStateMachine):
 
     @initialize()
     def _know_the_undisturbed_run(self) -> None:
-        undisturbed()
+        make_undisturbed()
 
     def teardown(self) -> None:
         """After all the faults, an undisturbed repair and run give the bytes of the undisturbed run."""
         try:
             if self.damaged:
                 self._repair()
-            make(self.folder)
-            now, wanted = files_of(self.folder), undisturbed()
+            make_dataset(self.folder)
+            now, wanted = files_of(self.folder), make_undisturbed()
             differing = sorted(name for name in now.keys() | wanted if now.get(name) != wanted.get(name))
             assert not differing, f"not the bytes of the undisturbed run: {differing}"
             COUNTS["finished with equal bytes"] += 1
@@ -99,7 +99,7 @@ class FolderMachine(RuleBasedStateMachine):
 
     @rule(fault=faults, seed=st.integers(0, 2**16))
     def generate(self, fault: tuple[str | None, int], seed: int) -> None:
-        self._under(fault, seed, lambda: make(self.folder))
+        self._under(fault, seed, lambda: make_dataset(self.folder))
 
     @precondition(lambda self: self.layout.manifest.is_file())
     @rule(fault=faults, seed=st.integers(0, 2**16))
@@ -119,27 +119,27 @@ class FolderMachine(RuleBasedStateMachine):
             self._look()
 
         with FaultyDisk(self.place, at=at, meanwhile=come):
-            self._attempt(lambda: make(self.folder))
+            self._attempt(lambda: make_dataset(self.folder))
 
     @precondition(lambda self: self.layout.manifest.is_file())
     @rule(data=st.data())
     def flip_a_bit(self, data: st.DataObject) -> None:
         names = sorted(
-            name for name in undisturbed() if name != "manifest.json" and (self.folder / name).is_file()
+            name for name in make_undisturbed() if name != "manifest.json" and (self.folder / name).is_file()
         )
         name = data.draw(st.sampled_from(names))
         content = bytearray((self.folder / name).read_bytes())
         bit = data.draw(st.integers(0, 8 * len(content) - 1))
         content[bit // 8] ^= 1 << bit % 8
         (self.folder / name).write_bytes(content)
-        self.damaged ^= {name} if bytes(content) == undisturbed()[name] else set()
-        self.damaged |= {name} if bytes(content) != undisturbed()[name] else set()
+        self.damaged ^= {name} if bytes(content) == make_undisturbed()[name] else set()
+        self.damaged |= {name} if bytes(content) != make_undisturbed()[name] else set()
         COUNTS["flipped bits"] += 1
 
     @precondition(lambda self: self.layout.manifest.is_file())
     @rule(data=st.data())
     def lose_a_file(self, data: st.DataObject) -> None:
-        name = data.draw(st.sampled_from(sorted(undisturbed().keys() - {"manifest.json"})))
+        name = data.draw(st.sampled_from(sorted(make_undisturbed().keys() - {"manifest.json"})))
         (self.folder / name).unlink(missing_ok=True)
         self.damaged.add(name)
         COUNTS["lost files"] += 1
@@ -166,11 +166,11 @@ class FolderMachine(RuleBasedStateMachine):
     def _look(self) -> None:
         COUNTS["looks"] += 1
         if self.layout.manifest.is_file():
-            wrong = {name for name, content in undisturbed().items() if self._bytes(name) != content}
+            wrong = {name for name, content in make_undisturbed().items() if self._bytes(name) != content}
             assert wrong <= self.damaged, (
                 f"{sorted(wrong - self.damaged)} are not those of the undisturbed run"
             )
-            named = {row["path"] for row in verify(str(self.folder))["damaged"]}
+            named = {row["path"] for row in verify_dataset(str(self.folder))["damaged"]}
             assert wrong <= named, f"verify does not name {sorted(wrong - named)}"
             if not wrong:
                 self._read()
@@ -223,22 +223,24 @@ class FolderMachine(RuleBasedStateMachine):
             COUNTS["refused"] += 1
 
     def _generate(self) -> None:
-        make(self.folder)
+        make_dataset(self.folder)
 
     def _gc(self) -> None:
-        gc(str(self.folder))
+        collect_garbage(str(self.folder))
 
     def _verify(self) -> None:
-        verify(str(self.folder))
+        verify_dataset(str(self.folder))
 
     def _repair(self) -> None:
-        result = repair(str(self.folder), runner="threads", workers=1)
+        result = repair_dataset(str(self.folder), runner="threads", workers=1)
         if result["repaired"]:
             self.damaged = set()
 
     def _read(self) -> None:
-        assert len(describe(str(self.folder))["clips"]) == len(_plan_ids())
-        rows = sql(str(self.folder), "SELECT clip_id, count(*) AS ticks FROM ticks GROUP BY clip_id")["rows"]
+        assert len(describe_dataset(str(self.folder))["clips"]) == len(_plan_ids())
+        rows = query_dataset(
+            str(self.folder), "SELECT clip_id, count(*) AS ticks FROM ticks GROUP BY clip_id"
+        )["rows"]
         assert {row["clip_id"] for row in rows} == _plan_ids() and {row["ticks"] for row in rows} == {201}
         assert read_clip(self.layout.frames, 0, "rgb").any()
 

@@ -17,10 +17,10 @@ from obstore.store import MemoryStore
 
 import flows.store.lease
 from benchmarks.store_faults.disk import Killed
-from benchmarks.store_faults.folder_machine import COUNTS, Told, make, undisturbed
-from flows.auditing.repair import repair
-from flows.auditing.verify import gc, verify
-from flows.reading.describe import describe
+from benchmarks.store_faults.folder_machine import COUNTS, Told, make_dataset, make_undisturbed
+from flows.auditing.repair import repair_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
+from flows.reading.describe import describe_dataset
 from flows.store.lease import LOCK
 from flows.store.objects import Objects
 
@@ -95,32 +95,32 @@ class ObjectsMachine(RuleBasedStateMachine):
 
     @initialize()
     def _know_the_undisturbed_run(self) -> None:
-        undisturbed()
+        make_undisturbed()
 
     def teardown(self) -> None:
         """After all the faults, an undisturbed repair and run give the objects of the undisturbed run."""
         try:
             with self._simulated(FaultyRequests(None, 0)):
                 if "manifest.json" in self._names() and self._differing():
-                    repair(ADDRESS, runner="threads", workers=1)
-                make(ADDRESS)
-                gc(ADDRESS)
-            assert not self._differing() and self._names() == undisturbed().keys()
+                    repair_dataset(ADDRESS, runner="threads", workers=1)
+                make_dataset(ADDRESS)
+                collect_garbage(ADDRESS)
+            assert not self._differing() and self._names() == make_undisturbed().keys()
             COUNTS["finished with equal bytes"] += 1
         finally:
             shutil.rmtree(self.place)
 
     @rule(fault=faults, elsewhere=st.booleans())
     def generate(self, fault: tuple[str | None, int], elsewhere: bool) -> None:
-        self._under(fault, elsewhere, lambda: make(ADDRESS))
+        self._under(fault, elsewhere, lambda: make_dataset(ADDRESS))
 
     @rule(fault=faults, elsewhere=st.booleans())
     def gc(self, fault: tuple[str | None, int], elsewhere: bool) -> None:
-        self._under(fault, elsewhere, lambda: gc(ADDRESS))
+        self._under(fault, elsewhere, lambda: collect_garbage(ADDRESS))
 
     @rule(fault=faults, elsewhere=st.booleans())
     def repair(self, fault: tuple[str | None, int], elsewhere: bool) -> None:
-        self._under(fault, elsewhere, lambda: repair(ADDRESS, runner="threads", workers=1))
+        self._under(fault, elsewhere, lambda: repair_dataset(ADDRESS, runner="threads", workers=1))
 
     @rule()
     def lock_of_an_owner_that_is_gone(self) -> None:
@@ -141,7 +141,7 @@ class ObjectsMachine(RuleBasedStateMachine):
     def lose_an_object(self, data: st.DataObject) -> None:
         if "manifest.json" in self._names():
             obstore.delete(
-                self.store, data.draw(st.sampled_from(sorted(undisturbed().keys() - {"manifest.json"})))
+                self.store, data.draw(st.sampled_from(sorted(make_undisturbed().keys() - {"manifest.json"})))
             )
             COUNTS["lost files"] += 1
 
@@ -153,9 +153,9 @@ class ObjectsMachine(RuleBasedStateMachine):
             self.committed = set()
             with self._simulated(FaultyRequests(None, 0)):
                 if not self._differing():
-                    assert len(describe(ADDRESS)["clips"]) == 4
+                    assert len(describe_dataset(ADDRESS)["clips"]) == 4
                 else:
-                    named = {row["path"] for row in verify(ADDRESS)["damaged"]}
+                    named = {row["path"] for row in verify_dataset(ADDRESS)["damaged"]}
                     assert self._differing() <= named
             return
         now = {name for name in names if name.startswith(".staging/") and name.endswith(".json")}
@@ -173,7 +173,7 @@ class ObjectsMachine(RuleBasedStateMachine):
         names = self._names()
         return {
             name
-            for name, content in undisturbed().items()
+            for name, content in make_undisturbed().items()
             if name not in names or bytes(obstore.get(self.store, name).bytes()) != content
         }
 

@@ -8,8 +8,6 @@ from pydantic import Field, model_validator
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Number, Text, read_entry
 
-FOLDER = Path(__file__).parent
-
 
 class BumpWindow(CatalogueEntry):
     """A stretch of the run with one road feature [s]."""
@@ -28,7 +26,7 @@ class BumpWindow(CatalogueEntry):
 
 
 class BumpStudy(CatalogueEntry):
-    """What a study file must hold; the first window calibrates the car."""
+    """Content of a study file; the first window calibrates the car."""
 
     run: Text
     windows: Annotated[tuple[BumpWindow, ...], Field(min_length=1)]
@@ -42,4 +40,4 @@ def load_bump_study(name_or_path: str | Path) -> BumpStudy:
     InputError
         Listing every problem of the file, or the studies that exist.
     """
-    return read_entry(BumpStudy, find_entry(FOLDER, name_or_path, "bump study"), "bump study")
+    return read_entry(BumpStudy, find_entry("bump study", name_or_path), "bump study")

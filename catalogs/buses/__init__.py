@@ -6,31 +6,30 @@ from typing import Annotated
 from pydantic import Field, field_validator, model_validator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Table, Text, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, Text, read_entry, require_quantity
 from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
 from tasks.studies.brake_dive import DiveModel
 from tasks.studies.bus_drive import Bus, BusSignal, DriveStyle
 
-FOLDER = Path(__file__).parent
 Positive = Annotated[float, Field(strict=True, gt=0)]
-Share = Annotated[Scalar, checked("1", minimum=0, maximum=1)]
-Ratio = Annotated[Scalar, checked("1", above=0)]
-Seconds = Annotated[Table, checked("s", above=0)]
+Share = Annotated[Scalar, require_quantity("1", minimum=0, maximum=1)]
+Ratio = Annotated[Scalar, require_quantity("1", above=0)]
+Seconds = Annotated[Table, require_quantity("s", above=0)]
 
 
 class TruthEntry(CatalogueEntry):
-    """The car that drives; the meanings stand at ``DiveModel``."""
+    """The car that drives; the meanings are given by ``DiveModel``."""
 
-    brake_gain: Annotated[Scalar, checked("N m MPa-1", above=0)]
+    brake_gain: Annotated[Scalar, require_quantity("N m MPa-1", above=0)]
     stiffness: Ratio
     damping_ratio: Ratio
 
 
 class EventsEntry(CatalogueEntry):
-    """How it brakes; the meanings stand at ``DriveStyle``."""
+    """How it brakes; the meanings are given by ``DriveStyle``."""
 
-    start_speed: Annotated[Table, checked("km h-1", above=0)]
-    peak_pressure: Annotated[Table, checked("bar", above=0)]
+    start_speed: Annotated[Table, require_quantity("km h-1", above=0)]
+    peak_pressure: Annotated[Table, require_quantity("bar", above=0)]
     ramp: Seconds
     hold: Seconds
     release: Seconds
@@ -38,7 +37,7 @@ class EventsEntry(CatalogueEntry):
     rough_share: Share
     dragging_share: Share
     lift_share: Share
-    slope: Annotated[Scalar, checked("deg", minimum=0)]
+    slope: Annotated[Scalar, require_quantity("deg", minimum=0)]
 
     @field_validator("start_speed", "peak_pressure", "ramp", "hold", "release")
     @classmethod
@@ -49,7 +48,7 @@ class EventsEntry(CatalogueEntry):
 
 
 class SignalEntry(CatalogueEntry):
-    """One signal; the meanings stand at ``BusSignal``."""
+    """One signal; the meanings are given by ``BusSignal``."""
 
     name: Text
     channel: Text
@@ -72,7 +71,7 @@ class SignalEntry(CatalogueEntry):
 
 
 class BusEntry(CatalogueEntry):
-    """What a bus file must hold."""
+    """Content of a bus file."""
 
     truth: TruthEntry
     events: EventsEntry
@@ -87,7 +86,7 @@ def load_bus(name_or_path: str | Path = "a2d2-like") -> Bus:
     InputError
         Listing every problem of the file, or the buses that exist.
     """
-    entry = read_entry(BusEntry, find_entry(FOLDER, name_or_path, "bus"), "bus")
+    entry = read_entry(BusEntry, find_entry("bus", name_or_path), "bus")
     events = entry.events
 
     def pair(table: Table, factor: float = 1.0) -> tuple[float, float]:

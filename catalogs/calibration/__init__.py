@@ -8,31 +8,29 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, read_entry, require_quantity
 from catalogs.vehicles import vehicle_units
 from tasks.identification.calibration.residual import Phase, Response, Yardstick
 from tasks.identification.calibration.scalars import KNOT_GROUPS
 from tasks.identification.calibration.staged import Bounds, Procedure, Stage
 from tasks.vehicle.effects.table import EFFECT_UNITS
 
-FOLDER = Path(__file__).parent
-
-Count = Annotated[Scalar, checked("1", minimum=1)]
+Count = Annotated[Scalar, require_quantity("1", minimum=1)]
 
 
 class ScalesEntry(CatalogueEntry):
-    """Size of one unit of each response; the meanings stand at ``Yardstick``."""
+    """Size of one unit of each response; the meanings are given by ``Yardstick``."""
 
-    speed: Annotated[Scalar, checked("m s-1", above=0)]
-    speed_drop: Annotated[Scalar, checked("m s-1", above=0)]
-    pitch: Annotated[Scalar, checked("deg", above=0)]
-    slip: Annotated[Scalar, checked("1", above=0)]
-    wheel_load: Annotated[Scalar, checked("N", above=0)]
-    stop: Annotated[Scalar, checked("m", above=0)]
+    speed: Annotated[Scalar, require_quantity("m s-1", above=0)]
+    speed_drop: Annotated[Scalar, require_quantity("m s-1", above=0)]
+    pitch: Annotated[Scalar, require_quantity("deg", above=0)]
+    slip: Annotated[Scalar, require_quantity("1", above=0)]
+    wheel_load: Annotated[Scalar, require_quantity("N", above=0)]
+    stop: Annotated[Scalar, require_quantity("m", above=0)]
 
 
 class BoundsEntry(CatalogueEntry):
-    """Limits and difference step of a group; the meanings stand at ``Bounds``."""
+    """Limits and difference step of a group; the meanings are given by ``Bounds``."""
 
     unit: Text
     lower: Number
@@ -53,7 +51,7 @@ class BoundsEntry(CatalogueEntry):
 
 
 class StageEntry(CatalogueEntry):
-    """One stage; the meanings stand at ``Stage``."""
+    """One stage; the meanings are given by ``Stage``."""
 
     name: Text
     groups: tuple[Text, ...]
@@ -70,17 +68,17 @@ def _group_units() -> dict[str, str]:
 
 
 class ProcedureEntry(CatalogueEntry):
-    """A whole procedure; the meanings stand at ``Procedure``."""
+    """A whole procedure; the meanings are given by ``Procedure``."""
 
     mode: Literal["paper", "coupled"]
     passes: Count
     evaluations: Count
-    start: Annotated[Scalar, checked("s", above=0)]
-    settle: Annotated[Scalar, checked("s", minimum=0)]
-    tail_speed: Annotated[Scalar, checked("m s-1", above=0)]
-    slip_speed: Annotated[Scalar, checked("m s-1", minimum=0)]
-    interval: Annotated[Scalar, checked("s", above=0)]
-    margin: Annotated[Scalar, checked("s", above=0)]
+    start: Annotated[Scalar, require_quantity("s", above=0)]
+    settle: Annotated[Scalar, require_quantity("s", minimum=0)]
+    tail_speed: Annotated[Scalar, require_quantity("m s-1", above=0)]
+    slip_speed: Annotated[Scalar, require_quantity("m s-1", minimum=0)]
+    interval: Annotated[Scalar, require_quantity("s", above=0)]
+    margin: Annotated[Scalar, require_quantity("s", above=0)]
     scales: ScalesEntry
     bounds: dict[Text, BoundsEntry]
     stages: tuple[StageEntry, ...]
@@ -106,17 +104,6 @@ class ProcedureEntry(CatalogueEntry):
         return self
 
 
-def procedure_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a procedure.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "calibration procedure")
-
-
 def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
     """Read a procedure, and the spacing of the samples that count [s].
 
@@ -129,13 +116,15 @@ def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
     InputError
         Listing every problem of the file.
     """
-    entry = read_entry(ProcedureEntry, procedure_source(name_or_path), "calibration procedure")
+    entry = read_entry(
+        ProcedureEntry, find_entry("calibration procedure", name_or_path), "calibration procedure"
+    )
     procedure = Procedure(
         mode=entry.mode,
         stages=tuple(Stage(**dict(stage)) for stage in entry.stages),
         passes=int(entry.passes.value),
         evaluations=int(entry.evaluations.value),
-        bounds={group: _inside(bounds) for group, bounds in entry.bounds.items()},
+        bounds={group: _convert_bounds(bounds) for group, bounds in entry.bounds.items()},
         yardstick=Yardstick(
             scales={name: scale.value for name, scale in entry.scales},
             start_s=entry.start.value,
@@ -148,7 +137,7 @@ def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
     return procedure, entry.interval.value
 
 
-def _inside(entry: BoundsEntry) -> Bounds:
+def _convert_bounds(entry: BoundsEntry) -> Bounds:
     """SI inside: an angle comes in degrees and is handed on in radians."""
     unit, factor = ("rad", radians(1.0)) if entry.unit == "deg" else (entry.unit, 1.0)
     return Bounds(

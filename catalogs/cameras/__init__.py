@@ -8,17 +8,15 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
 from tasks.render.camera import Camera
 from tasks.render.lens import Lens
 from tasks.render.readout import sensor_field
 from tasks.render.sensor import Sensor
 
-FOLDER = Path(__file__).parent
-
-Pixels = Annotated[Scalar, checked("px", above=0)]
-Metres = Annotated[Scalar, checked("m")]
-Distortion = Annotated[Scalar, checked("1", minimum=-2, maximum=2)]
+Pixels = Annotated[Scalar, require_quantity("px", above=0)]
+Metres = Annotated[Scalar, require_quantity("m")]
+Distortion = Annotated[Scalar, require_quantity("1", minimum=-2, maximum=2)]
 NO_DISTORTION = Field(default=Scalar(value=0.0, unit="1", source="no distortion"))
 
 LOOKING_FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -26,24 +24,24 @@ LOOKING_FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 
 
 class CameraEntry(CatalogueEntry):
-    """What a camera file must hold."""
+    """Content of a camera file."""
 
     name: Text
-    width: Annotated[Scalar, checked("px", minimum=16, maximum=8192)]
-    height: Annotated[Scalar, checked("px", minimum=16, maximum=8192)]
+    width: Annotated[Scalar, require_quantity("px", minimum=16, maximum=8192)]
+    height: Annotated[Scalar, require_quantity("px", minimum=16, maximum=8192)]
     focal_length: Pixels
     behind_front_axle: Metres
     left_of_centre: Metres
-    height_above_road: Annotated[Scalar, checked("m", above=0)]
-    exposure: Annotated[Scalar, checked("s", above=0, maximum=0.1)]
-    pitch_down: Annotated[Scalar, checked("deg", minimum=-45, maximum=45)] = Field(
+    height_above_road: Annotated[Scalar, require_quantity("m", above=0)]
+    exposure: Annotated[Scalar, require_quantity("s", above=0, maximum=0.1)]
+    pitch_down: Annotated[Scalar, require_quantity("deg", minimum=-45, maximum=45)] = Field(
         default=Scalar(value=0.0, unit="deg", source="level mount")
     )
-    exposure_compensation: Annotated[Scalar, checked("EV", minimum=-8, maximum=8)] = Field(
+    exposure_compensation: Annotated[Scalar, require_quantity("EV", minimum=-8, maximum=8)] = Field(
         default=Scalar(value=0.0, unit="EV", source="as the clear clip")
     )
-    full_well: Annotated[Scalar, checked("e-", above=0)] | None = None
-    read_noise: Annotated[Scalar, checked("e-", minimum=0)] = Field(
+    full_well: Annotated[Scalar, require_quantity("e-", above=0)] | None = None
+    read_noise: Annotated[Scalar, require_quantity("e-", minimum=0)] = Field(
         default=Scalar(value=0.0, unit="e-", source="no noise")
     )
     k1: Distortion = NO_DISTORTION
@@ -51,21 +49,10 @@ class CameraEntry(CatalogueEntry):
     p1: Distortion = NO_DISTORTION
     p2: Distortion = NO_DISTORTION
     k3: Distortion = NO_DISTORTION
-    line_delay: Annotated[Scalar, checked("s", minimum=0, maximum=0.001)] = Field(
+    line_delay: Annotated[Scalar, require_quantity("s", minimum=0, maximum=0.001)] = Field(
         default=Scalar(value=0.0, unit="s", source="one shutter for all rows")
     )
     motion_blur: bool = False
-
-
-def camera_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a camera.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "camera")
 
 
 def load_camera(name_or_path: str | Path) -> Camera:
@@ -80,7 +67,7 @@ def load_camera(name_or_path: str | Path) -> Camera:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    entry = read_entry(CameraEntry, camera_source(name_or_path), "camera")
+    entry = read_entry(CameraEntry, find_entry("camera", name_or_path), "camera")
     width, height, f = int(entry.width.value), int(entry.height.value), entry.focal_length.value
     mount = np.eye(4)
     mount[:3, :3] = (

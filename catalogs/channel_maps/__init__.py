@@ -8,14 +8,14 @@ from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, fie
 
 from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
-from catalogs.names import LONGEST_NAME
+from catalogs.names import LONGEST_NAME, WeatherName
 from catalogs.quantities import CatalogueEntry, Number, Text
-from catalogs.sentences import brief, cap_problems, describe_rules, shorten
+from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
 from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
 from tasks.campaign.signals import ChannelRule, Gain
 from tasks.errors import InputError
+from tasks.surface.weather import DRY
 
-FOLDER = Path(__file__).parent
 HIGHEST_RATE = 1_000_000.0
 """Of a campaign [Hz]: a thousand times what a vehicle's bus gives."""
 Part = Literal["train", "held_out"]
@@ -33,7 +33,7 @@ class GainEntry(CatalogueEntry):
 
 
 class ChannelEntry(CatalogueEntry):
-    """Where one channel comes from; the meanings stand at ``ChannelRule``."""
+    """Where one channel comes from; the meanings are given by ``ChannelRule``."""
 
     source: Text | Annotated[tuple[Text, ...], Field(min_length=1)]
     unit: Text
@@ -72,9 +72,9 @@ class TimeEntry(CatalogueEntry):
 
 
 class Conditions(CatalogueEntry):
-    """What the logger does not know of a run; the columns of runs.csv."""
+    """Facts of a run that the logger does not know; the columns of runs.csv."""
 
-    weather: Literal["dry", "rain", "snow"] = "dry"
+    weather: WeatherName = DRY
     precipitation_mm_h: Number = 0.0
     snow_accumulation_h: Number = 0.0
     direction: Literal[1, -1] = 1
@@ -87,7 +87,7 @@ class Conditions(CatalogueEntry):
 def _check_inside(file: str) -> str:
     path = PurePosixPath(file)
     if path.is_absolute() or ".." in path.parts or not path.name or not file.isprintable():
-        raise ValueError(f"must be a file in the folder of the measurements; it is {brief(file)}")
+        raise ValueError(f"must be a file in the folder of the measurements; it is {shorten_value(file)}")
     return file
 
 
@@ -150,7 +150,7 @@ class CsvEntry(CatalogueEntry):
 
 
 class ChannelMap(CatalogueEntry):
-    """What a map file holds. Without ``runs`` and ``segment`` every file is one run."""
+    """Content of a channel map file. Without ``runs`` and ``segment`` every file is one run."""
 
     campaign: Text
     vehicle: Text
@@ -185,7 +185,7 @@ class ChannelMap(CatalogueEntry):
                     _ = entry.rule(name).factor
                 except InputError as error:
                     problems += [f"channel {name}: {problem}" for problem in error.problems]
-        return _refused(channels, problems)
+        return _note_problems(channels, problems)
 
     @field_validator("not_measured")
     @classmethod
@@ -200,20 +200,22 @@ class ChannelMap(CatalogueEntry):
                 for channel in MAIN_CHANNELS
                 if (channel.name in info.data["channels"]) == (channel.name in names)
             ]
-        return _refused(names, problems)
+        return _note_problems(names, problems)
 
     @field_validator("runs")
     @classmethod
     def _runs_stand_once(cls, runs: tuple[RunEntry, ...]) -> tuple[RunEntry, ...]:
         names = [run.name for run in runs]
         twice = sorted({name for name in names if names.count(name) > 1})
-        return _refused(runs, [f"run {name} stands twice" for name in twice])
+        return _note_problems(runs, [f"run {name} stands twice" for name in twice])
 
     @field_validator("segment")
     @classmethod
     def _is_in_place_of_runs(cls, segment: SegmentEntry | None, info: ValidationInfo) -> SegmentEntry | None:
         both = segment is not None and bool(info.data.get("runs"))
-        return _refused(segment, ["a map has either runs or segment; this one has both"] if both else [])
+        return _note_problems(
+            segment, ["a map has either runs or segment; this one has both"] if both else []
+        )
 
 
 class FaultyMap(InputError):
@@ -238,7 +240,7 @@ def _unknown_channels(names: Iterable[str]) -> list[str]:
     ]
 
 
-def _refused(value: Kept, problems: list[str]) -> Kept:
+def _note_problems(value: Kept, problems: list[str]) -> Kept:
     if problems:
         raise ValueError("; ".join(problems))
     return value
@@ -254,7 +256,7 @@ def load_channel_map(name_or_path: str | Path) -> tuple[ChannelMap, Path]:
     FaultyMap
         Listing every problem of the file.
     """
-    path = find_entry(FOLDER, name_or_path, "channel map")
+    path = find_entry("channel map", name_or_path)
     content = read_yaml(path, "channel map", finite=False)
     try:
         return ChannelMap.model_validate(content), path
@@ -268,17 +270,17 @@ def _readable_part(content: dict[str, Any]) -> ChannelMap | None:
     channels = {
         name: entry
         for name, given in (named if isinstance(named, dict) else {}).items()
-        if (entry := _part(ChannelEntry, given)) is not None
+        if (entry := _read_part(ChannelEntry, given)) is not None
     }
-    time, csv = _part(TimeEntry, content.get("time")), _part(CsvEntry, content.get("csv", {}))
+    time, csv = _read_part(TimeEntry, content.get("time")), _read_part(CsvEntry, content.get("csv", {}))
     listed = content.get("runs", [])
-    runs = [_part(RunEntry, given) for given in listed] if isinstance(listed, list) else [None]
+    runs = [_read_part(RunEntry, given) for given in listed] if isinstance(listed, list) else [None]
     if not channels or csv is None or None in runs or (time is None and "time" in content):
         return None
     return ChannelMap.model_construct(channels=channels, time=time, csv=csv, runs=tuple(runs))
 
 
-def _part(model: type[Entry], content: object) -> Entry | None:
+def _read_part(model: type[Entry], content: object) -> Entry | None:
     try:
         return model.model_validate(content)
     except ValidationError:

@@ -13,7 +13,7 @@ LIBRARY_FILE = Path(__file__).with_name("library.yaml")
 
 
 class EffectEntry(CatalogueEntry):
-    """One effect; the meanings stand at ``Effect``."""
+    """One effect; the meanings are given by ``Effect``."""
 
     name: Text
     effect_class: EffectClass = Field(alias="class")
@@ -39,7 +39,7 @@ def _check_names(entries: list[EffectEntry]) -> list[EffectEntry]:
 
 
 LIBRARY = TypeAdapter(Annotated[list[EffectEntry], AfterValidator(_check_names)])
-"""What the file must hold."""
+"""Content of the file."""
 
 
 def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
@@ -54,10 +54,10 @@ def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
     InputError
         With every rule the file breaks.
     """
-    return tuple(_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
+    return tuple(_make_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
 
 
-def _effect(entry: EffectEntry) -> Effect:
+def _make_effect(entry: EffectEntry) -> Effect:
     return Effect(
         name=entry.name, effect_class=entry.effect_class, variable=entry.variable, enters=entry.enters,
         parameters=tuple(PARAMETERS[name] for name in entry.parameters),

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from catalogs.effects import load_effects
 from catalogs.quantities import CatalogueEntry, Number, read_entry
-from catalogs.sentences import brief
+from catalogs.sentences import shorten_value
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.effects.slots import Slot
 
@@ -19,7 +19,7 @@ TRUTHS_FILE = Path(__file__).with_name("truths.yaml")
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What a synthetic car has.
+    """Effect that a synthetic car has.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ class OutsideEntry(CatalogueEntry):
         if self.port not in PORTS or self.variable not in VARIABLES:
             problems.append(
                 f"port must be of {', '.join(PORTS)} and variable of {', '.join(VARIABLES)}; they are"
-                f" {brief(self.port)} and {brief(self.variable)}"
+                f" {shorten_value(self.port)} and {shorten_value(self.variable)}"
             )
         steps = np.diff(self.at)
         if not (steps > 0).all() or not np.allclose(steps, steps[0]):
-            problems.append(f"at must ascend in equal steps; it is {brief(self.at)}")
+            problems.append(f"at must ascend in equal steps; it is {shorten_value(self.at)}")
         if len(self.value) != len(self.at):
             problems.append(f"value must have one number for each of at; there are {len(self.value)}")
         if problems:
@@ -78,7 +78,7 @@ def _library_names() -> dict[str, set[str]]:
 
 
 class TruthFile(CatalogueEntry):
-    """What the file must hold."""
+    """Content of the file."""
 
     library: dict[str, Annotated[dict[str, Number], Field(min_length=1)]]
     outside: dict[str, OutsideEntry]
@@ -117,7 +117,7 @@ def load_truths(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
         Truth(name=name, values=values, slots=(), left_out=()) for name, values in file.library.items()
     ]
     outside = [
-        Truth(name=name, values={}, slots=(_slot(form),), left_out=form.left_out)
+        Truth(name=name, values={}, slots=(_make_slot(form),), left_out=form.left_out)
         for name, form in file.outside.items()
     ]
     return (*library, *outside)
@@ -144,7 +144,7 @@ def load_sizes(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
     )
 
 
-def _slot(form: OutsideEntry) -> Slot:
+def _make_slot(form: OutsideEntry) -> Slot:
     return Slot(
         port=form.port,
         variable=form.variable,

@@ -7,7 +7,7 @@ from typing import Any
 
 from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
-from catalogs.grids.blocks import combinations, fields_set_by
+from catalogs.grids.blocks import fields_set_by, list_combinations
 from catalogs.grids.faults import read_form
 from catalogs.grids.form import GridFile
 from catalogs.grids.selection import CALIBRATION, facts_of, split_of
@@ -15,11 +15,10 @@ from catalogs.scenario import UNKNOWN_WEATHER, Scenario, range_problems, scenari
 from catalogs.sentences import cap_problems, shorten
 from tasks.errors import InputError
 
-__all__ = ["GRID_FOLDER", "FaultyGrid", "Grid", "GridFile", "expand_grid", "grid_names", "load_grid"]
+__all__ = ["FaultyGrid", "Grid", "GridFile", "expand_grid", "load_grid"]
 
 LONGEST_LABEL = 200
 """Bytes of a label [1]: with a suffix it is still a file name, of 255 bytes at most."""
-GRID_FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,11 +53,6 @@ class FaultyGrid(InputError):
         self.grid = grid
 
 
-def grid_names() -> list[str]:
-    """Names of the grids that ship with the project."""
-    return sorted(path.stem for path in GRID_FOLDER.glob("*.yaml"))
-
-
 def load_grid(source: str | Path) -> Grid:
     """Read and check a grid by catalogue name or file.
 
@@ -69,7 +63,7 @@ def load_grid(source: str | Path) -> Grid:
     FaultyGrid
         Listing every problem of the file at once.
     """
-    path = find_entry(GRID_FOLDER, source, "grid")
+    path = find_entry("grid", source)
     form = read_form(read_yaml(path, "grid", finite=False), path)
     problems = cap_problems(form.problems)
     grid = None if form.settings is None else Grid(settings=form.settings, scenarios=(), tags=())
@@ -87,11 +81,11 @@ def load_grid(source: str | Path) -> Grid:
 def expand_grid(settings: GridFile, place: str) -> Grid:
     """The product of the blocks, later ones over earlier ones over ``base``, less what is excluded, each checked."""
     base = fields_set_by(settings.base)
-    # a value that every level overrides is judged all the same: it stands in the file
+    # a value that every level overrides is checked too: it is in the file
     problems: dict[str, list[str]] = {problem: ["base"] for problem in range_problems(Scenario(**base))}
     scenarios, tags, left_out = [], [], 0
     labels: set[str] = set()
-    for combination in combinations(settings):
+    for combination in list_combinations(settings):
         label = "/".join(level for level, _ in combination)
         merged: dict[str, Any] = dict(base)
         for _, partial in combination:
@@ -120,10 +114,10 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
         problems["exclude leaves nothing to make"] = ["all"]
     grid = Grid(settings=settings, scenarios=tuple(scenarios), tags=tuple(tags), left_out=left_out)
     if problems:
-        told = [f"{shorten(place)}: scenario {_some(named)}: {rule}" for rule, named in problems.items()]
+        told = [f"{shorten(place)}: scenario {_name_some(named)}: {rule}" for rule, named in problems.items()]
         raise FaultyGrid(cap_problems(told), grid)
     return grid
 
 
-def _some(labels: list[str]) -> str:
+def _name_some(labels: list[str]) -> str:
     return shorten(labels[0]) if len(labels) == 1 else f"{shorten(labels[0])} and {len(labels) - 1} more"

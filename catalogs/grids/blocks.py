@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Mapping
 from itertools import product
 from math import prod
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from catalogs.names import Label
+from catalogs.names import Label, WeatherName
 from catalogs.scenario import NUMBERS
 from catalogs.sentences import shorten
 
@@ -33,7 +33,7 @@ Whole = Annotated[int, BeforeValidator(_refuse_boolean)]
 class PartialScenario(Strict):
     """The scenario fields that one level of an axis sets; the rest keep their defaults."""
 
-    weather: Literal["dry", "rain", "snow"] | None = None
+    weather: WeatherName | None = None
     precipitation_mm_h: Number | None = None
     snow_accumulation_h: Number | None = None
     initial_speed_km_h: Number | None = None
@@ -79,7 +79,7 @@ class LatinHypercube(Strict):
 
 
 class Blocks(Strict):
-    """What a grid multiplies; at least one block has to be there."""
+    """Blocks whose product is the grid; there must be at least one."""
 
     axes: Annotated[
         dict[Label, Levels], Field(description="Product: every level of each axis with every other.")
@@ -117,26 +117,26 @@ def count_combinations(blocks: Blocks) -> int:
     return prod(counts)
 
 
-def combinations(blocks: Blocks) -> Iterator[list[Level]]:
+def list_combinations(blocks: Blocks) -> Iterator[list[Level]]:
     """Every combination of the blocks' levels, each a list of (name, fields), in the order in which they are written.
 
     Parameters
     ----------
     blocks : to be multiplied: axes, then zip, then scenarios, then the hypercube
     """
-    factors = [[[level] for level in _levels(axis)] for axis in blocks.axes.values()]
+    factors = [[[level] for level in _list_levels(axis)] for axis in blocks.axes.values()]
     if blocks.zip:
-        steps = zip(*(_levels(axis) for axis in blocks.zip.values()), strict=True)
+        steps = zip(*(_list_levels(axis) for axis in blocks.zip.values()), strict=True)
         factors.append([list(step) for step in steps])
     if blocks.scenarios:
-        factors.append([[level] for level in _levels(blocks.scenarios)])
+        factors.append([[level] for level in _list_levels(blocks.scenarios)])
     if blocks.latin_hypercube:
-        factors.append([[level] for level in _drawn(blocks.latin_hypercube)])
+        factors.append([[level] for level in _draw_levels(blocks.latin_hypercube)])
     for combination in product(*factors):
         yield [level for part in combination for level in part]
 
 
-def _levels(axis: Mapping[str, PartialScenario]) -> list[Level]:
+def _list_levels(axis: Mapping[str, PartialScenario]) -> list[Level]:
     return [(name, fields_set_by(partial)) for name, partial in axis.items()]
 
 
@@ -150,7 +150,7 @@ def fields_set_by(partial: PartialScenario) -> dict[str, Any]:
     return {name: value for name, value in partial if value is not None}
 
 
-def _drawn(cube: LatinHypercube) -> list[Level]:
+def _draw_levels(cube: LatinHypercube) -> list[Level]:
     from scipy.stats import qmc  # its import takes longer than most commands
 
     low, high = zip(*cube.ranges.values(), strict=True)

@@ -1,4 +1,4 @@
-"""Reading a faulty grid as far as it goes: what is wrong is told and left out, so that the rest is checked too."""
+"""Reading a faulty grid as far as possible: faults are reported and left out, so that the rest is checked too."""
 
 from collections.abc import Iterable
 from copy import deepcopy
@@ -36,7 +36,7 @@ class GridForm:
 
 
 def read_form(content: dict[str, Any], path: Path) -> GridForm:
-    """The settings of a grid, and what is wrong with their form.
+    """Return the settings of a grid, and the problems of their form.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def read_form(content: dict[str, Any], path: Path) -> GridForm:
     kept = deepcopy(content)
     form = GridForm(settings=None)
     unknown: dict[Place, set[str]] = {}
-    for _ in range(4):  # what is left out can bring a rule about the whole to light, and that another
+    for _ in range(4):  # without a fault, a rule about the whole grid can fail, and then another
         try:
             settings = GridFile.model_validate(kept)
         except ValidationError as error:
@@ -68,7 +68,7 @@ def _known_keys(place: Place) -> Iterable[str]:
 
 
 def _leave_out(kept: dict[str, Any], place: Place, unknown: dict[Place, set[str]]) -> bool:
-    """Take out what is wrong; False where then it is open which scenarios there are.
+    """Remove the faulty parts; return False where the scenarios are then undetermined.
 
     A field of a level, or all of the level, is noted as unknown.
     """

@@ -1,4 +1,4 @@
-"""The form of a grid file, and the bounds of what one grid may ask for."""
+"""The form of a grid file, and limits on the size of one grid."""
 
 from typing import Annotated, Literal
 
@@ -43,7 +43,7 @@ class GridFile(Blocks):
     pictures: bool = True
     base: PartialScenario = PartialScenario()
     exclude: list[Condition] = Field(
-        default=[], description="Combinations to leave out: those that keep any of these."
+        default=[], description="Combinations to leave out: those that meet any of these conditions."
     )
     splits: dict[Name, Condition] = Field(
         default={}, description="Name to condition; a clip belongs to the first that it keeps."

@@ -2,12 +2,10 @@
 
 from typing import Any
 
-from catalogs.cameras import FOLDER as CAMERAS
+from catalogs.entries import entry_names
 from catalogs.grids import GridFile
 from catalogs.scenario import SCENARIO_FIELDS
 from catalogs.scenes import BUILT_IN
-from catalogs.surfaces import surface_names
-from catalogs.vehicles import vehicle_names
 from tasks.conventions import CHANNELS_BY_NAME
 
 
@@ -20,9 +18,9 @@ def grid_schema() -> dict[str, Any]:
         unit = f" [{channel.unit}]" if channel.unit else ""
         schema["$defs"]["PartialScenario"]["properties"][name]["description"] = f"{channel.description}{unit}"
     entries = {
-        "vehicle": vehicle_names(),
-        "surface": surface_names(),
-        "camera": sorted(path.stem for path in CAMERAS.glob("*.yaml")),
+        "vehicle": entry_names("vehicle"),
+        "surface": entry_names("surface"),
+        "camera": entry_names("camera"),
         "scene": BUILT_IN,
     }
     for name, known in entries.items():

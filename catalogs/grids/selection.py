@@ -55,11 +55,11 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
 
     def holds(self, facts: Mapping[str, Any]) -> bool:
         """Whether the facts of a scenario keep every line."""
-        return all(_keeps(facts[name], wanted) for name, wanted in self.root.items())
+        return all(_meets(facts[name], wanted) for name, wanted in self.root.items())
 
 
 def facts_of(scenario: Scenario) -> dict[str, Any]:
-    """What conditions are held against: the scenario's fields and its place in the calibrated range."""
+    """Return the facts that conditions test: the scenario's fields and its place in the calibrated range."""
     return scenario.as_row() | {CALIBRATION: calibration_tag(scenario, load_calibrated_range())}
 
 
@@ -68,7 +68,7 @@ def split_of(facts: Mapping[str, Any], splits: Mapping[str, Condition]) -> str |
     return next((name for name, condition in splits.items() if condition.holds(facts)), None)
 
 
-def _keeps(value: Any, wanted: Any) -> bool:
+def _meets(value: Any, wanted: Any) -> bool:
     if isinstance(wanted, Between):
         return wanted.holds(value)
     return value in wanted if isinstance(wanted, list) else value == wanted

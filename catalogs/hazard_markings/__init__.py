@@ -6,10 +6,8 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, read_entry, require_quantity
 from tasks.render.road_paint import HazardMarking
-
-FOLDER = Path(__file__).parent
 
 
 def _check_colour(table: Table) -> Table:
@@ -18,26 +16,15 @@ def _check_colour(table: Table) -> Table:
     return table
 
 
-Reflectance = Annotated[Table, checked("1", minimum=0, maximum=1), AfterValidator(_check_colour)]
+Reflectance = Annotated[Table, require_quantity("1", minimum=0, maximum=1), AfterValidator(_check_colour)]
 
 
 class MarkingEntry(CatalogueEntry):
-    """What a marking's file must hold; the meanings stand at ``HazardMarking``."""
+    """Content of a marking's file; `HazardMarking` gives the meanings."""
 
-    stripe_width: Annotated[Scalar, checked("m", above=0)]
+    stripe_width: Annotated[Scalar, require_quantity("m", above=0)]
     paint: Reflectance
     gap: Reflectance
-
-
-def marking_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a marking.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "hazard marking")
 
 
 def load_marking(name_or_path: str | Path) -> HazardMarking:
@@ -52,7 +39,7 @@ def load_marking(name_or_path: str | Path) -> HazardMarking:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    entry = read_entry(MarkingEntry, marking_source(name_or_path), "hazard marking")
+    entry = read_entry(MarkingEntry, find_entry("hazard marking", name_or_path), "hazard marking")
     red, green, blue = entry.paint.value
     dark_red, dark_green, dark_blue = entry.gap.value
     return HazardMarking(

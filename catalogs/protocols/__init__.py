@@ -6,17 +6,16 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, read_entry, require_quantity
 from tasks.campaign.events import Protocol, Rule
 from tasks.campaign.selection import QUANTITIES
 
-FOLDER = Path(__file__).parent
-Window = Annotated[Table, checked("s")]
-Count = Annotated[Scalar, checked("1", minimum=0)]
+Window = Annotated[Table, require_quantity("s")]
+Count = Annotated[Scalar, require_quantity("1", minimum=0)]
 
 
 class RuleEntry(CatalogueEntry):
-    """One selection rule; the meanings stand at ``Rule``."""
+    """One selection rule; the meanings are given by ``Rule``."""
 
     name: Text
     criterion: Text
@@ -41,15 +40,15 @@ class RuleEntry(CatalogueEntry):
 
 
 class ProtocolEntry(CatalogueEntry):
-    """What a protocol file must hold; the meanings stand at ``Protocol``."""
+    """Content of a protocol file; `Protocol` gives the meanings."""
 
-    onset_pressure: Annotated[Scalar, checked("MPa", above=0)]
-    merge_gap: Annotated[Scalar, checked("s", minimum=0)]
+    onset_pressure: Annotated[Scalar, require_quantity("MPa", above=0)]
+    merge_gap: Annotated[Scalar, require_quantity("s", minimum=0)]
     analysis_window: Window
     baseline_window: Window
     evaluation_window: Window
     quality_window: Window
-    fixed_damping_ratio: Annotated[Scalar, checked("1", above=0)]
+    fixed_damping_ratio: Annotated[Scalar, require_quantity("1", above=0)]
     paper_candidates: Count | None = None
     paper_retained: Count | None = None
     rules: Annotated[tuple[RuleEntry, ...], Field(min_length=1)]
@@ -74,7 +73,7 @@ def load_protocol(name_or_path: str | Path = "brake-dive") -> Protocol:
     InputError
         Listing every problem of the file, or the protocols that exist.
     """
-    path = find_entry(FOLDER, name_or_path, "protocol")
+    path = find_entry("protocol", name_or_path)
     entry = read_entry(ProtocolEntry, path, "protocol")
 
     def pair(window: Table) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Arrays of a scene folder: a .npy file has to be what the scene needs before memory is taken for it."""
+"""Arrays of a scene folder: a .npy file is checked before memory is allocated for it."""
 
 import math
 import os
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from catalogs.sentences import brief, shorten
+from catalogs.sentences import shorten, shorten_value
 from tasks.errors import InputError
 
 LONGEST_HEADER = 1024
@@ -43,8 +43,8 @@ def read_array(path: Path, dtype: type[np.generic], shape: tuple[int | None, ...
         if kind != np.dtype(dtype) or len(found) != len(shape) or any(b not in (None, a) for a, b in lengths):
             expected = ", ".join("N" if length is None else str(length) for length in shape)
             raise InputError(
-                f"{path}: must hold {np.dtype(dtype)} of shape [{expected}]; it announces {brief(kind)} of shape"
-                f" {brief(list(found))}"
+                f"{path}: must hold {np.dtype(dtype)} of shape [{expected}]; it announces {shorten_value(kind)} of"
+                f" shape {shorten_value(list(found))}"
             )
         announced = math.prod(found) * kind.itemsize
         there = os.fstat(stream.fileno()).st_size - stream.tell()

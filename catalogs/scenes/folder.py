@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from catalogs.documents import parse_json
 from catalogs.scenes.array_files import open_regular, read_array
-from catalogs.sentences import brief
+from catalogs.sentences import shorten_value
 from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians, check_gaussians
@@ -69,7 +69,7 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
     partial = folder.with_name(f"{folder.name}.{secrets.token_hex(4)}.partial")
     partial.mkdir(parents=True)
     try:
-        for name, array in _arrays(scene).items():
+        for name, array in _list_arrays(scene).items():
             np.save(partial / f"{name}.npy", np.ascontiguousarray(array), allow_pickle=False)
         content = {
             "format": SCENE_FORMAT,
@@ -172,7 +172,7 @@ def scene_hash(folder: Path) -> str:
     return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
 
-def _arrays(scene: Scene) -> dict[str, NDArray[Any]]:
+def _list_arrays(scene: Scene) -> dict[str, NDArray[Any]]:
     names = (*GAUSSIAN_ARRAYS, *OPTIONAL_ARRAYS)
     held = {name: getattr(scene.gaussians, name) for name in names}
     arrays: dict[str, NDArray[Any]] = {name: array for name, array in held.items() if array is not None}
@@ -201,7 +201,7 @@ def read_facts(folder: Path) -> dict[str, Any]:
     content = parse_json(text, path, "scene.json")
     if not isinstance(content, dict) or content.get("format") != SCENE_FORMAT:
         found = content.get("format") if isinstance(content, dict) else content
-        raise InputError(f"{path}: the scene must be of format {SCENE_FORMAT}; it is {brief(found)}")
+        raise InputError(f"{path}: the scene must be of format {SCENE_FORMAT}; it is {shorten_value(found)}")
     hashes = content.get("sha256")
     left, right = content.get("carriageway_left"), content.get("carriageway_right")
     rules = {

@@ -45,7 +45,7 @@ def read_gaussians(path: Path) -> Gaussians:
         )
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    data = _decoded(path, form[1:])
+    data = _decode_file(path, form[1:])
     n = len(data.means)
     if n == 0:
         raise InputError(f"{path}: must hold at least one Gaussian; it holds none")
@@ -103,23 +103,25 @@ def write_gaussians(gaussians: Gaussians, path: Path) -> None:
     columns = {
         ("x", "y", "z"): gaussians.means,
         ("nx", "ny", "nz"): gaussians.normals,
-        _numbered("f_dc", 3): gaussians.sh[:, 0],
+        _number_names("f_dc", 3): gaussians.sh[:, 0],
         # channel-major: all coefficients of red, then of green, then of blue
-        _numbered("f_rest", 3 * (coefficients - 1)): gaussians.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1),
+        _number_names("f_rest", 3 * (coefficients - 1)): gaussians.sh[:, 1:]
+        .transpose(0, 2, 1)
+        .reshape(n, -1),
         ("opacity",): logit(opacity)[:, None],
-        _numbered("scale", 3): np.log(gaussians.scales),
-        _numbered("rot", 4): gaussians.quats_wxyz,
+        _number_names("scale", 3): np.log(gaussians.scales),
+        _number_names("rot", 4): gaussians.quats_wxyz,
     }
     properties = "".join(f"property float {name}\n" for names in columns for name in names)
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {n}\n{properties}end_header\n"
     path.write_bytes(header.encode() + np.concatenate(list(columns.values()), axis=1).astype("<f4").tobytes())
 
 
-def _numbered(name: str, count: int) -> tuple[str, ...]:
+def _number_names(name: str, count: int) -> tuple[str, ...]:
     return tuple(f"{name}_{i}" for i in range(count))
 
 
-def _decoded(path: Path, form: str) -> Any:
+def _decode_file(path: Path, form: str) -> Any:
     """The file as gsply's arrays: logarithmic scales, logit opacities, SH by coefficient."""
     try:
         if form.endswith("ply"):

@@ -1,4 +1,4 @@
-"""What the header of a .ply announces, held against the file before anything is decoded.
+"""Compare the header of a .ply with the file before anything is decoded.
 
 The decoder reads columns and rows where it expects them, without a second look: what a header announces has to be what
 lies there.
@@ -7,7 +7,7 @@ lies there.
 from dataclasses import dataclass
 from pathlib import Path
 
-from catalogs.sentences import brief, cap_problems, shorten
+from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.errors import InputError
 
 LONGEST_HEADER = 8192
@@ -69,7 +69,7 @@ def check_ply(path: Path) -> None:
         lines = head[len(BEGIN) : end].decode("ascii").split("\n")
     except UnicodeDecodeError:
         raise InputError(f"{path}: the header of a .ply must be ASCII text; it is not") from None
-    elements = _elements(path, [line.split() for line in lines])
+    elements = _read_elements(path, [line.split() for line in lines])
     problems = _compressed_problems(elements) if "chunk" in elements else _plain_problems(elements)
     if problems:
         raise InputError(cap_problems([f"{path}: {problem}" for problem in problems]))
@@ -81,7 +81,7 @@ def check_ply(path: Path) -> None:
         )
 
 
-def _elements(path: Path, lines: list[list[str]]) -> dict[str, Element]:
+def _read_elements(path: Path, lines: list[list[str]]) -> dict[str, Element]:
     forms = [line[1:] for line in lines if line[:1] == ["format"]]
     if forms != [["binary_little_endian", "1.0"]]:
         found = shorten(" ".join(forms[0] if forms else []), 60)
@@ -103,7 +103,7 @@ def _elements(path: Path, lines: list[list[str]]) -> dict[str, Element]:
                 )
     if "vertex" not in counts:
         raise InputError(
-            f"{path}: a .ply of Gaussians must have vertex elements; it has {brief(list(counts))}"
+            f"{path}: a .ply of Gaussians must have vertex elements; it has {shorten_value(list(counts))}"
         )
     return {name: Element(count=counts[name], properties=tuple(properties[name])) for name in counts}
 
@@ -111,7 +111,7 @@ def _elements(path: Path, lines: list[list[str]]) -> dict[str, Element]:
 def _plain_problems(elements: dict[str, Element]) -> list[str]:
     vertex = elements["vertex"]
     names = [name for _, name in vertex.properties]
-    problems = _repeated(names)
+    problems = _find_repeated(names)
     if missing := [name for name in GAUSSIAN_PROPERTIES if name not in names]:
         problems.append(f"a Gaussian must have {', '.join(missing)}; missing here")
     rest = sum(name.startswith("f_rest_") for name in names)
@@ -120,7 +120,7 @@ def _plain_problems(elements: dict[str, Element]) -> list[str]:
     if other := [f"{kind} {name}" for kind, name in vertex.properties if kind != "float"]:
         problems.append(f"a Gaussian's properties must be of type float; not so: {shorten(', '.join(other))}")
     if len(elements) > 1:
-        problems.append(f"the vertices must be the only element; there are {brief(list(elements))}")
+        problems.append(f"the vertices must be the only element; there are {shorten_value(list(elements))}")
     return problems
 
 
@@ -131,7 +131,7 @@ def _compressed_problems(elements: dict[str, Element]) -> list[str]:
     }
     problems = [
         f"the elements of a compressed .ply must be chunk, vertex and, where there is one, sh, in this order;"
-        f" they are {brief(list(elements))}"
+        f" they are {shorten_value(list(elements))}"
         for names in [tuple(elements)]
         if names not in {("chunk", "vertex"), ("chunk", "vertex", "sh")}
     ]
@@ -150,7 +150,7 @@ def _compressed_problems(elements: dict[str, Element]) -> list[str]:
         )
     if harmonics is not None:
         names = [name for _, name in harmonics.properties]
-        problems += _repeated(names)
+        problems += _find_repeated(names)
         whole = len(names) in REST_COUNTS and {kind for kind, _ in harmonics.properties} <= {"uchar"}
         if not whole or harmonics.count != vertex:
             problems.append(
@@ -160,6 +160,6 @@ def _compressed_problems(elements: dict[str, Element]) -> list[str]:
     return problems
 
 
-def _repeated(names: list[str]) -> list[str]:
+def _find_repeated(names: list[str]) -> list[str]:
     twice = sorted({name for name in names if names.count(name) > 1})
-    return [f"each property must stand once; {brief(twice)} stand twice"] if twice else []
+    return [f"each property must stand once; {shorten_value(twice)} stand twice"] if twice else []

@@ -94,17 +94,17 @@ def _csv_route(text: str, metres_per_unit: float) -> Route:
     if twice := [name for name in names if header.count(name) > 1]:
         raise InputError(f"a route CSV must have each column once; {', '.join(twice)} stand twice")
     lines = [(i, row) for i, row in enumerate(rows[1:], start=2) if any(row)]
-    numbers = _numbers(lines, [header.index(name) for name in names], len(header))
+    numbers = _read_numbers(lines, [header.index(name) for name in names], len(header))
     positions = metres_per_unit * numbers[:, :3]
     if not attitude:
         return route_from_positions(positions)
-    return route_from_poses(_poses(positions, numbers[:, 3:]))
+    return route_from_poses(_make_poses(positions, numbers[:, 3:]))
 
 
 def _camera_poses(text: str, suffix: str) -> NDArray[np.float64]:
     """OpenCV camera poses [M, 4, 4] of a file, in its own unit and frame."""
     if suffix == ".json":
-        return _nerfstudio(text)
+        return _read_nerfstudio(text)
     lines = [
         (i, line.replace(",", " ").split())
         for i, line in enumerate(text.splitlines(), start=1)
@@ -113,16 +113,16 @@ def _camera_poses(text: str, suffix: str) -> NDArray[np.float64]:
     width = len(lines[0][1]) if lines else 0
     if width not in (8, 12):
         raise InputError(f"poses need 12 (KITTI) or 8 (TUM) numbers on every line; the first has {width}")
-    numbers = _numbers(lines, range(width), width)
+    numbers = _read_numbers(lines, range(width), width)
     if width == 8:
         # TUM writes time, position, and the quaternion's scalar last
-        return _poses(numbers[:, 1:4], numbers[:, [7, 4, 5, 6]])
+        return _make_poses(numbers[:, 1:4], numbers[:, [7, 4, 5, 6]])
     poses = np.tile(np.eye(4), (len(numbers), 1, 1))
     poses[:, :3] = numbers.reshape(-1, 3, 4)
-    return _orthonormal(poses)
+    return _make_orthonormal(poses)
 
 
-def _nerfstudio(text: str) -> NDArray[np.float64]:
+def _read_nerfstudio(text: str) -> NDArray[np.float64]:
     content = parse_json(text.encode(), "transforms.json", "route")
     frames = content.get("frames") if isinstance(content, dict) else None
     if not isinstance(frames, list) or not frames:
@@ -141,18 +141,18 @@ def _nerfstudio(text: str) -> NDArray[np.float64]:
     if problems:
         raise InputError(problems)
     # frames are stored in any order; their names count the pictures, with leading zeros or without
-    order = sorted(range(len(frames)), key=lambda i: _natural(str(frames[i].get("file_path", ""))))
+    order = sorted(range(len(frames)), key=lambda i: _split_digits(str(frames[i].get("file_path", ""))))
     cameras = np.stack([poses[i] for i in order])
     cameras[:, :3, :3] = cameras[:, :3, :3] @ OPENGL_TO_OPENCV
-    return _orthonormal(cameras)
+    return _make_orthonormal(cameras)
 
 
-def _natural(name: str) -> list[tuple[int, str]]:
+def _split_digits(name: str) -> list[tuple[int, str]]:
     """Sorting key under which picture 2 comes before picture 10; a number of too many digits is read in parts."""
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d{1,18})", name)]
 
 
-def _numbers(
+def _read_numbers(
     lines: Sequence[tuple[int, list[str]]], columns: Sequence[int], width: int
 ) -> NDArray[np.float64]:
     """Finite numbers [M, columns] of numbered lines of ``width`` words; every line at fault is a problem."""
@@ -173,7 +173,7 @@ def _numbers(
     return values
 
 
-def _poses(positions: NDArray[np.float64], quats_wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
+def _make_poses(positions: NDArray[np.float64], quats_wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
     length = np.linalg.norm(quats_wxyz, axis=1)
     if len(length) and np.abs(length - 1).max() > PRINTED_DIGITS:
         bad = int(np.abs(length - 1).argmax())
@@ -184,7 +184,7 @@ def _poses(positions: NDArray[np.float64], quats_wxyz: NDArray[np.float64]) -> N
     return poses
 
 
-def _orthonormal(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def _make_orthonormal(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Poses whose rotations, printed with few digits, are made exact."""
     R = poses[:, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):

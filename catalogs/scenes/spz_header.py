@@ -1,4 +1,4 @@
-"""What a .spz announces, held against what it unpacks to: a few bytes can stand for terabytes."""
+"""Compare the size that a .spz announces with the size it unpacks to: a few bytes can stand for terabytes."""
 
 import struct
 import zlib
@@ -11,7 +11,7 @@ HEADER = struct.Struct("<4sIIBBBB")
 """Magic, version, Gaussians, degree of the spherical harmonics, fractional bits, flags, reserved."""
 VERSIONS = (1, 2, 3, 4)
 HARMONICS = (0, 3, 8, 15)
-"""Coefficients of each colour beyond the first, by degree."""
+"""Number of coefficients of each colour after the first, by degree."""
 LARGEST_FREE, LARGEST_RATIO = 2**26, 64
 """Bytes that any .spz may unpack to, and by how many times its own size a larger one may grow [1]: of quantised clouds
 without view-dependent colour, which compress best, gzip leaves a tenth."""

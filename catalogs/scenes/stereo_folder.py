@@ -50,9 +50,9 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
             f"{folder}: must be a folder with calib.txt, poses.txt, image_l and image_r; there is none"
         )
     problems: list[str] = []
-    calibration = _rows(folder / "calib.txt", problems)
-    poses = _rows(folder / "poses.txt", problems)
-    left, right = (_pictures(folder / side, problems) for side in ("image_l", "image_r"))
+    calibration = _read_matrices(folder / "calib.txt", problems)
+    poses = _read_matrices(folder / "poses.txt", problems)
+    left, right = (_read_pictures(folder / side, problems) for side in ("image_l", "image_r"))
     if calibration is not None:
         problems += _calibration_problems(folder / "calib.txt", calibration)
     if poses is not None:
@@ -90,8 +90,8 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
     )
 
 
-def _rows(path: Path, problems: list[str]) -> NDArray[np.float64] | None:
-    """3x4 matrices of a text file, one per row; None, and a problem, where there is none to be had."""
+def _read_matrices(path: Path, problems: list[str]) -> NDArray[np.float64] | None:
+    """Return the 3x4 matrices of a text file, one per row; None, and a problem, where it cannot be read."""
     try:
         content = read_content(path, "table of matrices", LARGEST_PICTURE).decode()
         lines = [line for line in content.splitlines() if line.strip()]
@@ -148,21 +148,21 @@ def _pose_problems(path: Path, poses: NDArray[np.float64]) -> list[str]:
     ]
 
 
-def _pictures(folder: Path, problems: list[str]) -> dict[str, NDArray[np.uint8]]:
+def _read_pictures(folder: Path, problems: list[str]) -> dict[str, NDArray[np.uint8]]:
     """RGB pictures of a folder by name, in order."""
     names = sorted(folder.glob("*.png"))
     if not names:
         problems.append(f"{folder}: must hold .png pictures; there are none")
     pictures = {}
     for path in names:
-        picture = _picture(path, problems)
+        picture = _read_picture(path, problems)
         if picture is not None:
             pictures[path.name] = picture
     return pictures
 
 
-def _picture(path: Path, problems: list[str]) -> NDArray[np.uint8] | None:
-    """An RGB picture [H, W, 3]; None, and a problem, where there is none, or one of no camera's size."""
+def _read_picture(path: Path, problems: list[str]) -> NDArray[np.uint8] | None:
+    """Return an RGB picture [H, W, 3]; None, and a problem, where it is missing or too large or small."""
     try:
         content = read_content(path, "picture", LARGEST_PICTURE)
     except InputError as error:

@@ -6,22 +6,22 @@ from typing import Annotated, Any
 
 from pydantic import create_model
 
-from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Table, read_entry, require_quantity
 from tasks.scene.street.layout import StreetLayout
 
 STREET_FILE = Path(__file__).parent / "street.yaml"
 
 
-def _quantity(name: str) -> Any:
+def _choose_type(name: str) -> Any:
     """The type of one entry: colours have no unit, angles may be negative, every length is positive."""
     if name.endswith("_rgb"):
-        return Annotated[Table, checked("1", minimum=0.0)]
+        return Annotated[Table, require_quantity("1", minimum=0.0)]
     if name.endswith("_deg"):
-        return Annotated[Scalar, checked("deg")]
-    return Annotated[Scalar, checked("m", above=0.0)]
+        return Annotated[Scalar, require_quantity("deg")]
+    return Annotated[Scalar, require_quantity("m", above=0.0)]
 
 
-_FIELDS: dict[str, Any] = {field.name: (_quantity(field.name), ...) for field in fields(StreetLayout)}
+_FIELDS: dict[str, Any] = {field.name: (_choose_type(field.name), ...) for field in fields(StreetLayout)}
 
 StreetEntry = create_model("StreetEntry", __base__=CatalogueEntry, **_FIELDS)
 """What the street's file must hold: every field of `StreetLayout`."""

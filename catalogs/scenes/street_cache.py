@@ -1,4 +1,4 @@
-"""The built-in street, generated once, kept in the user's cache, and made anew where it was damaged."""
+"""The built-in street: generated once, kept in the user's cache, and generated again if it is damaged."""
 
 import fcntl
 import hashlib
@@ -43,7 +43,7 @@ def cached_street(seed: int = 2025) -> Path:
         if not _is_whole(folder):
             with _only_maker(folder.parent):
                 if not _is_whole(folder):
-                    _make(folder, seed)
+                    _make_street(folder, seed)
     except OSError as error:
         raise InputError(
             f"{folder.parent}: the cache of generated scenes must be a folder that can be written, with room for 60 MB;"
@@ -52,26 +52,26 @@ def cached_street(seed: int = 2025) -> Path:
     return folder
 
 
-def _make(folder: Path, seed: int) -> None:
+def _make_street(folder: Path, seed: int) -> None:
     """Write the street beside its place, then rename it; what killed makers left goes first."""
     for path in sorted(folder.parent.iterdir()):
         if HALF_MADE.fullmatch(path.name):
-            _forget(path)
-    if not _forget(folder):
+            _remove_street(path)
+    if not _remove_street(folder):
         raise InputError(
             f"{folder}: must be the built-in street as muSync made it; it is damaged, and is or holds something else:"
-            " move it away, and the street is made anew"
+            " move it away, and the street is generated again"
         )
     own = folder.with_name(f"{folder.name}.{os.getpid()}")
     try:
-        write_scene(_built(seed), own, {"source": "generated", "licence": "Apache-2.0"})
+        write_scene(_build_street(seed), own, {"source": "generated", "licence": "Apache-2.0"})
         (own / MARKER).write_text(_facts_hash(own))
         own.rename(folder)
     finally:
-        _forget(own)
+        _remove_street(own)
 
 
-def _built(seed: int) -> Scene:
+def _build_street(seed: int) -> Scene:
     from tasks.scene.street.build import build_street
 
     return build_street(seed)
@@ -92,7 +92,7 @@ def _facts_hash(folder: Path) -> str:
     return hashlib.sha256((folder / "scene.json").read_bytes()).hexdigest()
 
 
-def _forget(folder: Path) -> bool:
+def _remove_street(folder: Path) -> bool:
     """Remove a cached street, whole or not; False where anything but one is there, which is left as it is."""
     if not os.path.lexists(folder):
         return True

@@ -6,15 +6,13 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
+from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
 from tasks.studies.stop_study import Rung
 from tasks.vehicle.effects.table import PARAMETERS
 
-FOLDER = Path(__file__).parent
-
 
 class RungEntry(CatalogueEntry):
-    """One step of the ladder; the meanings stand at ``Rung``."""
+    """One step of the ladder; the meanings are given by ``Rung``."""
 
     name: Text
     adds: Text
@@ -49,11 +47,11 @@ class RungEntry(CatalogueEntry):
 
 
 class StopStudy(CatalogueEntry):
-    """What a study file must hold."""
+    """Content of a study file."""
 
     train: Text
     held_out: Text
-    lead_s: Annotated[Scalar, checked("s", above=0)]
+    lead_s: Annotated[Scalar, require_quantity("s", above=0)]
     rungs: Annotated[tuple[RungEntry, ...], Field(min_length=1)]
 
     @property
@@ -80,4 +78,4 @@ def load_stop_study(name_or_path: str | Path) -> StopStudy:
     InputError
         Listing every problem of the file, or the studies that exist.
     """
-    return read_entry(StopStudy, find_entry(FOLDER, name_or_path, "stop study"), "stop study")
+    return read_entry(StopStudy, find_entry("stop study", name_or_path), "stop study")

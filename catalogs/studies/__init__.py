@@ -7,34 +7,43 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter
 
 from catalogs.grids.blocks import PartialScenario
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, checked, read_entries, read_entry
+from catalogs.quantities import (
+    CatalogueEntry,
+    Number,
+    Scalar,
+    Table,
+    Text,
+    read_entries,
+    read_entry,
+    require_quantity,
+)
 from catalogs.scenario import Scenario
 from tasks.studies.sensitivity import PrintedFigure, StudyProtocol, WeatherStudy
 
 FOLDER = Path(__file__).parent
 
-Count = Annotated[Scalar, checked("1", minimum=0)]
+Count = Annotated[Scalar, require_quantity("1", minimum=0)]
 
 
 class ProtocolEntry(CatalogueEntry):
-    """Braking protocol; the meanings stand at ``StudyProtocol``."""
+    """Braking protocol; the meanings are given by ``StudyProtocol``."""
 
-    initial_speed: Annotated[Scalar, checked("km h-1", above=0)]
-    peak_pressure_mpa: Annotated[Scalar, checked("MPa", above=0)]
-    ramp_s: Annotated[Scalar, checked("s", minimum=0)]
-    coast_deceleration: Annotated[Scalar, checked("m s-2", minimum=0)]
-    step_s: Annotated[Scalar, checked("s", above=0)]
-    snow_accumulation_h: Annotated[Scalar, checked("h", minimum=0)]
+    initial_speed: Annotated[Scalar, require_quantity("km h-1", above=0)]
+    peak_pressure_mpa: Annotated[Scalar, require_quantity("MPa", above=0)]
+    ramp_s: Annotated[Scalar, require_quantity("s", minimum=0)]
+    coast_deceleration: Annotated[Scalar, require_quantity("m s-2", minimum=0)]
+    step_s: Annotated[Scalar, require_quantity("s", above=0)]
+    snow_accumulation_h: Annotated[Scalar, require_quantity("h", minimum=0)]
     samples: Count
-    percentiles: Annotated[Table, checked("%", minimum=0, maximum=100)]
+    percentiles: Annotated[Table, require_quantity("%", minimum=0, maximum=100)]
 
 
 class WeatherStudyEntry(CatalogueEntry):
-    """What is varied; the meanings stand at ``WeatherStudy``."""
+    """Values that are varied; `WeatherStudy` gives the meanings."""
 
     seed: Count
     parameters: tuple[Text, ...]
-    highest_rate: Annotated[Scalar, checked("mm h-1", above=0)]
+    highest_rate: Annotated[Scalar, require_quantity("mm h-1", above=0)]
     sampled_rates: Count
     nominal_rates: Count
 
@@ -58,7 +67,7 @@ class SensitivityEntry(CatalogueEntry):
 
 
 class ConditionEntry(PartialScenario):
-    """One condition of the paper's Appendix C as it stands in the file."""
+    """One condition of the paper's Appendix C as the file gives it."""
 
     name: Text
     split: Text
@@ -101,8 +110,10 @@ def load_sensitivity_study(path: Path = SENSITIVITY) -> tuple[StudyProtocol, tup
     values["samples"] = int(values["samples"])
     protocol = StudyProtocol(
         **values,
-        rain=WeatherStudy(kind="rain", **_study(entry.rain)),
-        snow=WeatherStudy(kind="snow", **_study(entry.snow)),
+        weathers={
+            kind: WeatherStudy(kind=kind, **_make_study(varied))
+            for kind, varied in (("rain", entry.rain), ("snow", entry.snow))
+        },
     )
     return protocol, tuple(PrintedFigure(**figure.model_dump()) for figure in entry.printed)
 
@@ -120,7 +131,7 @@ def load_conditions() -> tuple[Condition, ...]:
     )
 
 
-def _study(entry: WeatherStudyEntry) -> dict[str, Any]:
+def _make_study(entry: WeatherStudyEntry) -> dict[str, Any]:
     return {
         "seed": int(entry.seed.value),
         "parameters": entry.parameters,

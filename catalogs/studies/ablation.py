@@ -6,9 +6,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from catalogs.quantities import CatalogueEntry, Scalar, Text, checked, read_entry
-from catalogs.scenario import Scenario, Weather
+from catalogs.names import WeatherName
+from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
+from catalogs.scenario import Scenario
 from catalogs.studies import Condition, load_conditions, load_sensitivity_study
+from tasks.surface.weather import DRY, find_weather
 
 Variant = Literal["appearance-only", "vertical-only", "fixed-mu", "full"]
 VARIANTS: dict[Variant, str] = {
@@ -19,23 +21,16 @@ VARIANTS: dict[Variant, str] = {
 }
 """What each variant does (paper, Section 4.4)."""
 
-Rate = Annotated[Scalar, checked("mm h-1", above=0)]
-
-
-class FamilyRates(CatalogueEntry):
-    """The rate that stands for all rates of a kind of weather."""
-
-    rain: Rate
-    snow: Rate
+Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class AblationEntry(CatalogueEntry):
-    """What the file must hold."""
+    """What the file must hold; ``family_rates`` stand for all rates of a kind of weather."""
 
-    family_rates: FamilyRates
+    family_rates: dict[WeatherName, Rate]
     stop_condition: Text
     pitch_condition: Text
-    reference_pitch_rmse: Annotated[Scalar, checked("deg", above=0)]
+    reference_pitch_rmse: Annotated[Scalar, require_quantity("deg", above=0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,19 +44,19 @@ class Ablation:
     reference_pitch_rmse_deg : printed distance of the full model from its reference [deg]
     """
 
-    stops: dict[Weather, tuple[Scenario, ...]]
+    stops: dict[str, tuple[Scenario, ...]]
     pitch: Condition
     reference_pitch_rmse_deg: float
 
 
 def load_ablation() -> Ablation:
     """The study of the paper's Section 4.4."""
-    entry, protocol = _entry(), load_sensitivity_study()[0]
+    entry, protocol = _load_entry(), load_sensitivity_study()[0]
     conditions = {condition.name: condition for condition in load_conditions()}
     dry = conditions[entry.stop_condition].scenario
-    stops: dict[Weather, tuple[Scenario, ...]] = {}
-    for study in (protocol.rain, protocol.snow):
-        hours = protocol.snow_accumulation_h if study.kind == "snow" else 0.0
+    stops: dict[str, tuple[Scenario, ...]] = {}
+    for study in protocol.weathers.values():
+        hours = protocol.snow_accumulation_h if find_weather(study.kind).accumulates else 0.0
         rates = np.linspace(0.0, study.highest_rate, study.nominal_rates)[1:]
         stops[study.kind] = (
             dry,
@@ -75,25 +70,26 @@ def load_ablation() -> Ablation:
     )
 
 
-def cut(scenario: Scenario, variant: Variant) -> Scenario:
-    """The scenario that a variant drives; what is seen stays that of the scenario itself.
+def cut_coupling(scenario: Scenario, variant: Variant) -> Scenario:
+    """Return the scenario that a variant drives; the appearance stays that of the original scenario.
 
     Parameters
     ----------
     scenario : as it is seen
     variant : which coupling is cut
     """
-    dry = replace(scenario, weather="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0)
+    dry = replace(scenario, weather=DRY, precipitation_mm_h=0.0, snow_accumulation_h=0.0)
     if variant == "appearance-only":
         return dry
     if variant == "vertical-only":
         return replace(dry, peak_pressure_mpa=0.0, brake_onset_s=None, brake_onset_m=None)
-    if variant == "fixed-mu" and scenario.weather != "dry":
-        rate: Scalar = getattr(_entry().family_rates, scenario.weather)
-        hours = load_sensitivity_study()[0].snow_accumulation_h if scenario.weather == "snow" else 0.0
+    rate = _load_entry().family_rates.get(scenario.weather) if variant == "fixed-mu" else None
+    if rate is not None:
+        accumulates = find_weather(scenario.weather).accumulates
+        hours = load_sensitivity_study()[0].snow_accumulation_h if accumulates else 0.0
         return replace(scenario, precipitation_mm_h=rate.value, snow_accumulation_h=hours)
     return scenario
 
 
-def _entry() -> AblationEntry:
+def _load_entry() -> AblationEntry:
     return read_entry(AblationEntry, Path(__file__).with_name("ablation.yaml"), "study")

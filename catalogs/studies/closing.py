@@ -1,14 +1,16 @@
 """Harder campaigns for close-loop than one effect on a rich design: two effects at once, and too few manoeuvres."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from catalogs.documents import read_json_document
 from catalogs.effects.truths import Truth
+from catalogs.names import WeatherName
 from catalogs.quantities import CatalogueEntry, Number, read_entry
-from tasks.campaign.planned_runs import TRAINING, Drive
+from tasks.campaign.planned_runs import TRAINING, RunPlan
+from tasks.surface.weather import DRY
 
 FILE = Path(__file__).with_name("closing.yaml")
 ERROR_RATES = Path(__file__).with_name("closing_error_rates.json")
@@ -18,9 +20,9 @@ Positive = Annotated[float, Field(strict=True, gt=0)]
 
 
 class DriveEntry(CatalogueEntry):
-    """One planned run; the meanings stand at ``Drive``."""
+    """One planned run; the meanings are given by ``RunPlan``."""
 
-    weather: Literal["dry", "rain", "snow"] = "dry"
+    weather: WeatherName = DRY
     rate: Annotated[float, Field(strict=True, ge=0)] = 0.0
     speed: Positive
     peak: Number
@@ -39,9 +41,9 @@ class ClosingStudy(CatalogueEntry):
     partner_after: Annotated[int, Field(strict=True, ge=1)]
     poor_design: Annotated[tuple[DriveEntry, ...], Field(min_length=TRAINING + 3)]
 
-    def drives(self) -> tuple[Drive, ...]:
+    def drives(self) -> tuple[RunPlan, ...]:
         """The poor design as planned runs."""
-        return tuple(Drive(**entry.model_dump()) for entry in self.poor_design)
+        return tuple(RunPlan(**entry.model_dump()) for entry in self.poor_design)
 
     def pairs(self, truths: tuple[Truth, ...]) -> tuple[tuple[Truth, Truth], ...]:
         """Each truth with its partner; a pair comes once.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from catalogs.documents import read_content
 from catalogs.entries import find_entry
-from catalogs.sentences import brief, cap_problems, shorten
+from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.errors import InputError
 from tasks.vehicle.tyres.magic_formula import (
     MagicFormula,
@@ -19,7 +19,6 @@ from tasks.vehicle.tyres.magic_formula import (
 from tasks.vehicle.tyres.magic_formula_tyre import MOST_LOAD_CHANGE
 from tasks.vehicle.tyres.scaling import NAMES, fold_scaling
 
-FOLDER = Path(__file__).parent
 LARGEST_TIR = 2**20
 """Bytes of a tyre property file [1]: those of MF-Tool have 20 kB."""
 VERSIONS = {"6": "MF 5.2", "52": "MF 5.2", "61": "MF 6.1", "62": "MF 6.1"}
@@ -40,22 +39,6 @@ _KEY = re.compile(r"[A-Z][A-Z0-9_]*")
 _COMMENT = re.compile(r"""^((?:[^'"$!]|'[^']*'|"[^"]*")*)[$!].*$""")
 
 
-def tyre_names() -> tuple[str, ...]:
-    """Names of the tyres in the catalogue."""
-    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.tir")))
-
-
-def tyre_source(name_or_path: str | Path) -> Path:
-    """The property file of a tyre.
-
-    Raises
-    ------
-    InputError
-        If there is none; the sentence lists those that exist.
-    """
-    return find_entry(FOLDER, name_or_path, "tyre", suffixes=(".tir",))
-
-
 def load_tyre(name_or_path: str | Path) -> MagicFormula:
     """Read a tyre by its name in the catalogue or from a property file.
 
@@ -68,7 +51,7 @@ def load_tyre(name_or_path: str | Path) -> MagicFormula:
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    source = tyre_source(name_or_path)
+    source = find_entry("tyre", name_or_path)
     return parse_tyre(read_content(source, "tyre", LARGEST_TIR), source)
 
 
@@ -86,16 +69,16 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
         One sentence for each fault: no SI units, an unknown FITTYP, a value that is no number or stands twice, all
         coefficients that its version needs and that are missing, a curve without grip.
     """
-    entries, problems = _read_entries(content.decode("utf-8-sig", "replace"))
+    entries, problems = _read_lines(content)
     problems += [
-        f"{unit} must be {names[0]}; it is {brief(value)}"
+        f"{unit} must be {names[0]}; it is {shorten_value(value)}"
         for unit, names in UNITS.items()
         if (value := entries.get(unit, names[0])).lower() not in names
     ]
     version = VERSIONS.get(entries.get("FITTYP", ""))
     if version is None:
         known = "6 or 52 (MF 5.2), 61 or 62 (MF 6.1)"
-        problems.append(f"FITTYP must be {known}; it is {brief(entries.get('FITTYP'))}")
+        problems.append(f"FITTYP must be {known}; it is {shorten_value(entries.get('FITTYP'))}")
     values: dict[str, float] = {}
     if version is not None:
         names = NAMES[version]
@@ -107,7 +90,7 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
         for name in (*names.needed, *names.optional, *names.factors):
             number = _read_number(entries.get(name, "0"))
             if number is None:
-                problems.append(f"{name} must be a finite number; it is {brief(entries[name])}")
+                problems.append(f"{name} must be a finite number; it is {shorten_value(entries[name])}")
             elif name in entries:
                 values[name] = number
         if not problems:
@@ -117,12 +100,22 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
     return fold_scaling(values, version)
 
 
-def _read_entries(text: str) -> tuple[dict[str, str], list[str]]:
-    """Keys and values of the known sections, and what is wrong with their lines."""
+def tyre_entries(content: bytes) -> dict[str, str]:
+    """Keys and values of the sections that are read, as text; what is no entry is left out.
+
+    Parameters
+    ----------
+    content : of a property file
+    """
+    return _read_lines(content)[0]
+
+
+def _read_lines(content: bytes) -> tuple[dict[str, str], list[str]]:
+    """Keys and values of the sections that are read, and what is wrong with their lines."""
     entries: dict[str, str] = {}
     problems: list[str] = []
     section = ""
-    for number, whole in enumerate(text.splitlines(), 1):
+    for number, whole in enumerate(content.decode("utf-8-sig", "replace").splitlines(), 1):
         line = _COMMENT.sub(r"\1", whole).strip()
         if line.startswith("["):
             section = line.strip("[]").strip().upper().replace(" ", "_")
@@ -130,7 +123,9 @@ def _read_entries(text: str) -> tuple[dict[str, str], list[str]]:
             continue
         key, equals, value = (part.strip() for part in line.partition("="))
         if not equals or not _KEY.fullmatch(key.upper()):
-            problems.append(f"line {number} must be KEY = value, as all of [{section}]; it is {brief(line)}")
+            problems.append(
+                f"line {number} must be KEY = value, as all of [{section}]; it is {shorten_value(line)}"
+            )
         elif key.upper() in entries:
             problems.append(f"{key.upper()} must stand once; it stands again in line {number}")
         else:
@@ -156,6 +151,8 @@ def _shape_problems(values: Mapping[str, float], version: str) -> list[str]:
     c, problems = tyre.longitudinal, []
     if not 1.0 < c.pcx1 <= 2.0:
         problems.append(f"PCX1 LCX must be above 1 and at most 2, for a curve with a peak; it is {c.pcx1:g}")
+    if not 0.0 < tyre.lateral.pcy1 <= 2.0:
+        problems.append(f"PCY1 LCY must be above 0 and at most 2; it is {tyre.lateral.pcy1:g}")
     for load in (0.0, 1.0, 1.0 + MOST_LOAD_CHANGE):
         peak, stiffness = longitudinal_peak(load - 1.0, 0.0, c), longitudinal_stiffness(load - 1.0, c)
         if not (0 < peak < 10 and 0 < stiffness < 1e4):

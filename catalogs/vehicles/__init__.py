@@ -1,7 +1,6 @@
 """Vehicles: mechanical values, tyre families and frozen calibration."""
 
 from functools import cache
-from itertools import pairwise
 from math import radians
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,66 +9,28 @@ from pydantic import Field, model_validator
 
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Table, checked, parse_entry
+from catalogs.names import Name, WeatherName
+from catalogs.quantities import CatalogueEntry, Scalar, parse_entry, require_quantity
+from catalogs.tyre_families import KNOT_TABLES, FamilyEntry
+from catalogs.tyres import load_tyre
 from catalogs.vehicles.added import FormEntry, effect_problems
 from catalogs.vehicles.frozen import Provenance, check_seal
+from catalogs.weather.grip import FOLDER as WEATHER
+from catalogs.weather.grip import shared_families
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
-from tasks.vehicle.parameters import TyreFamily, Vehicle
+from tasks.vehicle.parameters import Vehicle
 
-FOLDER = Path(__file__).parent
-
-Mass = Annotated[Scalar, checked("kg", above=0)]
-Length = Annotated[Scalar, checked("m", above=0)]
-Inertia = Annotated[Scalar, checked("kg m2", above=0)]
-Stiffness = Annotated[Scalar, checked("N m-1", above=0)]
-Damping = Annotated[Scalar, checked("N s m-1", minimum=0)]
-Rate = Annotated[Scalar, checked("s-1", above=0)]
-Speed = Annotated[Scalar, checked("m s-1", above=0)]
-Scales = Annotated[Table, checked("1", above=0)]
-Durations = Annotated[Table, checked("s", above=0)]
-KNOT_TABLES = ("efficiency", "slip_stiffness", "pitch_scale", "hold_s", "release_s")
-
-
-class FamilyEntry(CatalogueEntry):
-    """What a tyre family must hold; the meanings stand at ``TyreFamily``."""
-
-    burckhardt: Annotated[Table, checked("1", above=0)]
-    surface_friction: Scales
-    efficiency: Scales
-    slip_stiffness: Scales
-    pitch_scale: Scales
-    hold_s: Durations
-    release_s: Durations
-
-    @model_validator(mode="after")
-    def _tables_match_their_knots(self) -> "FamilyEntry":
-        knots = self.surface_friction.value
-        problems = [
-            f"{name} must have one value per surface_friction knot ({len(knots)}); it has {count}"
-            for name in KNOT_TABLES
-            if (count := len(getattr(self, name).value)) != len(knots)
-        ]
-        if any(low >= high for low, high in pairwise(knots)):
-            problems.append(f"surface_friction knots must ascend; they are {list(knots)}")
-        if len(self.burckhardt.value) != 3:
-            problems.append(f"burckhardt must be c1, c2, c3; it has {len(self.burckhardt.value)} values")
-        elif (c := self.burckhardt.value)[0] * c[1] <= c[2]:
-            problems.append(f"burckhardt must rise from zero slip: c1 c2 above c3; it is {list(c)}")
-        if problems:
-            raise ValueError("; ".join(problems))
-        return self
-
-
-class FamiliesEntry(CatalogueEntry):
-    """One tyre family per kind of weather."""
-
-    dry: FamilyEntry
-    rain: FamilyEntry
-    snow: FamilyEntry
+Mass = Annotated[Scalar, require_quantity("kg", above=0)]
+Length = Annotated[Scalar, require_quantity("m", above=0)]
+Inertia = Annotated[Scalar, require_quantity("kg m2", above=0)]
+Stiffness = Annotated[Scalar, require_quantity("N m-1", above=0)]
+Damping = Annotated[Scalar, require_quantity("N s m-1", minimum=0)]
+Rate = Annotated[Scalar, require_quantity("s-1", above=0)]
+Speed = Annotated[Scalar, require_quantity("m s-1", above=0)]
 
 
 class VehicleEntry(CatalogueEntry):
-    """What a vehicle file must hold; the meanings stand at ``Vehicle``."""
+    """Content of a vehicle file; `Vehicle` gives the meanings."""
 
     sprung_mass: Mass
     unsprung_mass_f: Mass
@@ -87,20 +48,21 @@ class VehicleEntry(CatalogueEntry):
     wheel_radius: Length
     wheel_inertia_f: Inertia
     wheel_inertia_r: Inertia
-    brake_gain: Annotated[Scalar, checked("N m MPa-1", above=0)]
-    front_brake_share: Annotated[Scalar, checked("1", minimum=0, maximum=1)]
-    abs_release_width: Annotated[Scalar, checked("1", above=0)]
+    brake_gain: Annotated[Scalar, require_quantity("N m MPa-1", above=0)]
+    front_brake_share: Annotated[Scalar, require_quantity("1", minimum=0, maximum=1)]
+    abs_release_width: Annotated[Scalar, require_quantity("1", above=0)]
     abs_build_rate: Rate
     abs_release_rate: Rate
-    coast_deceleration: Annotated[Scalar, checked("m s-2", minimum=0)]
-    hold_ratio: Annotated[Scalar, checked("1", minimum=0)]
-    coupled_pitch_scale: Annotated[Scalar, checked("1", above=0)]
-    static_pitch: Annotated[Scalar, checked("deg", above=-45, below=45)]
+    coast_deceleration: Annotated[Scalar, require_quantity("m s-2", minimum=0)]
+    hold_ratio: Annotated[Scalar, require_quantity("1", minimum=0)]
+    coupled_pitch_scale: Annotated[Scalar, require_quantity("1", above=0)]
+    static_pitch: Annotated[Scalar, require_quantity("deg", above=-45, below=45)]
     slip_speed_floor: Speed
     stop_speed: Speed
-    lock_speed: Annotated[Scalar, checked("rad s-1", above=0)]
-    gravity: Annotated[Scalar, checked("m s-2", above=0)]
-    families: FamiliesEntry
+    lock_speed: Annotated[Scalar, require_quantity("rad s-1", above=0)]
+    gravity: Annotated[Scalar, require_quantity("m s-2", above=0)]
+    families: Annotated[dict[WeatherName, FamilyEntry], Field(min_length=1)]
+    tyre: Name | None = None
     effects: dict[str, Scalar] = Field(default_factory=dict)
     forms: tuple[FormEntry, ...] = ()
     provenance: Provenance | None = None
@@ -123,25 +85,30 @@ class VehicleEntry(CatalogueEntry):
     def _units_inside(self) -> dict[str, str]:
         """Unit of each group that a calibration may move; angles are in radians there."""
         fields = {name: quantity.unit for name, quantity in self if isinstance(quantity, Scalar)}
-        knots = {name: getattr(self.families.dry, name).unit for name in KNOT_TABLES}
+        knots = {name: getattr(next(iter(self.families.values())), name).unit for name in KNOT_TABLES}
         inside = {name: "rad" if unit == "deg" else unit for name, unit in fields.items()}
         return {**inside, **knots, **EFFECT_UNITS}
 
 
-def vehicle_names() -> tuple[str, ...]:
-    """Names of the vehicles in the catalogue."""
-    return tuple(sorted(entry.stem for entry in FOLDER.glob("*.yaml")))
+def vehicle_tyre_source(name_or_path: str | Path) -> Path | None:
+    """The property file of the tyre that a vehicle names: beside the vehicle's file, or in the catalogue.
 
+    Parameters
+    ----------
+    name_or_path : of the vehicle
 
-def vehicle_source(name_or_path: str | Path) -> Path:
-    """The YAML file of a vehicle.
+    Returns
+    -------
+    The file; None where the vehicle names none and drives on its families' Burckhardt curves.
 
     Raises
     ------
     InputError
-        If there is none; the sentence lists those that exist.
+        As ``load_vehicle``.
     """
-    return find_entry(FOLDER, name_or_path, "vehicle")
+    source = find_entry("vehicle", name_or_path)
+    name = _read_entry(source).tyre
+    return None if name is None else _find_tyre(name, source)
 
 
 def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
@@ -152,46 +119,53 @@ def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
     InputError
         As ``load_vehicle``.
     """
-    return _read(vehicle_source(name_or_path)).provenance
+    return _read_entry(find_entry("vehicle", name_or_path)).provenance
 
 
 @cache
 def vehicle_units() -> dict[str, str]:
     """Unit of each number of a vehicle file."""
-    entry = _read(FOLDER / "paper-reference.yaml")
+    entry = _read_entry(find_entry("vehicle", "paper-reference"))
     return {name: quantity.unit for name, quantity in entry if isinstance(quantity, Scalar)}
 
 
-def load_vehicle(name_or_path: str | Path) -> Vehicle:
+def load_vehicle(name_or_path: str | Path, weather: Path = WEATHER) -> Vehicle:
     """Read a vehicle by its name in the catalogue or from a YAML file.
 
     Parameters
     ----------
     name_or_path : name, or path ending in .yaml
+    weather : folder of the weather catalogue, which has tyre families for kinds that the vehicle has none of
 
     Raises
     ------
     InputError
         Listing every problem of the file, or the names that exist.
     """
-    source = vehicle_source(name_or_path)
-    entry = _read(source)
+    source = find_entry("vehicle", name_or_path)
+    entry = _read_entry(source)
     values: dict[str, Any] = {
         name: quantity.value
         for name in VehicleEntry.model_fields
         if isinstance(quantity := getattr(entry, name), Scalar)
     }
-    families = {
-        weather: TyreFamily(**{name: getattr(family, name).value for name in FamilyEntry.model_fields})
-        for weather, family in entry.families
-    }
+    families = {kind: family.family for kind, family in entry.families.items()}
     values["static_pitch"] = radians(values["static_pitch"])
     effects = {name: number.value for name, number in entry.effects.items()}
     forms = tuple(form.form for form in entry.forms)
-    return Vehicle(name=source.stem, families=families, effects=effects, forms=forms, **values)
+    tyre = None if entry.tyre is None else load_tyre(_find_tyre(entry.tyre, source))
+    return Vehicle(
+        name=source.stem, families=families, shared_families=shared_families(weather), tyre=tyre, effects=effects,
+        forms=forms, **values,
+    )  # fmt: skip
 
 
-def _read(source: Path) -> VehicleEntry:
+def _find_tyre(name: str, vehicle: Path) -> Path:
+    beside = vehicle.with_name(f"{name}.tir")
+    return beside if beside.is_file() else find_entry("tyre", name)
+
+
+def _read_entry(source: Path) -> VehicleEntry:
     content = read_content(source, "vehicle", LARGEST_YAML)
     check_seal(content, source)
     return parse_entry(VehicleEntry, content, source, "vehicle")

@@ -1,4 +1,4 @@
-"""What a vehicle file may add to the plain model: numbers of effects, and forms that no effect of the library has."""
+"""Additions of a vehicle file to the plain model: numbers of effects, and forms that no effect of the library has."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -18,7 +18,7 @@ VARIABLE_UNITS = dict(
 
 
 class FormEntry(CatalogueEntry):
-    """What a form must hold; the meanings stand at ``Form``. ``range`` is where it was seen: two values."""
+    """Content of a form; `Form` gives the meanings. ``range``: start and end of the identified interval."""
 
     port: Text
     variable: Text

@@ -1,1 +1,1 @@
-"""Whether a dataset still is what was made, and why a number in it is what it is."""
+"""Audits: whether a dataset still holds the recorded bytes, and how each of its numbers follows from its inputs."""

@@ -9,9 +9,9 @@ from typing import Any
 from flows.making.generate import create_frame_arrays, fan_out
 from flows.making.input_changes import input_changes
 from flows.making.plan import Plan, read_plan
-from flows.running.orchestration import stage
+from flows.running.orchestration import run_as_stage
 from flows.running.runner import RunnerName
-from flows.store.address import everything, working
+from flows.store.address import open_for_writing, want_everything
 from flows.store.arrays import arrays_of
 from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_atomically
@@ -21,7 +21,7 @@ from flows.store.staging import scratch_dataset
 from flows.store.telemetry import read_columns
 from manifests.canonical import sha256_of
 from manifests.compare import first_pixel_difference, first_row_difference
-from manifests.explain import as_sentences, reasons
+from manifests.explain import as_sentences, find_reasons
 from manifests.manifest import damaged_files, manifest_damage
 from manifests.records import Manifest, Receipt
 from tasks.conventions import TICK_CHANNELS
@@ -30,7 +30,7 @@ from tasks.errors import InputError
 STAGE_OF = {"ticks": "vehicle", "frames": "frames"} | dict.fromkeys(arrays_of(labels=True), "render")
 
 
-def audit(
+def audit_dataset(
     dataset: str,
     *,
     share: float = 0.1,
@@ -65,15 +65,15 @@ def audit(
     changes: list[dict[str, Any]] = []
     mismatches: list[dict[str, Any]] = []
     not_remade: list[str] = []
-    with working(dataset, everything) as layout:
+    with open_for_writing(dataset, want_everything) as layout:
         manifest = read_manifest(layout)
-        damaged = stage(damaged_files)(layout.root, manifest)
+        damaged = run_as_stage(damaged_files)(layout.root, manifest)
         if (fault := manifest_damage(layout.manifest.read_bytes())) is not None:
             damaged.append({"path": "manifest.json", "clip_id": None, "damage": fault})
         chosen = chosen_clips(manifest, share)
         try:
             changes = input_changes(layout, manifest)
-            mismatches = stage(remake_and_compare)(
+            mismatches = run_as_stage(remake_and_compare)(
                 layout, manifest, chosen, runner, workers or other_count(), scheduler
             )
         except InputError as error:
@@ -85,7 +85,7 @@ def audit(
         "files": len(manifest["artifacts"]) + sum(len(clip["artifacts"]) for clip in manifest["clips"]),
         "damaged": damaged,
         "rerun": [clip["clip_id"] for clip in chosen],
-        "mismatches": [row | {"why": reasons(row["changed"], changes)} for row in mismatches],
+        "mismatches": [row | {"why": find_reasons(row["changed"], changes)} for row in mismatches],
         "differences": as_sentences(changes),
         "not_remade": not_remade,
     }
@@ -99,7 +99,7 @@ def format_text(result: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    result : of `audit`
+    result : of `audit_dataset`
     """
     lines = [
         f"{len(result['damaged'])} of {result['files']} files are not those recorded",

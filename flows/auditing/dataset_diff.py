@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flows.store.address import reading
+from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
@@ -14,13 +14,13 @@ from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from manifests.canonical import content_id
 from manifests.compare import first_row_difference
-from manifests.explain import input_differences, reasons
+from manifests.explain import find_reasons, input_differences
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.label_moves import figure_moves, tick_moves
+from tasks.eval.label_moves import compare_figures, compare_ticks
 
 
-def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
+def compare_datasets(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
     """Compare two finished datasets clip by clip; clips are paired by their scenario.
 
     Parameters
@@ -39,9 +39,9 @@ def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
         If a folder is no sealed dataset, or its inputs are missing.
     """
     results = Outputs(out, "diff", "diff.json", "diff.txt")
-    old, new = reading(a), reading(b)
+    old, new = open_for_reading(a), open_for_reading(b)
     before, after = read_manifest(old), read_manifest(new)
-    why = input_differences(before, after, _inputs(old, before), _inputs(new, after))
+    why = input_differences(before, after, _read_inputs(old, before), _read_inputs(new, after))
     theirs = {content_id(clip["scenario"]): clip for clip in after["clips"]}
     ours = {content_id(clip["scenario"]): clip for clip in before["clips"]}
     pairs = [(clip, theirs[key]) for key, clip in ours.items() if key in theirs]
@@ -58,7 +58,7 @@ def diff(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
             "compared": len(pairs),
             "changed": len(rows),
             "labels_changed": sum("ticks" in row["changed"] for row in rows),
-            "largest": _largest(rows),
+            "largest": _find_largest_changes(rows),
         },
     }
     results.write_json("diff.json", result)
@@ -71,7 +71,7 @@ def format_text(result: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    result : of `diff`
+    result : of `compare_datasets`
     """
     summary = result["summary"]
     lines = [
@@ -104,29 +104,29 @@ def _clip_row(
         "clip_id_a": a["clip_id"],
         "clip_id_b": b["clip_id"],
         "changed": changed,
-        "why": reasons(changed, why),
+        "why": find_reasons(changed, why),
         "first": None,
         "picture": None,
     }
-    moves = figure_moves(a["figures"], b["figures"])
+    moves = compare_figures(a["figures"], b["figures"])
     if "ticks" in changed:
-        ours, theirs = _ticks(old, a), _ticks(new, b)
-        moves |= tick_moves(ours, theirs)
+        ours, theirs = _read_ticks(old, a), _read_ticks(new, b)
+        moves |= compare_ticks(ours, theirs)
         first = first_row_difference(ours, theirs, [channel.name for channel in TICK_CHANNELS])
         row["first"] = first and {
             "channel": first["channel"], "tick": first["tick"], "a": first["recorded"], "b": first["remade"]
         }  # fmt: skip
     if "rgb" in changed:
-        row["picture"] = _picture(old, new, a["index"], b["index"])
+        row["picture"] = _compare_pictures(old, new, a["index"], b["index"])
     return row | {"labels": {name: None if isnan(value) else value for name, value in moves.items()}}
 
 
-def _ticks(layout: Layout, clip: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _read_ticks(layout: Layout, clip: Mapping[str, Any]) -> dict[str, np.ndarray]:
     folder = layout.telemetry / "ticks" / f"family={clip['scenario']['weather']}"
     return read_columns(folder, clip["clip_id"], [channel.name for channel in TICK_CHANNELS])
 
 
-def _picture(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | None:
+def _compare_pictures(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | None:
     """Share of changed pixels and mean change of their 8-bit values; None for pictures of two sizes."""
     ours, theirs = read_clip(old.frames, a, "rgb"), read_clip(new.frames, b, "rgb")
     if ours.shape[1:] != theirs.shape[1:]:
@@ -139,7 +139,7 @@ def _picture(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | Non
     }
 
 
-def _inputs(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, bytes]:
+def _read_inputs(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, bytes]:
     files = {name: layout.inputs / name for name in manifest["inputs"]}
     missing = [file for file in files.values() if not file.is_file()]
     if missing:
@@ -147,8 +147,8 @@ def _inputs(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, bytes]:
     return {name: file.read_bytes() for name, file in files.items()}
 
 
-def _largest(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Per label the clip in which it moved furthest."""
+def _find_largest_changes(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return, for each label, the clip with the largest change."""
     largest: dict[str, dict[str, Any]] = {}
     for row in rows:
         for name, value in row["labels"].items():

@@ -16,7 +16,7 @@ from flows.making.driving import controls_of, hazard_of, weather_of
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
 from flows.reading.query import VIEWS
-from flows.store.address import reading, telemetry
+from flows.store.address import open_for_reading, want_telemetry
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
@@ -24,11 +24,12 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, surface_steps
 from tasks.scene.route import Route
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import surface_response
 from tasks.vehicle.rollout import rollout
 
 
-def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> dict[str, Any]:
+def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None) -> dict[str, Any]:
     """Rain rate -> film -> mu_c -> mu_eff -> force -> dv/dt -> pitch -> pixel shift of one frame.
 
     Parameters
@@ -50,7 +51,7 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
         The folder is no sealed dataset, or has no such clip or frame.
     """
     results = Outputs(out, "explain", "explain.json", "explain.txt")
-    layout = reading(dataset, telemetry)
+    layout = open_for_reading(dataset, want_telemetry)
     manifest, plan = read_manifest(layout), read_plan(layout.root)
     chosen = [c for c in plan.clips if clip in (c.clip_id, c.label)]
     problems = []
@@ -77,20 +78,22 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
             f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"
             f" {', '.join(dict.fromkeys(empty))}: musync repair makes the table again"
         )
-    vehicle = load_vehicle(layout.inputs / "vehicle.yaml")
+    vehicle = load_vehicle(layout.inputs / "vehicle.yaml", layout.inputs / "weather")
     mode = plan.settings.vehicle_mode
     hazard = hazard_of(scenario)
-    surface = load_surface(layout.inputs / "surface.yaml")
-    ride = rollout(
-        vehicle, scenario.weather, float(row["surface_friction"]), controls_of(scenario), hazard,
-        mode=mode, duration_s=plan.duration_s, snow_depth_mm=float(row["snow_depth_mm"]),
-    )  # fmt: skip
-    response = surface_response(vehicle, scenario.weather, float(row["surface_friction"]))
+    surface = load_surface(layout.inputs / "surface.yaml", layout.inputs / "weather")
+    state = SurfaceState(
+        kind=scenario.weather,
+        friction=float(row["surface_friction"]),
+        snow_depth_mm=float(row["snow_depth_mm"]),
+    )
+    ride = rollout(vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s)
+    response = surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(scenario), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row),
         *pitch_steps(vehicle, response, hazard, mode, row, ride.columns),
-        *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, _route(plan.scene)),
+        *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, _find_route(plan.scene)),
     ]  # fmt: skip
     result = {
         "dataset": str(layout.root),
@@ -101,7 +104,7 @@ def explain(dataset: str, clip: str, frame: int, *, out: str | None = None) -> d
         "t_s": int(row["t_ns"]) / 1e9,
         "vehicle_mode": mode,
         "effects": sorted(vehicle.effects) + [form.name for form in vehicle.forms],
-        "asked": _asked(scenario),
+        "asked": _list_scenario(scenario),
         "steps": [_as_row(step) for step in steps],
         "agrees": all(step.agrees for step in steps),
     }
@@ -115,7 +118,7 @@ def format_text(result: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    result : of `explain`
+    result : of `explain_frame`
     """
     asked = ", ".join(f"{name} {value:g}" if isinstance(value, float) else value
                       for name, value in result["asked"].items())  # fmt: skip
@@ -143,14 +146,14 @@ def _as_row(step: Step) -> dict[str, Any]:
     return {name: None if isinstance(v, float) and not isfinite(v) else v for name, v in row.items()}
 
 
-def _asked(scenario: Scenario) -> dict[str, Any]:
+def _list_scenario(scenario: Scenario) -> dict[str, Any]:
     row = scenario.as_row()
     return {
         name: v for name, v in row.items() if v not in (None, 0.0) and (isinstance(v, str) or isfinite(v))
     }
 
 
-def _route(scene: Mapping[str, str]) -> Route | None:
+def _find_route(scene: Mapping[str, str]) -> Route | None:
     """The scene's route; None where the scene has moved away, which leaves one step out."""
     try:
         return load_scene(find_scene(scene)).route

@@ -1,4 +1,4 @@
-"""Making again what is broken or missing in a finished dataset, byte for byte, or saying why that cannot be."""
+"""Repair of a finished dataset: damaged and missing files are made again byte for byte, or a sentence says why not."""
 
 import shutil
 from collections.abc import Iterable, Mapping
@@ -12,9 +12,9 @@ from flows.making.generate import create_frame_arrays, fan_out
 from flows.making.input_changes import recorded_input
 from flows.making.plan import Plan, input_sources, read_plan
 from flows.making.seal import clips_table, pairs_table, preview_sheet, table_parts, write_part
-from flows.running.orchestration import stage
+from flows.running.orchestration import run_as_stage
 from flows.running.runner import RunnerName
-from flows.store.address import everything, publish, working
+from flows.store.address import open_for_writing, send_files, want_everything
 from flows.store.layout import STAGED_TABLES, Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
@@ -31,7 +31,7 @@ SUMMARIES = {"telemetry/clips.parquet": clips_table, "telemetry/pairs.parquet": 
 """Tables that follow from the clips' records."""
 
 
-def repair(
+def repair_dataset(
     dataset: str,
     *,
     out: str | None = None,
@@ -58,20 +58,20 @@ def repair(
         The manifest itself is damaged, or inputs that clips follow from cannot be found any more.
     """
     results = Outputs(out, "repair", "repair.json")
-    with working(dataset, everything) as layout:
-        result = _repaired(layout, runner, workers, scheduler)
+    with open_for_writing(dataset, want_everything) as layout:
+        result = _repair_locked(layout, runner, workers, scheduler)
     results.write_json("repair.json", result)
     return result
 
 
-def _repaired(
+def _repair_locked(
     layout: Layout, runner: RunnerName, workers: int | None, scheduler: str | None
 ) -> dict[str, Any]:
     if not layout.manifest.is_file():
         read_manifest(layout)  # says what is missing, before anything is written there
     with sole_writer(layout):
         remove_staged(left_overs(layout))
-        found = stage(compare_files)(layout)
+        found = run_as_stage(compare_files)(layout)
         if any(row["path"] == "manifest.json" for row in found["damaged"]):
             raise InputError(
                 f"{layout}/manifest.json: {found['damaged'][0]['damage']}, so nothing says what the other files should"
@@ -80,11 +80,13 @@ def _repaired(
         manifest = read_manifest(layout)
         paths = [row["path"] for row in found["damaged"] if row["damage"] != "not recorded"]
         _refuse_files_as_folders(layout, paths)
-        restored = stage(restore)(layout, manifest, paths, runner, workers, scheduler) if paths else []
-        publish(layout, [layout.root / path for path in restored])
+        restored = (
+            run_as_stage(restore_files)(layout, manifest, paths, runner, workers, scheduler) if paths else []
+        )
+        send_files(layout, [layout.root / path for path in restored])
         remove_staging(layout)
     return {
-        "repaired": stage(compare_files)(layout)["verified"],
+        "repaired": run_as_stage(compare_files)(layout)["verified"],
         "damaged": found["damaged"],
         "restored": restored,
         "failed": sorted(set(paths) - set(restored)),
@@ -93,7 +95,7 @@ def _repaired(
 
 
 def _refuse_files_as_folders(layout: Layout, paths: Iterable[str]) -> None:
-    """Raise `InputError` where something else stands in the place of a folder, or a folder in that of a file."""
+    """Raise `InputError` where a folder is expected and something else exists, or a folder exists instead of a file."""
     places = {place for path in paths for place in PurePosixPath(path).parents} - {PurePosixPath(".")}
     wrong = [place for place in places if (layout.root / place).is_file()]
     wrong += [PurePosixPath(path) for path in paths if (layout.root / path).is_dir()]
@@ -107,7 +109,7 @@ def _refuse_files_as_folders(layout: Layout, paths: Iterable[str]) -> None:
         )
 
 
-def restore(
+def restore_files(
     layout: Layout,
     manifest: Manifest,
     paths: list[str],
@@ -127,7 +129,7 @@ def restore(
                 restored.append(path)
 
     with scratch_dataset(layout) as scratch:
-        plan = _prepare(layout, scratch, manifest)
+        plan = _prepare_scratch(layout, scratch, manifest)
         move_in(scratch, [path for path in paths if (scratch.root / path).is_file()])
         parts = {table: table_parts(plan, table) for table in STAGED_TABLES}
         broken = [(t, path, ids) for t in parts for path, ids in parts[t].items() if path in wanted]
@@ -145,7 +147,7 @@ def restore(
     return sorted(restored)
 
 
-def _prepare(layout: Layout, scratch: Layout, manifest: Manifest) -> Plan:
+def _prepare_scratch(layout: Layout, scratch: Layout, manifest: Manifest) -> Plan:
     """Plan, inputs and empty arrays in the scratch folder, from the dataset, the manifest or the catalogue."""
     plan = plan_of(manifest)
     write_json(scratch.plan, plan.as_json())

@@ -6,7 +6,7 @@ from typing import Any
 from securesystemslib.signer import CryptoSigner
 
 from catalogs.documents import LARGEST_JSON, read_content
-from flows.store.address import publish, working
+from flows.store.address import open_for_writing, send_files
 from flows.store.layout import Layout, write_atomically
 from flows.store.lock import sole_writer
 from flows.store.sealed import read_manifest
@@ -29,7 +29,7 @@ LARGEST_KEY = 2**16
 SEAL_ALONE = "the seal shows damage, not forgery: a stranger who changes files can compute it again"
 
 
-def sign(dataset: str, *, key: str) -> dict[str, Any]:
+def sign_dataset(dataset: str, *, key: str) -> dict[str, Any]:
     """Sign a finished dataset's manifest, and with it every file that the manifest records.
 
     The signature goes into ``manifest.dsse.json`` beside the manifest. Another key adds another signature; the same
@@ -51,7 +51,7 @@ def sign(dataset: str, *, key: str) -> dict[str, Any]:
         If the key is no Ed25519 private key, the manifest is damaged, or the present envelope holds another statement.
     """
     signer = load_signer(read_content(Path(key), "private key", LARGEST_KEY), key)
-    with working(dataset, _signed_record) as layout:
+    with open_for_writing(dataset, _signed_record) as layout:
         read_manifest(layout)
         with sole_writer(layout):
             try:
@@ -68,7 +68,7 @@ def _sign_manifest(layout: Layout, signer: CryptoSigner) -> dict[str, Any]:
     envelope = add_signature(content, before, signer)
     if envelope != before:
         write_atomically(layout.root / ENVELOPE, envelope)
-        publish(layout, [layout.root / ENVELOPE])
+        send_files(layout, [layout.root / ENVELOPE])
     return {
         "key_id": signer.public_key.keyid,
         "manifest_sha256": sha256_of([content]),

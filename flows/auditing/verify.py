@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from flows.auditing.signing import signature_findings
-from flows.running.orchestration import stage
-from flows.store.address import everything, stored_record, working
+from flows.running.orchestration import run_as_stage
+from flows.store.address import open_for_writing, want_everything, want_record
 from flows.store.layout import Layout
 from flows.store.links import foreign_entries
 from flows.store.lock import sole_writer
@@ -20,7 +20,7 @@ READ_AS_DATA = ("telemetry/", "frames.zarr/")
 """Where a file that nobody recorded would still be read as data."""
 
 
-def verify(dataset: str, *, key: str | None = None, out: str | None = None) -> dict[str, Any]:
+def verify_dataset(dataset: str, *, key: str | None = None, out: str | None = None) -> dict[str, Any]:
     """Compare every file of a dataset with its recorded hash, and the manifest with its seal and a signature.
 
     Parameters
@@ -41,16 +41,16 @@ def verify(dataset: str, *, key: str | None = None, out: str | None = None) -> d
         If the folder is no sealed dataset of this format, or the key is none.
     """
     results = Outputs(out, "verify", "verify.json")
-    with working(dataset, everything) as layout:
+    with open_for_writing(dataset, want_everything) as layout:
         signature = signature_findings(layout, key)
-        result = stage(compare_files)(layout) | signature
+        result = run_as_stage(compare_files)(layout) | signature
     result["verified"] = result["verified"] and result["signed"] is not False
     results.write_json("verify.json", result)
     return result
 
 
 def compare_files(layout: Layout) -> dict[str, Any]:
-    """What `verify` returns."""
+    """Return the result of `verify_dataset` for files that are at hand."""
     foreign = foreign_entries(layout.root)
     damaged: list[dict[str, str | None]] = [
         {"path": path, "clip_id": None, "damage": "a link, or no file"} for path in foreign
@@ -79,7 +79,7 @@ def compare_files(layout: Layout) -> dict[str, Any]:
     }
 
 
-def gc(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
+def collect_garbage(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
     """Remove what killed runs left: half-written files, scratch folders, and a finished dataset's staged files.
 
     Committed clips of an unfinished dataset stay, and so does a scratch folder that a live run holds. Only what muSync
@@ -99,11 +99,11 @@ def gc(dataset: str, *, dry_run: bool = False) -> dict[str, Any]:
     InputError
         If the folder is no dataset or holds links, or another run is writing it.
     """
-    with working(dataset, stored_record) as layout:
-        return _collect(layout, dry_run)
+    with open_for_writing(dataset, want_record) as layout:
+        return _remove_from(layout, dry_run)
 
 
-def _collect(layout: Layout, dry_run: bool) -> dict[str, Any]:
+def _remove_from(layout: Layout, dry_run: bool) -> dict[str, Any]:
     finished, begun = layout.manifest.is_file(), (layout.staging / BEGUN).is_file()
     if not layout.plan.is_file() and not finished:
         raise InputError(
@@ -112,7 +112,7 @@ def _collect(layout: Layout, dry_run: bool) -> dict[str, Any]:
         )
     with sole_writer(layout):
         found = left_overs(layout)
-        size = sum(_bytes(path) for path in found)
+        size = sum(_count_bytes(path) for path in found)
         if not dry_run:
             remove_left_overs(layout)
         elif finished:
@@ -120,6 +120,6 @@ def _collect(layout: Layout, dry_run: bool) -> dict[str, Any]:
     return {"removed": sorted(str(path) for path in found), "bytes": size, "dry_run": dry_run}
 
 
-def _bytes(path: Path) -> int:
+def _count_bytes(path: Path) -> int:
     files = path.rglob("*") if path.is_dir() else [path]
     return sum(file.stat().st_size for file in files if file.is_file())

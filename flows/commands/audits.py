@@ -2,10 +2,19 @@
 
 from typing import Any
 
-from flows.commands.command import DATASET, GRID, OUT, RUNNER, Command, argument, option, require
+from flows.commands.command import (
+    DATASET,
+    GRID,
+    OUT,
+    RUNNER,
+    Command,
+    define_argument,
+    define_option,
+    require_key,
+)
 
 GROUP = "Audits"
-VERIFIED = require("verified")
+VERIFIED = require_key("verified")
 LAW_COLUMNS = ("label", "passed", "laws", "column", "tightest")
 
 
@@ -24,10 +33,10 @@ COMMANDS = (
         name="audit",
         group=GROUP,
         sentence="Verify every hash of a dataset and make a share of its clips again.",
-        function="flows.auditing.audit:audit",
+        function="flows.auditing.audit:audit_dataset",
         options=(
             DATASET,
-            option("share", float, "Share of the clips to make again, 0 to 1.", 0.1),
+            define_option("share", float, "Share of the clips to make again, 0 to 1.", 0.1),
             OUT,
             *RUNNER,
         ),
@@ -38,10 +47,10 @@ COMMANDS = (
         name="verify",
         group=GROUP,
         sentence="Verify every hash of a dataset, the seal of its manifest and a signature; make nothing.",
-        function="flows.auditing.verify:verify",
+        function="flows.auditing.verify:verify_dataset",
         options=(
             DATASET,
-            option(
+            define_option(
                 "key",
                 str | None,
                 "File with the signer's Ed25519 public key (PEM), to check the signature.",
@@ -55,26 +64,28 @@ COMMANDS = (
         name="sign",
         group=GROUP,
         sentence="Sign a dataset's manifest, and with it every file that it records, with a private key.",
-        function="flows.auditing.signing:sign",
-        options=(DATASET, option("key", str, "File with the Ed25519 private key: PEM, PKCS#8.")),
+        function="flows.auditing.signing:sign_dataset",
+        options=(DATASET, define_option("key", str, "File with the Ed25519 private key: PEM, PKCS#8.")),
         is_flow=False,
     ),
     Command(
         name="repair",
         group=GROUP,
         sentence="Make again the files of a dataset that are damaged or missing, to the recorded bytes.",
-        function="flows.auditing.repair:repair",
+        function="flows.auditing.repair:repair_dataset",
         options=(DATASET, OUT, *RUNNER),
-        passed=require("repaired"),
+        passed=require_key("repaired"),
     ),
     Command(
         name="gc",
         group=GROUP,
         sentence="Remove the files that killed runs left in a dataset and beside it; committed clips stay.",
-        function="flows.auditing.verify:gc",
+        function="flows.auditing.verify:collect_garbage",
         options=(
-            argument("dataset", str, "Folder or s3:// address of a dataset, finished or not.", in_store=True),
-            option("dry_run", bool, "List these files and remove nothing.", False),
+            define_argument(
+                "dataset", str, "Folder or s3:// address of a dataset, finished or not.", in_store=True
+            ),
+            define_option("dry_run", bool, "List these files and remove nothing.", False),
         ),
     ),
     Command(
@@ -90,10 +101,10 @@ COMMANDS = (
         name="diff",
         group=GROUP,
         sentence="Compare two datasets: which clips differ, by how much, and which inputs can be the cause.",
-        function="flows.auditing.dataset_diff:diff",
+        function="flows.auditing.dataset_diff:compare_datasets",
         options=(
-            argument("a", str, DATASET.help, in_store=True),
-            argument("b", str, "Another dataset of the same scenarios.", in_store=True),
+            define_argument("a", str, DATASET.help, in_store=True),
+            define_argument("b", str, "Another dataset of the same scenarios.", in_store=True),
             OUT,
         ),
         output="sentences",
@@ -102,14 +113,14 @@ COMMANDS = (
         name="explain",
         group=GROUP,
         sentence="Follow one frame from the weather to the pixel; each number is computed again beside the stored one.",
-        function="flows.auditing.explain:explain",
+        function="flows.auditing.explain:explain_frame",
         options=(
             DATASET,
-            argument("clip", str, "Label or id of a clip."),
-            argument("frame", int, "Frame number, from 0."),
+            define_argument("clip", str, "Label or id of a clip."),
+            define_argument("frame", int, "Frame number, from 0."),
             OUT,
         ),
-        passed=require("agrees"),
+        passed=require_key("agrees"),
         output="sentences",
     ),
     Command(
@@ -118,9 +129,9 @@ COMMANDS = (
         sentence="Prove that visual seeds change the weather in the picture and nothing in the motion.",
         function="flows.making.replay:replay_audit",
         options=(
-            argument("grid", str, GRID.help, "severity", known=GRID.known),
-            option("seeds", int, "Visual seeds of each scenario.", 3),
-            option("frames", int, "Frames drawn of each run.", 2),
+            define_argument("grid", str, GRID.help, "severity", known=GRID.known),
+            define_option("seeds", int, "Visual seeds of each scenario.", 3),
+            define_option("frames", int, "Frames drawn of each run.", 2),
             OUT,
         ),
         brief=leave_out_differences,

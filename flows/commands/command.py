@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 Result = dict[str, Any]
 REQUIRED: Any = object()
-"""Default of an option that has to be given."""
+"""Default of a required option."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,7 @@ class Option:
         return self.spelling or self.name
 
 
-def argument(name: str, kind: Any, text: str, default: Any = REQUIRED, **details: Any) -> Option:
+def define_argument(name: str, kind: Any, text: str, default: Any = REQUIRED, **details: Any) -> Option:
     """Return an argument of the command line, which is given by its position.
 
     Parameters
@@ -54,7 +54,7 @@ def argument(name: str, kind: Any, text: str, default: Any = REQUIRED, **details
     return Option(name=name, kind=kind, help=text, default=default, positional=True, **details)
 
 
-def option(name: str, kind: Any, text: str, default: Any = REQUIRED, **details: Any) -> Option:
+def define_option(name: str, kind: Any, text: str, default: Any = REQUIRED, **details: Any) -> Option:
     """Return an option of the command line.
 
     Parameters
@@ -113,33 +113,43 @@ def select_keys(*keys: str) -> Callable[[Result], Result]:
     return lambda result: {key: result[key] for key in keys}
 
 
-def require(key: str) -> Callable[[Result], bool]:
+def require_key(key: str) -> Callable[[Result], bool]:
     """Return a function that tells whether this value of a result is true."""
     return lambda result: bool(result[key])
 
 
-DATASET = argument("dataset", str, "Folder or s3:// address of a finished dataset.", in_store=True)
-GRID = argument("grid", str, "Grid file, or the name of a grid that ships.", known="catalogs/grids/*.yaml")
-CAMPAIGN = argument("campaign", str, "Campaign folder: campaign.yaml, runs.csv, runs/*.parquet.")
-TRACES = argument("traces", str, "Folder with cases.json and the traces as Parquet files.")
-VEHICLE = option("vehicle", str, "Vehicle name or file.", "paper-reference", known="catalogs/vehicles/*.yaml")
-CAMPAIGN_VEHICLE = option(
+DATASET = define_argument("dataset", str, "Folder or s3:// address of a finished dataset.", in_store=True)
+GRID = define_argument(
+    "grid", str, "Grid file, or the name of a grid that ships.", known="catalogs/grids/*.yaml"
+)
+CAMPAIGN = define_argument("campaign", str, "Campaign folder: campaign.yaml, runs.csv, runs/*.parquet.")
+TRACES = define_argument("traces", str, "Folder with cases.json and the traces as Parquet files.")
+VEHICLE = define_option(
+    "vehicle", str, "Vehicle name or file.", "paper-reference", known="catalogs/vehicles/*.yaml"
+)
+CAMPAIGN_VEHICLE = define_option(
     "vehicle",
     str | None,
     "Vehicle name or file to start from; by default the campaign's.",
     None,
     known="catalogs/vehicles/*.yaml",
 )
-CAMERA = option(
+CAMERA = define_option(
     "camera",
     str,
     "Camera YAML: a catalogue entry, or fx, fy, cx, cy.",
     known="catalogs/cameras/*.yaml",
 )
-OUT = option("out", str | None, "Folder for the JSON file that this command writes.", None)
-BACKEND = option("backend", str, "Rasteriser: auto, cpu or gsplat.", "auto", known=("auto", "cpu", "gsplat"))
+OUT = define_option("out", str | None, "Folder for the JSON file that this command writes.", None)
+BACKEND = define_option(
+    "backend", str, "Rasteriser: auto, cpu or gsplat.", "auto", known=("auto", "cpu", "gsplat")
+)
 RUNNER = (
-    option("runner", str, "threads, processes or dask.", "dask", known=("threads", "processes", "dask")),
-    option("workers", int | None, "Clips made at once; by default one for each processor.", None, minimum=1),
-    option("scheduler", str | None, "tcp:// or tls:// address of a running Dask scheduler.", None),
+    define_option(
+        "runner", str, "threads, processes or dask.", "dask", known=("threads", "processes", "dask")
+    ),
+    define_option(
+        "workers", int | None, "Clips made at once; by default one for each processor.", None, minimum=1
+    ),
+    define_option("scheduler", str | None, "tcp:// or tls:// address of a running Dask scheduler.", None),
 )

@@ -8,13 +8,13 @@ from flows.commands.command import (
     GRID,
     RUNNER,
     Command,
-    argument,
-    option,
+    define_argument,
+    define_option,
     select_keys,
 )
 
 GROUP = "Datasets"
-CLIPS = option(
+CLIPS = define_option(
     "clips", list[str] | None, "Label or id of a clip; may be given more than once.", None, spelling="clip"
 )
 
@@ -33,14 +33,14 @@ COMMANDS = (
         sentence="Make the dataset of a scenario grid, or the clips that it still lacks.",
         function="flows.making.request:make_dataset",
         options=(
-            argument("grid", str | None, GRID.help, None, known=GRID.known),
-            option(
+            define_argument("grid", str | None, GRID.help, None, known=GRID.known),
+            define_option(
                 "out",
                 str,
                 "Dataset folder: new, empty, or an unfinished run of the same grid.",
                 in_store=True,
             ),
-            option(
+            define_option(
                 "manifest",
                 str | None,
                 "Instead of a grid: a frozen run to be made again, by name or file.",
@@ -49,14 +49,14 @@ COMMANDS = (
             ),
             *RUNNER,
             BACKEND,
-            option(
+            define_option(
                 "vehicle",
                 str | None,
                 "Vehicle name or file instead of the grid's; a frozen vehicle runs in its own mode.",
                 None,
                 known="catalogs/vehicles/*.yaml",
             ),
-            option(
+            define_option(
                 "pictures", bool, "Render frames; without them, telemetry alone.", True, spelling="frames"
             ),
         ),
@@ -68,34 +68,36 @@ COMMANDS = (
         group=GROUP,
         sentence="Freeze a run for generate --manifest: scenarios, seeds, parameters and the hash of each clip's"
         " telemetry.",
-        function="flows.making.freezing:freeze",
+        function="flows.making.freezing:freeze_run",
         options=(
-            argument(
+            define_argument(
                 "grid",
                 str | None,
                 "Grid file or name; without one, every frozen run that ships.",
                 None,
                 known=GRID.known,
             ),
-            option("out", str | None, "File to write; by default where the project keeps its own.", None),
+            define_option(
+                "out", str | None, "File to write; by default where the project keeps its own.", None
+            ),
         ),
     ),
     Command(
         name="schedule",
         group=GROUP,
         sentence="Make a dataset of a grid at set times, as a Prefect deployment served from this process.",
-        function="flows.scheduled.scheduling:schedule",
+        function="flows.scheduled.scheduling:serve_grid",
         options=(
             GRID,
-            option("every", str, 'Cron expression, UTC: "0 3 * * *" is every night at three.'),
-            option(
+            define_option("every", str, 'Cron expression, UTC: "0 3 * * *" is every night at three.'),
+            define_option(
                 "out",
                 str,
                 "Folder or s3:// address in which each run makes its dated dataset.",
                 in_store=True,
             ),
             *RUNNER,
-            option(
+            define_option(
                 "notify", str | None, "Command or http(s) address that is called when a run has failed.", None
             ),
         ),
@@ -106,25 +108,25 @@ COMMANDS = (
         name="validate",
         group=GROUP,
         sentence="Check a grid and estimate its size, without making anything.",
-        function="flows.reading.describe:validate",
+        function="flows.reading.describe:validate_grid",
         options=(GRID,),
     ),
     Command(
         name="describe",
         group=GROUP,
         sentence="Summarise a dataset: clips, weathers, road features, verdicts.",
-        function="flows.reading.describe:describe",
+        function="flows.reading.describe:describe_dataset",
         options=(DATASET,),
     ),
     Command(
         name="sql",
         group=GROUP,
         sentence="Answer an SQL query over a dataset's views.",
-        function="flows.reading.query:sql",
+        function="flows.reading.query:query_dataset",
         options=(
             DATASET,
-            argument("query", str, "DuckDB SQL over clips, ticks, frames, verdicts and pairs."),
-            option(
+            define_argument("query", str, "DuckDB SQL over clips, ticks, frames, verdicts and pairs."),
+            define_option(
                 "allow_files",
                 bool,
                 "Let the query read and write files of this machine and load extensions; without it, the query"
@@ -138,20 +140,22 @@ COMMANDS = (
         name="schema",
         group=GROUP,
         sentence="List every column of every view: unit, paper symbol, CF standard name and meaning.",
-        function="flows.reading.query:schema",
-        options=(option("grid", bool, "Print the JSON Schema of a grid file instead, for editors.", False),),
+        function="flows.reading.query:list_columns",
+        options=(
+            define_option("grid", bool, "Print the JSON Schema of a grid file instead, for editors.", False),
+        ),
         json_with="grid",
     ),
     Command(
         name="preview",
         group=GROUP,
         sentence="Make an MP4 film of each clip, with speed, slip, pitch, load and brake pressure below the picture.",
-        function="flows.reading.previews:preview",
+        function="flows.reading.previews:make_films",
         options=(
             DATASET,
-            option("out", str, "Folder for the films."),
+            define_option("out", str, "Folder for the films."),
             CLIPS,
-            option("traces", bool, "Draw the vehicle's traces below the picture.", True),
+            define_option("traces", bool, "Draw the vehicle's traces below the picture.", True),
         ),
     ),
     Command(
@@ -159,10 +163,10 @@ COMMANDS = (
         group=GROUP,
         sentence="Make a page that opens without a server: clips to filter, films beside traces, siblings, the"
         " manifest.",
-        function="flows.reading.report:report",
+        function="flows.reading.report:make_report",
         options=(
             DATASET,
-            option(
+            define_option(
                 "out", str | None, "Folder for the page; by default DIR-report, beside the dataset.", None
             ),
             CLIPS,
@@ -172,11 +176,11 @@ COMMANDS = (
         name="sheets",
         group=GROUP,
         sentence="Draw one place in every weather, and each road feature before, at and after contact.",
-        function="flows.reading.sheets:sheets",
+        function="flows.reading.sheets:draw_sheets",
         options=(
             DATASET,
-            option("out", str, "Folder for weather.png and hazards.png."),
-            option("station", float, "Station on the route where the weathers are shown [m].", 12.0),
+            define_option("out", str, "Folder for weather.png and hazards.png."),
+            define_option("station", float, "Station on the route where the weathers are shown [m].", 12.0),
         ),
     ),
 )

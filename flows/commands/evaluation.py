@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from flows.commands.command import CAMERA, DATASET, OUT, Command, argument, option, require
+from flows.commands.command import CAMERA, DATASET, OUT, Command, define_argument, define_option, require_key
 
 GROUP = "Evaluation"
 EVALUATION_COLUMNS = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
@@ -25,24 +25,24 @@ COMMANDS = (
         name="evaluate",
         group=GROUP,
         sentence="Judge a dataset from its pixels: poses, motion, road edits and weather, beside the paper's figures.",
-        function="flows.judging.evaluation:evaluate",
+        function="flows.judging.evaluation:evaluate_dataset",
         options=(
             DATASET,
-            option("out", str, "Folder for evaluation.json, .parquet and .html."),
-            option(
+            define_option("out", str, "Folder for evaluation.json, .parquet and .html."),
+            define_option(
                 "trajectories",
                 str | None,
                 "Folder with METHOD/CLIP_ID.txt (TUM format), trajectories to score as well.",
                 None,
             ),
-            option("metric", bool, "The lengths of the trajectories are in metres.", False),
-            option(
+            define_option("metric", bool, "The lengths of the trajectories are in metres.", False),
+            define_option(
                 "learned",
                 str | None,
                 "YAML file of local checkpoints of learned judges (CLIP, DOVER, FAST-VQA, LPIPS).",
                 None,
             ),
-            option(
+            define_option(
                 "crf",
                 int | None,
                 "Encode with H.264 at this constant rate factor first, and judge the decoded frames.",
@@ -57,38 +57,40 @@ COMMANDS = (
         name="controls",
         group=GROUP,
         sentence="Desynchronise a dataset's claims in seven ways, and say which metric detects which fault.",
-        function="flows.judging.controls:controls",
+        function="flows.judging.controls:run_controls",
         options=(DATASET, OUT),
         brief=leave_out_roc,
-        passed=require("all_detected"),
+        passed=require_key("all_detected"),
     ),
     Command(
         name="judge",
         group=GROUP,
         sentence="Judge the motion of any video against the telemetry claimed for it, from pixels and intrinsics"
         " alone.",
-        function="flows.judging.foreign:judge",
+        function="flows.judging.foreign:judge_video",
         options=(
-            argument("video", str, "Any video file, or a trajectory (TUM format, .txt or .tum)."),
-            option("claim", str, "Telemetry Parquet with t_ns or time, pitch and station."),
+            define_argument("video", str, "Any video file, or a trajectory (TUM format, .txt or .tum)."),
+            define_option("claim", str, "Telemetry Parquet with t_ns or time, pitch and station."),
             CAMERA,
-            option("metric", bool, "The lengths of the trajectory are in metres.", False),
+            define_option("metric", bool, "The lengths of the trajectory are in metres.", False),
             OUT,
         ),
-        passed=require("passed"),
+        passed=require_key("passed"),
     ),
     Command(
         name="retention",
         group=GROUP,
         sentence="Measure how much of a road event's pitch a video editor kept (the paper's source-motion retention).",
-        function="flows.judging.foreign:retention",
+        function="flows.judging.foreign:measure_retention",
         options=(
-            argument("source", str, "Input of the editor: the drive over the road feature."),
-            argument("source_braking", str, "Input of the editor: the same drive braking on the flat road."),
-            argument("edited", str, "Output of the editor for the first."),
-            argument("edited_braking", str, "Output of the editor for the second."),
+            define_argument("source", str, "Input of the editor: the drive over the road feature."),
+            define_argument(
+                "source_braking", str, "Input of the editor: the same drive braking on the flat road."
+            ),
+            define_argument("edited", str, "Output of the editor for the first."),
+            define_argument("edited_braking", str, "Output of the editor for the second."),
             CAMERA,
-            option("event", tuple[int, int], "First and last frame of the event.", (16, 42)),
+            define_option("event", tuple[int, int], "First and last frame of the event.", (16, 42)),
             OUT,
         ),
     ),

@@ -9,8 +9,8 @@ from flows.commands.command import (
     TRACES,
     VEHICLE,
     Command,
-    argument,
-    option,
+    define_argument,
+    define_option,
     select_keys,
 )
 from flows.commands.studies import MODE
@@ -89,14 +89,14 @@ COMMANDS = (
         sentence="Make a campaign folder of measured recordings, or say what is wrong in which run and channel.",
         function="flows.measured.importing:import_measurements",
         options=(
-            argument("source", str, "CSV, Parquet or MDF4 file, or a folder of them."),
-            option(
+            define_argument("source", str, "CSV, Parquet or MDF4 file, or a folder of them."),
+            define_option(
                 "map",
                 str,
                 "Channel map: YAML file, or the name of one that ships.",
                 known="catalogs/channel_maps/*.yaml",
             ),
-            option("out", str, "Campaign folder to make."),
+            define_option("out", str, "Campaign folder to make."),
         ),
     ),
     Command(
@@ -105,8 +105,8 @@ COMMANDS = (
         sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
         function="flows.measured.protocol:brake_protocol",
         options=(
-            argument("campaign", str, "Campaign folder with brake pressure and pitch."),
-            option(
+            define_argument("campaign", str, "Campaign folder with brake pressure and pitch."),
+            define_option(
                 "protocol",
                 str,
                 "Protocol: YAML file, or the name of one.",
@@ -114,7 +114,7 @@ COMMANDS = (
                 known="catalogs/protocols/*.yaml",
             ),
             CAMPAIGN_VEHICLE,
-            option("all_events", bool, "Use every candidate, whatever rules it breaks.", False),
+            define_option("all_events", bool, "Use every candidate, whatever rules it breaks.", False),
             OUT,
         ),
         brief=shorten_brake_protocol,
@@ -125,8 +125,8 @@ COMMANDS = (
         sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
         function="flows.measured.stop_study:stop_study",
         options=(
-            argument("campaign", str, "Campaign folder with brake and engine torque."),
-            option(
+            define_argument("campaign", str, "Campaign folder with brake and engine torque."),
+            define_option(
                 "study",
                 str,
                 "Stop study: YAML file, or the name of one.",
@@ -144,8 +144,8 @@ COMMANDS = (
         sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
         function="flows.measured.bump_study:bump_study",
         options=(
-            argument("campaign", str, "Campaign folder with pitch rate and speed."),
-            option(
+            define_argument("campaign", str, "Campaign folder with pitch rate and speed."),
+            define_option(
                 "study",
                 str,
                 "Bump study: YAML file, or the name of one.",
@@ -163,17 +163,17 @@ COMMANDS = (
         sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
         function="flows.measured.bus_drives:synthetic_drives",
         options=(
-            option("out", str, "Folder for one bus log of each drive."),
-            option("drives", int, "Number of drives.", 3),
-            option("events", int, "Brake applications in each drive.", 46),
-            option("seed", int, "Seed of the whole set.", 2020),
+            define_option("out", str, "Folder for one bus log of each drive."),
+            define_option("drives", int, "Number of drives.", 3),
+            define_option("events", int, "Brake applications in each drive.", 46),
+            define_option("seed", int, "Seed of the whole set.", 2020),
         ),
     ),
     Command(
         name="agreement",
         group=GROUP,
         sentence="Compare the vehicle model with reference traces, as the paper's Appendix A.2 does.",
-        function="flows.studies.vehicle_model:agreement",
+        function="flows.studies.vehicle_model:measure_agreement",
         options=(TRACES, VEHICLE, MODE, OUT),
         brief=shorten_agreement,
     ),
@@ -184,19 +184,19 @@ COMMANDS = (
         function="flows.measured.calibration:calibrate",
         options=(
             TRACES,
-            option("out", str, "Folder for the frozen vehicle and calibration.json."),
-            option(
+            define_option("out", str, "Folder for the frozen vehicle and calibration.json."),
+            define_option(
                 "vehicle", str, "Vehicle name or file to start from.", VEHICLE.default, known=VEHICLE.known
             ),
-            option(
+            define_option(
                 "procedure",
                 str,
                 "Procedure name or file.",
                 "paper-staged",
                 known="catalogs/calibration/*.yaml",
             ),
-            option("split", str, "The split to fit; no other split is read.", "development"),
-            option("name", str, "Name of the frozen vehicle.", "calibrated"),
+            define_option("split", str, "The split to fit; no other split is read.", "development"),
+            define_option("name", str, "Name of the frozen vehicle.", "calibrated"),
         ),
         brief=select_keys("vehicle_file", "vehicle_sha256", "stages", "before", "after"),
     ),
@@ -207,7 +207,7 @@ COMMANDS = (
         function="flows.measured.closing:close_loop",
         options=(
             CAMPAIGN,
-            option("out", str, "Folder for verdict, report and grown vehicle."),
+            define_option("out", str, "Folder for verdict, report and grown vehicle."),
             CAMPAIGN_VEHICLE,
         ),
         brief=shorten_verdict,
@@ -219,21 +219,23 @@ COMMANDS = (
         sentence="Count how often close-loop is right on campaigns whose truth is known.",
         function="flows.measured.closing_benchmark:close_loop_benchmark",
         options=(
-            option(
+            define_option(
                 "out",
                 str,
                 "Folder for closing-benchmark.json and campaigns.jsonl; a later call continues there.",
             ),
-            option("seeds", int, "Campaigns of each known truth.", 10, minimum=0),
-            option("nulls", int, "Campaigns of a model that lacks nothing.", 100, minimum=0),
-            option(
+            define_option("seeds", int, "Campaigns of each known truth.", 10, minimum=0),
+            define_option("nulls", int, "Campaigns of a model that lacks nothing.", 100, minimum=0),
+            define_option(
                 "harder",
                 int,
                 "Campaigns of each pair of effects, and of each truth with a poor design.",
                 1,
                 minimum=0,
             ),
-            option("minutes", float, "Stop after this time, with the campaigns done so far [min].", 1e9),
+            define_option(
+                "minutes", float, "Stop after this time, with the campaigns done so far [min].", 1e9
+            ),
         ),
         brief=select_keys("false_discoveries", "summary", "power", "cpu_s"),
         one_thread=True,

@@ -1,16 +1,16 @@
 """Commands that build scenes from recordings and other tools, and render single frames of them."""
 
-from flows.commands.command import BACKEND, Command, argument, option
+from flows.commands.command import BACKEND, Command, define_argument, define_option
 
 GROUP = "Scenes"
-SUN = option(
+SUN = define_option(
     "sun_direction_deg",
     tuple[float, float] | None,
     "Azimuth and elevation of the sun [deg]: azimuth 0 is ahead at the start, 90 left; elevation 0 is the horizon.",
     None,
     spelling="sun",
 )
-SCENE_OUT = option("out", str, "Scene folder to make.")
+SCENE_OUT = define_option("out", str, "Scene folder to make.")
 
 COMMANDS = (
     Command(
@@ -19,7 +19,7 @@ COMMANDS = (
         sentence="Build a Gaussian scene from a posed stereo sequence.",
         function="flows.making.reconstruction:scene_from_stereo",
         options=(
-            argument("folder", str, "Folder with calib.txt, poses.txt, image_l/ and image_r/."),
+            define_argument("folder", str, "Folder with calib.txt, poses.txt, image_l/ and image_r/."),
             SCENE_OUT,
             SUN,
         ),
@@ -30,12 +30,12 @@ COMMANDS = (
         sentence="Make a scene of Gaussians trained elsewhere and a route through them.",
         function="flows.making.scenes:scene_import",
         options=(
-            argument("gaussians", str, ".ply, compressed .ply, .splat or .spz file."),
-            option("route", str, "Route: CSV, KITTI poses, TUM or nerfstudio transforms.json."),
+            define_argument("gaussians", str, ".ply, compressed .ply, .splat or .spz file."),
+            define_option("route", str, "Route: CSV, KITTI poses, TUM or nerfstudio transforms.json."),
             SCENE_OUT,
-            option("camera_height", float, "Height of the route's cameras above the road [m].", 1.5),
-            option("half_width", float, "Half the carriageway's width [m].", 3.5),
-            option("metres_per_unit", float, "Metres in one unit of the files.", 1.0),
+            define_option("camera_height", float, "Height of the route's cameras above the road [m].", 1.5),
+            define_option("half_width", float, "Half the carriageway's width [m].", 3.5),
+            define_option("metres_per_unit", float, "Metres in one unit of the files.", 1.0),
             SUN,
         ),
     ),
@@ -45,9 +45,9 @@ COMMANDS = (
         sentence="Render one frame of a scene at a world-to-camera pose.",
         function="flows.making.scenes:render_pose",
         options=(
-            argument("scene", str, "Scene folder, or the name of a built-in street."),
-            option("pose", str, "JSON file: viewmat 4x4, K 3x3, width, height."),
-            option("out", str, "Folder for rgb.png and the buffers."),
+            define_argument("scene", str, "Scene folder, or the name of a built-in street."),
+            define_option("pose", str, "JSON file: viewmat 4x4, K 3x3, width, height."),
+            define_option("out", str, "Folder for rgb.png and the buffers."),
             BACKEND,
         ),
     ),

@@ -1,9 +1,9 @@
 """Commands that repeat the paper's studies and measure speed."""
 
-from flows.commands.command import OUT, VEHICLE, Command, argument, option, select_keys
+from flows.commands.command import OUT, VEHICLE, Command, define_argument, define_option, select_keys
 
 GROUP = "Studies"
-MODE = option(
+MODE = define_option(
     "mode",
     str | None,
     "paper or coupled; by default the mode in which a frozen vehicle was fitted, or paper.",
@@ -16,7 +16,7 @@ COMMANDS = (
         name="sensitivity",
         group=GROUP,
         sentence="Reproduce the paper's bounded surface-parameter study (Appendix E) beside its printed figures.",
-        function="flows.studies.vehicle_model:sensitivity",
+        function="flows.studies.vehicle_model:run_sensitivity",
         options=(OUT,),
         brief=select_keys("solver_cases", "cpu_s", "beside_print"),
         passed=lambda result: all(row["agrees"] for row in result["beside_print"]),
@@ -25,12 +25,12 @@ COMMANDS = (
         name="ablation",
         group=GROUP,
         sentence="Cut one coupling at a time (the paper's Section 4.4): stops over the weather, pitch at a hump.",
-        function="flows.studies.ablation:ablation",
+        function="flows.studies.ablation:run_ablation",
         options=(
-            option("out", str, "Folder for ablation.json, .parquet and .svg."),
-            option("vehicle", str, VEHICLE.help, "multibody-grown", known=VEHICLE.known),
+            define_option("out", str, "Folder for ablation.json, .parquet and .svg."),
+            define_option("vehicle", str, VEHICLE.help, "multibody-grown", known=VEHICLE.known),
             MODE,
-            option(
+            define_option(
                 "traces",
                 str | None,
                 "Folder of reference traces, whose pitch is shown as the oracle's.",
@@ -43,8 +43,8 @@ COMMANDS = (
         name="bench",
         group=GROUP,
         sentence="Measure speed and memory beside a peer in the same run.",
-        function="flows.studies.vehicle_model:bench",
-        options=(argument("name", str | None, "One benchmark; by default all.", None), OUT),
+        function="flows.studies.vehicle_model:run_benchmarks",
+        options=(define_argument("name", str | None, "One benchmark; by default all.", None), OUT),
         is_flow=False,
     ),
 )

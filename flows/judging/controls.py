@@ -6,20 +6,27 @@ from typing import Any
 import numpy as np
 
 from catalogs.gates import load_gates
-from catalogs.studies.ablation import VARIANTS, Variant, cut
+from catalogs.studies.ablation import VARIANTS, Variant, cut_coupling
 from flows.drawing import as_svg
 from flows.judging.controls_figure import roc_figure
 from flows.judging.evaluation_rows import control_of
 from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
 from flows.making.clip import Catalogue, catalogue_of
-from flows.making.driving import drive
+from flows.making.driving import simulate_drive
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
-from flows.running.orchestration import stage
-from flows.store.address import reading
+from flows.running.orchestration import run_as_stage
+from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
-from tasks.eval.negative_controls import Claim, claim_scores, delayed, differs, scaled, separate
+from tasks.eval.negative_controls import (
+    Claim,
+    claims_differ,
+    compute_separation,
+    delay_claim,
+    scale_claimed_pitch,
+    score_claim,
+)
 from tasks.eval.video_motion import path_error, weather_error
 
 CUTS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu")
@@ -43,8 +50,8 @@ LEAST_PITCH, LEAST_WAY = np.deg2rad(0.05), 0.2
 """A copy that differs by less in pitch [rad] and way [m] is no fault."""
 
 
-def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
-    """Desynchronise a dataset in seven ways and say which metric sees which fault, and from what threshold.
+def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
+    """Desynchronise a dataset in seven ways and report which metric detects which fault, and from what threshold.
 
     All are detected only if each could be tried; `undetected` says of the others what kept them.
 
@@ -59,22 +66,22 @@ def controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         If the folder is no finished dataset, or holds fewer than two clips.
     """
     results = Outputs(out, "controls", "controls.json", "controls.svg")
-    root = reading(dataset).root
+    root = open_for_reading(dataset).root
     facts = clip_facts(root)
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")
-    clips = [stage(judge_clip)(View(root=root), row) for row in facts]
+    clips = [run_as_stage(judge_clip)(View(root=root), row) for row in facts]
     false = false_claims(clips, read_plan(root), catalogue_of(root))
     rows = list(score_controls(clips, false))
-    result = {**summary(rows, untried(clips, false)), "rows": [*rows, *unread_rows()]}
+    result = {**summarise_controls(rows, list_untried(clips, false)), "rows": [*rows, *unread_rows()]}
     results.write_json("controls.json", result)
     if rows and out is not None:
         results.write("controls.svg", as_svg(roc_figure(rows, CONTROLS)))
     return result
 
 
-def summary(rows: list[dict[str, Any]], kept: dict[str, str]) -> dict[str, Any]:
-    """What became of every control: who sees it, or why nobody does.
+def summarise_controls(rows: list[dict[str, Any]], kept: dict[str, str]) -> dict[str, Any]:
+    """Return the outcome of every control: the metrics that detect it, or why none could.
 
     Parameters
     ----------
@@ -105,7 +112,7 @@ def summary(rows: list[dict[str, Any]], kept: dict[str, str]) -> dict[str, Any]:
 
 
 def false_claims(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) -> list[dict[str, Claim]]:
-    """The faulty claims of each clip by control; those that say what the true one says are left out.
+    """Return the faulty claims of each clip by control, without those that equal the true claim.
 
     Parameters
     ----------
@@ -113,11 +120,11 @@ def false_claims(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) -> l
     plan, catalogue : the dataset's
     """
     true = _true_claims(clips)
-    return [dict(_copies(k, clips, true, plan, catalogue)) for k in range(len(clips))]
+    return [dict(_make_faulty_claims(k, clips, true, plan, catalogue)) for k in range(len(clips))]
 
 
-def untried(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> dict[str, str]:
-    """Controls that no method could be tried on, and why.
+def list_untried(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> dict[str, str]:
+    """Return the controls that no method could be applied to, with the reason.
 
     Parameters
     ----------
@@ -132,7 +139,7 @@ def untried(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> dict[str,
                 f"not tried: in none of {len(clips)} clips does it change the claim by"
                 f" {np.rad2deg(LEAST_PITCH):.2g} deg or {LEAST_WAY:g} m; add clips in which it does"
             )
-        elif not any(_whole(clip, method) for clip in changed for method in METHODS):
+        elif not any(_is_whole(clip, method) for clip in changed for method in METHODS):
             kept[name] = (
                 f"not tried: in the {len(changed)} clips whose claim it changes every method misses the pose of a"
                 " frame; add clips that can be tracked"
@@ -153,10 +160,10 @@ def score_controls(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> It
     dry = [control_of(clip, clips, weather=True) for clip in clips]
 
     def scores(k: int, method: str, claim: Claim) -> dict[str, float]:
-        return _scores(clips[k], dry[k], method, claim, response)
+        return _score_claim(clips[k], dry[k], method, claim, response)
 
     for method in METHODS:
-        whole = [k for k, clip in enumerate(clips) if _whole(clip, method)]
+        whole = [k for k, clip in enumerate(clips) if _is_whole(clip, method)]
         sound = [scores(k, method, true[k]) for k in whole]
         for name in CONTROLS:
             faulty = [scores(k, method, false[k][name]) for k in whole if name in false[k]]
@@ -165,7 +172,7 @@ def score_controls(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> It
                 bad = [scored[metric] for scored in faulty if metric in scored]
                 if not good:
                     continue
-                found = separate(good, bad)
+                found = compute_separation(good, bad)
                 yield {
                     "control": name,
                     "metric": metric,
@@ -204,17 +211,17 @@ def _true_claims(clips: list[JudgedClip]) -> list[Claim]:
     return [Claim(pitch=clip.frames["pitch"], station=clip.frames["station"]) for clip in clips]
 
 
-def _whole(clip: JudgedClip, method: str) -> bool:
+def _is_whole(clip: JudgedClip, method: str) -> bool:
     return not clip.motions[method].failed.any()
 
 
-def _scores(
+def _score_claim(
     clip: JudgedClip, dry: JudgedClip | None, method: str, claim: Claim, response: float
 ) -> dict[str, float]:
     """Scores of a claim on its clip and, where both were tracked, on the clip and its dry sibling."""
     motion = clip.motions[method]
-    scores = claim_scores(motion, claim, response, clip.times, clip.opening)
-    if dry is None or not _whole(dry, method) or not claim.station[-1] > claim.station[0]:
+    scores = score_claim(motion, claim, response, clip.times, clip.opening)
+    if dry is None or not _is_whole(dry, method) or not claim.station[-1] > claim.station[0]:
         return scores
     seen, control = motion.normalised_path, dry.motions[method].normalised_path
     if min(np.ptp(seen[:, 0]), np.ptp(control[:, 0])) > 0:  # neither stands
@@ -225,17 +232,17 @@ def _scores(
     return scores
 
 
-def _copies(
+def _make_faulty_claims(
     k: int, clips: list[JudgedClip], true: list[Claim], plan: Plan, catalogue: Catalogue
 ) -> Iterator[tuple[str, Claim]]:
     """Faulty claims of one clip that differ from its true one."""
     scenario = next(c.scenario for c in plan.clips if c.clip_id == clips[k].facts["clip_id"])
-    made = {"one-frame-delay": delayed(true[k], 1), "amplitude-0.8": scaled(true[k], 0.8),
-            "sign-flip": scaled(true[k], -1.0), "other-clip": true[(k + 1) % len(true)]}  # fmt: skip
+    made = {"one-frame-delay": delay_claim(true[k], 1), "amplitude-0.8": scale_claimed_pitch(true[k], 0.8),
+            "sign-flip": scale_claimed_pitch(true[k], -1.0), "other-clip": true[(k + 1) % len(true)]}  # fmt: skip
     ticks = np.rint(np.arange(plan.settings.frames) * TICK_RATE_HZ / plan.settings.frame_rate_hz).astype(int)
     for variant in CUTS:
-        _, ride = drive(
-            cut(scenario, variant),
+        _, ride = simulate_drive(
+            cut_coupling(scenario, variant),
             catalogue.vehicle,
             catalogue.surface,
             plan.settings.vehicle_mode,
@@ -243,5 +250,5 @@ def _copies(
         )
         made[variant] = Claim(pitch=ride.columns["pitch"][ticks], station=ride.columns["station"][ticks])
     for name, claim in made.items():
-        if differs(claim, true[k], LEAST_PITCH, LEAST_WAY):
+        if claims_differ(claim, true[k], LEAST_PITCH, LEAST_WAY):
             yield name, claim

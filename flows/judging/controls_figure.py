@@ -6,7 +6,7 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from flows.drawing import literal
+from flows.drawing import escape_formulas
 
 COLUMNS = 4
 
@@ -30,7 +30,7 @@ def roc_figure(rows: Sequence[Mapping[str, Any]], meanings: Mapping[str, str]) -
             mine = [row for row in rows if (row["control"], row["metric"]) == (control, metric)]
             if mine:
                 best = max(mine, key=lambda row: row["auc"])
-                label = literal(f"{metric} ({best['method']}, {best['auc']:.2f})")
+                label = escape_formulas(f"{metric} ({best['method']}, {best['auc']:.2f})")
                 axis.plot(
                     best["roc"]["false_alarms"],
                     best["roc"]["detections"],

@@ -10,20 +10,21 @@ import pyarrow as pa
 from catalogs.gates import load_gates
 from catalogs.learned_judges import load_judges
 from flows.judging.evaluation_means import mean_rows
-from flows.judging.evaluation_page import page
+from flows.judging.evaluation_page import render_page
 from flows.judging.evaluation_rows import control_of, figure_row, weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View, judge_clip
 from flows.judging.learned_rows import learned_rows
 from flows.judging.physics import clip_facts
 from flows.judging.road_edit_rows import road_edit_rows
 from flows.judging.trajectories import trajectory_files
-from flows.running.orchestration import stage
-from flows.store.address import reading
+from flows.running.orchestration import run_as_stage
+from flows.store.address import open_for_reading
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError
+from tasks.eval.motion_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.severity import severity_agreement
 from tasks.eval.video_motion import (
@@ -31,7 +32,6 @@ from tasks.eval.video_motion import (
     geometry_error,
     path_error,
     reference_progress,
-    rms,
     weather_error,
 )
 
@@ -46,10 +46,10 @@ SCHEMA = pa.schema(
         *((name, pa.int64()) for name in ("window", "averaged")),
     ]
 )
-"""Columns of the table of figures; those that no figure of a dataset fills keep their type."""
+"""Columns of the table of figures; an empty column keeps its type."""
 
 
-def evaluate(
+def evaluate_dataset(
     dataset: str,
     *,
     out: str,
@@ -75,15 +75,15 @@ def evaluate(
         If the folder is no finished dataset, or a trajectory or a checkpoint cannot be used.
     """
     results = Outputs(out, "evaluate", "evaluation.json", "evaluation.parquet", "evaluation.html")
-    root = reading(dataset).root
+    root = open_for_reading(dataset).root
     judges = load_judges(learned)
     facts = clip_facts(root)
     told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
     view = View(root=root, crf=crf)
-    clips = [stage(judge_clip)(view, row, told.get(row["clip_id"]), metric=metric) for row in facts]
+    clips = [run_as_stage(judge_clip)(view, row, told.get(row["clip_id"]), metric=metric) for row in facts]
     rows = [*pose_rows(clips), *weather_rows(clips), *geometry_rows(clips), *severity_rows(clips)]
     rows += quality_rows(clips)
-    rows += stage(road_edit_rows)(view, clips)
+    rows += run_as_stage(road_edit_rows)(view, clips)
     rows += learned_rows(view, clips, judges)
     rows += [figure_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
     rows += list(mean_rows(rows, clips))
@@ -94,17 +94,17 @@ def evaluate(
     }  # fmt: skip
     results.write_json("evaluation.json", result)
     write_parquet(pa.Table.from_pylist(rows, SCHEMA), results.path("evaluation.parquet"))
-    results.write("evaluation.html", page(clips, rows, run_id, codec))
+    results.write("evaluation.html", render_page(clips, rows, run_id, codec))
     return result
 
 
 def pose_rows(clips: list[JudgedClip]) -> Iterator[Row]:
-    """Pitch and progress of each clip by each method, with uncertainty; a failure is told, not scored."""
+    """Yield pitch and progress of each clip by each method, with uncertainty; a failure is reported, not scored."""
     responds = load_gates().response_deg
-    for clip, method, motion in _seen(clips):
+    for clip, method, motion in _list_recovered(clips):
         claimed = clip.frames["pitch"] - clip.frames["pitch"][0]
         way = clip.frames["station"] - clip.frames["station"][0]
-        failure = _failure(motion)
+        failure = _describe_failure(motion)
         label = clip.facts["label"]
         error = None if failure else float(np.rad2deg(rms(motion.pitch - claimed)))
         yield figure_row("pitch_rmse", method, label, error, "deg", note=failure,
@@ -121,14 +121,14 @@ def pose_rows(clips: list[JudgedClip]) -> Iterator[Row]:
 
 def weather_rows(clips: list[JudgedClip]) -> Iterator[Row]:
     """E_weather and E_path of each clip against the dry one of the same drive, with the perfect pose's floor."""
-    for clip, method, motion in _seen(clips):
+    for clip, method, motion in _list_recovered(clips):
         control = control_of(clip, clips, weather=True)
         if control is None:
             continue
         other, label = control.motions.get(method), clip.facts["label"]
         if other is None:
             continue
-        failure = _failure(motion) or _failure(other)
+        failure = _describe_failure(motion) or _describe_failure(other)
         station, control_station = clip.frames["station"], control.frames["station"]
         forward = motion.normalised_path, other.normalised_path
         for window in WINDOWS:
@@ -143,14 +143,14 @@ def weather_rows(clips: list[JudgedClip]) -> Iterator[Row]:
 
 def geometry_rows(clips: list[JudgedClip]) -> Iterator[Row]:
     """E_geometry of each clip with a road feature, at every window beside the perfect pose's floor."""
-    for clip, method, motion in _seen(clips):
+    for clip, method, motion in _list_recovered(clips):
         height = clip.facts["hazard_height_m"]
         if height == 0:
             continue
         claimed = clip.frames["pitch"]
         opening = np.inf if clip.opening is None else clip.opening
         name = "e_geometry_hump" if height > 0 else "e_geometry_depression"
-        failure = _failure(motion)
+        failure = _describe_failure(motion)
         for window in WINDOWS:
             try:
                 floor = geometry_error(clip.times, claimed, claimed, opening, window)
@@ -184,12 +184,12 @@ def severity_rows(clips: list[JudgedClip]) -> Iterator[Row]:
             yield figure_row("severity_adjacent_accuracy", name, condition, accuracy, "1", note=note)
 
 
-def _seen(clips: list[JudgedClip]) -> Iterator[tuple[JudgedClip, str, RecoveredMotion]]:
+def _list_recovered(clips: list[JudgedClip]) -> Iterator[tuple[JudgedClip, str, RecoveredMotion]]:
     for clip in clips:
         for method, motion in clip.motions.items():
             yield clip, method, motion
 
 
-def _failure(motion: RecoveredMotion) -> str:
+def _describe_failure(motion: RecoveredMotion) -> str:
     failed = int(motion.failed.sum())
     return f"{failed} of {len(motion.failed)} frames without a pose; {motion.failures[0]}" if failed else ""

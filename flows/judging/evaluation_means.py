@@ -47,7 +47,7 @@ def mean_rows(rows: Sequence[Row], clips: list[JudgedClip]) -> Iterator[Row]:
     rows : single figures
     clips : as their judges saw them
     """
-    places = _places(clips)
+    places = _find_conditions(clips)
     groups: dict[tuple[str, str, int], list[Row]] = defaultdict(list)
     for row in rows:
         groups[row["metric"], row["method"], row["window"]].append(row)
@@ -58,19 +58,19 @@ def mean_rows(rows: Sequence[Row], clips: list[JudgedClip]) -> Iterator[Row]:
             for over, value in printed.items():
                 yield {**figures[0], "condition": f"paper/{over}", "paper": value, "averaged": 0}
             continue
-        yield _mean("all", placed, places)
+        yield _average_rows("all", placed, places)
         heads = dict.fromkeys(places[row["condition"]].head for row in placed)
         for head in heads:
             mine = [row for row in placed if places[row["condition"]].head == head]
             if 1 < len(mine) < len(placed):
-                yield _mean(f"{head}/all", mine, places)
+                yield _average_rows(f"{head}/all", mine, places)
         for over, value in printed.items():
             mine = [row for row in placed if SETS[over](places[row["condition"]].facts)]
             if mine:
-                yield _mean(f"paper/{over}", mine, places, value)
+                yield _average_rows(f"paper/{over}", mine, places, value)
 
 
-def _places(clips: list[JudgedClip]) -> dict[str, Place]:
+def _find_conditions(clips: list[JudgedClip]) -> dict[str, Place]:
     places = {}
     for facts in (clip.facts for clip in clips):
         label = facts["label"]
@@ -81,7 +81,9 @@ def _places(clips: list[JudgedClip]) -> dict[str, Place]:
     return places
 
 
-def _mean(condition: str, rows: list[Row], places: dict[str, Place], paper: float | None = None) -> Row:
+def _average_rows(
+    condition: str, rows: list[Row], places: dict[str, Place], paper: float | None = None
+) -> Row:
     first, scored = rows[0], [row for row in rows if row["value"] is not None]
     seeds = [places[row["condition"]].seed for row in scored]
     values = _seed_means([row["value"] for row in scored], seeds)

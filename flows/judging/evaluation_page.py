@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from flows.drawing import NO_SCRIPTS, as_svg, literal
+from flows.drawing import NO_SCRIPTS, as_svg, escape_formulas
 from flows.judging.judged_clip import JudgedClip, Row
 
 COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
@@ -55,8 +55,8 @@ LEAST_SWING_DEG = 0.25
 """Half of the least pitch that a plot spans, so that a drift of hundredths looks like one [deg]."""
 
 
-def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: str) -> str:
-    """The whole page.
+def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: str) -> str:
+    """Return the HTML of the whole page.
 
     Parameters
     ----------
@@ -73,14 +73,14 @@ def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: s
         " it. Window 0 is none. The paper's figures come from VGGT on other videos.</p>",
         "<h2>Summary</h2>",
         "<p>Without smoothing: means over all clips, and over the clips that the paper's protocol takes, within each"
-        " visual seed and then over seeds.</p>", _summary(rows, names),
+        " visual seed and then over seeds.</p>", _render_summary(rows, names),
         "<h2>Pitch: claimed and recovered</h2>",
-        _figure(_pitch_plot(clips), f"Claimed (black) and recovered; the first {SHOWN_CLIPS} clips at most."),
-        *_geometry(rows),
-        "<h2>Clips</h2>", _thumbnails(clips),
+        _render_figure(_pitch_plot(clips), f"Claimed (black) and recovered; the first {SHOWN_CLIPS} clips at most."),
+        *_render_geometry(rows),
+        "<h2>Clips</h2>", _render_thumbnails(clips),
         "<h2>Every figure</h2>",
         *(f"<h3>{escape(name)}</h3><p>{escape(MEANING.get(name, ''))}</p>"
-          f"{_table([row for row in rows if row['metric'] == name])}" for name in names),
+          f"{_render_table([row for row in rows if row['metric'] == name])}" for name in names),
     ]  # fmt: skip
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8">{NO_SCRIPTS}<title>muSync evaluation</title>'
@@ -88,7 +88,7 @@ def page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: s
     )
 
 
-def _summary(rows: Sequence[Row], names: Sequence[str]) -> str:
+def _render_summary(rows: Sequence[Row], names: Sequence[str]) -> str:
     lines = []
     for name in names:
         mine = [row for row in rows if row["metric"] == name and row["window"] == 0]
@@ -112,7 +112,7 @@ def _is_single(row: Row) -> bool:
     return row["averaged"] is None
 
 
-def _table(rows: Sequence[Row]) -> str:
+def _render_table(rows: Sequence[Row]) -> str:
     head = (
         "condition",
         "method",
@@ -151,9 +151,13 @@ def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
         axis.plot(clip.times, claimed, color="black", lw=1.6, label="claimed")
         for method, motion in clip.motions.items():
             axis.plot(
-                clip.times, np.rad2deg(motion.pitch), color=COLOURS.get(method), lw=0.8, label=literal(method)
+                clip.times,
+                np.rad2deg(motion.pitch),
+                color=COLOURS.get(method),
+                lw=0.8,
+                label=escape_formulas(method),
             )
-        axis.set_title(literal(clip.facts["label"]), fontsize=9)
+        axis.set_title(escape_formulas(clip.facts["label"]), fontsize=9)
         axis.tick_params(labelsize=7)
         low, high = axis.get_ylim()
         axis.set_ylim(min(low, -LEAST_SWING_DEG), max(high, LEAST_SWING_DEG))
@@ -167,7 +171,7 @@ def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
     return figure
 
 
-def _geometry(rows: Sequence[Row]) -> list[str]:
+def _render_geometry(rows: Sequence[Row]) -> list[str]:
     """The section on road features; nothing for a dataset without one that was scored."""
     scored = [
         name
@@ -177,7 +181,7 @@ def _geometry(rows: Sequence[Row]) -> list[str]:
     if not scored:
         return []
     caption = "Mean over clips; dashed: a perfect pose."
-    return ["<h2>E_geometry and its floor</h2>", _figure(_window_plot(rows, scored), caption)]
+    return ["<h2>E_geometry and its floor</h2>", _render_figure(_window_plot(rows, scored), caption)]
 
 
 def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
@@ -190,7 +194,7 @@ def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
                 np.mean([r["value"] for r in mine if (r["window"], r["method"]) == (w, method)])
                 for w in windows
             ]
-            axis.plot(windows, means, "o-", color=COLOURS.get(method), ms=3, label=literal(method))
+            axis.plot(windows, means, "o-", color=COLOURS.get(method), ms=3, label=escape_formulas(method))
         floors = [np.mean([r["floor"] for r in mine if r["window"] == w]) for w in windows]
         axis.plot(windows, floors, "--", color="black", label="perfect pose")
         axis.set_title(name, fontsize=9)
@@ -201,11 +205,11 @@ def _window_plot(rows: Sequence[Row], names: Sequence[str]) -> Figure:
     return figure
 
 
-def _figure(figure: Figure, caption: str) -> str:
+def _render_figure(figure: Figure, caption: str) -> str:
     return f"<figure>{as_svg(figure)}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
-def _thumbnails(clips: Sequence[JudgedClip]) -> str:
+def _render_thumbnails(clips: Sequence[JudgedClip]) -> str:
     parts = []
     for clip in clips[:SHOWN_CLIPS]:
         pictures = []

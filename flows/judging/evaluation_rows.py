@@ -1,35 +1,57 @@
-"""A figure's row, and which clip a clip is held against."""
+"""Rows of figures, and the clip with which a clip is compared."""
 
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from catalogs.scenario import SCENARIO_FIELDS
 from flows.judging.judged_clip import JudgedClip, Row
+from tasks.surface.weather import DRY, WEATHERS
+
+
+class FigureDetails(TypedDict, total=False):
+    """Further columns of a figure; each may be left out.
+
+    Parameters
+    ----------
+    note : why a value is missing, or how to read it
+    window : of the smoothing; None for none [frames]
+    floor : score of a perfect estimate [unit]
+    uncertainty : standard uncertainty of the value [unit]
+    paper : figure that the paper prints for the same clips [unit]
+    averaged : number of figures of which it is the mean; None for a single figure [1]
+    seed_std : of a mean, sample standard deviation over visual seeds [unit]
+    """
+
+    note: str
+    window: int | None
+    floor: float | None
+    uncertainty: float | None
+    paper: float | None
+    averaged: int | None
+    seed_std: float | None
 
 
 def figure_row(
-    metric: str, method: str, condition: str, value: float | None, unit: str, *, note: str = "",
-    window: int | None = None, floor: float | None = None, uncertainty: float | None = None,
-    paper: float | None = None, averaged: int | None = None, seed_std: float | None = None,
-) -> Row:  # fmt: skip
-    """One figure of an evaluation; a missing one says why.
+    metric: str,
+    method: str,
+    condition: str,
+    value: float | None,
+    unit: str,
+    **details: Unpack[FigureDetails],
+) -> Row:
+    """Return one figure of an evaluation; a missing one says why.
 
     Parameters
     ----------
     metric, method, condition : what was measured, by what, on what
     value : None or not finite where it is missing [unit]
     unit : of value, floor and uncertainty
-    note : why a value is missing, or how to read it
-    window : of the smoothing; None for none [frames]
-    floor : what a perfect estimate scores [unit]
-    uncertainty : standard [unit]
-    paper : what the paper prints for the same clips [unit]
-    averaged : how many figures it is a mean of; None for a single figure [1]
-    seed_std : of a mean, sample standard deviation over visual seeds [unit]
+    details : as of `FigureDetails`
     """
+    note, uncertainty = details.get("note", ""), details.get("uncertainty")
     finite = value is not None and np.isfinite(value)
     return {
         "metric": metric,
@@ -37,13 +59,13 @@ def figure_row(
         "condition": condition,
         "value": value if finite else None,
         "unit": unit,
-        "paper": paper,
-        "window": window or 0,
-        "floor": floor,
+        "paper": details.get("paper"),
+        "window": details.get("window") or 0,
+        "floor": details.get("floor"),
         "uncertainty": uncertainty if uncertainty is not None and np.isfinite(uncertainty) else None,
         "note": note if finite or note else "not a number",
-        "averaged": averaged,
-        "seed_std": seed_std,
+        "averaged": details.get("averaged"),
+        "seed_std": details.get("seed_std"),
     }
 
 
@@ -54,7 +76,7 @@ def visual_seed(label: str) -> str:
 
 
 def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> JudgedClip | None:
-    """The clip of one visual seed that differs in nothing but a dry sky, or a flat road; None if there is none.
+    """Return the clip of the same visual seed that differs only by a dry sky, or by a flat road; None if there is none.
 
     Parameters
     ----------
@@ -68,9 +90,13 @@ def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> J
     held = set(SCENARIO_FIELDS) - free
     seed = visual_seed(clip.facts["label"])
     for other in (c for c in clips if visual_seed(c.facts["label"]) == seed):
-        plain = other.facts["weather"] == "dry" if weather else other.facts["hazard_height_m"] == 0
-        if plain and other is not clip and all(_same(clip.facts.get(k), other.facts.get(k)) for k in held):
-            return None if weather and clip.facts["weather"] == "dry" else other
+        plain = other.facts["weather"] == DRY if weather else other.facts["hazard_height_m"] == 0
+        if (
+            plain
+            and other is not clip
+            and all(_are_equal(clip.facts.get(k), other.facts.get(k)) for k in held)
+        ):
+            return None if weather and clip.facts["weather"] == DRY else other
     return None
 
 
@@ -81,8 +107,8 @@ def weather_families(clips: list[JudgedClip]) -> Iterator[tuple[str, str, list[J
     ----------
     clips : of the dataset
     """
-    for control in (c for c in clips if c.facts["weather"] == "dry"):
-        for kind in ("rain", "snow"):
+    for control in (c for c in clips if c.facts["weather"] == DRY):
+        for kind in WEATHERS:
             family = [
                 c for c in clips if c.facts["weather"] == kind and control_of(c, [control], weather=True) is control
             ]  # fmt: skip
@@ -91,5 +117,5 @@ def weather_families(clips: list[JudgedClip]) -> Iterator[tuple[str, str, list[J
                 yield kind, f"{kind}: {control.facts['label'].partition('/')[2] or 'all'}", levels
 
 
-def _same(a: Any, b: Any) -> bool:
+def _are_equal(a: Any, b: Any) -> bool:
     return bool(a == b or (a != a and b != b))

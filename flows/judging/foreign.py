@@ -9,7 +9,7 @@ from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
-from tasks.eval.foreign_video import claim_at, judge_motion
+from tasks.eval.foreign_video import judge_motion, sample_claim
 from tasks.eval.video_motion import motion_retention
 
 NEEDS_DEPTH = (
@@ -20,10 +20,10 @@ NEEDS_DEPTH = (
 )
 
 
-def judge(
+def judge_video(
     video: str, *, claim: str, camera: str, out: str | None = None, metric: bool = False
 ) -> dict[str, Any]:
-    """Hold a video's ego motion, by the essential chain, or a trajectory against the telemetry claimed for it.
+    """Compare a video's ego motion, by the essential chain, or a trajectory with the telemetry claimed for it.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def judge(
     """
     results = Outputs(out, "judge", "judgement.json")
     footage, told, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
-    at = claim_at(told, footage.times)
+    at = sample_claim(told, footage.times)
     recovered = footage.motion(lens, at.rows, metric=metric)
     verdict = judge_motion(recovered, at, load_foreign_gates())
     times, is_video = footage.times, footage.frames is not None
@@ -63,7 +63,7 @@ def judge(
     return result
 
 
-def retention(
+def measure_retention(
     source: str,
     source_braking: str,
     edited: str,
@@ -73,13 +73,13 @@ def retention(
     event: tuple[int, int] = (16, 42),
     out: str | None = None,
 ) -> dict[str, Any]:
-    """How much of the road event's pitch an editor kept: its input against its output (paper, Appendix A.5).
+    """Measure how much of the road event's pitch an editor kept, from its input and output (paper, Appendix A.5).
 
     Parameters
     ----------
     source, edited : videos or trajectories of the drive over the road feature, before and after the edit
     source_braking, edited_braking : the same of the drive that brakes on the flat road
-    camera : YAML, as for `judge`
+    camera : YAML, as for `judge_video`
     event : first and last frame of the event; the paper's at 10 frames a second
     out : folder for retention.json
 
@@ -119,7 +119,7 @@ def retention(
 
 
 def _read_all(*sources: tuple[Callable[[Path], Any], str]) -> list[Any]:
-    """What each reader makes of its file; every faulty one is told at once."""
+    """Return the value that each reader makes of its file; all faulty files are reported at once."""
     parts: list[Any] = []
     problems: list[str] = []
     for read, path in sources:

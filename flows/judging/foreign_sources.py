@@ -1,4 +1,4 @@
-"""What a judge of foreign videos is given: footage and its camera, from files it did not make."""
+"""Footage and its camera, read from files of others, for the judge of foreign videos."""
 
 import os
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.documents import read_yaml
-from catalogs.sentences import brief
+from catalogs.sentences import shorten_value
 from flows.judging.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.outside_trajectory import motion_from_trajectory
-from tasks.eval.poses.undistort import COEFFICIENTS, undistorted
+from tasks.eval.poses.undistort import COEFFICIENTS, undistort_frames
 
 MOST_FRAMES, LEAST_FRAMES = 3000, 5
 MOST_PIXELS = 960 * 540
@@ -76,7 +76,7 @@ class Footage:
     def motion(
         self, camera: ForeignCamera, rows: NDArray[np.int64] | None = None, *, metric: bool = False
     ) -> RecoveredMotion:
-        """Ego motion: by the essential chain from a video, as it is told from a trajectory.
+        """Return the ego motion: recovered by the essential chain from a video, or read from a trajectory.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class Footage:
             bent, seen = seen, np.empty_like(seen)
             for first in range(0, len(bent), CHUNK):
                 part = slice(first, first + CHUNK)
-                seen[part] = undistorted({"rgb": bent[part]}, K, camera.distortion)["rgb"]
+                seen[part] = undistort_frames({"rgb": bent[part]}, K, camera.distortion)["rgb"]
         return recover_motion_essential(seen, K, camera.mount)
 
 
@@ -177,7 +177,7 @@ def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64], tupl
     if not (np.diff(times) > 0).all():
         # a container without time stamps: the rate is all there is
         if not rate > 0:
-            raise InputError(f"{path}: the video tells neither time stamps nor a frame rate.")
+            raise InputError(f"{path}: the video has neither time stamps nor a frame rate.")
         times = np.arange(len(stamps)) / rate
     return frames[: len(stamps)], times - times[0], size
 
@@ -204,7 +204,7 @@ def read_camera(path: Path) -> ForeignCamera:
         numbers = {"fx": f, "fy": f} | centre | numbers
     wrong = [
         f"{path}: the camera's {key} must be a number of {least} to {LARGEST_CAMERA:g};"
-        f" it is {brief(numbers.get(key))}."
+        f" it is {shorten_value(numbers.get(key))}."
         for key, least in (("width", 1), ("height", 1), ("fx", 1e-3), ("fy", 1e-3), ("cx", 0.0), ("cy", 0.0))
         if not _is_number(numbers.get(key), least)
     ]
@@ -213,7 +213,7 @@ def read_camera(path: Path) -> ForeignCamera:
         key: numbers.get(key) or 0.0 for key in ("behind_front_axle", "left_of_centre", "height_above_road")
     }
     wrong += [
-        f"{path}: the camera's {key} must be a number within +-{LARGEST_CAMERA:g}; it is {brief(value)}."
+        f"{path}: the camera's {key} must be a number within +-{LARGEST_CAMERA:g}; it is {shorten_value(value)}."
         for key, value in (bends | places).items()
         if not _is_number(value, -LARGEST_CAMERA)
     ]

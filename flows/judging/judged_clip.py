@@ -11,25 +11,21 @@ from numpy.typing import NDArray
 
 from flows.judging.physics import clip_columns
 from flows.judging.trajectories import read_trajectory
-from flows.making.clip import PIXEL_CENTRE, catalogue_of
+from flows.making.clip import PIXEL_CENTRE, catalogue_of, prepare_for_checks
 from flows.making.plan import read_plan
 from flows.reading.film import through_film
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.no_reference import piqe, temporal_error
-from tasks.eval.poses.essential import recover_motion_essential
+from tasks.eval.poses.checks import POSE_CHECKS
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.outside_trajectory import motion_from_trajectory
-from tasks.eval.poses.photometric import recover_motion_photometric
-from tasks.eval.poses.pnp import recover_motion_pnp
-from tasks.eval.poses.undistort import undistorted
-from tasks.eval.poses.unroll import one_shutter
-from tasks.eval.poses.unusable import glossy_pixels, unusable_pixels
+from tasks.eval.poses.undistort import undistort_frames
 from tasks.eval.severity import image_statistics, sampled_frames
 
 Row = dict[str, Any]
-METHODS = ("photometric", "pnp", "essential")
+METHODS = tuple(POSE_CHECKS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,13 +83,13 @@ class View:
             rate = read_plan(self.root).settings.frame_rate_hz
             buffers["rgb"] = through_film(buffers["rgb"], rate, self.crf)
         camera = catalogue_of(self.root).camera
-        return list(undistorted(buffers, camera.K - PIXEL_CENTRE, camera.distortion).values())
+        return list(undistort_frames(buffers, camera.K - PIXEL_CENTRE, camera.distortion).values())
 
 
 def judge_clip(
     view: View, facts: Row, outside: Mapping[str, Path] | None = None, *, metric: bool = False
 ) -> JudgedClip:
-    """All three pose checks and the image statistics of one clip, and what others recovered of it.
+    """Return all pose checks and the image statistics of one clip, and the trajectories that others recovered of it.
 
     Parameters
     ----------
@@ -111,37 +107,27 @@ def judge_clip(
     catalogue = catalogue_of(view.root)
     rgb, depth, kind = view.arrays(facts["index"], "rgb", "depth", "class")
     frames = clip_columns(view.root, "frames", facts)
-    K, mount = catalogue.camera.K - PIXEL_CENTRE, catalogue.camera.T_rig_camera
-    route = catalogue.scene.route.pose(frames["station"])[:, :3, :3]
     times = np.asarray(frames["t_ns"] * 1e-9, np.float64)
-    still = one_shutter(
-        {"rgb": rgb, "depth": depth, "class": kind},
-        K,
-        mount,
-        distortion=catalogue.camera.distortion,
-        line_delay_s=catalogue.camera.line_delay_s,
-        frame_interval_s=float(times[1] - times[0]),
-        film_depth_mm=facts["film_depth_mm"],
-        route_rotations=route,
+    clip = prepare_for_checks(
+        {"rgb": rgb, "depth": depth, "class": kind}, frames, facts["film_depth_mm"], catalogue
     )
-    hidden = unusable_pixels(still["class"], facts["film_depth_mm"])
-    with_depth = (still["rgb"], still["depth"], K, mount)
     others = {name: read_trajectory(path) for name, path in (outside or {}).items()}
     sampled = rgb[sampled_frames(len(rgb))]
     small = rgb[[0, len(rgb) // 3, 2 * len(rgb) // 3]]
     return JudgedClip(
         facts=facts,
         frames=frames,
-        motions={
-            "photometric": recover_motion_photometric(
-                *with_depth, hidden | glossy_pixels(still["class"]), route
-            ),
-            "pnp": recover_motion_pnp(*with_depth, hidden, route),
-            "essential": recover_motion_essential(rgb, K, mount, route_rotations=route),
-        }
+        motions={name: check(clip) for name, check in POSE_CHECKS.items()}
         | {
-            name: motion_from_trajectory(name, times, *told, mount, metric=metric, route_rotations=route)
-            for name, told in others.items()
+            name: motion_from_trajectory(
+                name,
+                times,
+                *trajectory,
+                clip.camera.T_rig_camera,
+                metric=metric,
+                route_rotations=clip.route_rotations,
+            )
+            for name, trajectory in others.items()
         },
         statistics=image_statistics(rgb, np.isin(kind, ROAD_CLASSES)),
         quality={

@@ -1,10 +1,11 @@
-"""What learned judges say of a dataset's pictures; where their weights are missing, a row that says so."""
+"""Scores of learned judges for a dataset's pictures; where weights are missing, a row that says so."""
 
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.clip_prompts import load_prompts
 from catalogs.learned_judges import LoadedJudge
 from flows.judging.evaluation_rows import control_of, figure_row, weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View
@@ -16,9 +17,7 @@ from tasks.eval.learned_scores import (
     dover_scores,
 )
 from tasks.eval.severity import severity_agreement
-
-FEATURES = {"dry": 0, "rain": 1, "snow": 2}
-"""Rows of CLIP's text features."""
+from tasks.surface.weather import DRY
 
 
 def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJudge]) -> Iterator[Row]:
@@ -30,45 +29,48 @@ def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJu
     clips : as the other judges saw them
     judges : from `catalogs.learned_judges.load_judges`
     """
-    yield from _dover(view, clips, judges["dover"])
+    yield from _score_with_dover(view, clips, judges["dover"])
     yield from _fast_vqa(view, clips, judges["fast_vqa"])
     yield from _temporal_lpips(view, clips, judges["lpips"])
-    yield from _severity(view, clips, judges["clip"])
+    yield from _score_severity(view, clips, judges["clip"])
 
 
-def _dover(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
+def _score_with_dover(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
     names = ("dover_overall", "dover_technical", "dover_aesthetic")
     if loaded.network is None:
-        yield from _missing(names, loaded.note)
+        yield from _list_missing(names, loaded.note)
         return
     judge = WholeVideo(network=loaded.network)
-    scores = {clip.facts["label"]: dover_scores(judge.numbers(_pictures(view, clip))) for clip in clips}
+    scores = {
+        clip.facts["label"]: dover_scores(judge.evaluate_network(_read_pictures(view, clip)))
+        for clip in clips
+    }
     for name in names:
         given = {label: found[name] for label, found in scores.items() if name in found}
         if not given:
-            yield from _missing((name,), "not run: the checkpoint gives the overall score alone")
+            yield from _list_missing((name,), "not run: the checkpoint gives the overall score alone")
         for label, value in given.items():
             yield figure_row(name, "TorchScript", label, value, "1", note=loaded.note)
 
 
 def _fast_vqa(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
     if loaded.network is None:
-        yield from _missing(("fast_vqa",), loaded.note)
+        yield from _list_missing(("fast_vqa",), loaded.note)
         return
     judge = WholeVideo(network=loaded.network)
     for clip in clips:
-        value = _score(view, clip, judge)
+        value = _score_clip(view, clip, judge)
         yield figure_row("fast_vqa", "TorchScript", clip.facts["label"], value, "1", note=loaded.note)
 
 
 def _temporal_lpips(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
-    """Each clip's own, and what it exceeds that of its dry control by."""
+    """Yield the severity of each clip, and its difference to that of the dry control."""
     names = ("temporal_lpips", "temporal_lpips_excess")
     if loaded.network is None:
-        yield from _missing(names, loaded.note)
+        yield from _list_missing(names, loaded.note)
         return
     judge = FlowAlignedDistance(network=loaded.network)
-    scores = {clip.facts["clip_id"]: _score(view, clip, judge) for clip in clips}
+    scores = {clip.facts["clip_id"]: _score_clip(view, clip, judge) for clip in clips}
     for clip in clips:
         label, value = clip.facts["label"], scores[clip.facts["clip_id"]]
         yield figure_row(names[0], "TorchScript", label, value, "1", note=loaded.note)
@@ -78,25 +80,31 @@ def _temporal_lpips(view: View, clips: list[JudgedClip], loaded: LoadedJudge) ->
             yield figure_row(names[1], "TorchScript", label, excess, "1", note=loaded.note)
 
 
-def _missing(names: tuple[str, ...], note: str) -> Iterator[Row]:
+def _list_missing(names: tuple[str, ...], note: str) -> Iterator[Row]:
     for name in names:
         yield figure_row(name, "-", "-", None, "1", note=note)
 
 
-def _severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> Iterator[Row]:
+def _score_severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> Iterator[Row]:
     names = ("clip_severity_rho", "clip_adjacent_accuracy")
     if clip_judge.network is None or clip_judge.text_features is None:
-        yield from _missing(names, clip_judge.note)
+        yield from _list_missing(names, clip_judge.note)
         return
-    network, features = clip_judge.network, clip_judge.text_features
+    network = clip_judge.network
+    features = dict(zip(load_prompts(), clip_judge.text_features, strict=True))
     for kind, condition, levels in weather_families(clips):
+        if kind not in features:
+            for name in names:
+                note = f"not run: the catalogue has no CLIP prompts of {kind}"
+                yield figure_row(name, "TorchScript", condition, None, "1", note=note)
+            continue
         judge = ClipWeather(
             encode_image=getattr(network, "encode_image", network),
-            weather=features[FEATURES[kind]],
-            dry=features[FEATURES["dry"]],
+            weather=features[kind],
+            dry=features[DRY],
         )
         rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
-        scores = {c.facts["clip_id"]: _score(view, c, judge) for c in levels}
+        scores = {c.facts["clip_id"]: _score_clip(view, c, judge) for c in levels}
         rho, _ = severity_agreement(rates, scores)
         # the paper counts pairs whose score rises, whatever the correlation's sign
         rising = np.diff([scores[key] for key in sorted(rates, key=lambda key: rates[key])]) > 0
@@ -104,9 +112,9 @@ def _severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> I
             yield figure_row(name, "TorchScript", condition, value, "1", note=clip_judge.note)
 
 
-def _score(view: View, clip: JudgedClip, judge: VideoJudge) -> float:
-    return judge.score(_pictures(view, clip))
+def _score_clip(view: View, clip: JudgedClip, judge: VideoJudge) -> float:
+    return judge.score(_read_pictures(view, clip))
 
 
-def _pictures(view: View, clip: JudgedClip) -> NDArray[np.uint8]:
+def _read_pictures(view: View, clip: JudgedClip) -> NDArray[np.uint8]:
     return view.arrays(clip.facts["index"], "rgb")[0]

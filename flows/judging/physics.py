@@ -1,4 +1,4 @@
-"""The physics audit: a dataset's stored telemetry held against the laws that it claims to follow."""
+"""The physics audit: a dataset's stored telemetry compared with the physical laws that it must follow."""
 
 from pathlib import Path
 from typing import Any
@@ -8,8 +8,8 @@ import numpy as np
 from catalogs.documents import read_yaml
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.running.orchestration import stage
-from flows.store.address import reading, telemetry
+from flows.running.orchestration import run_as_stage
+from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_plan_record, recorded_grid
@@ -35,7 +35,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         If the folder is no finished dataset, a table lacks columns, or its mode's laws are not known here.
     """
     results = Outputs(out, "audit-physics", "physics.json")
-    root = reading(dataset, telemetry).root
+    root = open_for_reading(dataset, want_telemetry).root
     constants = read_constants(root)
     clips = clip_facts(root)
     held = [facts["label"] for facts in clips if facts["hold_speed"]]
@@ -44,7 +44,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
             f"{dataset}: {len(held)} clips hold their speed until the brake ({held[0]} first), by a force that no"
             " column records: the physics audit knows coasting cars only"
         )
-    rows = [stage(_clip_row)(root, facts, constants) for facts in clips]
+    rows = [run_as_stage(_clip_row)(root, facts, constants) for facts in clips]
     broken = [row for row in rows if not row["passed"]]
     result = {
         "verified": not broken,
@@ -103,22 +103,27 @@ def read_constants(root: Path) -> Constants:
     ]
     if missing:
         raise InputError(missing)
-    load_vehicle(files["vehicle"]), load_surface(files["surface"])  # of the form that they must have
-    car, surface = (read_yaml(path, "catalogue entry") for path in files.values())
+    # of the form that they must have
+    vehicle = load_vehicle(files["vehicle"], layout.inputs / "weather")
+    pavement = load_surface(files["surface"], layout.inputs / "weather")
+    car = read_yaml(files["vehicle"], "catalogue entry")
     mode = recorded_grid(read_plan_record(layout)["grid"], layout.plan).vehicle_mode
     if mode != "paper" or car.get("effects"):
         raise InputError(
             f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"
             f"{' with effects' if car.get('effects') else ''}, whose inner steps the stored ticks do not fix."
         )
-    tyres = {
-        family: TyreTables(**{name: tuple(table[name]["value"]) for name in TyreTables.__dataclass_fields__})
-        for family, table in car["families"].items()
-    }
-    return Constants(car=_numbers(car), surface=_numbers(surface), tyres=tyres, mode=mode)
+    if car.get("tyre"):
+        raise InputError(
+            f"{root}: the physics audit knows Burckhardt's tyre; this dataset's vehicle drives on {car['tyre']}"
+        )
+    families = {**vehicle.shared_families, **vehicle.families}
+    tyres = {kind: TyreTables(**vars(family)) for kind, family in families.items()}
+    surface = {name: value for name, value in vars(pavement).items() if isinstance(value, float)}
+    return Constants(car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode)
 
 
-def _numbers(entry: dict[str, Any]) -> dict[str, float]:
+def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
     scalars = {
         k: v for k, v in entry.items() if isinstance(v, dict) and isinstance(v.get("value"), (int, float))
     }
@@ -131,7 +136,7 @@ def _numbers(entry: dict[str, Any]) -> dict[str, float]:
 def _clip_row(root: Path, facts: dict[str, Any], constants: Constants) -> dict[str, Any]:
     ticks, frames = clip_columns(root, "ticks", facts), clip_columns(root, "frames", facts)
     holes = [f"ticks.{c}" for c in finite_rows(ticks)]
-    with np.errstate(all="ignore"):  # what is stored may be anything; a law that infinity enters is broken
+    with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
         verdict = audit_clip(ticks, frames, facts, constants)
     return {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
 

@@ -1,4 +1,4 @@
-"""How a dataset's road features show in its pictures, held against their flat twins."""
+"""Visibility of a dataset's road features in its pictures, compared with their flat twins."""
 
 import cv2
 import numpy as np
@@ -8,7 +8,7 @@ from flows.judging.evaluation_rows import control_of, figure_row
 from flows.judging.judged_clip import JudgedClip, Row, View
 from flows.making.clip import PIXEL_CENTRE, Catalogue, catalogue_of
 from tasks.conventions import ROAD_CLASSES
-from tasks.eval.flip import flip
+from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim
 from tasks.eval.road_edit import score_road_edit
 
@@ -71,7 +71,7 @@ def twin_rows(
     reach = np.ones((2 * AROUND + 1, 2 * AROUND + 1), np.uint8)
     rest = [cv2.dilate(targets[k].astype(np.uint8), reach) == 0 for k in kept]
     likeness = [ssim(control[k], feature[k], region) for k, region in zip(kept, rest, strict=True)]
-    differences = [flip(control[k], feature[k], region) for k, region in zip(kept, rest, strict=True)]
+    differences = [flip_error(control[k], feature[k], region) for k, region in zip(kept, rest, strict=True)]
     seen = [value for value in differences if value is not None]
     return [
         figure_row("twin_ssim", "off the feature", clip.facts["label"],

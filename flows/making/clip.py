@@ -25,10 +25,10 @@ from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
-from flows.making.driving import drive, hazard_of, ranges_of
+from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures
 from flows.making.places import find_scene, remember_place
 from flows.making.plan import TICK_RATE_HZ, ClipPlan, Plan, read_plan
-from flows.store.address import here, publish
+from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_json
 from flows.store.telemetry import columns_hash, labelled_table, write_parquet
@@ -36,22 +36,20 @@ from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
-from tasks.eval.poses.pnp import recover_motion_pnp
-from tasks.eval.poses.undistort import undistorted
-from tasks.eval.poses.unroll import one_shutter
-from tasks.eval.poses.unusable import unusable_pixels
+from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
+from tasks.eval.poses.undistort import undistort_frames
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
-from tasks.render.clip import render_clip
+from tasks.render.clip import ClipConditions, RigMotion, render_clip
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
-from tasks.render.road_paint import HazardMarking, painted
-from tasks.render.road_refinement import refined_road
-from tasks.render.weather.parameters import WeatherParameters, WeatherState
+from tasks.render.road_paint import HazardMarking, paint_feature
+from tasks.render.road_refinement import refine_road
+from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene
 from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
-from tasks.surface.state import SurfaceParameters
+from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
 
@@ -67,10 +65,20 @@ class Catalogue:
     surface: SurfaceParameters
     camera: Camera
     scene: Scene
-    looks: WeatherParameters
+    weather: Path
     gates: PoseThresholds
     study: StudyProtocol
     marking: HazardMarking | None = None
+
+    @property
+    def looks(self) -> WeatherParameters:
+        """How the weathers look, which who does not draw never reads."""
+        return _looks(self.weather)
+
+
+@lru_cache(maxsize=2)
+def _looks(folder: Path) -> WeatherParameters:
+    return load_weather(folder)
 
 
 @lru_cache(maxsize=2)
@@ -82,11 +90,11 @@ def catalogue_of(root: Path) -> Catalogue:
 def load_catalogue(inputs: Path, scene: str) -> Catalogue:
     """Load frozen inputs from their folder, and a scene."""
     return Catalogue(
-        vehicle=load_vehicle(inputs / "vehicle.yaml"),
-        surface=load_surface(inputs / "surface.yaml"),
+        vehicle=load_vehicle(inputs / "vehicle.yaml", inputs / "weather"),
+        surface=load_surface(inputs / "surface.yaml", inputs / "weather"),
         camera=load_camera(inputs / "camera.yaml"),
         scene=load_scene(scene),
-        looks=load_weather(inputs / "weather"),
+        weather=inputs / "weather",
         gates=load_gates(inputs / "gates.yaml"),
         marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
         study=load_sensitivity_study(inputs / "study.yaml")[0],
@@ -97,23 +105,24 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     """Make and commit clip ``index`` of a dataset whose scene lies at ``scene``; returns its receipt."""
     started = time.process_time(), time.perf_counter()
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
-    layout = here(layout)
+    layout = find_local(layout)
     plan = read_plan(layout.root)
     remember_place(plan.scene["sha256"], scene)
     clip = plan.clips[index]
     catalogue = catalogue_of(layout.root)
 
     mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
-    facts, ride = drive(clip.scenario, catalogue.vehicle, catalogue.surface, mode, duration_s)
+    state, ride = simulate_drive(clip.scenario, catalogue.vehicle, catalogue.surface, mode, duration_s)
+    facts = surface_figures(state, ride)
     ranges = ranges_of(
-        clip.scenario, facts, catalogue.vehicle, catalogue.surface, catalogue.study, mode, duration_s
+        clip.scenario, state, catalogue.vehicle, catalogue.surface, catalogue.study, mode, duration_s
     )
     frames = frame_rows(ride, plan, catalogue)
     buffers: dict[str, NDArray[Any]] = {}
     if plan.settings.pictures:
         rig_at = rig_of(ride, frames, catalogue)
-        buffers = picture(clip.scenario, facts, frames, plan, catalogue, int(clip.seed), rig_at)
-        frames |= judge(buffers, frames, facts["film_depth_mm"], catalogue)
+        buffers = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)
+        frames |= judge_motion(buffers, frames, state.film_depth_mm, catalogue)
     else:
         frames |= nothing_to_judge(len(frames["frame"]))
     verdict = frames.pop("verdict")
@@ -144,7 +153,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     }  # fmt: skip
     write_json(layout.receipt(clip.clip_id), receipt)
     tables = [layout.staged(clip.clip_id, table) for table in STAGED_TABLES]
-    publish(layout, [*shards.values(), *tables], last=layout.receipt(clip.clip_id))
+    send_files(layout, [*shards.values(), *tables], last=layout.receipt(clip.clip_id))
     cost = {
         "cpu_s": time.process_time() - started[0],
         "wall_s": time.perf_counter() - started[1],
@@ -155,20 +164,20 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
 
 def warm_up(layout: Layout, scene: str) -> None:
     """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
-    root = here(layout).root
+    root = find_local(layout).root
     plan = read_plan(root)
     remember_place(plan.scene["sha256"], scene)
     catalogue = catalogue_of(root)
     short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
     for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
-        facts, ride = drive(
+        state, ride = simulate_drive(
             clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, short.duration_s
         )
         frames = frame_rows(ride, short, catalogue)
         if plan.settings.pictures:
             rig_at = rig_of(ride, frames, catalogue)
-            buffers = picture(clip.scenario, facts, frames, short, catalogue, int(clip.seed), rig_at)
-            judge(buffers, frames, facts["film_depth_mm"], catalogue)
+            buffers = render_frames(clip.scenario, state, frames, short, catalogue, int(clip.seed), rig_at)
+            judge_motion(buffers, frames, state.film_depth_mm, catalogue)
 
 
 def relief_of(hazard: RoadHazard, route: Route) -> RoadRelief:
@@ -206,71 +215,54 @@ def rig_of(ride: Rollout, frames: Mapping[str, NDArray[Any]], catalogue: Catalog
     )  # fmt: skip
 
 
-def picture(
+def render_frames(
     scenario: Scenario,
-    facts: Mapping[str, Any],
+    state: SurfaceState,
     frames: Mapping[str, NDArray[Any]],
     plan: Plan,
     catalogue: Catalogue,
     seed: int,
     rig_at: RigAt,
 ) -> dict[str, NDArray[Any]]:
-    """The clip's finished frames, depth and class."""
+    """Render the clip's finished frames, depth and class."""
     hazard = hazard_of(scenario)
-    weather = WeatherState(
-        kind=scenario.weather,
-        precipitation_mm_h=scenario.precipitation_mm_h,
-        film_depth_mm=facts["film_depth_mm"],
-        snow_depth_mm=facts["snow_depth_mm"],
-        snow_coverage=facts["snow_coverage"],
-    )
     scene = catalogue.scene
     gaussians, relief = scene.gaussians, None
     if hazard.height_m != 0:
         relief = relief_of(hazard, scene.route)
         carriageway = scene.carriageway_left, scene.carriageway_right
-        gaussians = refined_road(gaussians, relief)
+        gaussians = refine_road(gaussians, relief)
         if catalogue.marking is not None and hazard.height_m > 0:
             albedo = catalogue.looks.sky.asphalt_albedo
-            gaussians = painted(gaussians, relief, catalogue.marking, *carriageway, albedo)
+            gaussians = paint_feature(gaussians, relief, catalogue.marking, *carriageway, albedo)
         gaussians, _ = apply_road_profile(gaussians, relief, *carriageway)
     return render_clip(
-        gaussians, scene.environment, scene.route, catalogue.camera, frames["T_world_rig"].reshape(-1, 4, 4),
-        frame_rate_hz=plan.settings.frame_rate_hz, weather=weather, looks=catalogue.looks, seed=seed,
-        backend=select_backend(plan.backend), relief=relief, to_sun=scene.to_sun,
-        labelled=(lambda station: road_elevation(station, hazard)) if plan.settings.labels else None,
-        rig_at=rig_at, composition=plan.settings.composition,
-    )  # fmt: skip
+        replace(scene, gaussians=gaussians),
+        catalogue.camera,
+        RigMotion(
+            T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
+            frame_rate_hz=plan.settings.frame_rate_hz,
+            rig_at=rig_at,
+        ),
+        ClipConditions(state=state, parameters=catalogue.looks, seed=seed),
+        select_backend(plan.backend),
+        relief=relief,
+        labels=plan.settings.labels,
+        composition=plan.settings.composition,
+    )
 
 
-def judge(
+def judge_motion(
     buffers: Mapping[str, NDArray[Any]],
     frames: Mapping[str, NDArray[Any]],
     film_depth_mm: float,
     catalogue: Catalogue,
 ) -> dict[str, Any]:
-    """Motion recovered from the finished frames, held against the telemetry."""
-    K, route = catalogue.camera.K - PIXEL_CENTRE, catalogue.scene.route.pose(frames["station"])[:, :3, :3]
-    seen = one_shutter(
-        undistorted(
-            {name: buffers[name] for name in ("rgb", "depth", "class")}, K, catalogue.camera.distortion
-        ),
-        K,
-        catalogue.camera.T_rig_camera,
-        distortion=catalogue.camera.distortion,
-        line_delay_s=catalogue.camera.line_delay_s,
-        frame_interval_s=float(frames["t_ns"][1] - frames["t_ns"][0]) * 1e-9,
-        film_depth_mm=film_depth_mm,
-        route_rotations=route,
-    )
-    recovered = recover_motion_pnp(
-        seen["rgb"],
-        seen["depth"],
-        K,
-        catalogue.camera.T_rig_camera,
-        unusable=unusable_pixels(seen["class"], film_depth_mm),
-        route_rotations=route,
-    )
+    """Motion that the gate's pose check recovers from the finished frames, compared with the telemetry."""
+    camera = catalogue.camera
+    shown = {name: buffers[name] for name in ("rgb", "depth", "class")}
+    pinhole = undistort_frames(shown, camera.K - PIXEL_CENTRE, camera.distortion)
+    recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue))
     verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)
     return {
         "recovered_pitch": recovered.pitch,
@@ -279,8 +271,30 @@ def judge(
     }
 
 
+def prepare_for_checks(
+    pinhole: Mapping[str, NDArray[Any]],
+    frames: Mapping[str, NDArray[Any]],
+    film_depth_mm: float,
+    catalogue: Catalogue,
+) -> CheckedClip:
+    """Return a clip's undistorted ``rgb``, ``depth`` and ``class`` as every pose check takes them."""
+    camera = catalogue.camera
+    return prepare_clip(
+        pinhole,
+        JudgeCamera(
+            K=camera.K - PIXEL_CENTRE,
+            T_rig_camera=camera.T_rig_camera,
+            distortion=camera.distortion,
+            line_delay_s=camera.line_delay_s,
+        ),
+        frame_interval_s=float(frames["t_ns"][1] - frames["t_ns"][0]) * 1e-9,
+        film_depth_mm=film_depth_mm,
+        route_rotations=catalogue.scene.route.pose(frames["station"])[:, :3, :3],
+    )
+
+
 def nothing_to_judge(frames: int) -> dict[str, Any]:
-    """What `judge` returns where there is no picture: everything not represented."""
+    """Return the result of `judge_motion` where there is no picture: every value is not represented."""
     verdict = {figure.name: None for figure in fields(PoseVerdict)}
     return {
         "recovered_pitch": np.full(frames, np.nan),

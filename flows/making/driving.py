@@ -1,44 +1,44 @@
 """From a scenario to the vehicle's motion: what the weather, the driver and the road are to the model."""
 
-from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
 
 from catalogs.scenario import Scenario
 from tasks.studies.label_ranges import label_ranges, sampled_friction
 from tasks.studies.sensitivity import StudyProtocol
-from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
 
 
-def drive(
+def simulate_drive(
     scenario: Scenario,
     vehicle: Vehicle,
     surface: SurfaceParameters,
     mode: Mode,
     duration_s: float,
-) -> tuple[dict[str, Any], Rollout]:
-    """Weather to surface state to friction to vehicle motion."""
-    weather = weather_of(scenario)
-    state = surface_state(weather, surface)
-    friction = surface_friction(weather, state, surface)
-    ride = _ride(scenario, vehicle, friction, state.snow_depth_mm, mode, duration_s)
-    facts = {
+) -> tuple[SurfaceState, Rollout]:
+    """Simulate a scenario: weather to surface state to friction to vehicle motion."""
+    state = surface_state(weather_of(scenario), surface)
+    return state, _simulate_vehicle(scenario, vehicle, state, mode, duration_s)
+
+
+def surface_figures(state: SurfaceState, ride: Rollout) -> dict[str, float]:
+    """Return what tables and receipts record of the surface and the tyre on it."""
+    return {
         "film_depth_mm": state.film_depth_mm,
         "snow_depth_mm": state.snow_depth_mm,
         "snow_coverage": state.snow_coverage,
-        "surface_friction": friction,
+        "surface_friction": state.friction,
         "tyre_peak": ride.tyre_peak,
     }
-    return facts, ride
 
 
 def ranges_of(
     scenario: Scenario,
-    facts: Mapping[str, Any],
+    state: SurfaceState,
     vehicle: Vehicle,
     surface: SurfaceParameters,
     study: StudyProtocol,
@@ -48,23 +48,22 @@ def ranges_of(
     """Percentiles of the clip's labels under the bounds of the surface parameters; the snow's depth stays nominal."""
 
     def again(friction: float) -> tuple[float, float]:
-        ride = _ride(scenario, vehicle, friction, facts["snow_depth_mm"], mode, duration_s)
+        ride = _simulate_vehicle(scenario, vehicle, replace(state, friction=friction), mode, duration_s)
         return ride.stopping_distance, float(ride.columns["pitch"].max())
 
     return label_ranges(sampled_friction(weather_of(scenario), surface, study), again)
 
 
-def _ride(
-    scenario: Scenario, vehicle: Vehicle, friction: float, snow_depth_mm: float, mode: Mode, duration_s: float
+def _simulate_vehicle(
+    scenario: Scenario, vehicle: Vehicle, state: SurfaceState, mode: Mode, duration_s: float
 ) -> Rollout:
     return rollout(
-        vehicle, scenario.weather, friction, controls_of(scenario), hazard_of(scenario),
-        mode=mode, duration_s=duration_s, snow_depth_mm=snow_depth_mm,
+        vehicle, state, controls_of(scenario), hazard_of(scenario), mode=mode, duration_s=duration_s
     )  # fmt: skip
 
 
 def weather_of(scenario: Scenario) -> Weather:
-    """What falls on the road in the scenario."""
+    """Return the weather of the scenario."""
     return Weather(
         kind=scenario.weather,
         precipitation_mm_h=scenario.precipitation_mm_h,
@@ -73,7 +72,7 @@ def weather_of(scenario: Scenario) -> Weather:
 
 
 def controls_of(scenario: Scenario) -> Controls:
-    """What the driver does in the scenario."""
+    """Return the driver's controls in the scenario."""
     return Controls(
         initial_speed=scenario.initial_speed_km_h / 3.6,
         brake=BrakeCommand(

@@ -1,16 +1,16 @@
-"""Frozen runs: made from a grid, held against what is here, and made again hash for hash."""
+"""Frozen runs: frozen from a grid, compared with the code and catalogue at hand, and made again hash for hash."""
 
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from catalogs.documents import parse_yaml
-from catalogs.grids import Grid, GridFile, expand_grid, grid_names, load_grid
+from catalogs.entries import entry_names
+from catalogs.grids import Grid, GridFile, expand_grid, load_grid
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.making.driving import drive
-from flows.making.generate import RunReport, generate
+from flows.making.driving import simulate_drive
+from flows.making.generate import RunReport, generate_dataset
 from flows.making.places import find_scene
 from flows.making.plan import Plan, freeze_grid
 from flows.running.progress import progress_bar
@@ -19,17 +19,17 @@ from flows.store.layout import write_atomically
 from flows.store.outputs import refuse_link
 from flows.store.sealed import read_manifest, recorded_grid
 from flows.store.telemetry import columns_hash
-from manifests.explain import as_sentences, tool_differences, tools_here
+from manifests.explain import as_sentences, parse_input, tool_differences, tools_here
 from manifests.frozen_run import (
     FOLDER,
-    differences,
     differing_clips,
+    find_differences,
     frozen_names,
     parameters_that_matter,
     read_frozen,
-    sealed,
+    seal_run,
 )
-from manifests.provenance import processor
+from manifests.provenance import describe_processor
 from manifests.records import FrozenRun
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
@@ -37,8 +37,8 @@ from tasks.errors import InputError
 SHOWN_DIFFERENCES = 8
 
 
-def freeze(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]:
-    """Freeze the run of a grid, or anew those that ship with the project.
+def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]:
+    """Freeze the run of a grid, or freeze again those that ship with the project.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def freeze(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]
         raise InputError("--out FILE: name the grid whose run is to be frozen in it")
     if out is not None and Path(out).suffix != ".json":
         raise InputError(f"--out {out}: the file of a frozen run must end in .json; it does not")
-    if out is None and (strange := [name for name in names if name not in grid_names()]):
+    if out is None and (strange := [name for name in names if name not in entry_names("grid")]):
         raise InputError(
             [f"{name}: is no grid of the project: say with --out FILE where to freeze it" for name in strange]
         )
@@ -108,17 +108,17 @@ def _frozen_before(file: Path, ours: bool) -> FrozenRun | None:
 
 
 def frozen_run(grid: Grid) -> dict[str, Any]:
-    """The frozen run of a grid, with the telemetry that comes out here."""
-    plan, inputs = _planned(grid)
+    """Return the frozen run of a grid, with the hashes of the telemetry that this machine computes."""
+    plan, inputs = _plan_clips(grid)
     ticks = ticks_of(plan, grid.settings)
-    return sealed({
+    return seal_run({
         "name": grid.settings.name,
         "grid": plan.settings.model_dump(mode="json", exclude_defaults=True),
-        "parameters": _parameters(plan, inputs),
-        "clips": [clip | {"ticks": ticks[clip["label"]]} for clip in _records(plan)],
+        "parameters": _read_parameters(plan, inputs),
+        "clips": [clip | {"ticks": ticks[clip["label"]]} for clip in _list_records(plan)],
         "scene": dict(plan.scene),
         "made_with": {key: dict(value) for key, value in plan.made_with.items()},
-        "processor": processor(),
+        "processor": describe_processor(),
     })  # fmt: skip
 
 
@@ -129,10 +129,10 @@ def problems_of(frozen: FrozenRun) -> list[str]:
     """
     try:
         grid = _grid_of(frozen)
-        plan, inputs = _planned(grid)
+        plan, inputs = _plan_clips(grid)
     except InputError as error:
         return list(error.problems)
-    found = differences(frozen, _parameters(plan, inputs), _records(plan))
+    found = find_differences(frozen, _read_parameters(plan, inputs), _list_records(plan))
     if found:
         return found
     differing = differing_clips(frozen, ticks_of(plan, grid.settings))
@@ -145,7 +145,7 @@ def problems_of(frozen: FrozenRun) -> list[str]:
     ]
 
 
-def reproduce(
+def reproduce_run(
     manifest: str,
     out: str,
     *,
@@ -159,7 +159,7 @@ def reproduce(
     Parameters
     ----------
     manifest : name of a frozen run that ships, or a file
-    out : dataset folder, as in `flows.making.generate.generate`
+    out : dataset folder, as in `flows.making.generate.generate_dataset`
 
     Returns
     -------
@@ -182,7 +182,7 @@ def reproduce(
             f" freezes it anew; source {frozen['made_with']['code']['source_sha256'][:12]} of version"
             f" {frozen['made_with']['code']['version']} makes it as it was",
         ])  # fmt: skip
-    report = generate(
+    report = generate_dataset(
         _grid_of(frozen), out, runner=runner, workers=workers, scheduler=scheduler, backend=backend
     )
     made = {clip["label"]: clip["content"]["ticks"] for clip in read_manifest(report.layout)["clips"]}
@@ -201,7 +201,9 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     vehicle, surface = load_vehicle(asked.vehicle), load_surface(asked.surface)
     return {
         clip.label: columns_hash(
-            drive(clip.scenario, vehicle, surface, plan.settings.vehicle_mode, plan.duration_s)[1].columns,
+            simulate_drive(clip.scenario, vehicle, surface, plan.settings.vehicle_mode, plan.duration_s)[
+                1
+            ].columns,
             names,
         )
         for clip in plan.clips
@@ -214,16 +216,16 @@ def _grid_of(frozen: FrozenRun) -> Grid:
     return expand_grid(settings.model_copy(update={"scene": find_scene(frozen["scene"])}), place)
 
 
-def _planned(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
+def _plan_clips(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
     # no id of a clip is kept, so it does not matter which rasteriser the plan names
     return freeze_grid(grid, grid.settings.name, "cpu")
 
 
-def _parameters(plan: Plan, inputs: Mapping[str, bytes]) -> dict[str, Any]:
-    parsed = {name: parse_yaml(content, name, "catalogue entry") for name, content in inputs.items()}
+def _read_parameters(plan: Plan, inputs: Mapping[str, bytes]) -> dict[str, Any]:
+    parsed = {name: parse_input(name, content) for name, content in inputs.items()}
     return parameters_that_matter(parsed, plan.settings.pictures)
 
 
-def _records(plan: Plan) -> list[dict[str, Any]]:
+def _list_records(plan: Plan) -> list[dict[str, Any]]:
     kept = ("label", "seed", "scenario", "split", "calibration")
     return [{key: clip[key] for key in kept} for clip in plan.as_json()["clips"]]

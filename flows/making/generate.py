@@ -11,12 +11,20 @@ from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs
 from flows.making.places import find_scene
 from flows.making.plan import Plan, make_plan, plan_differences, read_plan
-from flows.making.seal import needed_to_seal, seal
+from flows.making.seal import needed_to_seal, seal_dataset
 from flows.running.failures import ClipsFailed, disk_full_sentence
-from flows.running.orchestration import stage
+from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
 from flows.running.runner import RunnerName, open_executor, run_unordered
-from flows.store.address import bring, claim, forget_begun, publish, reading, resumable, working
+from flows.store.address import (
+    fetch_files,
+    forget_begun,
+    open_for_reading,
+    open_for_writing,
+    send_files,
+    send_first,
+    want_progress,
+)
 from flows.store.frames import create_arrays
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
@@ -27,12 +35,12 @@ from tasks.errors import InputError
 from tasks.render.rasterise.backend import select_backend
 
 SHOWN = 8
-"""Differences told when a folder holds another run."""
+"""Differences reported when a folder holds another run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
-    """What a generating run did.
+    """Result of a generating run.
 
     Parameters
     ----------
@@ -51,7 +59,7 @@ class RunReport:
     cost: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
-def generate(
+def generate_dataset(
     grid: str | Grid,
     out: str,
     *,
@@ -75,7 +83,7 @@ def generate(
     """
     missing: list[int] = []
     cost: dict[str, dict[str, float]] = {}
-    with working(out, resumable) as layout:
+    with open_for_writing(out, want_progress) as layout:
         plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
         _refuse_other_content(layout)
         if layout.manifest.is_file():
@@ -83,13 +91,13 @@ def generate(
             _clear_up(layout)
         else:
             with sole_writer(layout):
-                stage(prepare)(layout, plan, inputs)
+                run_as_stage(prepare_dataset)(layout, plan, inputs)
                 if not layout.manifest.is_file():  # or another run has ended just now
                     missing = [clip.index for clip in plan.clips if not is_committed(layout, clip.clip_id)]
-                    cost = stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
-                    bring(layout, needed_to_seal(layout, plan))
-                    stage(seal)(layout, plan)
-    return _report(reading(out, summary), plan, len(missing), cost)
+                    cost = run_as_stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
+                    fetch_files(layout, needed_to_seal(layout, plan))
+                    run_as_stage(seal_dataset)(layout, plan)
+    return _make_report(open_for_reading(out, is_preview), plan, len(missing), cost)
 
 
 def _clear_up(layout: Layout) -> None:
@@ -99,12 +107,12 @@ def _clear_up(layout: Layout) -> None:
             remove_left_overs(layout)
 
 
-def summary(name: str) -> bool:
-    """What is shown of a run when it has ended."""
+def is_preview(name: str) -> bool:
+    """Whether a file is shown when a run has ended."""
     return name.startswith("previews/")
 
 
-def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, float]]) -> RunReport:
+def _make_report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, float]]) -> RunReport:
     clips = read_manifest(layout)["clips"]
     return RunReport(
         layout=layout,
@@ -116,7 +124,7 @@ def _report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, flo
     )
 
 
-def prepare(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
+def prepare_dataset(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
     """Lay out the folder and freeze the plan in it; a folder that holds the same plan is left as it is.
 
     Parameters
@@ -148,8 +156,8 @@ def prepare(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
     ]
     # last: where the plan exists, the folder is ready to be filled
     write_json(layout.plan, plan.as_json())
-    publish(layout, prepared)
-    claim(layout, layout.plan)
+    send_files(layout, prepared)
+    send_first(layout, layout.plan)
 
 
 def _refuse_other_content(layout: Layout) -> None:

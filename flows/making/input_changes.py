@@ -1,4 +1,4 @@
-"""What a dataset was made from beside what its clips would be made from again: inputs, parameters, scene and tools."""
+"""Compare the inputs, parameters, scene and tools that made a dataset with those at hand."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -71,6 +71,6 @@ def recorded_input(
 
 
 def frozen_inputs(layout: Layout, names: Iterable[str]) -> dict[str, bytes]:
-    """The catalogue files that a dataset keeps, by name; those that are missing are left out."""
+    """Return the catalogue files that a dataset keeps, by name, without the missing ones."""
     files = {name: layout.inputs / name for name in names}
     return {name: file.read_bytes() for name, file in files.items() if file.is_file()}

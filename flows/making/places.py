@@ -22,7 +22,7 @@ def remember_place(sha256: str, place: str | Path) -> None:
     sha256 : of a file's bytes, or that identifies a scene
     place : file or folder
     """
-    note, absolute = _note(sha256), str(Path(place).resolve())
+    note, absolute = _find_note(sha256), str(Path(place).resolve())
     if noted_place(sha256) != Path(absolute):
         write_json(note, absolute)
 
@@ -30,7 +30,7 @@ def remember_place(sha256: str, place: str | Path) -> None:
 def noted_place(sha256: str) -> Path | None:
     """Where something of a hash lay when it was last used; None if nothing is noted, or the note is damaged."""
     try:
-        place = read_json(_note(sha256))
+        place = read_json(_find_note(sha256))
     except InputError:
         return None
     return Path(place) if isinstance(place, str) else None
@@ -77,5 +77,5 @@ def _identity_at(place: Path) -> str | None:
         return None
 
 
-def _note(sha256: str) -> Path:
+def _find_note(sha256: str) -> Path:
     return cache_root() / "places" / f"{sha256}.json"

@@ -1,31 +1,33 @@
 """From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Set
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from catalogs.cameras import camera_source, load_camera
+from catalogs.cameras import load_camera
+from catalogs.entries import find_entry
 from catalogs.gates import GATES
 from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
-from catalogs.hazard_markings import load_marking, marking_source
+from catalogs.hazard_markings import load_marking
 from catalogs.scenario import Scenario, route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
-from catalogs.surfaces import load_surface, surface_source
-from catalogs.vehicles import load_vehicle, vehicle_provenance, vehicle_source
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle, vehicle_provenance, vehicle_tyre_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.making.memory import memory_problems
 from flows.making.places import remember_place
 from flows.store.layout import Layout
 from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
 from manifests.canonical import content_id, sha256_of
-from manifests.explain import input_differences, shown, value_differences
+from manifests.explain import format_value, input_differences, value_differences
 from manifests.provenance import code_version, library_versions
 from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
+from tasks.surface.weather import WEATHERS
 
 TICK_RATE_HZ = 1000
 LOADERS: Mapping[str, Callable[[Path], Any]] = {
@@ -148,7 +150,7 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         "vehicle_mode": settings.vehicle_mode,
         "frames": settings.frames,
         "frame_rate_hz": settings.frame_rate_hz,
-        # what is as it was before there was a choice keeps its ids
+        # a default that was introduced later is left out, so that older clips keep their ids
         **({} if settings.composition == "linear" else {"composition": settings.composition}),
     }
     clips = tuple(_clip_plans(grid, asked))
@@ -160,7 +162,8 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
     made_with = {"code": code_version(), "libraries": library_versions()}
     recorded = recorded_settings(settings)
     for name, lookup in input_sources(settings).items():
-        if getattr(settings, Path(name).stem, None) != getattr(recorded, Path(name).stem, None):
+        key = "vehicle" if name.endswith(".tir") else Path(name).stem
+        if getattr(settings, key, None) != getattr(recorded, key, None):
             remember_place(hashes[name], lookup())
     run_id = content_id(
         [asked, recorded.model_dump(mode="json"), [clip.clip_id for clip in clips], made_with]
@@ -199,18 +202,30 @@ def recorded_reference(reference: str) -> str:
 
 
 def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
-    """The catalogue files that a grid stands on: name under ``inputs/`` to what finds it."""
+    """Return the catalogue files that a grid can use, every kind of weather among them: name under ``inputs/`` to the
+    function that finds it."""
     marking = settings.hazard_marking
     weather = {f"weather/{path.name}": path for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
     return {
-        "vehicle.yaml": partial(vehicle_source, settings.vehicle),
-        "surface.yaml": partial(surface_source, settings.surface),
-        "camera.yaml": partial(camera_source, settings.camera),
+        "vehicle.yaml": partial(find_entry, "vehicle", settings.vehicle),
+        "surface.yaml": partial(find_entry, "surface", settings.surface),
+        "camera.yaml": partial(find_entry, "camera", settings.camera),
         "gates.yaml": lambda: GATES,
         "study.yaml": lambda: SENSITIVITY,
         **{name: partial(Path, path) for name, path in weather.items()},
-        **({} if marking is None else {"hazard_marking.yaml": partial(marking_source, marking)}),
+        **(
+            {} if marking is None else {"hazard_marking.yaml": partial(find_entry, "hazard marking", marking)}
+        ),
+        **({} if (tyre := _tyre_behind(settings)) is None else {tyre.name: partial(Path, tyre)}),
     }
+
+
+def _tyre_behind(settings: GridFile) -> Path | None:
+    """The tyre's file; None where there is none, or where the vehicle is faulty, which its own lookup tells."""
+    try:
+        return vehicle_tyre_source(settings.vehicle)
+    except InputError:
+        return None
 
 
 @lru_cache(maxsize=4)
@@ -243,23 +258,33 @@ def plan_differences(
     bare = [{**plan, "grid": {}} for plan in (theirs, ours)]
     rows = input_differences(bare[0], bare[1], their_inputs, our_inputs)
     rest = [(f"{row['input']} {row['path']}".strip(), row["a"], row["b"]) for row in rows]
-    return [f"{place} is {shown(a)} there and {shown(b)} here" for place, a, b in (*grid, *rest)]
+    return [
+        f"{place} is {format_value(a)} there and {format_value(b)} here" for place, a, b in (*grid, *rest)
+    ]
 
 
 def _read_behind(grid: Grid) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
-    """The catalogue files and the scene behind a grid, and what is wrong with them or with the grid on them."""
-    inputs, scene, problems = _read_entries(grid.settings)
+    """Return the catalogue files and the scene behind a grid, and the problems of these and of the grid with them."""
+    weathers = {scenario.weather for _, scenario in grid.scenarios}
+    inputs, scene, problems = _read_entries(grid.settings, weathers)
+    if not problems:
+        problems += _weather_problems(grid.settings, weathers)
     if scene:
         problems += _route_problems(grid)
     return inputs, scene, problems + _camera_problems(grid.settings)
 
 
-def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
-    """The catalogue files that a grid names, its scene's identity, and what is wrong with them."""
+def _read_entries(
+    settings: GridFile, weathers: Collection[str]
+) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
+    """Return the catalogue files that a grid names or whose weather it has, its scene, and their problems."""
     inputs: dict[str, bytes] = {}
     scene: dict[str, str] = {}
     problems: list[str] = []
+    unasked = {f"weather/{kind}.yaml" for kind in WEATHERS if kind not in weathers}
     for name, lookup in input_sources(settings).items():
+        if name in unasked:
+            continue
         try:
             source = lookup()
             LOADERS.get(name, Path.stat)(source)
@@ -272,6 +297,18 @@ def _read_entries(settings: GridFile) -> tuple[dict[str, bytes], dict[str, str],
     except InputError as error:
         problems += error.problems
     return inputs, scene, problems
+
+
+def _weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
+    """Kinds of weather in which the vehicle has no tyres."""
+    vehicle = load_vehicle(settings.vehicle)
+    problems: list[str] = []
+    for kind in sorted(weathers & WEATHERS.keys()):
+        try:
+            vehicle.tyre_family(kind)
+        except InputError as error:
+            problems += error.problems
+    return problems
 
 
 def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:
@@ -303,7 +340,7 @@ def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
 
 
 def _camera_problems(settings: GridFile) -> list[str]:
-    """Settings that the camera or the memory of this machine cannot serve; a faulty camera is told elsewhere."""
+    """List settings that exceed the camera or the memory of this machine; a faulty camera is reported elsewhere."""
     try:
         camera = load_camera(settings.camera)
     except InputError:

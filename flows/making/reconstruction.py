@@ -8,7 +8,7 @@ from catalogs.scenes import write_scene
 from catalogs.scenes.folder import must_be_new
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from tasks.errors import InputError
-from tasks.reconstruction.reconstruct import reconstruct
+from tasks.reconstruction.reconstruct import reconstruct_street
 from tasks.scene.scene import sun_problems
 
 
@@ -29,7 +29,7 @@ def scene_from_stereo(
     must_be_new(Path(out))
     if problems := sun_problems(sun_direction_deg):
         raise InputError(problems)
-    result = reconstruct(read_stereo_folder(Path(folder)))
-    figures = result.figures()
+    result = reconstruct_street(read_stereo_folder(Path(folder)))
+    figures = result.summarise()
     write_scene(replace(result.scene, sun_direction_deg=sun_direction_deg), Path(out), figures)
     return {"scene": out, **figures}

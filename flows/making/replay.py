@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.grids import load_grid
-from flows.making.clip import Catalogue, frame_rows, load_catalogue, picture, rig_of
-from flows.making.driving import drive
+from flows.making.clip import Catalogue, frame_rows, load_catalogue, render_frames, rig_of
+from flows.making.driving import simulate_drive, surface_figures
 from flows.making.plan import ClipPlan, Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.store.frames import buffer_hash
@@ -19,6 +19,7 @@ from flows.store.outputs import Outputs
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.render.rasterise.backend import select_backend
+from tasks.surface.weather import DRY
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,14 +79,14 @@ def replay_audit(
                 write_atomically(Path(folder) / file, content)
             catalogue = load_catalogue(Path(folder), checked.settings.scene)
             for clip in plan.clips:
-                runs.append(_run(clip, plan, catalogue, frames))
+                runs.append(_run_clip(clip, plan, catalogue, frames))
                 advance(f"{clip.label} seed {seed}")
     replays, again = runs[: count * seeds], runs[count * seeds :]
     differences = _largest_differences(replays, count)
     problems = [
         f"{channel} differs by up to {size:g} between seeds" for channel, size in differences.items() if size
     ]
-    dry = {label for label, scenario in checked.scenarios if scenario.weather == "dry"}
+    dry = {label for label, scenario in checked.scenarios if scenario.weather == DRY}
     for k, (label, _) in enumerate(checked.scenarios):
         pictures = {run.frames_sha256 for run in replays[k::count]}
         if len(pictures) != (1 if label in dry else seeds):
@@ -104,16 +105,16 @@ def replay_audit(
     return result
 
 
-def _run(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Replay:
-    facts, ride = drive(
+def _run_clip(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Replay:
+    state, ride = simulate_drive(
         clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
     )
     rows = frame_rows(ride, plan, catalogue)
     shown = {name: column[:frames] for name, column in rows.items()}
     rig_at = rig_of(ride, shown, catalogue)
-    buffers = picture(clip.scenario, facts, shown, plan, catalogue, int(clip.seed), rig_at)
+    buffers = render_frames(clip.scenario, state, shown, plan, catalogue, int(clip.seed), rig_at)
     columns = {channel.name: ride.columns[channel.name] for channel in TICK_CHANNELS}
-    columns |= {name: np.array([value]) for name, value in facts.items()} | {
+    columns |= {name: np.array([value]) for name, value in surface_figures(state, ride).items()} | {
         "T_world_rig": rows["T_world_rig"]
     }
     return Replay(
@@ -124,12 +125,14 @@ def _run(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Repla
 def _largest_differences(runs: list[Replay], count: int) -> dict[str, float]:
     """Largest absolute difference of each channel to the first seed's run of the same scenario; NaN equals NaN."""
     return {
-        name: max(_difference(run.columns[name], runs[k % count].columns[name]) for k, run in enumerate(runs))
+        name: max(
+            _find_difference(run.columns[name], runs[k % count].columns[name]) for k, run in enumerate(runs)
+        )
         for name in runs[0].columns
     }
 
 
-def _difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def _find_difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     if a.shape != b.shape or (np.isnan(a.astype(float)) != np.isnan(b.astype(float))).any():
         return float("inf")
     return float(np.nanmax(np.abs(a.astype(float) - b.astype(float)), initial=0.0))

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from flows.making.freezing import reproduce
-from flows.making.generate import RunReport, generate
+from flows.making.freezing import reproduce_run
+from flows.making.generate import RunReport, generate_dataset
 from tasks.errors import InputError
 
 
@@ -23,8 +23,8 @@ def make_dataset(
     grid : grid file or name; None with a ``manifest``
     out : dataset folder, or its address in an object store
     manifest : name or file of a frozen run, in place of a grid
-    vehicle, pictures : as of `flows.making.generate.generate`; a frozen run has its own
-    execution : ``runner``, ``workers``, ``scheduler`` and ``backend`` of `flows.making.generate.generate`
+    vehicle, pictures : as of `flows.making.generate.generate_dataset`; a frozen run has its own
+    execution : ``runner``, ``workers``, ``scheduler`` and ``backend`` of `flows.making.generate.generate_dataset`
 
     Returns
     -------
@@ -34,17 +34,17 @@ def make_dataset(
     Raises
     ------
     InputError
-        For neither or both of grid and manifest, and as `generate` and `reproduce` raise it.
+        For neither or both of grid and manifest, and as `generate_dataset` and `reproduce_run` raise it.
     """
     if grid is not None and manifest is None:
-        return _list_facts(generate(grid, out, vehicle=vehicle, pictures=pictures, **execution))
+        return _list_facts(generate_dataset(grid, out, vehicle=vehicle, pictures=pictures, **execution))
     if manifest is None or grid is not None:
         raise InputError("generate needs either a GRID or --manifest NAME, and not both")
     if vehicle is not None or not pictures:
         raise InputError(
             "--manifest sets the vehicle and whether frames are rendered: leave out --vehicle and --no-frames"
         )
-    report, differing = reproduce(manifest, out, **execution)
+    report, differing = reproduce_run(manifest, out, **execution)
     return _list_facts(report) | {
         "reproduced": report.clips - len(differing),
         "telemetry_differs": differing,

@@ -14,13 +14,13 @@ from catalogs.scenes.route_files import read_route
 from flows.store.outputs import Outputs
 from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
-from tasks.render.composition import compose, encode_8bit
+from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.contact_sheet import encode_png
 from tasks.render.environment import environment_view, plain_sky
 from tasks.render.rasterise.backend import select_backend
 from tasks.scene.classify import classify_road
 from tasks.scene.scene import Scene, sun_problems
-from tasks.scene.transform import moved
+from tasks.scene.transform import transform_gaussians
 
 
 def scene_import(
@@ -51,7 +51,7 @@ def scene_import(
     if problems := sun_problems(sun_direction_deg):
         raise InputError(problems)
     course, T_world_source = read_route(Path(route), camera_height, metres_per_unit)
-    cloud = moved(read_gaussians(Path(gaussians)), T_world_source)
+    cloud = transform_gaussians(read_gaussians(Path(gaussians)), T_world_source)
     scene = Scene(
         name=Path(out).name,
         gaussians=classify_road(cloud, course, half_width, -half_width),
@@ -84,7 +84,7 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
     engine = select_backend(backend)
     gbuffer = engine.rasterise(engine.prepare(loaded.gaussians), viewmat, intrinsics, width, height)
     sky = environment_view(loaded.environment, viewmat, intrinsics, width, height)
-    picture = encode_8bit(compose(gbuffer, sky, loaded.gaussians.display_encoded))
+    picture = encode_8bit(compose_over_sky(gbuffer, sky, loaded.gaussians.display_encoded))
     buffers: dict[str, Any] = {
         "depth": gbuffer.expected_depth,
         "surface_depth": gbuffer.depth,

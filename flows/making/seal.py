@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from flows.making.plan import Plan
-from flows.store.address import publish, withdraw
+from flows.store.address import remove_files, send_files
 from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_atomically
 from flows.store.sealed import read_receipt
@@ -16,20 +16,20 @@ from flows.store.staging import remove_staged, remove_staging, staged_files
 from flows.store.telemetry import labelled_table, read_columns, read_table, write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.environment import environment_bom
-from manifests.manifest import freeze, is_quarantined
-from manifests.provenance import git_commit, processor
+from manifests.manifest import freeze_manifest, is_quarantined
+from manifests.provenance import describe_processor, git_commit
 from manifests.records import Receipt
 from manifests.siblings import sibling_pairs
 from tasks.conventions import PAIR_CHANNELS
-from tasks.render.contact_sheet import contact_sheet, encode_png
+from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
 PREVIEW_FRAMES = (0, 20, 40, 80)
 PREVIEW_CLIPS = 24
 
 
-def seal(layout: Layout, plan: Plan) -> None:
-    """Gather the staged tables, draw the contact sheet, and freeze the manifest last."""
+def seal_dataset(layout: Layout, plan: Plan) -> None:
+    """Collect the staged tables, draw the contact sheet, and freeze the manifest last."""
     receipts = [read_receipt(layout, clip.clip_id) for clip in plan.clips]
     tables = [
         write_part(layout, table, path, clip_ids)
@@ -54,11 +54,11 @@ def seal(layout: Layout, plan: Plan) -> None:
         *sorted(layout.frames.rglob("zarr.json")),
     ]
     artifacts = {layout.relative(path): sha256_of_file(path) for path in shared}
-    made_on = {"processor": processor(), "git": git_commit(), "environment": environment_bom()}
-    write_atomically(layout.manifest, freeze(plan.as_json(), receipts, artifacts, made_on))
-    publish(layout, made, last=layout.manifest)
+    made_on = {"processor": describe_processor(), "git": git_commit(), "environment": environment_bom()}
+    write_atomically(layout.manifest, freeze_manifest(plan.as_json(), receipts, artifacts, made_on))
+    send_files(layout, made, last=layout.manifest)
     staged = staged_files(layout)
-    withdraw(layout, staged)
+    remove_files(layout, staged)
     remove_staged(staged)
     remove_staging(layout)
 
@@ -66,7 +66,7 @@ def seal(layout: Layout, plan: Plan) -> None:
 def needed_to_seal(layout: Layout, plan: Plan) -> list[Path]:
     """The files of finished clips that sealing reads."""
     ids = [clip.clip_id for clip in plan.clips]
-    shown = spread(plan.clips, PREVIEW_CLIPS) if plan.settings.pictures else []
+    shown = pick_evenly(plan.clips, PREVIEW_CLIPS) if plan.settings.pictures else []
     return [
         *(layout.receipt(clip_id) for clip_id in ids),
         *(layout.staged(clip_id, table) for clip_id in ids for table in STAGED_TABLES),
@@ -125,16 +125,16 @@ def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Seque
     """The contact sheet as PNG, from staged frame tables and the frames at ``pictures_at``."""
     frames = [frame for frame in PREVIEW_FRAMES if frame < plan.settings.frames]
     rows = []
-    for receipt in spread(receipts, PREVIEW_CLIPS):
+    for receipt in pick_evenly(receipts, PREVIEW_CLIPS):
         pictures = read_clip(pictures_at, receipt["index"], "rgb")
         columns = read_columns(layout.staged(receipt["clip_id"], "frames"))
         label = receipt["label"] + (" (quarantined)" if is_quarantined(receipt) else "")
         rows.append((label, [pictures[frame] for frame in frames],
                      {"speed": columns["speed"], "pitch": columns["pitch"]}))  # fmt: skip
-    return encode_png(contact_sheet(rows, frames, plan.settings.frame_rate_hz))
+    return encode_png(draw_contact_sheet(rows, frames, plan.settings.frame_rate_hz))
 
 
-def spread(items: Sequence[Any], most: int) -> list[Any]:
-    """At most that many of the items, evenly spread from the first to the last."""
+def pick_evenly(items: Sequence[Any], most: int) -> list[Any]:
+    """Return at most that many of the items, evenly spaced from the first to the last."""
     chosen = np.linspace(0, len(items) - 1, min(len(items), most))
     return [items[i] for i in np.rint(chosen).astype(int)]

@@ -9,7 +9,7 @@ from catalogs.bump_studies import load_bump_study
 from catalogs.drives import read_drives
 from catalogs.vehicles import load_vehicle
 from flows.store.outputs import Outputs
-from tasks.campaign.sensor_agreement import sensor_agreement
+from tasks.campaign.sensor_agreement import measure_sensor_agreement
 from tasks.errors import InputError
 from tasks.studies.brake_dive import pitch_mode
 from tasks.studies.road_bump import fit_feature, fit_feature_and_car, passage_of
@@ -56,7 +56,7 @@ def bump_study(
     result: dict[str, Any] = {
         "campaign": recorded.name,
         "vehicle": base.name,
-        "sensors": asdict(sensor_agreement(drive.columns, drive.interval)),
+        "sensors": asdict(measure_sensor_agreement(drive.columns, drive.interval)),
         "pitch_mode": {"uncalibrated": _mode(base), "calibrated": _mode(car)},
         "windows": [
             {

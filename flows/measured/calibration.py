@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from catalogs.calibration import load_procedure, procedure_source
+from catalogs.calibration import load_procedure
+from catalogs.entries import find_entry
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
-from catalogs.vehicles import load_vehicle, vehicle_source
+from catalogs.vehicles import load_vehicle
 from catalogs.vehicles.frozen import frozen_text
 from flows.store.outputs import Outputs
 from flows.studies.vehicle_model import agreement_of
@@ -160,7 +161,7 @@ def _frozen(
     fitted: Vehicle, base: str, procedure_name: str, procedure: Procedure, split: str, data: dict[str, str]
 ) -> str:
     """The frozen file: the base's entry with the calibrated values in it, and where they come from."""
-    source = vehicle_source(base)
+    source = find_entry("vehicle", base)
     entry = yaml.safe_load(source.read_text(encoding="utf-8"))
     before = entry.pop("provenance", None) or {"bounds": {}}
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
@@ -176,14 +177,14 @@ def _frozen(
             in_entry = degrees(value) if entry[group]["unit"] == "deg" else value
             entry[group] |= {"value": float(f"{in_entry:.{DIGITS}g}"), "source": note}
             continue
-        for family, table in fitted.families.items():
-            entry["families"][family][group] |= {"value": list(getattr(table, group)), "source": note}
+        for family, tables in entry["families"].items():
+            tables[group] |= {"value": list(getattr(fitted.families[family], group)), "source": note}
     provenance = {
         "mode": procedure.mode,
         "base": source.stem,
         "base_sha256": sha256_of_file(source),
         "procedure": Path(procedure_name).stem,
-        "procedure_sha256": sha256_of_file(procedure_source(procedure_name)),
+        "procedure_sha256": sha256_of_file(find_entry("calibration procedure", procedure_name)),
         "version": code_version()["version"],
         "split": split,
         "data_sha256": data,

@@ -9,8 +9,9 @@ import numpy as np
 from catalogs.campaigns import read_campaign
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
+from catalogs.entries import find_entry
 from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_source
+from catalogs.vehicles import load_vehicle
 from flows.measured.closing_ledger import record_reading
 from flows.measured.closing_report import report_html
 from flows.measured.closing_residuals import residual_rmse
@@ -49,7 +50,7 @@ def close_loop(
     grown = f"{Path(name).stem}-grown.yaml"
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown)
     results.write_json("split.json", split_of(measured))
-    earlier = record_reading(measured, sha256_of_file(vehicle_source(name)))
+    earlier = record_reading(measured, sha256_of_file(find_entry("vehicle", name)))
     trace = find_missing_effects(measured, model, road, load_effects(), load_decision_rules())
     result = verdict_json(trace.verdict)
     result["residual_rmse"] = residual_rmse(trace)

@@ -17,7 +17,7 @@ from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
-from tasks.campaign.planned_runs import RICH, Drive
+from tasks.campaign.planned_runs import RICH, RunPlan
 from tasks.identification.benchmark import classify_outcome, interval_holds_truth, synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import find_missing_effects
@@ -50,7 +50,7 @@ class Planned:
     kind: str
     truths: tuple[Truth, ...] = ()
     seed: int
-    design: tuple[Drive, ...] = RICH
+    design: tuple[RunPlan, ...] = RICH
 
     @property
     def name(self) -> str | None:

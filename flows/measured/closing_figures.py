@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flows.drawing import literal
+from flows.drawing import escape_formulas
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.forms import Leftover, curve, form_hypotheses, scan_leftovers
 from tasks.identification.decision.search import Found
@@ -43,7 +43,7 @@ def residual_force(trace: Trace) -> str:
         grown = state is trace.end and trace.end is not trace.start
         for run, colour in zip(state.evidence.train, colours, strict=True):
             x, force = _force_points(run.model, state, variable, grown)
-            axis.plot(x, force, ".", ms=2.5, color=colour, label=literal(run.model.run.name))
+            axis.plot(x, force, ".", ms=2.5, color=colour, label=escape_formulas(run.model.run.name))
         axis.axhline(0.0, color="#888888", lw=0.8)
         axis.set_title(title)
         axis.set_xlabel(f"{variable} [{VARIABLE_UNITS[VARIABLES.index(variable)]}]")
@@ -179,7 +179,7 @@ def traces(trace: Trace) -> str:
             c = CHANNELS.index(channel)
             _trace(axes[row, column], time, run.model.measured[:, c], frozen[:, c], after[:, c])
             axes[row, column].set_ylabel(f"{channel.replace('_', ' ')}\n[{CHANNEL_UNITS[c]}]", fontsize=8)
-        axes[0, column].set_title(literal(f"{title}: {run.model.run.name} ({run.model.run.weather})"))
+        axes[0, column].set_title(escape_formulas(f"{title}: {run.model.run.name} ({run.model.run.weather})"))
         axes[-1, column].set_xlabel("time [s]")
     axes[0, 0].legend(fontsize=7)
     return picture(figure)

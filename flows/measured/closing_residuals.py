@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flows.drawing import literal
+from flows.drawing import escape_formulas
 from flows.measured.closing_figures import picture
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.verdict import Trace
@@ -76,7 +76,7 @@ def residuals_over_time(trace: Trace) -> str:
         for column, left in enumerate(both):
             for c in range(len(CHANNELS)):
                 axes[c, column].plot(
-                    time, left[:, c], lw=0.6, color=colour, label=literal(run.model.run.name)
+                    time, left[:, c], lw=0.6, color=colour, label=escape_formulas(run.model.run.name)
                 )
     for c, (channel, unit) in enumerate(zip(CHANNELS, CHANNEL_UNITS, strict=True)):
         axes[c, 0].set_ylabel(f"{channel.replace('_', ' ')}\n[{unit}]", fontsize=7)

@@ -6,7 +6,8 @@ from typing import Any
 import yaml
 
 from catalogs.effects import LIBRARY_FILE
-from catalogs.vehicles import load_vehicle, vehicle_source
+from catalogs.entries import find_entry
+from catalogs.vehicles import load_vehicle
 from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of_file
@@ -38,7 +39,7 @@ def grown_vehicle(
     -------
     The text, or None where nothing was added; and the parameters that could not be.
     """
-    source = vehicle_source(name)
+    source = find_entry("vehicle", name)
     entry: dict[str, Any] = yaml.safe_load(source.read_text(encoding="utf-8"))
     before = entry.pop("provenance", None) or {"bounds": {}}
     base = load_vehicle(name)
@@ -133,10 +134,11 @@ def _write(entry: dict[str, Any], grown: Vehicle, row: EffectParameter, field: s
         return
     if field.startswith(FAMILY):
         table = field.removeprefix(FAMILY)
-        for weather, family in grown.families.items():
-            old = entry["families"][weather][table]
-            entry["families"][weather][table] = {
-                **old, "value": list(getattr(family, table)), "source": f"{old['source']}; {source}",
+        # families that the weather lends a vehicle are no part of its file
+        for weather, tables in entry["families"].items():
+            old = tables[table]
+            tables[table] = {
+                **old, "value": list(getattr(grown.families[weather], table)), "source": f"{old['source']}; {source}",
             }  # fmt: skip
         return
     entry[field] |= {"value": getattr(grown, field), "source": f"{entry[field]['source']}; {source}"}

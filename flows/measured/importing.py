@@ -22,7 +22,7 @@ from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.episodes import pressure_episodes
-from tasks.campaign.signals import Signal, as_channel
+from tasks.campaign.signals import Signal, convert_to_channel
 from tasks.errors import InputError
 
 
@@ -246,7 +246,7 @@ def _segmented(
         raise InputError("a map with segment needs the channel brake_pressure")
     runs: list[PlannedRun] = []
     for file, signals in recordings.items():
-        pressure = as_channel(signals[rule.sources[0]], rule)
+        pressure = convert_to_channel(signals[rule.sources[0]], rule)
         episodes = pressure_episodes(
             pressure.time, pressure.values, threshold=segment.above_mpa, merge_gap=segment.merge_gap_s
         )

@@ -10,7 +10,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.store.outputs import Outputs
 from tasks.campaign.campaign import CHANNELS
-from tasks.campaign.events import Drive
+from tasks.campaign.events import RecordedRun
 from tasks.errors import InputError
 from tasks.studies.stop import Stop, StopErrors, stop_of, stopping_distance
 from tasks.studies.stop_findings import after_stop, rebound, saturation, slip_cycles
@@ -97,7 +97,7 @@ def stop_study(
     return result
 
 
-def _stop(by_name: dict[str, Drive], name: str, lead: float) -> Stop | list[str]:
+def _stop(by_name: dict[str, RecordedRun], name: str, lead: float) -> Stop | list[str]:
     if name not in by_name:
         return [f"the study needs the run {name}; there are: {', '.join(by_name)}"]
     missing = [channel for channel in NEEDED if channel not in by_name[name].columns]

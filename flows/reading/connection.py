@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from catalogs.sentences import shorten
 from flows.reading.table_files import SCHEME, TableFiles, table_files
-from flows.store.address import reading, telemetry
+from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
 from tasks.conventions import CHECK_CHANNELS
@@ -31,8 +31,8 @@ _CLOSED: dict[str, str | bool | int | float | list[str]] = {
 """Nothing is put aside on the disk: a query that needs more memory ends with an error and fills no disk."""
 
 
-def connect(dataset: str | Path, *, allow_files: bool = False) -> duckdb.DuckDBPyConnection:
-    """A DuckDB connection in memory with the views of a sealed dataset; what is not represented is NULL.
+def connect_views(dataset: str | Path, *, allow_files: bool = False) -> duckdb.DuckDBPyConnection:
+    """Return a DuckDB connection in memory with the views of a sealed dataset; values not represented are NULL.
 
     Parameters
     ----------
@@ -44,14 +44,14 @@ def connect(dataset: str | Path, *, allow_files: bool = False) -> duckdb.DuckDBP
     InputError
         If the folder is no sealed dataset.
     """
-    layout = reading(dataset, telemetry)
+    layout = open_for_reading(dataset, want_telemetry)
     return connect_sealed(layout, read_manifest(layout), allow_files=allow_files)
 
 
 def connect_sealed(
     layout: Layout, manifest: Mapping[str, Any], *, allow_files: bool = False
 ) -> duckdb.DuckDBPyConnection:
-    """`connect` to a dataset whose manifest has been read.
+    """`connect_views` to a dataset whose manifest has been read.
 
     Queries reach the recorded tables and nothing else: no file, network, extension or Python variable. They use at most
     half of the machine's memory, and none of its disk: a query that needs more ends with an error.
@@ -61,14 +61,14 @@ def connect_sealed(
     paths = {name: path for names in tables.values() for name, path in names.items()}
     connection.register_filesystem(TableFiles(paths))
     if not allow_files:
-        connection.execute(f"SET allowed_paths = {_literal(map(_address, paths))}")
+        connection.execute(f"SET allowed_paths = {_format_list(map(_make_address, paths))}")
         connection.execute("SET enable_external_access = false")
         connection.execute("SET lock_configuration = true")
     try:
         for table, names in tables.items():
             connection.execute(
-                f"CREATE VIEW {table} AS SELECT {_columns(table, next(iter(names.values())))} FROM"
-                f" read_parquet({_literal(map(_address, names))},"
+                f"CREATE VIEW {table} AS SELECT {_select_columns(table, next(iter(names.values())))} FROM"
+                f" read_parquet({_format_list(map(_make_address, names))},"
                 f" hive_partitioning = {table in {'ticks', 'frames'}})"
             )
         checks = ", ".join(channel.name for channel in CHECK_CHANNELS)
@@ -82,7 +82,7 @@ def connect_sealed(
     return connection
 
 
-def _columns(table: str, first: Path) -> str:
+def _select_columns(table: str, first: Path) -> str:
     """All columns, with NaN as NULL: SQL's aggregates leave NULL out, and would return NaN for NaN."""
     schema = pq.read_schema(first)
     if len(schema) > MOST_COLUMNS:
@@ -100,11 +100,11 @@ def quote_identifier(name: str) -> str:
     return f'"{escaped}"'
 
 
-def _address(name: str) -> str:
+def _make_address(name: str) -> str:
     return f"{SCHEME}://{name}"
 
 
-def _literal(texts: Iterable[str]) -> str:
+def _format_list(texts: Iterable[str]) -> str:
     """A list of texts as SQL takes it."""
     escaped = (text.replace("'", "''") for text in texts)
     return "[" + ", ".join(f"'{text}'" for text in escaped) + "]"

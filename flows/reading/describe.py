@@ -1,11 +1,11 @@
-"""What is in a dataset, and what a grid would make: for people, without making anything."""
+"""Summaries of a dataset and of the clips that a grid would make; nothing is made."""
 
 from collections import Counter
 from typing import Any
 
 from catalogs.cameras import load_camera
 from flows.making.plan import TICK_RATE_HZ, make_plan
-from flows.store.address import nothing, reading, stored_bytes
+from flows.store.address import open_for_reading, stored_bytes, want_manifest
 from flows.store.sealed import read_manifest
 
 CPU_SECONDS_PER_MEGAPIXEL = 1.3
@@ -16,7 +16,7 @@ BYTES_PER_PIXEL, BYTES_OF_LABELS_PER_PIXEL, BYTES_PER_TICK = 2.4, 3.8, 76
 """On the disk, compressed: measured on the built-in street; noise and another scene's texture cost more."""
 
 
-def describe(dataset: str) -> dict[str, Any]:
+def describe_dataset(dataset: str) -> dict[str, Any]:
     """Counts, sizes, settings and one line per clip of a sealed dataset.
 
     Raises
@@ -24,7 +24,7 @@ def describe(dataset: str) -> dict[str, Any]:
     InputError
         If the folder is no sealed dataset.
     """
-    layout = reading(dataset, nothing)
+    layout = open_for_reading(dataset, want_manifest)
     manifest = read_manifest(layout)
     settings = manifest["grid"]
     return {
@@ -49,7 +49,7 @@ def describe(dataset: str) -> dict[str, Any]:
     }
 
 
-def validate(grid: str) -> dict[str, Any]:
+def validate_grid(grid: str) -> dict[str, Any]:
     """Check a grid without making anything; counts and estimates.
 
     Raises

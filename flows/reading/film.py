@@ -29,13 +29,13 @@ def write_film(
         stream = container.add_stream("libx264", rate=round(frame_rate_hz))
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         stream.options = {"crf": str(crf), "preset": "medium", "threads": "1"}
-        for frame in (*_frames(pictures), None):
+        for frame in (*_make_frames(pictures), None):
             for packet in stream.encode(frame):
                 container.mux(packet)
 
 
 def through_film(pictures: NDArray[np.uint8], frame_rate_hz: float, crf: int) -> NDArray[np.uint8]:
-    """The pictures as they come back from a film.
+    """Encode pictures as a film and return the decoded pictures.
 
     Parameters
     ----------
@@ -50,6 +50,6 @@ def through_film(pictures: NDArray[np.uint8], frame_rate_hz: float, crf: int) ->
         return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
 
 
-def _frames(pictures: Iterable[NDArray[np.uint8]]) -> Iterable[av.VideoFrame]:
+def _make_frames(pictures: Iterable[NDArray[np.uint8]]) -> Iterable[av.VideoFrame]:
     for picture in pictures:
         yield av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")

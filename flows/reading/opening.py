@@ -13,9 +13,9 @@ import pyarrow.parquet as pq
 
 from catalogs.sentences import shorten
 from flows.reading.connection import connect_sealed, quote_identifier
-from flows.reading.query import VIEWS, refused_query, schema
+from flows.reading.query import VIEWS, list_columns, refused_query
 from flows.reading.table_files import table_files
-from flows.store.address import frames_store, reading, telemetry
+from flows.store.address import frames_store, open_for_reading, want_telemetry
 from flows.store.frame_metadata import check_frames, read_local_metadata
 from flows.store.layout import Layout
 from flows.store.objects import Objects
@@ -54,14 +54,14 @@ class Dataset:
         return f"Dataset({self.origin or str(self.root)!r}, {len(self.manifest['clips'])} clips)"
 
     def telemetry(self, table: str = "ticks") -> pyarrow.dataset.Dataset:
-        """A stored table as a pyarrow dataset: clips, ticks, frames or pairs; units stand in its schema.
+        """Return a stored table as a pyarrow dataset: clips, ticks, frames or pairs; its schema has the units.
 
         Raises
         ------
         InputError
             If there is no such table.
         """
-        _known(table, STORED)
+        _check_names(table, STORED)
         paths = list(table_files(self._layout, self.manifest)[table].values())
         try:
             # without the metadata of the whole: libraries read settings for other libraries there
@@ -94,7 +94,7 @@ class Dataset:
             raise refused_query(query, error, "musync.open(..., allow_files=True)") from None
 
     def pandas(self, table: str = "clips", columns: Sequence[str] | None = None) -> "pd.DataFrame":
-        """A view as a pandas frame; what is not represented is NaN.
+        """Return a view as a pandas frame; values not represented are NaN.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class Dataset:
         columns: Sequence[str] | None,
         evaluate: Callable[[duckdb.DuckDBPyRelation], _Answer],
     ) -> _Answer:
-        _known(table, tuple(VIEWS))
+        _check_names(table, tuple(VIEWS))
         chosen = "*" if columns is None else ", ".join(map(quote_identifier, columns))
         relation = self.sql(f"SELECT {chosen} FROM {table}")
         try:
@@ -212,18 +212,18 @@ class Dataset:
 
         folders = tuple(f"frames.zarr/{array}/" for array in arrays)
         # workers read the files of these arrays often: they have to be here, and no links
-        reading(self.origin or self.root, lambda name: name.startswith(folders))
+        open_for_reading(self.origin or self.root, lambda name: name.startswith(folders))
         return windows_of(
             self._layout, self.manifest, window, stride or window, columns, arrays, clips, quarantined
         )
 
     def _checked_frames(self) -> Any:
-        """The Zarr store of the frames, once their metadata are found to be those that muSync writes."""
+        """Return the Zarr store of the frames, after checking that muSync wrote its metadata."""
         grid, layout = self.manifest["grid"], self._layout
         if not grid.get("pictures", True):
             raise InputError(f"{layout}: the dataset was made without frames")
         if self.origin is None:
-            reading(self.root, lambda name: name.startswith("frames.zarr/"))
+            open_for_reading(self.root, lambda name: name.startswith("frames.zarr/"))
             read = read_local_metadata(layout.frames)
             members = [path.name for path in layout.frames.glob("*") if path.is_dir()]
         else:
@@ -236,7 +236,7 @@ class Dataset:
 
     def schema(self) -> dict[str, Any]:
         """Columns of every view with unit, paper symbol, CF standard name and description."""
-        return schema()
+        return list_columns()
 
 
 def open(dataset: str | Path, *, allow_files: bool = False) -> Dataset:
@@ -253,12 +253,12 @@ def open(dataset: str | Path, *, allow_files: bool = False) -> Dataset:
     InputError
         If the folder is no sealed dataset.
     """
-    layout = reading(dataset, telemetry)
+    layout = open_for_reading(dataset, want_telemetry)
     return Dataset(
         root=layout.root, manifest=read_manifest(layout), origin=layout.origin, allow_files=allow_files
     )
 
 
-def _known(table: str, names: tuple[str, ...]) -> None:
+def _check_names(table: str, names: tuple[str, ...]) -> None:
     if table not in names:
         raise InputError(f"table {table!r}: no such table; there are {', '.join(names)}")

@@ -12,20 +12,22 @@ from numpy.typing import NDArray
 from flows.making.plan import read_plan
 from flows.reading.film import write_film
 from flows.running.progress import progress_bar
-from flows.store.address import reading
+from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
-from tasks.render.traces import TRACES, with_traces
+from tasks.render.traces import TRACES, add_traces
 
 NAME_BYTES = 150
 """Of a label that a film's name keeps [B]."""
 
 
-def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: bool = True) -> dict[str, Any]:
+def make_films(
+    dataset: str, out: str, *, clips: list[str] | None = None, traces: bool = True
+) -> dict[str, Any]:
     """Write one MP4 a clip.
 
     Parameters
@@ -40,7 +42,7 @@ def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: b
     InputError
         The folder holds no finished dataset, or a clip is not in it.
     """
-    layout = reading(dataset)
+    layout = open_for_reading(dataset)
     if not layout.manifest.is_file():
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
     plan, rows = read_plan(layout.root), read_manifest(layout)["clips"]
@@ -53,7 +55,7 @@ def preview(dataset: str, out: str, *, clips: list[str] | None = None, traces: b
     with progress_bar("films", len(chosen)) as advance:
         for row in chosen:
             film = BytesIO()
-            write_film(film, _pictures(layout, row, traces), plan.settings.frame_rate_hz)
+            write_film(film, _draw_pictures(layout, row, traces), plan.settings.frame_rate_hz)
             name = names[row["clip_id"]]
             results.write(name, film.getvalue())
             films.append(str(results.path(name)))
@@ -106,9 +108,9 @@ def named_clips(
     return [row for row in rows if row["label"] in names or row["clip_id"] in names]
 
 
-def _pictures(layout: Layout, row: Mapping[str, Any], traces: bool) -> list[NDArray[np.uint8]]:
+def _draw_pictures(layout: Layout, row: Mapping[str, Any], traces: bool) -> list[NDArray[np.uint8]]:
     pictures = list(read_clip(layout.frames, row["index"], "rgb"))
     if not traces:
         return pictures
     columns = read_columns(layout.telemetry / "frames", row["clip_id"], [trace.column for trace in TRACES])
-    return [with_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]
+    return [add_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]

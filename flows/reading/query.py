@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import duckdb
 
 from catalogs.sentences import shorten
-from flows.reading.connection import connect
+from flows.reading.connection import connect_views
 from flows.store.arrays import arrays_of
 from tasks.conventions import (
     CHECK_CHANNELS,
@@ -48,7 +48,7 @@ _REACHED = re.compile(
 _Result = TypeVar("_Result")
 
 
-def sql(dataset: str, query: str, *, allow_files: bool = False) -> dict[str, Any]:
+def query_dataset(dataset: str, query: str, *, allow_files: bool = False) -> dict[str, Any]:
     """Answer an SQL query over the views clips, ticks, frames, verdicts and pairs; Ctrl-C ends it.
 
     Parameters
@@ -68,15 +68,17 @@ def sql(dataset: str, query: str, *, allow_files: bool = False) -> dict[str, Any
         The folder is no sealed dataset, the query is none that DuckDB answers, it asks for files without
         ``allow_files``, or its answer is too large to be returned.
     """
-    with connect(dataset, allow_files=allow_files) as connection:
+    with connect_views(dataset, allow_files=allow_files) as connection:
         try:
-            names, rows = run_interruptibly(connection, lambda: _answer(connection, query))
+            names, rows = run_interruptibly(connection, lambda: _fetch_answer(connection, query))
         except duckdb.Error as error:
             raise refused_query(query, error, "--allow-files") from None
-    return {"columns": names, "rows": [dict(zip(names, map(_plain, row), strict=True)) for row in rows]}
+    return {"columns": names, "rows": [dict(zip(names, map(_make_plain, row), strict=True)) for row in rows]}
 
 
-def _answer(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+def _fetch_answer(
+    connection: duckdb.DuckDBPyConnection, query: str
+) -> tuple[list[str], list[tuple[Any, ...]]]:
     answer = connection.execute(query)
     names = [column[0] for column in answer.description or ()]
     rows: list[tuple[Any, ...]] = []
@@ -135,11 +137,11 @@ def refused_query(query: str, error: Exception, option: str) -> InputError:
 
 
 def _last_line(text: str) -> str:
-    """DuckDB's message; of an exception that a file raised, what it says and not where."""
+    """Return DuckDB's message; of an exception that a file raised, its sentence without the traceback."""
     return text.splitlines()[-1] if text.startswith("Traceback") else text
 
 
-def schema(*, grid: bool = False) -> dict[str, Any]:
+def list_columns(*, grid: bool = False) -> dict[str, Any]:
     """Every view's columns: name, unit, paper symbol, CF standard name and description, from the one table.
 
     The key ``arrays`` holds those of the frames: type and dimensions too.
@@ -152,17 +154,17 @@ def schema(*, grid: bool = False) -> dict[str, Any]:
         from catalogs.grids.schema import grid_schema
 
         return grid_schema()
-    views = {view: [_meaning(channel) for channel in channels] for view, channels in VIEWS.items()}
+    views = {view: [_describe_channel(channel) for channel in channels] for view, channels in VIEWS.items()}
     return views | {
         "arrays": [
-            _meaning(array.channel)
+            _describe_channel(array.channel)
             | {"dtype": array.dtype, "dimensions": ["clip", "frame", "y", "x", *array.dimensions]}
             for array in arrays_of(labels=True).values()
         ]
     }
 
 
-def _meaning(channel: Channel) -> dict[str, Any]:
+def _describe_channel(channel: Channel) -> dict[str, Any]:
     return {
         "name": channel.name,
         "unit": channel.unit,
@@ -172,10 +174,10 @@ def _meaning(channel: Channel) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:
+def _make_plain(value: Any) -> Any:
     """A value that JSON has."""
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [_make_plain(entry) for entry in value]
     return value if isinstance(value, bool | int | float | str | None) else str(value)

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flows.making.plan import TICK_RATE_HZ
-from flows.making.seal import spread
+from flows.making.seal import pick_evenly
 from flows.reading.film import write_film
 from flows.reading.previews import named_clips
 from flows.running.progress import progress_bar
-from flows.store.address import reading
+from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs, read_marker
@@ -37,7 +37,7 @@ TRACED_CLIPS = 200
 DECIMALS = {"km/h": 1, "deg": 2, "kN": 2, "MPa": 2, "": 3}
 
 
-def report(dataset: str, *, out: str | None = None, clips: list[str] | None = None) -> dict[str, Any]:
+def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None = None) -> dict[str, Any]:
     """Write a folder with a page that opens from the disk: ``index.html``, its data, and a film a clip.
 
     Several files rather than one: a browser reads from the disk only what is looked at, so that the page of a large
@@ -58,23 +58,23 @@ def report(dataset: str, *, out: str | None = None, clips: list[str] | None = No
     InputError
         The folder holds no finished dataset, a clip is not in it, or the page's folder holds other files.
     """
-    layout = reading(dataset)
+    layout = open_for_reading(dataset)
     manifest = read_manifest(layout)
     rows = manifest["clips"]
-    brought = named_clips(rows, clips, dataset) if clips else spread(rows, TRACED_CLIPS)
-    folder = _folder(layout, out)
+    brought = named_clips(rows, clips, dataset) if clips else pick_evenly(rows, TRACED_CLIPS)
+    folder = _choose_folder(layout, out)
     pictures = manifest["grid"].get("pictures", True)
     data = page_data(manifest, {row["clip_id"] for row in brought}, pictures)
     fixed = {source.name: source.read_bytes() for source in sorted(PAGE.iterdir())} | {
-        "plotly.min.js": _plotly().encode(),
-        "data.js": f"const REPORT = {_script(data)};\n".encode(),
+        "plotly.min.js": _read_plotly().encode(),
+        "data.js": f"const REPORT = {_format_script(data)};\n".encode(),
     }
     of_clips = [
         name for row in brought for name in (_traces_name(row), *([_film_name(row)] if pictures else []))
     ]
     page = Outputs(folder, COMMAND, *fixed, *of_clips)
     with page.alone():
-        made = _bring(layout, manifest, brought, page, pictures)
+        made = _write_clips(layout, manifest, brought, page, pictures)
         for name, content in fixed.items():
             page.write(name, content)
         page.remove_others(OF_A_CLIP.fullmatch)
@@ -88,7 +88,7 @@ def report(dataset: str, *, out: str | None = None, clips: list[str] | None = No
 
 
 def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) -> dict[str, Any]:
-    """What the page shows of all clips; telemetry comes clip by clip.
+    """Return the page's data of all clips; telemetry is loaded clip by clip.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     }  # fmt: skip
 
 
-def packed(columns: Mapping[str, NDArray[Any]], names: Sequence[str]) -> dict[str, Any]:
+def pack_columns(columns: Mapping[str, NDArray[Any]], names: Sequence[str]) -> dict[str, Any]:
     """Columns as float64, each as eight planes of one byte of every number, deflated, in base64.
 
     Planes because neighbours in time share their high bytes: less than half of what deflate alone leaves.
@@ -137,7 +137,7 @@ def packed(columns: Mapping[str, NDArray[Any]], names: Sequence[str]) -> dict[st
     return {"rows": rows, "columns": list(names), "packed": base64.b64encode(squeezed).decode()}
 
 
-def _bring(
+def _write_clips(
     layout: Layout,
     manifest: Mapping[str, Any],
     brought: Sequence[Mapping[str, Any]],
@@ -154,7 +154,8 @@ def _bring(
                 layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id, names
             )
             page.write(
-                _traces_name(row), f"clipArrived({_script(clip_id)}, {_script(packed(ticks, names))});\n"
+                _traces_name(row),
+                f"clipArrived({_format_script(clip_id)}, {_format_script(pack_columns(ticks, names))});\n",
             )
             if pictures and not page.path(_film_name(row)).is_file():
                 film = BytesIO()
@@ -177,7 +178,7 @@ def _film_name(row: Mapping[str, Any]) -> str:
     return f"media/{row['clip_id']}.mp4"
 
 
-def _folder(layout: Layout, out: str | None) -> Path:
+def _choose_folder(layout: Layout, out: str | None) -> Path:
     if out is None and layout.origin is not None:
         raise InputError(f"{layout}: --out must name a folder for the page of a dataset in an object store")
     beside = layout.root.with_name(f"{layout.root.name}-report")
@@ -220,12 +221,12 @@ def _manifest_facts(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _script(value: Any) -> str:
+def _format_script(value: Any) -> str:
     """A value as JavaScript: in ASCII, and without what could end a script element."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def _plotly() -> str:
+def _read_plotly() -> str:
     # its import takes a second, which no other command should pay
     from plotly.offline import get_plotlyjs
 

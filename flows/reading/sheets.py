@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.making.seal import PREVIEW_CLIPS, spread
-from flows.store.address import reading
+from flows.making.seal import PREVIEW_CLIPS, pick_evenly
+from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
-from tasks.render.contact_sheet import encode_png, picture_sheet
+from tasks.render.contact_sheet import draw_picture_sheet, encode_png
 
 WEATHER_FIELDS = ("weather", "precipitation_mm_h", "snow_accumulation_h")
 BEFORE_M, AFTER_M = 5.0, 1.0
@@ -23,7 +23,7 @@ BEFORE_M, AFTER_M = 5.0, 1.0
 Picture = tuple[str, NDArray[np.uint8]]
 
 
-def sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
+def draw_sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
     """Draw what a dataset's grid allows of the two sheets.
 
     Parameters
@@ -38,18 +38,18 @@ def sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
         The folder holds no finished dataset, or its grid has neither two weathers nor a road feature.
     """
     results = Outputs(out, "sheets", "weather.png", "hazards.png")
-    layout = reading(dataset)
+    layout = open_for_reading(dataset)
     if not layout.manifest.is_file():
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
     clips = read_manifest(layout)["clips"]
     weathers = [row for row in _by_everything_but_weather(clips) if len(row) > 1]
-    hazards = spread([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
+    hazards = pick_evenly([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
     drawn = {
         "weather": [
-            [_still(layout, clip, station, clip["label"]) for clip in row]
-            for row in spread(weathers, PREVIEW_CLIPS)
+            [_draw_still(layout, clip, station, clip["label"]) for clip in row]
+            for row in pick_evenly(weathers, PREVIEW_CLIPS)
         ],
-        "hazards": [_contact(layout, clip, clips) for clip in hazards],
+        "hazards": [_draw_contact(layout, clip, clips) for clip in hazards],
     }
     if not any(drawn.values()):
         raise InputError(f"{dataset}: must have two weathers of one drive, or a road feature; it has neither")
@@ -57,7 +57,7 @@ def sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
     for name, rows in drawn.items():
         if rows:
             file = f"{name}.png"
-            results.write(file, encode_png(picture_sheet(rows)))
+            results.write(file, encode_png(draw_picture_sheet(rows)))
             written[name] = str(results.path(file))
     return written
 
@@ -70,14 +70,16 @@ def _by_everything_but_weather(clips: Sequence[Mapping[str, Any]]) -> list[list[
     return list(groups.values())
 
 
-def _contact(layout: Layout, clip: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]) -> list[Picture]:
+def _draw_contact(
+    layout: Layout, clip: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]
+) -> list[Picture]:
     """Before, at and after contact; beside them the place before contact on the flat twin, where there is one."""
     scenario = clip["scenario"]
     half, center = scenario["hazard_length_m"] / 2, scenario["hazard_center_m"]
     places = {clip["label"]: center - half - BEFORE_M, "contact": center, "after": center + half + AFTER_M}
-    stills = [_still(layout, clip, place, caption) for caption, place in places.items()]
+    stills = [_draw_still(layout, clip, place, caption) for caption, place in places.items()]
     twins = [other for other in clips if is_flat_twin(other, clip)]
-    return stills + [_still(layout, twin, center - half - BEFORE_M, twin["label"]) for twin in twins[:1]]
+    return stills + [_draw_still(layout, twin, center - half - BEFORE_M, twin["label"]) for twin in twins[:1]]
 
 
 def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
@@ -95,7 +97,7 @@ def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
     return same and other["seed"] == clip["seed"] and not other["scenario"]["hazard_height_m"]
 
 
-def _still(layout: Layout, clip: Mapping[str, Any], station: float, caption: str) -> Picture:
+def _draw_still(layout: Layout, clip: Mapping[str, Any], station: float, caption: str) -> Picture:
     """The frame nearest to a station, and a caption with the body's pitch in it."""
     columns = read_columns(layout.telemetry / "frames", clip["clip_id"], ["station", "pitch"])
     frame = int(np.argmin(np.abs(columns["station"] - station)))

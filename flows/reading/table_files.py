@@ -16,7 +16,7 @@ from typing import Any
 
 from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
 
-from catalogs.sentences import brief
+from catalogs.sentences import shorten_value
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -40,7 +40,7 @@ def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[s
             continue
         named = _WHOLE.fullmatch(recorded) or _PART.fullmatch(recorded)
         if named is None:
-            problems.append(f"{layout}/manifest.json: {brief(recorded)}: no place of a table's files")
+            problems.append(f"{layout}/manifest.json: {shorten_value(recorded)}: no place of a table's files")
             continue
         tables[named["table"]][recorded.removeprefix("telemetry/")] = layout.root / recorded
     problems += [

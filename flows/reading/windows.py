@@ -13,7 +13,7 @@ import torch
 import zarr
 from torch.utils.data import Dataset, Sampler
 
-from catalogs.sentences import brief, shorten
+from catalogs.sentences import shorten, shorten_value
 from flows.reading.table_files import table_files
 from flows.store.arrays import arrays_of
 from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
@@ -150,7 +150,7 @@ def windows_of(
     )
     rows = [row for row in rows if row["label"] not in left_out]
     if not rows and not problems:
-        problems = [f"{layout}: every clip is in quarantine; quarantined=True takes them all the same"]
+        problems = [f"{layout}: every clip is in quarantine; quarantined=True includes them"]
     if problems:
         raise InputError(problems)
     if left_out:
@@ -168,7 +168,7 @@ def windows_of(
         values |= _clip_values(file, columns, frames)
     if absent := [row["label"] for row in rows if row["clip_id"] not in values]:
         raise InputError(
-            f"{layout}/telemetry/frames: rows of {len(absent)} clips are missing ({brief(absent)}):"
+            f"{layout}/telemetry/frames: rows of {len(absent)} clips are missing ({shorten_value(absent)}):"
             " musync verify says which files are damaged"
         )
     return ClipWindows(

@@ -1,1 +1,1 @@
-"""Where the work happens, and what is told meanwhile."""
+"""Workers that make clips, and progress and failures that are reported."""

@@ -1,10 +1,13 @@
 """A Dask cluster that others started: do its workers compute as this machine does, and are their kernels compiled?"""
 
+import asyncio
 import os
 import re
 import socket
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
+
+from distributed.comm import CommClosedError
 
 from manifests.provenance import code_version, library_versions
 from tasks.errors import InputError
@@ -16,7 +19,7 @@ VISIBLE = "CUDA_VISIBLE_DEVICES"
 
 
 def facts_here() -> dict[str, str]:
-    """What has to be equal on every machine that makes a dataset, because its manifest records one of each."""
+    """Return the facts that must be equal on every machine that makes a dataset: its manifest records one of each."""
     code, libraries = code_version(), library_versions()
     libraries["python"] = libraries["python"].rpartition(".")[0]
     kept = {name: version for name, version in libraries.items() if name not in NOT_ON_WORKERS}
@@ -44,7 +47,7 @@ def version_problems(
             if facts.get(name) != version:
                 sentence = f"{name} is {facts.get(name, 'absent')} there and {version} here: install the same"
                 told.setdefault(sentence, []).append(address)
-    return [f"{_some(addresses)}: {sentence}" for sentence, addresses in told.items()]
+    return [f"{_name_some(addresses)}: {sentence}" for sentence, addresses in told.items()]
 
 
 def check_cluster(client: Any, address: str) -> None:
@@ -81,7 +84,7 @@ def share_gpus(client: Any) -> None:
 
 
 def gpu_for(place: int, visible: str | None, present: Sequence[str]) -> str | None:
-    """The GPU of a worker; None where there is none to choose, because Slurm or dask-cuda has given it its one.
+    """Return the GPU of a worker; None where Slurm or dask-cuda has already assigned one.
 
     Parameters
     ----------
@@ -103,7 +106,7 @@ def _take_gpu(places: Mapping[str, int], dask_worker: Any) -> None:
 def _by_host(client: Any) -> dict[str, list[str]]:
     """Workers of each machine, in the order of their addresses."""
     hosts: dict[str, list[str]] = {}
-    for worker, host in sorted(client.run(socket.gethostname).items()):
+    for worker, host in sorted(client.run(socket.gethostname, on_error="ignore").items()):
         hosts.setdefault(host, []).append(worker)
     return hosts
 
@@ -117,6 +120,8 @@ def warm_cluster(client: Any, warm: Callable[[], Any], address: str) -> None:
     warm : compiles and loads what a clip needs
     address : of its scheduler
 
+    A worker that dies meanwhile is passed over: the scheduler gives it no work.
+
     Raises
     ------
     InputError
@@ -126,19 +131,24 @@ def warm_cluster(client: Any, warm: Callable[[], Any], address: str) -> None:
     first = [workers[0] for workers in hosts.values()]
     rest = [worker for workers in hosts.values() for worker in workers[1:]]
     for wave in (first, rest):
-        futures = {worker: client.submit(warm, workers=[worker], pure=False) for worker in wave}
-        for worker, future in futures.items():
-            error = future.exception()
-            if isinstance(error, InputError | OSError):
+        # not as tasks: one that is bound to a worker that dies waits for it for ever
+        answers = client.run(_call_in_thread, warm, workers=wave, on_error="return") if wave else {}
+        for worker, error in answers.items():
+            if isinstance(error, InputError | OSError) and not isinstance(error, CommClosedError):
                 raise InputError(
                     f"--scheduler {address}: worker {worker} cannot begin ({error}): the dataset's folder and the scene"
                     " must be visible on every worker under the same path"
                 )
-            if error is not None:
+            if isinstance(error, Exception) and not isinstance(error, CommClosedError):
                 raise error
 
 
-def _some(addresses: list[str]) -> str:
+async def _call_in_thread(function: Callable[[], Any]) -> None:
+    """Call a function beside a worker's event loop, which goes on telling the scheduler that the worker lives."""
+    await asyncio.to_thread(function)
+
+
+def _name_some(addresses: list[str]) -> str:
     shown = ", ".join(addresses[:SHOWN_WORKERS])
     rest = len(addresses) - SHOWN_WORKERS
     return f"workers {shown} and {rest} more" if rest > 0 else f"worker {shown}"

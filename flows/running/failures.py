@@ -76,7 +76,7 @@ def explain_end(error: BaseException, given: Sequence[str]) -> tuple[int, list[s
     elif isinstance(error, MemoryError):
         sentence = "memory ran out; give fewer --workers, or fewer or smaller frames"
     else:
-        said = shortened(" ".join(f"{type(error).__name__}: {error}".split()), 300)
+        said = cut_middle(" ".join(f"{type(error).__name__}: {error}".split()), 300)
         sentence = f"a defect of muSync, not of your input, ended the command ({said})"
     file = keep_traceback(error, given)
     where = (
@@ -84,7 +84,7 @@ def explain_end(error: BaseException, given: Sequence[str]) -> tuple[int, list[s
         if file is None
         else f"lies in {file}: please report it with that file"
     )
-    return BROKEN, [f"{shortened(sentence, LONGEST)}; the traceback {where}"]
+    return BROKEN, [f"{cut_middle(sentence, LONGEST)}; the traceback {where}"]
 
 
 def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
@@ -102,7 +102,7 @@ def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
     if isinstance(error, RuntimeError) and str(error).startswith(
         "Symlink loop from"
     ):  # of pathlib until Python 3.12
-        return f"{shortened(str(error), 200)}: {SURROUNDINGS[errno.ELOOP]}"
+        return f"{cut_middle(str(error), 200)}: {SURROUNDINGS[errno.ELOOP]}"
     if not isinstance(error, OSError):
         return None
     told = disk_full_sentence(error)
@@ -116,7 +116,7 @@ def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
         sentence = NAMED.get(error.errno or 0)
     if sentence is None:
         return None
-    return f"{shortened(path, 200)}: {sentence}" if path else sentence
+    return f"{cut_middle(path, 200)}: {sentence}" if path else sentence
 
 
 def disk_full_sentence(error: BaseException) -> str | None:
@@ -140,7 +140,7 @@ def keep_traceback(error: BaseException, given: Sequence[str]) -> Path | None:
     at = datetime.now(UTC)
     head = f"{at.isoformat(timespec='seconds')} python {sys.version.split()[0]} musync {given!r}\n\n"
     lines = "".join(traceback.format_exception(error))
-    content = (head + shortened(lines, MOST_BYTES // 4)).encode("utf-8", "backslashreplace")
+    content = (head + cut_middle(lines, MOST_BYTES // 4)).encode("utf-8", "backslashreplace")
     for folder in _failure_folders():
         path = folder / f"musync-failure-{at:%Y%m%dT%H%M%S}-{os.getpid()}-{time.monotonic_ns()}.txt"
         try:
@@ -155,7 +155,7 @@ def keep_traceback(error: BaseException, given: Sequence[str]) -> Path | None:
     return None
 
 
-def shortened(text: str, longest: int) -> str:
+def cut_middle(text: str, longest: int) -> str:
     """The text, with its middle left out where it is too long."""
     return text if len(text) <= longest else f"{text[: longest // 2]} ... {text[-longest // 2 :]}"
 

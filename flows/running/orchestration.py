@@ -9,7 +9,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def stage(function: Callable[P, R]) -> Callable[P, R]:
+def run_as_stage(function: Callable[P, R]) -> Callable[P, R]:
     """Run the function as a Prefect task inside a flow run, and as itself outside one.
 
     Outside a flow Prefect is not even imported: its import and temporary server cost seconds that a

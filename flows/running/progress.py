@@ -13,21 +13,21 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from flows.running.terminal import open_console, say, visible
+from flows.running.terminal import escape_controls, open_console, print_lines
 
 Advance = Callable[[str], None]
 
 
 @contextmanager
 def progress_bar(title: str, total: int) -> Iterator[Advance]:
-    """Yield a function that is told the name of each finished piece of work."""
+    """Yield a function to call with the name of each finished piece of work."""
     if not sys.stderr.isatty():
         done = 0
 
         def report(name: str) -> None:
             nonlocal done
             done += 1
-            say(f"{title} {done}/{total} {visible(name)}", error=True)
+            print_lines(f"{title} {done}/{total} {escape_controls(name)}", error=True)
 
         yield report
         return
@@ -37,4 +37,4 @@ def progress_bar(title: str, total: int) -> Iterator[Advance]:
     )  # fmt: skip
     with Progress(*columns, console=open_console(error=True)) as bar:
         task = bar.add_task(title, total=total, last="")
-        yield lambda name: bar.update(task, advance=1, last=visible(name))
+        yield lambda name: bar.update(task, advance=1, last=escape_controls(name))

@@ -1,4 +1,4 @@
-"""What a terminal is given: text of users and datasets as plain text, never as markup, emoji or control sequences."""
+"""Output to a terminal: text of users and datasets stays plain text, never markup, emoji or control sequences."""
 
 import os
 import re
@@ -11,21 +11,21 @@ if TYPE_CHECKING:
 _UNPRINTABLE = re.compile(
     "[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""Control characters, those that turn the direction of writing, line separators, and halves of characters."""
+"""Control characters, marks of writing direction, line separators, and unpaired surrogates."""
 
 
-def visible(text: str) -> str:
+def escape_controls(text: str) -> str:
     """One line of text whose control characters are written out: the escape character as ``\\x1b``."""
     return _UNPRINTABLE.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
-def visible_lines(text: str) -> str:
+def escape_lines(text: str) -> str:
     """The same for text of several lines."""
-    return "\n".join(map(visible, text.split("\n")))
+    return "\n".join(map(escape_controls, text.split("\n")))
 
 
-def say(text: str, *, error: bool = False) -> None:
-    """Print lines for people; a reader that has gone (``| head -1``) is no failure.
+def print_lines(text: str, *, error: bool = False) -> None:
+    """Print lines for people; a closed pipe (``| head -1``) is no failure.
 
     Parameters
     ----------
@@ -34,14 +34,14 @@ def say(text: str, *, error: bool = False) -> None:
     """
     stream = sys.stderr if error else sys.stdout
     try:
-        stream.write(visible_lines(text) + "\n")
+        stream.write(escape_lines(text) + "\n")
         stream.flush()
     except BrokenPipeError:
-        _silence(stream)
+        _silence_stream(stream)
 
 
 def open_console(*, error: bool = False, **options: Any) -> "Console":
-    """A Rich console that takes text as it is; strings for it go through `visible` first.
+    """A Rich console that takes text as it is; strings for it go through `escape_controls` first.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def open_console(*, error: bool = False, **options: Any) -> "Console":
 
     class PlainConsole(Console):
         def on_broken_pipe(self) -> None:
-            _silence(self.file)  # type: ignore[arg-type]
+            _silence_stream(self.file)  # type: ignore[arg-type]
 
     return PlainConsole(stderr=error, markup=False, emoji=False, highlight=False, **options)
 
 
-def _silence(stream: TextIO) -> None:
-    """Let a stream go nowhere, so that what is still to be printed disturbs nobody."""
+def _silence_stream(stream: TextIO) -> None:
+    """Redirect a stream to the null device, so that further output causes no error."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)

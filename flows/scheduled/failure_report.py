@@ -1,4 +1,4 @@
-"""What a scheduled run that failed leaves for people: a report, and word to a command or a webhook."""
+"""Report a scheduled run that failed: in a file, and to a command or a webhook."""
 
 import json
 import shlex
@@ -7,7 +7,7 @@ import urllib.request
 from datetime import UTC, datetime
 from pathlib import Path
 
-from flows.running.terminal import visible
+from flows.running.terminal import escape_controls
 from flows.store.objects import Objects, is_address
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
@@ -19,7 +19,7 @@ LOCAL = Path(".musync")
 
 
 def report_failure(grid: str, root: str, at: datetime, error: BaseException, notify: str | None) -> Path:
-    """Write what went wrong for people, and tell the notification hook; returns the report.
+    """Write a report of a failed run, and call the notification hook; return the report's path.
 
     Under an address in an object store the report is an object too, and the file lies under the working folder.
 
@@ -30,7 +30,7 @@ def report_failure(grid: str, root: str, at: datetime, error: BaseException, not
     notify : shell-like command, which gets the report's path as its last argument, or an http(s) address, which
         gets JSON; a hook that fails is noted in the report
     """
-    name = f"{REPORTS}/{stamp(at)}.txt"
+    name = f"{REPORTS}/{format_stamp(at)}.txt"
     place = Outputs((LOCAL if is_address(root) else Path(root)).resolve(), "schedule", name)
     facts = {
         "what": "a scheduled muSync run failed",
@@ -41,24 +41,24 @@ def report_failure(grid: str, root: str, at: datetime, error: BaseException, not
         "next": "committed clips are kept; the next run of the schedule makes what is missing",
     }
     # what failed may say anything, but a line of its own it does not get
-    text = "".join(f"{key}: {visible(value)}\n" for key, value in facts.items())
+    text = "".join(f"{key}: {escape_controls(value)}\n" for key, value in facts.items())
     place.write(name, text)
     path = place.path(name)
     if notify is not None:
         try:
-            _notify(notify, path, facts)
+            _call_hook(notify, path, facts)
         except (OSError, subprocess.SubprocessError) as fault:
-            text += visible(f"notification {notify} failed: {fault}") + "\n"
+            text += escape_controls(f"notification {notify} failed: {fault}") + "\n"
             place.write(name, text)
     if is_address(root):
         try:
             Objects(root).write(name, text.encode())
         except InputError as fault:  # the store may be what failed
-            place.write(name, text + visible(f"the report could not be sent: {fault}") + "\n")
+            place.write(name, text + escape_controls(f"the report could not be sent: {fault}") + "\n")
     return path
 
 
-def _notify(notify: str, report: Path, facts: dict[str, str]) -> None:
+def _call_hook(notify: str, report: Path, facts: dict[str, str]) -> None:
     if is_webhook(notify):
         body = json.dumps(facts | {"report": str(report)}).encode()
         # S310: is_webhook lets http and https alone through
@@ -73,6 +73,6 @@ def is_webhook(notify: str) -> bool:
     return notify.startswith(("http://", "https://"))
 
 
-def stamp(at: datetime) -> str:
+def format_stamp(at: datetime) -> str:
     """A time as names of datasets and reports carry it: UTC, to the second."""
     return f"{at.astimezone(UTC):%Y%m%dT%H%M%SZ}"

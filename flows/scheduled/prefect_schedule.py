@@ -44,14 +44,14 @@ make_dataset = task(
 )(scheduled_run)
 
 
-def _crashed(flow: Any, flow_run: Any, state: Any) -> None:
+def _report_crash(flow: Any, flow_run: Any, state: Any) -> None:
     """A run whose process was killed cannot report by itself: whoever started it does."""
     asked = flow_run.parameters
     at = flow_run.expected_start_time or datetime.now(UTC)
     report_failure(asked["grid"], asked["root"], at, RuntimeError(state.message), asked.get("notify"))
 
 
-@flow(name="musync-scheduled", persist_result=False, on_crashed=[_crashed])
+@flow(name="musync-scheduled", persist_result=False, on_crashed=[_report_crash])
 def scheduled(
     grid: str,
     root: str,
@@ -76,7 +76,7 @@ def scheduled(
     return dataset
 
 
-def serve(every: str, parameters: dict[str, Any]) -> None:
+def serve_schedule(every: str, parameters: dict[str, Any]) -> None:
     """Register the flow with its schedule and run what falls due, one run at a time, until stopped.
 
     Parameters
@@ -102,7 +102,7 @@ def serve(every: str, parameters: dict[str, Any]) -> None:
 
 
 def _stop_runs() -> None:
-    """End runs that are still going, while the server can be told; this process would wait for them otherwise."""
+    """Stop runs that are still going while the server still answers; this process would wait for them otherwise."""
     running = active_children()
     for run in running:
         run.terminate()

@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any, get_args
 
 from catalogs.documents import parse_json
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
 from flows.running.runner import RunnerName
-from flows.scheduled.failure_report import is_webhook, stamp
+from flows.scheduled.failure_report import format_stamp, is_webhook
 from flows.store.address import PREPARED
 from flows.store.layout import Layout
 from flows.store.objects import Objects, is_address
@@ -55,7 +55,7 @@ def dataset_place(grid: str, root: str, backend: str, at: datetime) -> str:
     for place, run_id in begun(root, re.compile(rf"{re.escape(name)}-\d{{8}}T\d{{6}}Z")):
         if run_id in {plan.run_id, NO_PLAN}:
             return place
-    return f"{root}/{name}-{stamp(at)}"
+    return f"{root}/{name}-{format_stamp(at)}"
 
 
 def _begun_in_folder(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, str]]:
@@ -115,7 +115,9 @@ def scheduled_run(
     ``dataset``, ``run_id``, ``clips``, ``made``, ``contact_sheet`` and ``verdicts[]``.
     """
     place = dataset_place(grid, root, backend, at)
-    report = generate(grid, place, runner=runner, workers=workers, scheduler=scheduler, backend=backend)
+    report = generate_dataset(
+        grid, place, runner=runner, workers=workers, scheduler=scheduler, backend=backend
+    )
     clips = read_manifest(report.layout)["clips"]
     return {
         "dataset": str(report.layout),
@@ -206,7 +208,7 @@ def _place_problems(out: str) -> list[str]:
     return [f"--out {out}: must be a folder that can be written; {nearest} cannot"]
 
 
-def schedule(
+def serve_grid(
     grid: str,
     *,
     every: str,
@@ -237,9 +239,9 @@ def schedule(
     if not is_address(out):
         Path(out).mkdir(parents=True, exist_ok=True)
     with _prefect_api():
-        from flows.scheduled.prefect_schedule import serve
+        from flows.scheduled.prefect_schedule import serve_schedule
 
-        serve(every, parameters)
+        serve_schedule(every, parameters)
 
 
 @contextmanager

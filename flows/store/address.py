@@ -1,4 +1,4 @@
-"""A dataset by its address: a folder, or ``s3://bucket/prefix``, which is worked on through a folder here.
+"""A dataset by its address: a folder, or ``s3://bucket/prefix``, which is accessed through a local folder.
 
 What reads a finished dataset gets a folder in the user's cache, named by the hash of the manifest: files come once, and
 only with their recorded bytes. What writes, or asks whether the bytes are right, gets a folder of its own for its time,
@@ -32,40 +32,42 @@ PREPARED = ("inputs/", "frames.zarr/", ".staging/")
 """What is sent before a plan, and means nothing without it."""
 
 
-def everything(name: str) -> bool:
-    """All files of a dataset, those of unfinished clips too."""
+def want_everything(name: str) -> bool:
+    """Whether a file is wanted: every file is, those of unfinished clips too."""
     return True
 
 
-def telemetry(name: str) -> bool:
-    """What questions about numbers need, and what frames there are."""
+def want_telemetry(name: str) -> bool:
+    """Whether a file is needed to answer questions about numbers, or lists the frames."""
     return name.endswith("zarr.json") or not name.startswith(("frames.zarr/", "previews/"))
 
 
-def nothing(name: str) -> bool:
-    """The manifest alone, which always comes."""
+def want_manifest(name: str) -> bool:
+    """Whether a file is wanted beside the manifest, which always is: none."""
     return False
 
 
-def planned(name: str) -> bool:
-    """What a worker needs to make a clip."""
+def want_plan(name: str) -> bool:
+    """Whether a worker needs the file to make a clip."""
     return name == "plan.json" or name.startswith("inputs/") or name.endswith("zarr.json")
 
 
-def stored_record(name: str) -> bool:
-    """What says how far a dataset is, and what a killed run staged."""
+def want_record(name: str) -> bool:
+    """Whether a file tells how far a dataset is, or was staged by a killed run."""
     return name in {"plan.json", "manifest.json"} or name.startswith(".staging/")
 
 
-def resumable(name: str) -> bool:
-    """What going on with a run needs: its plan, and which clips are complete."""
+def want_progress(name: str) -> bool:
+    """Whether a file is needed to continue a run: its plan, and which clips are complete."""
     return (
-        planned(name) or name == "manifest.json" or (name.startswith(".staging/") and name.endswith(".json"))
+        want_plan(name)
+        or name == "manifest.json"
+        or (name.startswith(".staging/") and name.endswith(".json"))
     )
 
 
-def reading(address: str | Path, wanted: Wanted = everything) -> Layout:
-    """A finished dataset to read from, without links in it.
+def open_for_reading(address: str | Path, wanted: Wanted = want_everything) -> Layout:
+    """Return a finished dataset to read from; one that contains links is refused.
 
     Parameters
     ----------
@@ -84,8 +86,8 @@ def reading(address: str | Path, wanted: Wanted = everything) -> Layout:
     objects = Objects(str(address))
     content = objects.read("manifest.json")
     if content is None:
-        raise InputError(_unfinished(objects))
-    layout = Layout(_mirrors() / sha256_of([content])[:32], objects.address)
+        raise InputError(_describe_unfinished(objects))
+    layout = Layout(_find_mirrors() / sha256_of([content])[:32], objects.address)
     place = f"{layout}/manifest.json"
     manifest = check_manifest(parse_json(content, place, "manifest"), place)
     recorded = {name: digest for name, (digest, _) in recorded_files(manifest).items() if wanted(name)}
@@ -109,8 +111,8 @@ def reading(address: str | Path, wanted: Wanted = everything) -> Layout:
 
 
 @contextmanager
-def working(address: str, wanted: Wanted) -> Iterator[Layout]:
-    """A dataset to write to or to examine; at an object store's address, the files that it holds now.
+def open_for_writing(address: str, wanted: Wanted) -> Iterator[Layout]:
+    """Yield a dataset to write to or to examine; of an address in an object store, the files that it holds now.
 
     Parameters
     ----------
@@ -137,13 +139,13 @@ def working(address: str, wanted: Wanted) -> Iterator[Layout]:
         yield layout
 
 
-def here(layout: Layout) -> Layout:
-    """In a worker: the dataset in a folder of this machine; with a store, no folder need be shared."""
-    return layout if layout.origin is None or layout.root.parent.is_dir() else _elsewhere(layout)
+def find_local(layout: Layout) -> Layout:
+    """Return the dataset of a worker in a local folder; with an object store, no folder need be shared."""
+    return layout if layout.origin is None or layout.root.parent.is_dir() else _open_elsewhere(layout)
 
 
-def bring(layout: Layout, paths: Iterable[Path]) -> None:
-    """Have files here that other machines or earlier runs sent to the store.
+def fetch_files(layout: Layout, paths: Iterable[Path]) -> None:
+    """Fetch files that other machines or earlier runs sent to the store.
 
     Raises
     ------
@@ -159,8 +161,8 @@ def bring(layout: Layout, paths: Iterable[Path]) -> None:
             )
 
 
-def publish(layout: Layout, paths: Iterable[Path], last: Path | None = None) -> None:
-    """Send files to the store; ``last`` is sent when the others are there, and tells readers so."""
+def send_files(layout: Layout, paths: Iterable[Path], last: Path | None = None) -> None:
+    """Send files to the store; ``last`` is sent after the others, and marks them as complete."""
     if layout.origin is not None:
         objects = Objects(layout.origin)
         objects.send({layout.relative(path): path for path in paths})
@@ -168,8 +170,8 @@ def publish(layout: Layout, paths: Iterable[Path], last: Path | None = None) -> 
             objects.write(layout.relative(last), last)
 
 
-def claim(layout: Layout, path: Path) -> None:
-    """Send a file that must not be there yet.
+def send_first(layout: Layout, path: Path) -> None:
+    """Send a file that must not exist in the store yet.
 
     Raises
     ------
@@ -184,14 +186,14 @@ def claim(layout: Layout, path: Path) -> None:
         )
 
 
-def withdraw(layout: Layout, paths: Collection[Path]) -> None:
+def remove_files(layout: Layout, paths: Collection[Path]) -> None:
     """Remove files from the store."""
     if layout.origin is not None:
         Objects(layout.origin).remove([layout.relative(path) for path in paths])
 
 
 def forget_begun(layout: Layout) -> None:
-    """Remove from the store what a run sent that was stopped before its plan."""
+    """Remove the files that a run sent to the store and that was stopped before its plan."""
     if layout.origin is not None:
         objects = Objects(layout.origin)
         objects.remove([name for name in objects.sizes() if name != LOCK])
@@ -205,13 +207,13 @@ def stored_bytes(layout: Layout) -> int:
 
 
 def frames_store(layout: Layout) -> Any:
-    """The Zarr store of the frames, which are read from where they lie."""
+    """Return the Zarr store of the frames, which are read from the folder or the object store."""
     return (
         layout.frames if layout.origin is None else Objects(f"{layout.origin}/{layout.frames.name}").as_zarr()
     )
 
 
-def _unfinished(objects: Objects) -> str:
+def _describe_unfinished(objects: Objects) -> str:
     names = objects.sizes().keys()
     if "plan.json" not in names:
         return f"{objects.address}: there is no muSync dataset"
@@ -222,29 +224,29 @@ def _unfinished(objects: Objects) -> str:
     )
 
 
-def _mirrors() -> Path:
+def _find_mirrors() -> Path:
     return cache_root() / "stores"
 
 
 @contextmanager
 def _work_folder() -> Iterator[Path]:
-    """A new folder beside the mirrors that goes with the run; those of killed runs go now."""
-    _mirrors().mkdir(parents=True, exist_ok=True)
-    for left in _mirrors().glob("work-*"):
+    """Yield a new folder beside the mirrors, removed after the run; those of killed runs are removed now."""
+    _find_mirrors().mkdir(parents=True, exist_ok=True)
+    for left in _find_mirrors().glob("work-*"):
         with ExitStack() as stack:
-            if _held(left, stack):
+            if _try_lock(left, stack):
                 shutil.rmtree(left, ignore_errors=True)
     with ExitStack() as stack:
-        folder = Path(mkdtemp(prefix="work-", dir=_mirrors()))
-        while not _held(folder, stack):  # another run took it for a left-over just now
-            folder = Path(mkdtemp(prefix="work-", dir=_mirrors()))
+        folder = Path(mkdtemp(prefix="work-", dir=_find_mirrors()))
+        while not _try_lock(folder, stack):  # another run has just removed it as a left-over
+            folder = Path(mkdtemp(prefix="work-", dir=_find_mirrors()))
         try:
             yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _held(folder: Path, stack: ExitStack) -> bool:
+def _try_lock(folder: Path, stack: ExitStack) -> bool:
     """Lock a work folder for as long as the stack lives, if no live process holds it."""
     try:
         stream = stack.enter_context((folder / "alive").open("w"))
@@ -255,9 +257,9 @@ def _held(folder: Path, stack: ExitStack) -> bool:
 
 
 @lru_cache(maxsize=1)
-def _elsewhere(layout: Layout) -> Layout:
+def _open_elsewhere(layout: Layout) -> Layout:
     """This process's own folder for a run whose folder lies on another machine."""
     assert layout.origin is not None
     stack = ExitStack()
     atexit.register(stack.close)
-    return stack.enter_context(working(layout.origin, planned))
+    return stack.enter_context(open_for_writing(layout.origin, want_plan))

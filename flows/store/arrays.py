@@ -23,7 +23,7 @@ class PixelArray:
     flags: tuple[str, ...] = ()
 
 
-def _array(
+def _define_array(
     name: str,
     dtype: str,
     unit: str,
@@ -37,23 +37,27 @@ def _array(
 
 _CLASSES = tuple(kind.name.lower() for kind in SemanticClass)
 _PIXELS = (
-    _array("rgb", "uint8", "1", "sRGB-encoded colour", ("channel",)),
-    _array("depth", "float32", "m", "camera z, rounded to 13 mantissa bits; NaN where nothing is seen"),
-    _array("class", "uint8", "1", "semantic class", flags=_CLASSES),
+    _define_array("rgb", "uint8", "1", "sRGB-encoded colour", ("channel",)),
+    _define_array(
+        "depth", "float32", "m", "camera z, rounded to 13 mantissa bits; NaN where nothing is seen"
+    ),
+    _define_array("class", "uint8", "1", "semantic class", flags=_CLASSES),
 )
 _LABELS = (
-    _array("normal", "int8", "1", "world normal in steps of 1/127; zero where nothing is seen", ("axis",)),
-    _array(
+    _define_array(
+        "normal", "int8", "1", "world normal in steps of 1/127; zero where nothing is seen", ("axis",)
+    ),
+    _define_array(
         "road",
         "float32",
         "m",
         "station and lateral position of road pixels; NaN off the road",
         ("coordinate",),
     ),
-    _array(
+    _define_array(
         "flow", "float32", "px", "way right and down to the next frame; NaN without depth", ("direction",)
     ),
-    _array(
+    _define_array(
         "marks", "uint8", "1", "bits: what changed the pixel, is out of sight in the next frame, is hazard"
     ),
 )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.documents import parse_json
-from catalogs.sentences import brief, cap_problems
+from catalogs.sentences import cap_problems, shorten_value
 from flows.store.arrays import DIMENSION_SIZES, PixelArray, arrays_of
 from tasks.errors import InputError
 
@@ -31,7 +31,7 @@ _CODECS = {
 _INDEX_CODECS = ["bytes", "crc32c"]
 
 ReadMetadata = Callable[[str], bytes | None]
-"""The bytes of a file of the frames by its relative path; None where there is none."""
+"""Return the bytes of a file of the frames by its relative path; None where there is no file."""
 
 
 def read_local_metadata(folder: Path) -> ReadMetadata:
@@ -65,7 +65,7 @@ def check_frames(
     shapes = {}
     for name in sorted(members):
         if name not in arrays_of(labels=True):
-            problems.append(f"{place}/{brief(name)}: no array that muSync writes; remove it")
+            problems.append(f"{place}/{shorten_value(name)}: no array that muSync writes; remove it")
             continue
         try:
             shapes[name] = check_array(read, name, place)
@@ -75,7 +75,7 @@ def check_frames(
         if shapes[name][:2] != (clips, frames):
             problems.append(
                 f"{place}/{name}: must have the manifest's {clips} clips of {frames} frames; its shape is"
-                f" {brief(list(shapes[name]))}"
+                f" {shorten_value(list(shapes[name]))}"
             )
     if len({shape[2:4] for shape in shapes.values()}) > 1:
         problems.append(f"{place}: all arrays must have pictures of one size; they have several")
@@ -105,7 +105,7 @@ def check_array(read: ReadMetadata, name: str, place: object) -> tuple[int, ...]
     metadata = parse_json(content, where, "array's metadata")
     array = arrays_of(labels=True)[name]
     if not isinstance(metadata, dict):
-        raise InputError(f"{where}: must be a table of metadata; it is {brief(metadata)}")
+        raise InputError(f"{where}: must be a table of metadata; it is {shorten_value(metadata)}")
     shape: Any = metadata.get("shape")
     problems = _shape_problems(shape, array)
     if not problems:
@@ -135,13 +135,13 @@ def _shape_problems(shape: Any, array: PixelArray) -> list[str]:
     whole = isinstance(shape, list) and all(type(size) is int and 1 <= size < 2**31 for size in shape)
     if not whole or len(shape) != 4 + len(sizes) or shape[4:] != sizes:
         return [
-            f"shape must be [clip, frame, y, x{''.join(f', {size}' for size in sizes)}]; it is {brief(shape)}"
+            f"shape must be [clip, frame, y, x{''.join(f', {size}' for size in sizes)}]; it is {shorten_value(shape)}"
         ]
     picture = prod(shape[2:]) * np.dtype(array.dtype).itemsize
     if picture > LARGEST_PICTURE or shape[1] * picture > LARGEST_CLIP:
         return [
             f"a picture must have at most {LARGEST_PICTURE:,} bytes and a clip {LARGEST_CLIP:,};"
-            f" the shape is {brief(shape)}"
+            f" the shape is {shorten_value(shape)}"
         ]
     return []
 
@@ -161,18 +161,18 @@ def _layout_problems(metadata: Mapping[str, Any], array: PixelArray, shape: list
     }
     found = {"storage_transformers": [], **metadata}
     problems = [
-        f"{key} must be {brief(value)}; it is {brief(found.get(key))}"
+        f"{key} must be {shorten_value(value)}; it is {shorten_value(found.get(key))}"
         for key, value in wanted.items()
         if found.get(key) != value
     ]
     problems += [
-        f"{brief(key)}: no key that muSync writes"
+        f"{shorten_value(key)}: no key that muSync writes"
         for key in found.keys() - wanted.keys() - {"codecs", "attributes"}
     ]
     if not _is_shard(metadata.get("codecs"), [1, 1, *tail]):
         problems.append(
             "codecs must be those that muSync writes: a shard of one chunk a frame, each as bytes, blosc (zstd),"
-            f" crc32c; they are {brief(metadata.get('codecs'), most=120)}"
+            f" crc32c; they are {shorten_value(metadata.get('codecs'), most=120)}"
         )
     return problems
 

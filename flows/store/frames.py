@@ -45,7 +45,7 @@ def create_arrays(
                 Crc32cCodec(),
             ],
             dimension_names=("clip", "frame", "y", "x", *array.dimensions),
-            attributes=_labels(array),
+            attributes=_describe_array(array),
         )
     _write_files(path, metadata)
 
@@ -95,7 +95,7 @@ def _write_files(folder: Path, files: Mapping[str, Buffer]) -> None:
         write_atomically(folder / name, content.to_bytes())
 
 
-def _labels(array: PixelArray) -> dict[str, Any]:
+def _describe_array(array: PixelArray) -> dict[str, Any]:
     """The words that a telemetry column of the same kind carries, and CF's attributes of codes."""
     labels: dict[str, Any] = {"long_name": array.channel.description, **channel_labels(array.channel)}
     if array.flags:

@@ -23,17 +23,17 @@ LOCK = ".staging/lock"
 
 
 @contextmanager
-def leased(objects: Objects) -> Iterator[None]:
-    """Hold the dataset at an address for writing.
+def hold_lease(objects: Objects) -> Iterator[None]:
+    """Hold the lease of the dataset at an address for writing.
 
     Raises
     ------
     InputError
         If another run holds it.
     """
-    tag = objects.write(LOCK, _claim(), expected="") or _taken_over(objects)
+    tag = objects.write(LOCK, _make_claim(), expected="") or _taken_over(objects)
     held, ended = [tag], Event()
-    renewer = Thread(target=_keep, args=(objects, held, ended), daemon=True)
+    renewer = Thread(target=_renew_lease, args=(objects, held, ended), daemon=True)
     renewer.start()
     try:
         yield
@@ -44,11 +44,11 @@ def leased(objects: Objects) -> Iterator[None]:
             objects.remove([LOCK])
 
 
-def _keep(objects: Objects, held: list[str], ended: Event) -> None:
-    """Renew the lock until the run ends, or somebody else has it."""
+def _renew_lease(objects: Objects, held: list[str], ended: Event) -> None:
+    """Renew the lock until the run ends, or another run has taken it."""
     while not ended.wait(RENEW_S):
         try:
-            tag = objects.write(LOCK, _claim(), expected=held[0])
+            tag = objects.write(LOCK, _make_claim(), expected=held[0])
         except InputError:  # no answer now: the next time
             continue
         if tag is None:
@@ -70,7 +70,7 @@ def _taken_over(objects: Objects) -> str:
         if objects.tag(LOCK) != seen:
             raise busy
         time.sleep(WATCH_S)
-    tag = objects.write(LOCK, _claim(), expected=seen or "")
+    tag = objects.write(LOCK, _make_claim(), expected=seen or "")
     if tag is None:
         raise busy
     return tag
@@ -89,7 +89,7 @@ def _owner_of(content: bytes | None) -> dict[str, Any]:
     return owner if known else unknown
 
 
-def _claim() -> bytes:
+def _make_claim() -> bytes:
     claim = {"host": platform.node(), "pid": os.getpid(), "renewal": uuid.uuid4().hex}
     return json.dumps(claim, sort_keys=True).encode()
 

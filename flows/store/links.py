@@ -51,10 +51,10 @@ def refuse_foreign_entries(root: Path, wanted: Callable[[str], bool] = lambda na
         Naming every such entry.
     """
     if found := foreign_entries(root, wanted):
-        raise InputError(cap_problems([_sentence(root, path) for path in found]))
+        raise InputError(cap_problems([_describe_link(root, path) for path in found]))
 
 
-def _sentence(root: Path, path: str) -> str:
+def _describe_link(root: Path, path: str) -> str:
     place = root / path
     if place.is_symlink():
         kind = "a link"

@@ -8,7 +8,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from flows.store.layout import Layout
-from flows.store.lease import leased
+from flows.store.lease import hold_lease
 from flows.store.links import refuse_foreign_entries
 from flows.store.objects import Objects
 from tasks.errors import InputError
@@ -28,7 +28,7 @@ def sole_writer(layout: Layout) -> Iterator[None]:
     refuse_foreign_entries(layout.root)
     lock = _locked_file(layout)
     try:
-        with nullcontext() if layout.origin is None else leased(Objects(layout.origin)):
+        with nullcontext() if layout.origin is None else hold_lease(Objects(layout.origin)):
             yield
     finally:
         os.close(lock)
@@ -58,7 +58,7 @@ def _is_at(lock: int, path: Path) -> bool:
 
 
 def _open_lock(path: Path) -> int:
-    """The lock file, made where there is none; a file that is there is neither followed, nor cut, nor written."""
+    """Open the lock file, and create it where it is missing; an existing file is not followed, truncated or written."""
     with suppress(FileExistsError):
         path.parent.mkdir(parents=True)
     with suppress(IsADirectoryError, NotADirectoryError):

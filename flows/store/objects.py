@@ -57,7 +57,7 @@ class Objects:
             parts.netloc,
             prefix=prefix,
             client_options={
-                "allow_http": _server().startswith("http://"),
+                "allow_http": _find_server().startswith("http://"),
                 "connect_timeout": CONNECT_TIMEOUT,
             },
             retry_config={"max_retries": RETRIES, "retry_timeout": RETRY_FOR},
@@ -75,7 +75,7 @@ class Objects:
         return sorted(PurePosixPath(name).name for name in found)
 
     def read(self, name: str) -> bytes | None:
-        """An object's bytes; None where there is none."""
+        """Return an object's bytes; None where there is no object."""
         with self._explained():
             try:
                 return bytes(self._api.get(self._store, name).bytes())
@@ -108,7 +108,7 @@ class Objects:
         return tag
 
     def tag(self, name: str) -> str | None:
-        """What changes with an object's content; None where there is no object."""
+        """Return the tag of an object, which changes with its content; None where there is no object."""
         with self._explained():
             try:
                 found: str = self._api.head(self._store, name)["e_tag"]
@@ -117,7 +117,7 @@ class Objects:
         return found
 
     def remove(self, names: Collection[str]) -> None:
-        """Remove objects; one that is not there is none the worse."""
+        """Remove objects; a missing object is no error."""
         if names:
             with self._explained():
                 self._api.delete(self._store, sorted(names))
@@ -166,17 +166,17 @@ class Objects:
         named = re.search(r"<Code>(\w+)</Code>", text)
         code = named[1] if named else type(error).__name__
         if code == "NoSuchBucket":
-            return f"the bucket does not exist at {_server()}: create it, or correct the address"
+            return f"the bucket does not exist at {_find_server()}: create it, or correct the address"
         refused = code in CREDENTIALS or code in {"PermissionDeniedError", "UnauthenticatedError"}
         if refused or "169.254.169.254" in text:  # where credentials are asked for when none are given
             return (
-                f"{_server()} refuses the credentials ({code}): set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY to"
+                f"{_find_server()} refuses the credentials ({code}): set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY to"
                 " those of somebody who may read and write there"
             )
         if named is None and "HTTP error" in text:
-            return f"no object store answers at {_server()}: check AWS_ENDPOINT_URL and the network"
-        return f"{_server()} answers {code}: {text.splitlines()[0]}"
+            return f"no object store answers at {_find_server()}: check AWS_ENDPOINT_URL and the network"
+        return f"{_find_server()} answers {code}: {text.splitlines()[0]}"
 
 
-def _server() -> str:
+def _find_server() -> str:
     return os.environ.get("AWS_ENDPOINT_URL") or "Amazon S3"

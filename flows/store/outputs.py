@@ -94,7 +94,7 @@ class Outputs:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Keep other calls from writing into the folder, and clear what killed ones left of the command's files.
+        """Lock the folder against other calls, and remove files that killed calls of this command left.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class Outputs:
             yield
             return
         self.folder.mkdir(parents=True, exist_ok=True)
-        with _held(self.folder, wait=False):
+        with _lock_folder(self.folder, wait=False):
             self._alone = True
             try:
                 self._clear_halves(self.folder)
@@ -122,7 +122,7 @@ class Outputs:
                         half.unlink()
 
     def _locked(self, folder: Path) -> AbstractContextManager[None]:
-        return nullcontext() if self._alone else _held(folder, wait=True)
+        return nullcontext() if self._alone else _lock_folder(folder, wait=True)
 
     def _refuse_strangers(self, folder: Path) -> None:
         problems = [f"{folder}: {problem}" for problem in map(name_problem, self.names) if problem]
@@ -186,7 +186,7 @@ def read_marker(folder: Path) -> dict[str, str]:
 
 
 def refuse_link(path: Path) -> None:
-    """Refuse to write to a file through a link, or to what is no file.
+    """Refuse to write through a link, or to something that is no file.
 
     Raises
     ------
@@ -213,7 +213,7 @@ def _in_the_way(folder: Path, name: str, known: dict[str, str], command: str) ->
 
 
 def _no_folder_above(folder: Path, name: str) -> str | None:
-    """The link or file that lies where a folder between must be; None if there is none."""
+    """Return the link or file at the place of a parent folder; None if there is none."""
     above = [
         folder.joinpath(*PurePosixPath(name).parts[:k]) for k in range(1, len(PurePosixPath(name).parts))
     ]
@@ -240,7 +240,7 @@ def _write_marker(folder: Path, files: dict[str, str]) -> None:
 
 
 @contextmanager
-def _held(folder: Path, *, wait: bool) -> Iterator[None]:
+def _lock_folder(folder: Path, *, wait: bool) -> Iterator[None]:
     """Lock a folder itself, so that no lock file stays behind."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:

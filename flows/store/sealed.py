@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 from pydantic import ValidationError
 
 from catalogs.grids import GridFile
-from catalogs.sentences import brief, cap_problems, describe_rules
+from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from flows.store.arrays import arrays_of
 from flows.store.layout import STAGED_TABLES, Layout, read_json
 from manifests.manifest import MANIFEST_FORMAT
@@ -120,7 +120,7 @@ def _of_format(content: Any, wanted: str, place: object) -> Any:
     found = content.get("format") if isinstance(content, dict) else None
     if found != wanted:
         raise InputError(
-            f"{place}: must be of format {wanted}; it is {brief(found)}:"
+            f"{place}: must be of format {wanted}; it is {shorten_value(found)}:"
             " read the dataset with the version of muSync that wrote it, or make it again"
         )
     return content

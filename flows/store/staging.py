@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from flows.store.address import withdraw
+from flows.store.address import remove_files
 from flows.store.layout import PARTIAL, STAGED_TABLES, Layout
 from flows.store.lock import sole_writer
 from manifests.canonical import ID_LENGTH
@@ -24,7 +24,7 @@ _STAGED = re.compile(
 
 def staged_files(layout: Layout) -> list[Path]:
     """Files in the staging folder that muSync wrote, but for the lock."""
-    return sorted(path for path in _entries(layout) if _STAGED.fullmatch(path.name) and path.is_file())
+    return sorted(path for path in _list_entries(layout) if _STAGED.fullmatch(path.name) and path.is_file())
 
 
 def partial_files(layout: Layout) -> list[Path]:
@@ -36,7 +36,7 @@ def abandoned_scratch(layout: Layout) -> list[Path]:
     """Scratch folders of runs that are no more."""
     return sorted(
         path
-        for path in _entries(layout)
+        for path in _list_entries(layout)
         if _SCRATCH.fullmatch(path.name) and path.is_dir() and _is_abandoned(Layout(path))
     )
 
@@ -64,9 +64,9 @@ def remove_staging(layout: Layout) -> None:
 
 
 def remove_left_overs(layout: Layout) -> list[Path]:
-    """Remove what killed runs left, also from a store, and return what it was; the dataset is held for writing."""
+    """Remove the files that killed runs left, in a store too, and return their paths; needs the writer's lock."""
     found = left_overs(layout)
-    withdraw(layout, [path for path in found if path.is_file()])
+    remove_files(layout, [path for path in found if path.is_file()])
     remove_staged(found)
     if layout.manifest.is_file():
         remove_staging(layout)
@@ -93,7 +93,7 @@ def scratch_dataset(layout: Layout) -> Iterator[Layout]:
         folder = Path(tempfile.mkdtemp(prefix="musync-scratch-"))
     scratch = Layout(folder)
     try:
-        with sole_writer(scratch):  # what holds no lock is a left-over of a killed run
+        with sole_writer(scratch):  # without a lock it is left over from a killed run
             yield scratch
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -112,5 +112,5 @@ def _is_abandoned(scratch: Layout) -> bool:
         return False
 
 
-def _entries(layout: Layout) -> list[Path]:
+def _list_entries(layout: Layout) -> list[Path]:
     return list(layout.staging.iterdir()) if layout.staging.is_dir() else []

@@ -118,7 +118,7 @@ def read_columns(
 
 
 def table_columns(table: pa.Table) -> dict[str, np.ndarray]:
-    """Column name to NumPy array; a fixed-size list column comes back as 2-D."""
+    """Return NumPy arrays by column name; a fixed-size list column is 2-D."""
     columns = {}
     for name in table.column_names:
         column = table[name].combine_chunks()
@@ -156,7 +156,7 @@ def _constant_type(value: Any) -> pa.DataType:
 
 
 def channel_labels(channel: Channel) -> dict[str, str]:
-    """What a column's or array's metadata say of it; what is empty is left out."""
+    """Return the metadata of a column or array, without empty entries."""
     labels = {
         "units": channel.unit,
         "symbol": channel.symbol,

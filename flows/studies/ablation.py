@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from catalogs.references import Traces, read_reference
 from catalogs.studies import Condition
-from catalogs.studies.ablation import VARIANTS, Ablation, Variant, cut, load_ablation
+from catalogs.studies.ablation import VARIANTS, Ablation, Variant, cut_coupling, load_ablation
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.drawing import as_svg
-from flows.making.driving import drive
+from flows.making.driving import simulate_drive
 from flows.store.outputs import Outputs
 from flows.store.telemetry import write_parquet
 from flows.studies.ablation_figure import ablation_figure
@@ -29,10 +29,10 @@ STOP_S, PITCH_S = 15.0, 10.0
 Rows = list[dict[str, Any]]
 
 
-def ablation(
+def run_ablation(
     *, out: str, vehicle: str = "multibody-grown", mode: Mode | None = None, traces: str | None = None
 ) -> dict[str, Any]:
-    """Cut one coupling at a time and say what stops being true.
+    """Cut one coupling at a time and report the figures that change.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def ablation(
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
     oracle = None if traces is None else oracle_trace(Path(traces), study.pitch)
     stops = stop_rows(study, car, surface, chosen)
-    rides = {name: _ride(study.pitch, name, car, surface, chosen) for name in VARIANTS}
+    rides = {name: _simulate_variant(study.pitch, name, car, surface, chosen) for name in VARIANTS}
     pitch = [pitch_row(name, ride, study.pitch, car) for name, ride in rides.items()]
     curves: dict[str, NDArray[np.float64]] = {
         name: np.rad2deg(ride.columns["pitch"] + ride.static_pitch) for name, ride in rides.items()
@@ -68,7 +68,9 @@ def ablation(
         reference["note"] = "not run: no reference traces given"
     else:
         curves["reference"] = np.interp(time, oracle["time"], oracle["pitch"], right=np.nan)
-        reference |= {f"{name}_pitch_rmse_deg": _rmse(curves[name], curves["reference"]) for name in VARIANTS}
+        reference |= {
+            f"{name}_pitch_rmse_deg": _compute_rmse(curves[name], curves["reference"]) for name in VARIANTS
+        }
     result = {
         "vehicle": vehicle, "mode": chosen, "pitch_condition": study.pitch.name,
         "stops": stops, "pitch": pitch, "reference": reference,
@@ -96,8 +98,8 @@ def stop_rows(study: Ablation, car: Vehicle, surface: SurfaceParameters, mode: M
             if variant == "vertical-only":
                 continue
             for scenario in scenarios:
-                held = replace(cut(scenario, variant), hold_speed=True)
-                _, ride = drive(held, car, surface, mode, STOP_S)
+                held = replace(cut_coupling(scenario, variant), hold_speed=True)
+                _, ride = simulate_drive(held, car, surface, mode, STOP_S)
                 rows.append({
                     "variant": variant,
                     "weather": kind,
@@ -155,12 +157,12 @@ def oracle_trace(folder: Path, condition: Condition) -> Traces:
     raise InputError(f"{folder}: the ablation compares the pitch of {condition.name}; no case has that name")
 
 
-def _ride(
+def _simulate_variant(
     condition: Condition, variant: Variant, car: Vehicle, surface: SurfaceParameters, mode: Mode
 ) -> Rollout:
-    held = replace(cut(condition.scenario, variant), hold_speed=True)
-    return drive(held, car, surface, mode, PITCH_S)[1]
+    held = replace(cut_coupling(condition.scenario, variant), hold_speed=True)
+    return simulate_drive(held, car, surface, mode, PITCH_S)[1]
 
 
-def _rmse(curve: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
+def _compute_rmse(curve: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.nanmean((curve - reference) ** 2)))

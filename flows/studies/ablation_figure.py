@@ -36,7 +36,7 @@ def ablation_figure(
     figure = Figure(figsize=(11, 3.6), layout="constrained")
     rain, snow, angle = figure.subplots(1, 3, width_ratios=(1, 1, 1.6))
     for axis, kind in ((rain, "rain"), (snow, "snow")):
-        _stops(axis, [row for row in stops if row["weather"] == kind])
+        _draw_stops(axis, [row for row in stops if row["weather"] == kind])
         axis.set_xlabel(f"{kind} [mm/h]" if kind == "rain" else "snow, water equivalent [mm/h]")
     snow.sharey(rain)
     rain.set_ylabel("stopping distance [m]")
@@ -60,7 +60,7 @@ def ablation_figure(
     return figure
 
 
-def _stops(axis: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
+def _draw_stops(axis: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
     for variant in dict.fromkeys(row["variant"] for row in rows):
         mine = [row for row in rows if row["variant"] == variant]
         axis.plot(

@@ -12,15 +12,16 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
-from tasks.eval.state_agreement import CaseAgreement, aggregate, case_agreement
+from tasks.eval.state_agreement import CaseAgreement, case_agreement, summarise_groups
 from tasks.studies.sensitivity import beside_print, sensitivity_study
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, rollout
 
 BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries")
 
 
-def sensitivity(*, out: str | None = None) -> dict[str, Any]:
+def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
     results = Outputs(out, "sensitivity", "sensitivity.json")
     protocol, printed = load_sensitivity_study()
@@ -32,10 +33,10 @@ def sensitivity(*, out: str | None = None) -> dict[str, Any]:
     return result
 
 
-def agreement(
+def measure_agreement(
     traces: str, *, vehicle: str = "paper-reference", mode: Mode | None = None, out: str | None = None
 ) -> dict[str, Any]:
-    """Hold the vehicle model against reference traces by the paper's Appendix A.2 protocol.
+    """Compare the vehicle model with reference traces by the paper's Appendix A.2 protocol.
 
     Parameters
     ----------
@@ -70,22 +71,22 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
     splits: dict[str, list[CaseAgreement]] = {}
     for case, columns in reference:
         ride = rollout(
-            model, case.weather, case.surface_coefficient, case.controls(), case.hazard(),
+            model, SurfaceState(kind=case.weather, friction=case.surface_coefficient), case.controls(), case.hazard(),
             mode=mode, duration_s=case.duration_s(columns),
         )  # fmt: skip
         scored = case_agreement(columns, ride.columns, case.facts(model.wheelbase), ride.static_pitch)
         splits.setdefault(case.split, []).append(scored)
         rows.append({"split": case.split} | asdict(scored) | {"window": list(scored.window)})
     groups = [
-        {"split": split, "group": name, "count": group.count, **_plain(group.mean)}
+        {"split": split, "group": name, "count": group.count, **_make_plain(group.mean)}
         for split, cases in splits.items()
-        for name, group in aggregate(cases).items()
+        for name, group in summarise_groups(cases).items()
     ]
-    overall = aggregate([case for cases in splits.values() for case in cases])["all"].mean
-    return {"cases": rows, "groups": groups, "mean": _plain(overall)}
+    overall = summarise_groups([case for cases in splits.values() for case in cases])["all"].mean
+    return {"cases": rows, "groups": groups, "mean": _make_plain(overall)}
 
 
-def bench(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
+def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
     """Run one benchmark, or all of them.
 
     Raises
@@ -99,12 +100,12 @@ def bench(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
     rows = [
         row
         for chosen in ([name] if name else BENCHMARKS)
-        for row in import_module(f"benchmarks.{chosen}").rows()
+        for row in import_module(f"benchmarks.{chosen}").measure_rows()
     ]
     results.write_json("bench.json", {"rows": rows})
     return {"rows": rows}
 
 
-def _plain(figures: dict[str, float]) -> dict[str, float | None]:
+def _make_plain(figures: dict[str, float]) -> dict[str, float | None]:
     """JSON has no NaN: a figure that a group cannot have is null."""
     return {name: None if value != value else value for name, value in figures.items()}

@@ -1,4 +1,4 @@
-"""From a file's signals to the columns of one run, with every problem of it."""
+"""Assembly of one run's columns from a file's signals, with every problem of the run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,22 +8,28 @@ from numpy.typing import NDArray
 
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import UNITS
-from tasks.campaign.signals import ChannelRule, Signal, as_channel, common_clock, on_clock
+from tasks.campaign.signals import (
+    ChannelRule,
+    Signal,
+    convert_to_channel,
+    make_common_clock,
+    resample_on_clock,
+)
 
 MINIMUM_SAMPLES = 100
-"""Shorter runs hold too little to tell noise from motion."""
+"""Shorter runs hold too little data to separate noise from motion."""
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
     "°": "deg", "°/s": "deg/s", "1/min": "rpm", "-": "1",
     "Unit_Bar": "bar", "Unit_KiloMeterPerHour": "km/h", "Unit_DegreOfArc": "deg", "Unit_DegreOfArcPerSecon": "deg/s",
     "Unit_MeterPerSeconSquar": "m/s^2",
 }  # fmt: skip
-"""Ways in which files write the units that this project knows."""
+"""Spellings of the units that this project knows, as files have them."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Assembled:
-    """One run on a common clock, or what is wrong with it.
+    """One run on a common clock, or its problems.
 
     Parameters
     ----------
@@ -46,32 +52,32 @@ def assemble_run(
     ----------
     signals : logged signals by name
     rules : the channel map
-    start, end : stretch of the run in the logger's time, infinite for all there is [s]
+    start, end : limits of the run in the logger's time; infinite for the whole recording [s]
     rate : of the run [Hz]
     """
     found: list[tuple[str, str]] = []
     parts: dict[str, list[Signal]] = {}
     for rule in rules:
-        logged = [signals[name].between(start, end) for name in rule.sources]
+        logged = [signals[name].cut_window(start, end) for name in rule.sources]
         for signal in logged:
             stated = ALIASES.get(signal.unit, signal.unit)
             if stated in UNITS and stated != rule.unit:
                 found.append((rule.channel, f"is in {stated} by its file, in {rule.unit} by the map"))
             found += [(rule.channel, problem) for problem in signal_problems(signal)]
-        parts[rule.channel] = [as_channel(signal, rule) for signal in logged]
-    found += _frozen(parts)
-    problems = _sentences(found)
-    usable = {channel: signals for channel, signals in parts.items() if not _unreadable(signals)}
+        parts[rule.channel] = [convert_to_channel(signal, rule) for signal in logged]
+    found += _find_frozen_channels(parts)
+    problems = _write_sentences(found)
+    usable = {channel: signals for channel, signals in parts.items() if not _is_unreadable(signals)}
     if not usable:
         return Assembled(start=start, columns={}, problems=tuple(problems))
-    clock = common_clock([signal for signals in usable.values() for signal in signals], rate)
+    clock = make_common_clock([signal for signals in usable.values() for signal in signals], rate)
     if len(clock) < MINIMUM_SAMPLES:
         problems.append(
             f"has {len(clock)} samples that all channels share; a run needs {MINIMUM_SAMPLES}: widen its window"
         )
         return Assembled(start=start, columns={}, problems=tuple(problems))
     columns = {
-        channel: np.mean([on_clock(signal, clock) for signal in signals], axis=0)
+        channel: np.mean([resample_on_clock(signal, clock) for signal in signals], axis=0)
         for channel, signals in usable.items()
     }
     broken = {channel for channel, _ in found}
@@ -80,8 +86,8 @@ def assemble_run(
     return Assembled(start=float(clock[0]), columns={} if problems else columns, problems=tuple(problems))
 
 
-def _sentences(found: list[tuple[str, str]]) -> list[str]:
-    """One sentence per problem; channels of one clock share its faults, so they share the sentence."""
+def _write_sentences(found: list[tuple[str, str]]) -> list[str]:
+    """Write one sentence per problem; channels of one clock share its faults, so they share the sentence."""
     channels: dict[str, list[str]] = {}
     for channel, problem in found:
         if channel not in channels.setdefault(problem, []):
@@ -92,7 +98,7 @@ def _sentences(found: list[tuple[str, str]]) -> list[str]:
     ]
 
 
-def _frozen(parts: Mapping[str, list[Signal]]) -> list[tuple[str, str]]:
+def _find_frozen_channels(parts: Mapping[str, list[Signal]]) -> list[tuple[str, str]]:
     speed = parts["speed"][0] if "speed" in parts else None
     return [
         (channel, problem)
@@ -102,7 +108,7 @@ def _frozen(parts: Mapping[str, list[Signal]]) -> list[tuple[str, str]]:
     ]
 
 
-def _unreadable(signals: list[Signal]) -> bool:
+def _is_unreadable(signals: list[Signal]) -> bool:
     return any(
         len(s.time) < 2 or not np.isfinite(s.values).all() or bool((np.diff(s.time) <= 0).any())
         for s in signals

@@ -1,4 +1,4 @@
-"""The attrition table of a selection: what each rule costs, alone and in turn."""
+"""The attrition table of a selection: the events that each rule removes, alone and in turn."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from tasks.campaign.selection import QUANTITIES, Selection
 
 @dataclass(frozen=True, kw_only=True)
 class AttritionRow:
-    """One rule's share in a selection.
+    """Events that one rule removes from a selection.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class AttritionRow:
 
 
 def attrition_table(selection: Selection, protocol: Protocol) -> tuple[AttritionRow, ...]:
-    """One row per rule, in the protocol's order; failure counts overlap, as in the paper's table.
+    """Return one row per rule, in the protocol's order; failure counts overlap, as in the paper's table.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a measurement campaign holds, free of files: runs, split, tolerances."""
+"""A measurement campaign without its files: runs, split, tolerances."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ SESSION = ("pressure_gain", "mass", "pitch_gain", "wheel_radius", "damping", "st
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
-    """One-sigma doubts about a session (relative, grade as slope) and about a single run.
+    """One-sigma uncertainties of a session (relative, grade as slope) and of a single run.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ class Run:
     Parameters
     ----------
     name : as in runs.csv
-    held_out : belongs to the runs that no fit may see
-    weather : dry, rain or snow
+    held_out : belongs to the runs that no fit may read
+    weather : name of the kind of weather
     precipitation_mm_h, snow_accumulation_h : rate [mm/h] and time of snowfall [h]
     direction : +1 along the route, -1 against it
     disc_rise : disc temperature above ambient at the start [K]
@@ -76,7 +76,7 @@ class Campaign:
     ----------
     name, vehicle : of the campaign and of the catalogue entry it is compared with
     runs : in the order of runs.csv
-    tolerances : what a session and a run may be off by
+    tolerances : uncertainties of a session and of a run
     content_hash : SHA-256 over every file read
     split_hash : SHA-256 over the names of the training and held-out runs
     """
@@ -95,5 +95,5 @@ class Campaign:
 
     @property
     def held_out(self) -> tuple[Run, ...]:
-        """Runs that only judge."""
+        """Runs that only test a fit."""
         return tuple(run for run in self.runs if run.held_out)

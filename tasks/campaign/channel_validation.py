@@ -1,22 +1,22 @@
-"""What can be wrong in measured channels, imported or given as a campaign: rules on arrays, answers in sentences."""
+"""Validation of measured channels, imported or of a campaign: rules on arrays, problems in sentences."""
 
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.channels import CHANNELS_BY_NAME, likely_unit
+from tasks.campaign.channels import CHANNELS_BY_NAME, guess_unit
 from tasks.campaign.signals import Signal
 
 GAP_STEPS = 5.0
-"""A step between samples beyond this many usual ones is a gap."""
+"""A step between samples longer than this many median steps is a gap."""
 FROZEN_SECONDS = 0.5
 FROZEN_DWELLS = 20.0
-"""A frozen sensor holds a value that long, and that many times longer than it usually does."""
+"""A frozen sensor holds a value this long, and this many times longer than usual."""
 SHORT_FREEZE_SECONDS = 0.25
-"""Held that long is enough where hardly any value is held: that many times longer than 95 % of the holds."""
+"""This long suffices for a sensor that hardly holds values: it must be as many times longer than 95 % of the holds."""
 MOVING = 2.0
-"""Speed from which a car shakes its sensors [m/s]."""
+"""Speed above which the vibration of a car changes every sensor's value [m/s]."""
 SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
 DECELERATION_PER_PRESSURE = (0.3, 8.0)
@@ -34,7 +34,7 @@ LARGEST_ACCELERATION, LARGEST_CORRECTION = 20.0, 0.5
 
 
 def signal_problems(signal: Signal) -> list[str]:
-    """What is wrong with one signal on its own clock: empty, gaps, clock jumps, values that are not numbers.
+    """Return the problems of one signal on its own clock: empty, gaps, clock jumps, values that are not numbers.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def signal_problems(signal: Signal) -> list[str]:
 
 
 def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | None:
-    """Whether a sensor held one value while the car moved.
+    """Return the problem of a sensor that held one value while the car moved; None if there is none.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | Non
     usual, most = np.quantile(dwells, (0.5, 0.95)) if len(changes) > 2 else (0.0, np.inf)
     jumps = differences[changes]
     beside = np.maximum(np.concatenate(([0.0], jumps)), np.concatenate((jumps, [0.0])))
-    # a coarse sensor holds a value until its next step; one that was frozen has more to make up for
+    # a coarse sensor holds a value until its next step; after a freeze the next step is larger
     coarse = beside < 1.5 * jumps.min() if len(changes) > 2 else np.zeros(len(dwells), dtype=bool)
     locked = signal.values[edges[:-1]] == 0.0  # a locked wheel reads 0 for a while
     held = (dwells >= FROZEN_SECONDS) & (dwells >= FROZEN_DWELLS * usual)
@@ -107,7 +107,7 @@ def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | Non
 def plausibility_problems(
     columns: Mapping[str, NDArray[np.float64]], interval: float, units: Mapping[str, str]
 ) -> list[str]:
-    """Wrong units and signs by magnitude and by what other channels say; every sentence names its channel.
+    """Return wrong units and signs, by magnitude and by other channels; every sentence names its channel.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def plausibility_problems(
                 f"channel {name} reaches {peak:.4g} {channel.unit}, which no road car does (limit {channel.limit:g}):"
                 " correct its unit or scale"
             )
-    smooth = {name: _smoothed(values, interval) for name, values in columns.items()}
+    smooth = {name: _moving_mean(values, interval) for name, values in columns.items()}
     problems += _radius_problems(smooth, interval)
     if "speed" in smooth:
         rate = np.gradient(smooth["speed"], interval)
@@ -154,7 +154,7 @@ def plausibility_problems(
 
 
 def _step_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
-    """Speed that jumps where its clock does not: samples are lost."""
+    """Return the problem of a speed that jumps while its clock does not: samples are lost."""
     if "speed" not in columns:
         return []
     steps = np.abs(np.diff(columns["speed"]))
@@ -170,7 +170,7 @@ def _step_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) 
 
 
 def _pressure_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
-    """Pressure that never changes: of a car that never brakes it is 0, and the car does not brake."""
+    """Return the problem of a constant pressure, or of a pressure of 0 while the car brakes."""
     pressure = columns.get("brake_pressure")
     if pressure is None or np.ptp(pressure) > 0:
         return []
@@ -181,7 +181,7 @@ def _pressure_problems(columns: Mapping[str, NDArray[np.float64]], interval: flo
         ]
     lost = 0.0
     if "speed" in columns:
-        rate = np.sort(np.gradient(_smoothed(columns["speed"], interval), interval))
+        rate = np.sort(np.gradient(_moving_mean(columns["speed"], interval), interval))
         lost = -float(np.mean(rate[: max(round(SMOOTHING / interval), 1)]))
     if lost <= WITHOUT_BRAKE:
         return []
@@ -231,7 +231,7 @@ def _pair_problems(
     correlation: float,
     mapped_unit: str | None,
 ) -> list[str]:
-    """Sign and, where the two must be equal and so the mapped unit is given, size of one channel by another."""
+    """Check the sign of one channel by another, and its size where both must be equal, so that a unit is given."""
     x, y = other - other.mean(), values - values.mean()
     spread = float(np.sqrt((x @ x) * (y @ y)))
     if spread <= 0 or abs(float(x @ y)) < correlation * spread:
@@ -243,7 +243,7 @@ def _pair_problems(
         ]
     if 0.4 < slope < 2.5 or mapped_unit is None:
         return []
-    guess = likely_unit(mapped_unit, slope)
+    guess = guess_unit(mapped_unit, slope)
     hint = f"; taken as {mapped_unit}, it looks like {guess}" if guess else ""
     return [
         f"channel {name} is {slope:.3g} times {other_name}: the unit or scale of one of them is wrong{hint}"
@@ -261,7 +261,7 @@ def _braking_problems(
         return []
     problems = []
     if "pitch" in columns:
-        # changes over half a second: the body's answer to the brake, without the slow slope of the road
+        # changes over half a second: the body's response to the brake, without the slow slope of the road
         lag = max(round(0.5 / interval), 1)
         dive, less = columns["pitch"][lag:] - columns["pitch"][:-lag], rate[:-lag] - rate[lag:]
         found = _pair_problems("pitch", dive, "the deceleration", less, 0.5, None)
@@ -278,7 +278,7 @@ def _braking_problems(
 
 
 def _dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list[str]:
-    """Size of the body's answer to the brake, where it answers at all."""
+    """Check the size of the body's pitch response to the brake, where there is one."""
     x, y = less - less.mean(), dive - dive.mean()
     if float(x @ y) < 0.5 * float(np.sqrt((x @ x) * (y @ y))) or not x.any():
         return []
@@ -292,6 +292,6 @@ def _dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list
     ]
 
 
-def _smoothed(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+def _moving_mean(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
     width = min(max(round(SMOOTHING / interval), 1), len(values))
     return np.convolve(values, np.ones(width) / width, mode="valid")

@@ -27,7 +27,7 @@ class MeasuredChannel:
     ----------
     name, unit : as in the run's file
     limit : magnitude that no road car exceeds [the channel's unit]
-    moves : a moving car's sensor never holds one value for long
+    moves : in a moving car the sensor never holds one value for long
     description : for people
     """
 
@@ -38,37 +38,39 @@ class MeasuredChannel:
     description: str
 
 
-def _channel(name: str, unit: str, limit: float, description: str, moves: bool = True) -> MeasuredChannel:
+def _make_channel(
+    name: str, unit: str, limit: float, description: str, moves: bool = True
+) -> MeasuredChannel:
     return MeasuredChannel(name=name, unit=unit, limit=limit, moves=moves, description=description)
 
 
 MAIN_CHANNELS = (
-    _channel("brake_pressure", "MPa", 25.0, "brake pressure at the caliper line", moves=False),
-    _channel("speed", "m/s", 90.0, "speed over ground"),
-    _channel("longitudinal_acceleration", "m/s^2", 20.0, "accelerometer, forward positive"),
-    _channel("wheel_speed_front", "rad/s", 400.0, "mean of the front wheels"),
-    _channel("wheel_speed_rear", "rad/s", 400.0, "mean of the rear wheels"),
-    _channel("pitch", "deg", 25.0, "nose-down positive"),
-    _channel("pitch_rate", "deg/s", 150.0, "nose-down positive"),
-    _channel("vertical_acceleration", "m/s^2", 60.0, "of the body, up positive, without gravity"),
+    _make_channel("brake_pressure", "MPa", 25.0, "brake pressure at the caliper line", moves=False),
+    _make_channel("speed", "m/s", 90.0, "speed over ground"),
+    _make_channel("longitudinal_acceleration", "m/s^2", 20.0, "accelerometer, forward positive"),
+    _make_channel("wheel_speed_front", "rad/s", 400.0, "mean of the front wheels"),
+    _make_channel("wheel_speed_rear", "rad/s", 400.0, "mean of the rear wheels"),
+    _make_channel("pitch", "deg", 25.0, "nose-down positive"),
+    _make_channel("pitch_rate", "deg/s", 150.0, "nose-down positive"),
+    _make_channel("vertical_acceleration", "m/s^2", 60.0, "of the body, up positive, without gravity"),
 )
-"""What closing the loop compares; a map must say of each where it is or that it was not measured."""
+"""Channels that closing the loop compares; a map must give the source of each or state that it was not measured."""
 
 SIDE_CHANNELS = (
-    _channel("steering_angle", "deg", 900.0, "at the steering wheel, left positive", moves=False),
-    _channel("yaw_rate", "deg/s", 150.0, "left positive", moves=False),
-    _channel("roll_rate", "deg/s", 150.0, "right side down positive", moves=False),
-    _channel("lateral_acceleration", "m/s^2", 20.0, "left positive", moves=False),
-    _channel("brake_torque", "N m", 40000.0, "all wheels together, braking positive", moves=False),
-    _channel("engine_torque", "N m", 40000.0, "at the wheels, driving positive", moves=False),
+    _make_channel("steering_angle", "deg", 900.0, "at the steering wheel, left positive", moves=False),
+    _make_channel("yaw_rate", "deg/s", 150.0, "left positive", moves=False),
+    _make_channel("roll_rate", "deg/s", 150.0, "right side down positive", moves=False),
+    _make_channel("lateral_acceleration", "m/s^2", 20.0, "left positive", moves=False),
+    _make_channel("brake_torque", "N m", 40000.0, "all wheels together, braking positive", moves=False),
+    _make_channel("engine_torque", "N m", 40000.0, "at the wheels, driving positive", moves=False),
 )
-"""What selection rules and residual plots use."""
+"""Channels that selection rules and residual plots use."""
 
 CHANNELS_BY_NAME = {channel.name: channel for channel in (*MAIN_CHANNELS, *SIDE_CHANNELS)}
 
 
 def unit_factor(unit: str, target: str) -> float:
-    """What a value in ``unit`` is multiplied with to be in ``target``.
+    """Return the factor that converts a value in ``unit`` to ``target``.
 
     Raises
     ------
@@ -86,12 +88,12 @@ def unit_factor(unit: str, target: str) -> float:
     return size / wanted_size
 
 
-def likely_unit(taken: str, ratio: float) -> str | None:
-    """The unit of values that come out ``ratio`` times too large when taken to be in another; None if none fits.
+def guess_unit(taken: str, ratio: float) -> str | None:
+    """Return the likely unit of values that are ``ratio`` times too large in the assumed unit; None if none fits.
 
     Parameters
     ----------
-    taken : the unit that they were taken to be in
+    taken : the assumed unit
     ratio : size found over size expected [1]
     """
     dimension, size = UNITS[taken]

@@ -29,7 +29,7 @@ class Episode:
 def pressure_episodes(
     time: NDArray[np.float64], pressure: NDArray[np.float64], *, threshold: float, merge_gap: float
 ) -> tuple[Episode, ...]:
-    """Episodes of samples at or above a threshold, merged over short gaps (paper, Appendix C.5).
+    """Return the episodes of samples at or above a threshold, merged over short gaps (paper, Appendix C.5).
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def pressure_episodes(
     active = np.flatnonzero(pressure >= threshold)
     if not active.size:
         return ()
-    # the paper's gap is a time difference of samples, which binary fractions miss by a rounding
+    # the paper's gap is a time difference of samples, with the rounding of binary fractions
     breaks = np.flatnonzero(np.diff(time[active]) > merge_gap + 1e-9)
     firsts = active[np.concatenate(([0], breaks + 1))]
     lasts = active[np.concatenate((breaks, [active.size - 1]))]

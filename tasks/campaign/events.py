@@ -7,17 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.episodes import Episode, pressure_episodes
-from tasks.surface.state import Weather
+from tasks.surface.weather import DRY, Weather
 
 Window = tuple[float, float]
-DRY = Weather(kind="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0)
+DRY_ROAD = Weather(kind=DRY)
 ROUNDING = 1e-6
 """Windows include a sample that misses their edge by less than this [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rule:
-    """One criterion that every retained event keeps.
+    """One criterion that every retained event satisfies.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Rule:
     paper_fails: int | None
 
     def holds(self, value: float) -> bool:
-        """Whether a measured value keeps the rule."""
+        """Return whether a measured value satisfies the rule."""
         return value >= self.limit if self.is_minimum else value <= self.limit
 
 
@@ -63,13 +63,13 @@ class Protocol:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
-    """One run with the drive that it belongs to.
+class RecordedRun:
+    """One recorded run with the drive that it belongs to.
 
     Parameters
     ----------
     name : of the run
-    drive : complete drives are what is left out
+    drive : name of the drive; cross-validation leaves out complete drives
     interval : time between samples [s]
     columns : channels by name, each float64 [N]
     weather : on the road
@@ -79,7 +79,7 @@ class Drive:
     drive: str
     interval: float
     columns: Mapping[str, NDArray[np.float64]]
-    weather: Weather = DRY
+    weather: Weather = DRY_ROAD
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +88,7 @@ class Event:
 
     Parameters
     ----------
-    run, drive : where it is from
+    run, drive : its run and drive
     at : time of the onset in the run [s]
     duration : of the active pressure [s]
     time : float64 [N] about the onset [s]
@@ -104,22 +104,22 @@ class Event:
     time: NDArray[np.float64]
     columns: Mapping[str, NDArray[np.float64]]
     protocol: Protocol
-    weather: Weather = DRY
+    weather: Weather = DRY_ROAD
 
-    def within(self, window: Window) -> NDArray[np.bool_]:
-        """Mask of the samples in a window about the onset [s]."""
+    def mask_window(self, window: Window) -> NDArray[np.bool_]:
+        """Return the mask of the samples in a window about the onset [s]."""
         inside: NDArray[np.bool_] = (self.time >= window[0] - ROUNDING) & (self.time <= window[1] + ROUNDING)
         return inside
 
-    def change(self, channel: str) -> NDArray[np.float64]:
-        """A channel less its median over the baseline window, float64 [N]."""
+    def subtract_baseline(self, channel: str) -> NDArray[np.float64]:
+        """Return a channel less its median over the baseline window, float64 [N]."""
         values = self.columns[channel]
-        return values - float(np.median(values[self.within(self.protocol.baseline)]))
+        return values - float(np.median(values[self.mask_window(self.protocol.baseline)]))
 
     @property
     def pitch_baseline(self) -> tuple[float, float]:
         """Slope [deg/s] and value at the onset [deg] of the line through the pitch before the event."""
-        before = self.within(self.protocol.baseline)
+        before = self.mask_window(self.protocol.baseline)
         slope, at_onset = np.polyfit(self.time[before], self.columns["pitch"][before], 1)
         return float(slope), float(at_onset)
 
@@ -135,8 +135,8 @@ class Event:
         return float(self.columns["speed"][int(np.argmin(np.abs(self.time)))])
 
 
-def drive_events(drive: Drive, protocol: Protocol) -> tuple[int, list[Event]]:
-    """Number of pressure episodes of a run, and those whose analysis window it covers.
+def find_events(drive: RecordedRun, protocol: Protocol) -> tuple[int, list[Event]]:
+    """Return the number of pressure episodes of a run, and the events whose analysis window it covers.
 
     Parameters
     ----------
@@ -148,11 +148,13 @@ def drive_events(drive: Drive, protocol: Protocol) -> tuple[int, list[Event]]:
     episodes = pressure_episodes(
         time, pressure, threshold=protocol.onset_pressure, merge_gap=protocol.merge_gap
     )
-    cut = [_cut(drive, time, episode, protocol) for episode in episodes]
+    cut = [_cut_event(drive, time, episode, protocol) for episode in episodes]
     return len(episodes), [event for event in cut if event is not None]
 
 
-def _cut(drive: Drive, time: NDArray[np.float64], episode: Episode, protocol: Protocol) -> Event | None:
+def _cut_event(
+    drive: RecordedRun, time: NDArray[np.float64], episode: Episode, protocol: Protocol
+) -> Event | None:
     about = time - episode.onset_time
     start, end = protocol.analysis
     if about[0] > start + ROUNDING or about[-1] < end - ROUNDING:

@@ -1,4 +1,4 @@
-"""What a driver would ask of a run: how far until slow, how deep the nose dips."""
+"""Manoeuvre figures of a run: stopping distance and peak pitch."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +8,9 @@ from tasks.campaign.campaign import CHANNELS
 BRAKED = 0.1
 """Brake pressure from which a run brakes [MPa]."""
 FELL = 2.0
-"""Fall of the speed from which a braked run counts [m/s]."""
+"""Least decrease of speed of a braked run [m/s]."""
 SMOOTHED = 0.1
-"""Time over which pitch is averaged before its peak is taken: else the peak is that of the noise [s]."""
+"""Time over which pitch is averaged before its peak is taken, since the peak would otherwise be that of noise [s]."""
 MANOEUVRE_UNITS = {"stopping_distance": "m", "peak_pitch": "deg"}
 
 
@@ -20,10 +20,10 @@ def manoeuvre_errors(
     pressure: NDArray[np.float64],
     interval: float,
 ) -> NDArray[np.float64] | None:
-    """Model minus measured in stopping distance and peak pitch, for several models of one run.
+    """Return model minus measured stopping distance and peak pitch, for several models of one run.
 
     The distance counts from the first brake pressure to the lowest speed that the measurement and every model reach,
-    so that all are asked the same question though the record ends at walking pace.
+    so that all distances end at one speed although the record ends at walking pace.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def manoeuvre_errors(
     reached = float(np.max(lowest[:, -1]))
     if float(np.min(lowest[:, 0])) - reached < FELL:
         return None
-    distance = np.array([_distance(speed, reached, interval) for speed in lowest])
+    distance = np.array([_distance_until(speed, reached, interval) for speed in lowest])
     width = min(max(round(SMOOTHED / interval), 1), both.shape[1])
     window = np.full(width, 1.0 / width)
     peak = np.array([np.convolve(p, window, mode="valid").max() for p in both[:, :, CHANNELS.index("pitch")]])
@@ -52,8 +52,8 @@ def manoeuvre_errors(
     return np.asarray(figures[1:] - figures[0], dtype=np.float64)
 
 
-def _distance(speed: NDArray[np.float64], reached: float, interval: float) -> float:
-    """Distance until a falling speed (float64 [N]) first reaches a value, by trapezia [m]."""
+def _distance_until(speed: NDArray[np.float64], reached: float, interval: float) -> float:
+    """Return the distance until a falling speed (float64 [N]) first reaches a value, by trapezia [m]."""
     end = int(np.argmax(speed <= reached))
     whole = float(np.sum(0.5 * (speed[1:end] + speed[: end - 1]))) * interval if end > 1 else 0.0
     if end == 0:

@@ -1,17 +1,18 @@
-"""Planned runs: what a test driver is asked to do, before anything is measured."""
+"""Planned runs: the instructions to a test driver before anything is measured."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Run
+from tasks.surface.weather import DRY, find_weather
 
 INTERVAL = 0.01
 """Time between samples [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class RunPlan:
     """One planned run.
 
     Parameters
@@ -24,7 +25,7 @@ class Drive:
     hazard : centre, length, height [m]
     """
 
-    weather: str = "dry"
+    weather: str = DRY
     rate: float = 0.0
     speed: float
     peak: float
@@ -33,56 +34,56 @@ class Drive:
     hazard: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-RICH: tuple[Drive, ...] = (
-    Drive(speed=32.0, peak=0.0, duration=8.0), Drive(speed=16.7, peak=0.0, duration=8.0),
-    Drive(speed=25.0, peak=2.0, disc_rise=350.0), Drive(speed=27.8, peak=1.5, disc_rise=150.0),
-    Drive(speed=26.4, peak=-2.4), Drive(speed=16.7, peak=2.3), Drive(speed=11.1, peak=3.5, duration=4.0),
-    Drive(weather="rain", rate=10.0, speed=22.2, peak=2.3), Drive(weather="rain", rate=25.0, speed=12.5, peak=3.0),
-    Drive(weather="snow", rate=3.0, speed=13.9, peak=2.3), Drive(weather="snow", rate=1.0, speed=9.7, peak=0.6),
-    Drive(speed=11.1, peak=0.0, duration=4.0, hazard=(12.0, 3.7, 0.075)),
-    Drive(speed=9.7, peak=0.0, duration=4.0, hazard=(10.0, 2.0, -0.08)),
-    Drive(speed=7.8, peak=0.5, duration=4.0, hazard=(10.0, 3.7, 0.06)),
-    Drive(speed=25.0, peak=0.0, duration=8.0), Drive(speed=22.2, peak=2.6, disc_rise=250.0),
-    Drive(speed=33.3, peak=2.0, disc_rise=80.0), Drive(speed=13.9, peak=1.6, duration=5.0),
-    Drive(weather="rain", rate=10.0, speed=16.7, peak=2.6), Drive(weather="snow", rate=1.0, speed=12.5, peak=2.0),
-    Drive(speed=8.9, peak=0.8, duration=4.0, hazard=(9.0, 3.7, 0.05)),
-    Drive(speed=9.7, peak=0.0, duration=4.0, hazard=(12.0, 2.5, 0.06)),
+RICH: tuple[RunPlan, ...] = (
+    RunPlan(speed=32.0, peak=0.0, duration=8.0), RunPlan(speed=16.7, peak=0.0, duration=8.0),
+    RunPlan(speed=25.0, peak=2.0, disc_rise=350.0), RunPlan(speed=27.8, peak=1.5, disc_rise=150.0),
+    RunPlan(speed=26.4, peak=-2.4), RunPlan(speed=16.7, peak=2.3), RunPlan(speed=11.1, peak=3.5, duration=4.0),
+    RunPlan(weather="rain", rate=10.0, speed=22.2, peak=2.3), RunPlan(weather="rain", rate=25.0, speed=12.5, peak=3.0),
+    RunPlan(weather="snow", rate=3.0, speed=13.9, peak=2.3), RunPlan(weather="snow", rate=1.0, speed=9.7, peak=0.6),
+    RunPlan(speed=11.1, peak=0.0, duration=4.0, hazard=(12.0, 3.7, 0.075)),
+    RunPlan(speed=9.7, peak=0.0, duration=4.0, hazard=(10.0, 2.0, -0.08)),
+    RunPlan(speed=7.8, peak=0.5, duration=4.0, hazard=(10.0, 3.7, 0.06)),
+    RunPlan(speed=25.0, peak=0.0, duration=8.0), RunPlan(speed=22.2, peak=2.6, disc_rise=250.0),
+    RunPlan(speed=33.3, peak=2.0, disc_rise=80.0), RunPlan(speed=13.9, peak=1.6, duration=5.0),
+    RunPlan(weather="rain", rate=10.0, speed=16.7, peak=2.6), RunPlan(weather="snow", rate=1.0, speed=12.5, peak=2.0),
+    RunPlan(speed=8.9, peak=0.8, duration=4.0, hazard=(9.0, 3.7, 0.05)),
+    RunPlan(speed=9.7, peak=0.0, duration=4.0, hazard=(12.0, 2.5, 0.06)),
 )  # fmt: skip
-"""A design that excites every port, 14 training runs first."""
+"""An experiment design that excites every port, 14 training runs first."""
 TRAINING = 14
 
-EXPERIMENTS: tuple[tuple[str, Drive], ...] = (
-    ("coast down from 36 m/s for 12 s", Drive(speed=36.0, peak=0.0, duration=12.0)),
-    ("coast down from 12 m/s for 12 s", Drive(speed=12.0, peak=0.0, duration=12.0)),
-    ("hard stop from 33 m/s with cold discs, 2.4 MPa", Drive(speed=33.0, peak=2.4, duration=7.0)),
+EXPERIMENTS: tuple[tuple[str, RunPlan], ...] = (
+    ("coast down from 36 m/s for 12 s", RunPlan(speed=36.0, peak=0.0, duration=12.0)),
+    ("coast down from 12 m/s for 12 s", RunPlan(speed=12.0, peak=0.0, duration=12.0)),
+    ("hard stop from 33 m/s with cold discs, 2.4 MPa", RunPlan(speed=33.0, peak=2.4, duration=7.0)),
     (
         "hard stop from 33 m/s with hot discs, 2.4 MPa",
-        Drive(speed=33.0, peak=2.4, duration=7.0, disc_rise=350.0),
+        RunPlan(speed=33.0, peak=2.4, duration=7.0, disc_rise=350.0),
     ),
-    ("gentle stop from 14 m/s, 0.6 MPa", Drive(speed=14.0, peak=0.6, duration=9.0)),
-    ("pulsed braking from 28 m/s, 2.4 MPa", Drive(speed=28.0, peak=-2.4, duration=7.0)),
+    ("gentle stop from 14 m/s, 0.6 MPa", RunPlan(speed=14.0, peak=0.6, duration=9.0)),
+    ("pulsed braking from 28 m/s, 2.4 MPa", RunPlan(speed=28.0, peak=-2.4, duration=7.0)),
     (
         "ABS stop from 22 m/s in rain of 10 mm/h, 2.6 MPa",
-        Drive(weather="rain", rate=10.0, speed=22.0, peak=2.6),
+        RunPlan(weather="rain", rate=10.0, speed=22.0, peak=2.6),
     ),
-    ("ABS stop from 14 m/s on snow, 2.0 MPa", Drive(weather="snow", rate=2.0, speed=14.0, peak=2.0)),
+    ("ABS stop from 14 m/s on snow, 2.0 MPa", RunPlan(weather="snow", rate=2.0, speed=14.0, peak=2.0)),
     (
         "roll over a hump of 3.7 m and 75 mm at 11 m/s",
-        Drive(speed=11.0, peak=0.0, duration=5.0, hazard=(15.0, 3.7, 0.075)),
+        RunPlan(speed=11.0, peak=0.0, duration=5.0, hazard=(15.0, 3.7, 0.075)),
     ),
 )
-"""Runs that any proving ground can make, to choose from when two explanations must be told apart."""
+"""Runs that any proving ground allows, from which one is chosen to separate two hypotheses."""
 
 
-def planned_run(drive: Drive, name: str, direction: int = 1, *, held_out: bool = False) -> Run:
-    """The run of a plan, with its pressure trace and no response yet but the speed it starts with.
+def make_planned_run(drive: RunPlan, name: str, direction: int = 1, *, held_out: bool = False) -> Run:
+    """Return the run of a plan, with its pressure trace and initial speed but no other response.
 
     Parameters
     ----------
     drive : the plan
     name : of the run
     direction : along (1) or against (-1) the route
-    held_out : belongs to the runs that no fit may see
+    held_out : belongs to the runs that no fit may read
     """
     count = round(drive.duration / INTERVAL)
     t = np.arange(count) * INTERVAL
@@ -91,9 +92,10 @@ def planned_run(drive: Drive, name: str, direction: int = 1, *, held_out: bool =
         pressure *= np.where((t > 1.5) & (((t - 1.5) % 1.0) < 0.5), 0.3, 1.0)
     response = np.zeros((count, len(CHANNELS)))
     response[:, CHANNELS.index("speed")] = drive.speed
+    hours = 1.0 if find_weather(drive.weather).accumulates else 0.0
     return Run(
         name=name, held_out=held_out, weather=drive.weather, precipitation_mm_h=drive.rate,
-        snow_accumulation_h=1.0 if drive.weather == "snow" else 0.0, direction=direction, disc_rise=drive.disc_rise,
+        snow_accumulation_h=hours, direction=direction, disc_rise=drive.disc_rise,
         hazard_center=drive.hazard[0], hazard_length=drive.hazard[1], hazard_height=drive.hazard[2],
         interval=INTERVAL, pressure=pressure, response=response,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What can be wrong in a run of a campaign: its columns, their declared clock, and the rules for measured channels."""
+"""Validation of a campaign's run: its columns, their declared clock, and the rules for measured channels."""
 
 from collections.abc import Mapping
 
@@ -18,12 +18,12 @@ CLOCK_STEP, CLOCK_DRIFT = 0.1, 0.001
 def run_problems(
     columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str], interval: float
 ) -> list[str]:
-    """Every problem of one run, one sentence each; empty when it can be used.
+    """Return every problem of one run, one sentence each; empty when it can be used.
 
     Parameters
     ----------
     columns : measured columns by name, each float64 [N]
-    units : units from the file's metadata, by column; a column without one is taken on trust
+    units : units from the file's metadata, by column; a column without one counts as correct
     interval : declared time between samples [s]
     """
     problems = [f"channel {name} is missing" for name in COLUMN_UNITS if name not in columns]

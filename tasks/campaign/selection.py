@@ -1,4 +1,4 @@
-"""Conjunctive selection of braking events: what the rules measure, and what becomes of each event."""
+"""Conjunctive selection of braking events: the quantities of the rules, and the verdict on each event."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,17 +6,17 @@ from math import isnan, nan
 
 import numpy as np
 
-from tasks.campaign.events import Drive, Event, Protocol, Rule, Window, drive_events
+from tasks.campaign.events import Event, Protocol, RecordedRun, Rule, Window, find_events
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """What a rule measures.
+    """A quantity that a rule limits.
 
     Parameters
     ----------
     unit : of the result
-    channels : that must have been measured
+    channels : channels that it needs
     measure : its function of an event
     """
 
@@ -25,26 +25,28 @@ class Quantity:
     measure: Callable[[Event], float]
 
 
-def _p95(event: Event, channel: str, window: Window) -> float:
-    return float(np.percentile(np.abs(event.columns[channel][event.within(window)]), 95))
+def _percentile_95(event: Event, channel: str, window: Window) -> float:
+    return float(np.percentile(np.abs(event.columns[channel][event.mask_window(window)]), 95))
 
 
 def _largest_rise(event: Event, channel: str, sign: float) -> float:
-    inside = event.within(event.protocol.evaluation)
-    return max(float(np.max(sign * event.change(channel)[inside])), 0.0)
+    inside = event.mask_window(event.protocol.evaluation)
+    return max(float(np.max(sign * event.subtract_baseline(channel)[inside])), 0.0)
 
 
 def _onset_residual(event: Event) -> float:
     return float(abs(event.dive[int(np.argmin(np.abs(event.time)))]))
 
 
-def _deviation(event: Event) -> float:
-    return float(np.std(event.columns["pitch"][event.within(event.protocol.baseline)]))
+def _pitch_deviation(event: Event) -> float:
+    return float(np.std(event.columns["pitch"][event.mask_window(event.protocol.baseline)]))
 
 
-def _quality(channel: str, unit: str) -> Quantity:
+def _percentile_quantity(channel: str, unit: str) -> Quantity:
     return Quantity(
-        unit=unit, channels=(channel,), measure=lambda event: _p95(event, channel, event.protocol.quality)
+        unit=unit,
+        channels=(channel,),
+        measure=lambda event: _percentile_95(event, channel, event.protocol.quality),
     )
 
 
@@ -59,31 +61,33 @@ QUANTITIES: dict[str, Quantity] = {
         channels=("longitudinal_acceleration",),
         measure=lambda event: _largest_rise(event, "longitudinal_acceleration", -1.0),
     ),
-    "steering_p95": _quality("steering_angle", "deg"),
-    "yaw_rate_p95": _quality("yaw_rate", "deg/s"),
+    "steering_p95": _percentile_quantity("steering_angle", "deg"),
+    "yaw_rate_p95": _percentile_quantity("yaw_rate", "deg/s"),
     "pitch_slope": Quantity(
         unit="deg/s", channels=("pitch",), measure=lambda event: abs(event.pitch_baseline[0])
     ),
-    "pitch_deviation": Quantity(unit="deg", channels=("pitch",), measure=_deviation),
+    "pitch_deviation": Quantity(unit="deg", channels=("pitch",), measure=_pitch_deviation),
     "onset_residual": Quantity(unit="deg", channels=("pitch",), measure=_onset_residual),
-    "vertical_acceleration_p95": _quality("vertical_acceleration", "m/s^2"),
-    "roll_rate_p95": _quality("roll_rate", "deg/s"),
+    "vertical_acceleration_p95": _percentile_quantity("vertical_acceleration", "m/s^2"),
+    "roll_rate_p95": _percentile_quantity("roll_rate", "deg/s"),
     "pressure_before_p95": Quantity(
-        unit="MPa", channels=(), measure=lambda event: _p95(event, "brake_pressure", event.protocol.baseline)
+        unit="MPa",
+        channels=(),
+        measure=lambda event: _percentile_95(event, "brake_pressure", event.protocol.baseline),
     ),
 }
-"""What selection rules may measure (paper, Appendix C.5)."""
+"""Quantities that selection rules may limit (paper, Appendix C.5)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """One event held against every rule.
+    """One event with its result for every rule.
 
     Parameters
     ----------
     event : the event
     values : measured quantity by rule; NaN where its channel was not measured
-    failed : names of the rules that it breaks
+    failed : names of the rules that it violates
     """
 
     event: Event
@@ -93,12 +97,12 @@ class Judged:
 
 @dataclass(frozen=True, kw_only=True)
 class Selection:
-    """The events of a campaign and what became of them.
+    """The events of a campaign and the verdict on each.
 
     Parameters
     ----------
     episodes : detected pressure episodes
-    judged : those that support the analysis window, in order of drive and time
+    judged : events that cover the analysis window, in order of drive and time
     unassessed : rules whose channel no run has
     """
 
@@ -108,11 +112,11 @@ class Selection:
 
     @property
     def retained(self) -> tuple[Event, ...]:
-        """Events that keep every rule that could be assessed."""
+        """Events that satisfy every rule that could be assessed."""
         return tuple(judged.event for judged in self.judged if not judged.failed)
 
 
-def select_events(drives: Sequence[Drive], protocol: Protocol) -> Selection:
+def select_events(drives: Sequence[RecordedRun], protocol: Protocol) -> Selection:
     """Detect, cut and judge the braking events of all drives.
 
     Parameters
@@ -122,23 +126,23 @@ def select_events(drives: Sequence[Drive], protocol: Protocol) -> Selection:
     """
     episodes, events = 0, []
     for drive in drives:
-        found = drive_events(drive, protocol)
+        found = find_events(drive, protocol)
         episodes += found[0]
         events += found[1]
-    judged = tuple(judge(event, protocol.rules) for event in events)
+    judged = tuple(judge_event(event, protocol.rules) for event in events)
     unassessed = tuple(
         rule.name for rule in protocol.rules if judged and all(isnan(one.values[rule.name]) for one in judged)
     )
     return Selection(episodes=episodes, judged=judged, unassessed=unassessed)
 
 
-def judge(event: Event, rules: Sequence[Rule]) -> Judged:
-    """Hold one event against every rule; a rule whose channel is missing is neither kept nor broken.
+def judge_event(event: Event, rules: Sequence[Rule]) -> Judged:
+    """Judge one event by every rule; a rule whose channel is missing is neither satisfied nor violated.
 
     Parameters
     ----------
     event : the event
-    rules : all are tried, none ends the trial
+    rules : all are evaluated, also after a violation
     """
     values = {
         rule.name: QUANTITIES[rule.name].measure(event)

@@ -1,4 +1,4 @@
-"""What a recording's channels say about one another: two sensors of one motion, gravity on a slope."""
+"""Agreement between the channels of a recording: two sensors of one motion, gravity on a slope."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 SMOOTHING_S = 0.5
 EDGE_S = 2.0
-"""Left out at both ends, where smoothing lacks samples."""
+"""Time left out at both ends, where smoothing lacks samples [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorAgreement:
-    """How channels of one run agree.
+    """Agreement of channels of one run.
 
     Parameters
     ----------
@@ -30,21 +30,21 @@ class SensorAgreement:
     gravity_correlation: float
 
 
-def sensor_agreement(columns: Mapping[str, NDArray[np.float64]], interval: float) -> SensorAgreement:
-    """Regress each pair over the run.
+def measure_sensor_agreement(columns: Mapping[str, NDArray[np.float64]], interval: float) -> SensorAgreement:
+    """Fit each pair of channels over the run by a line.
 
     Parameters
     ----------
     columns : speed, longitudinal_acceleration, pitch and pitch_rate, each float64 [N] in campaign units
     interval : [s]
     """
-    smooth = {name: _smoothed(columns[name], interval) for name in
+    smooth = {name: _moving_mean(columns[name], interval) for name in
               ("speed", "longitudinal_acceleration", "pitch", "pitch_rate")}  # fmt: skip
     inner = slice(round(EDGE_S / interval), -round(EDGE_S / interval))
     rate = np.gradient(smooth["pitch"], interval)[inner]
-    gain, correlation = _regression(smooth["pitch_rate"][inner], rate)
+    gain, correlation = _regress(smooth["pitch_rate"][inner], rate)
     beyond = (smooth["longitudinal_acceleration"] - np.gradient(smooth["speed"], interval))[inner]
-    gravity, agreement = _regression(-np.sin(np.radians(smooth["pitch"][inner])), beyond)
+    gravity, agreement = _regress(-np.sin(np.radians(smooth["pitch"][inner])), beyond)
     return SensorAgreement(
         rate_of_pitch_gain=gain,
         rate_of_pitch_correlation=correlation,
@@ -53,10 +53,10 @@ def sensor_agreement(columns: Mapping[str, NDArray[np.float64]], interval: float
     )
 
 
-def _regression(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+def _regress(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
     return float(np.polyfit(x, y, 1)[0]), float(np.corrcoef(x, y)[0, 1])
 
 
-def _smoothed(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+def _moving_mean(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
     width = max(round(SMOOTHING_S / interval), 1)
     return np.convolve(values, np.ones(width) / width, mode="same")

@@ -1,4 +1,4 @@
-"""A logged signal: its own clock, what the channel map makes of it, and its way onto a common clock."""
+"""A logged signal on its own clock, its conversion by the channel map, and its resampling on a common clock."""
 
 from dataclasses import dataclass
 
@@ -23,8 +23,8 @@ class Signal:
     values: NDArray[np.float64]
     unit: str = ""
 
-    def between(self, start: float, end: float) -> "Signal":
-        """The samples from ``start`` to ``end`` [s], both included."""
+    def cut_window(self, start: float, end: float) -> "Signal":
+        """Return the samples from ``start`` to ``end`` [s], both included."""
         inside = (self.time >= start) & (self.time <= end)
         return Signal(time=self.time[inside], values=self.values[inside], unit=self.unit)
 
@@ -46,7 +46,7 @@ class Gain:
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelRule:
-    """How one channel of a campaign comes from a logger's signals.
+    """Rule that makes one channel of a campaign from a logger's signals.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class ChannelRule:
     sign : -1 where the logger's positive direction is the opposite one
     scale : correction of the sensor's gain [1]
     offset : added last [the channel's unit]
-    delay : how much later than the truth the logger's time stamp is [s]
+    delay : delay of the logger's time stamp [s]
     gain : change of quantity, or None
     """
 
@@ -71,7 +71,7 @@ class ChannelRule:
 
     @property
     def factor(self) -> float:
-        """What a logged value is multiplied with to be in the channel's unit.
+        """Factor from a logged value to the channel's unit.
 
         Raises
         ------
@@ -85,8 +85,8 @@ class ChannelRule:
         return self.sign * self.scale * inward * self.gain.value * unit_factor(self.gain.target_unit, target)
 
 
-def as_channel(signal: Signal, rule: ChannelRule) -> Signal:
-    """The signal in the channel's unit and direction, at the times when it was true.
+def convert_to_channel(signal: Signal, rule: ChannelRule) -> Signal:
+    """Convert a signal to the channel's unit, direction and true times.
 
     Parameters
     ----------
@@ -100,11 +100,11 @@ def as_channel(signal: Signal, rule: ChannelRule) -> Signal:
     )
 
 
-def on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values at the times of a uniform clock.
+def resample_on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Resample a signal at the times of a uniform clock.
 
     A slower signal is linear between its samples. A faster one is averaged over the clock's interval, so that
-    what the clock cannot carry does not fold into it.
+    frequencies above the clock's limit do not alias.
 
     Parameters
     ----------
@@ -119,12 +119,12 @@ def on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
     first, last = float(signal.time[0]), float(signal.time[-1])
     left = np.maximum(clock - 0.5 * interval, first)
     right = np.minimum(clock + 0.5 * interval, last)
-    # the trapezoid's area is only piecewise linear at the samples: exact enough for more than two of them
+    # the integral is interpolated linearly between samples: accurate enough with more than two of them
     return (np.interp(right, signal.time, area) - np.interp(left, signal.time, area)) / (right - left)
 
 
-def common_clock(signals: list[Signal], rate: float) -> NDArray[np.float64]:
-    """Times at ``rate`` [Hz] over what all signals cover [s]; empty if they share less than two samples.
+def make_common_clock(signals: list[Signal], rate: float) -> NDArray[np.float64]:
+    """Return times at ``rate`` [Hz] over the span that all signals cover [s]; empty for fewer than two samples.
 
     Parameters
     ----------

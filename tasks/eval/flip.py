@@ -1,11 +1,13 @@
-"""The difference that a viewer sees when two pictures are flipped back and forth, by its authors' own package."""
+"""FLIP: the difference that a viewer sees between two pictures shown in turn, by its authors' own package."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
-def flip(reference: NDArray[np.uint8], picture: NDArray[np.uint8], region: NDArray[np.bool_]) -> float | None:
-    """Mean LDR-FLIP over a region, at the authors' 67 pixels a degree; None where flip-evaluator is missing [1].
+def flip_error(
+    reference: NDArray[np.uint8], picture: NDArray[np.uint8], region: NDArray[np.bool_]
+) -> float | None:
+    """Return the mean LDR-FLIP over a region, at the authors' 67 pixels a degree; None without flip-evaluator [1].
 
     Parameters
     ----------

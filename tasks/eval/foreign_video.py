@@ -1,4 +1,4 @@
-"""Any video's recovered motion against a claim that has its own clock."""
+"""Recovered motion of any video, compared with claimed telemetry that has its own clock."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,9 +13,9 @@ from tasks.eval.poses.rigid import Floats
 from tasks.eval.video_motion import geometry_error
 
 EVENT_PITCH = np.deg2rad(0.3)
-"""Claimed swing from which there is an event to judge, ten times the chain's error over a second [rad]."""
+"""Least range of the claimed pitch that counts as an event: ten times the error of the chain over a second [rad]."""
 EVENT_LEAD = 0.6
-"""From the opening of the event window to the largest swing [s]."""
+"""Time from the opening of the event window to the largest claimed pitch [s]."""
 
 LEAST_SHARED = 5
 """Fewest frames within the claim's time that can be judged [1]."""
@@ -23,7 +23,7 @@ LEAST_SHARED = 5
 
 @dataclass(frozen=True, kw_only=True)
 class VideoClaim:
-    """Telemetry on its own clock, which starts with the video's.
+    """Claimed telemetry on its own clock, which starts when the video starts.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ class ClaimAtFrames:
     station: Floats
 
 
-def claim_at(claim: VideoClaim, times: Floats) -> ClaimAtFrames:
-    """The claim at the video's frames, linear between its rows.
+def sample_claim(claim: VideoClaim, times: Floats) -> ClaimAtFrames:
+    """Return the claim at the video's frames, linear between its rows.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def claim_at(claim: VideoClaim, times: Floats) -> ClaimAtFrames:
     InputError
         If too few frames lie within it.
     """
-    # half a frame past the last row is still that row
+    # a frame up to half an interval after the last row takes that row
     slack = 0.5 * float(np.median(np.diff(times)))
     rows = np.flatnonzero(times <= claim.time[-1] + slack)
     if len(rows) < LEAST_SHARED:
@@ -85,7 +85,7 @@ def claim_at(claim: VideoClaim, times: Floats) -> ClaimAtFrames:
 
 
 def _event_error(recovered: RecoveredMotion, claim: ClaimAtFrames) -> float | None:
-    """E_geometry about the largest claimed swing: drift over a long clip does not hide a short response."""
+    """E_geometry about the largest claimed pitch, so that drift over a long clip does not hide a short response."""
     swing = np.abs(claim.pitch - np.median(claim.pitch))
     if recovered.failed.any() or swing.max() < EVENT_PITCH:
         return None
@@ -97,13 +97,13 @@ def _event_error(recovered: RecoveredMotion, claim: ClaimAtFrames) -> float | No
 
 
 def judge_motion(recovered: RecoveredMotion, claim: ClaimAtFrames, limits: PoseThresholds) -> dict[str, Any]:
-    """Figures and verdict; None where a figure cannot be formed.
+    """Return figures and verdict; None where a figure cannot be formed.
 
     Parameters
     ----------
     recovered : from the pixels
     claim : at the same frames
-    limits : what must be kept
+    limits : thresholds of the verdict
     """
     if recovered.failed.all():
         raise InputError("No frame of the video could be placed: it shows too little that can be followed.")

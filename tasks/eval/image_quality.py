@@ -13,7 +13,7 @@ WINDOW, SIGMA, K1, K2 = 11, 1.5, 0.01, 0.03
 def psnr(
     reference: NDArray[np.uint8], picture: NDArray[np.uint8], region: NDArray[np.bool_] | None = None
 ) -> float:
-    """Peak signal-to-noise ratio over all channels of a region.
+    """Return the peak signal-to-noise ratio over all channels of a region.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def psnr(
 def ssim(
     reference: NDArray[np.uint8], picture: NDArray[np.uint8], region: NDArray[np.bool_] | None = None
 ) -> float:
-    """Mean structural similarity of the luma over a region (Wang et al. 2004, DOI 10.1109/TIP.2003.819861).
+    """Return the mean structural similarity of luma over a region (Wang et al. 2004, DOI 10.1109/TIP.2003.819861).
 
     Only windows that lie wholly inside the picture count, as in the authors' own code; a window counts
     for the region that holds its centre.

@@ -1,4 +1,4 @@
-"""How far the labels of one clip moved between two versions of a dataset, in physical units."""
+"""Differences between the labels of one clip in two versions of a dataset, in physical units."""
 
 from collections.abc import Mapping
 from math import degrees, nan
@@ -26,11 +26,11 @@ FIGURES = {
     "film_depth_change_mm": ("film_depth_mm", 1.0),
     "snow_depth_change_mm": ("snow_depth_mm", 1.0),
 }
-"""Change of a clip's own figure, B less A: figure to the manifest's name and the factor to its unit."""
+"""Change of a clip's figure, B minus A: figure to the manifest's name and the factor to its unit."""
 
 
-def tick_moves(a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]]) -> dict[str, float]:
-    """Differences of the tick tables over the ticks that both have.
+def compare_ticks(a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]]) -> dict[str, float]:
+    """Compare two tick tables over the ticks that both have.
 
     Parameters
     ----------
@@ -41,17 +41,19 @@ def tick_moves(a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]]) -> 
     Root mean squares of `RMS_CHANNELS`, the largest differences of speed, pitch and load, and the change of the
     final position, each in the unit of its name; NaN where a channel is missing.
     """
-    moves = {name: _rms(a, b, channels) * factor for name, (channels, factor) in RMS_CHANNELS.items()}
+    moves = {
+        name: _rms_difference(a, b, channels) * factor for name, (channels, factor) in RMS_CHANNELS.items()
+    }
     return moves | {
-        "speed_largest_m_s": _largest(a, b, ("speed",)),
-        "pitch_largest_deg": degrees(_largest(a, b, ("pitch",))),
-        "axle_load_largest_n": _largest(a, b, ("axle_load_f", "axle_load_r")),
-        "final_station_change_m": _final(a, b, "station"),
+        "speed_largest_m_s": _largest_difference(a, b, ("speed",)),
+        "pitch_largest_deg": degrees(_largest_difference(a, b, ("pitch",))),
+        "axle_load_largest_n": _largest_difference(a, b, ("axle_load_f", "axle_load_r")),
+        "final_station_change_m": _final_difference(a, b, "station"),
     }
 
 
-def figure_moves(a: Mapping[str, float | None], b: Mapping[str, float | None]) -> dict[str, float]:
-    """Changes of the clips' own figures, B less A.
+def compare_figures(a: Mapping[str, float | None], b: Mapping[str, float | None]) -> dict[str, float]:
+    """Compare the figures of a clip, B minus A.
 
     Parameters
     ----------
@@ -62,14 +64,14 @@ def figure_moves(a: Mapping[str, float | None], b: Mapping[str, float | None]) -
     Each in the unit of its name; NaN where either version has none.
     """
 
-    def change(name: str) -> float:
+    def change_of(name: str) -> float:
         old, new = a.get(name), b.get(name)
         return nan if old is None or new is None else float(new) - float(old)
 
-    return {label: change(name) * factor for label, (name, factor) in FIGURES.items()}
+    return {label: change_of(name) * factor for label, (name, factor) in FIGURES.items()}
 
 
-def _errors(
+def _stack_differences(
     a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]], channels: tuple[str, ...]
 ) -> NDArray[np.float64]:
     if any(channel not in table for channel in channels for table in (a, b)):
@@ -78,18 +80,20 @@ def _errors(
     return np.concatenate([np.asarray(b[c][:count], dtype=np.float64) - a[c][:count] for c in channels])
 
 
-def _rms(a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]], channels: tuple[str, ...]) -> float:
-    errors = _errors(a, b, channels)
+def _rms_difference(
+    a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]], channels: tuple[str, ...]
+) -> float:
+    errors = _stack_differences(a, b, channels)
     return float(np.sqrt(np.mean(errors**2))) if errors.size else nan
 
 
-def _largest(
+def _largest_difference(
     a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]], channels: tuple[str, ...]
 ) -> float:
-    errors = _errors(a, b, channels)
+    errors = _stack_differences(a, b, channels)
     return float(np.max(np.abs(errors))) if errors.size else nan
 
 
-def _final(a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]], channel: str) -> float:
-    errors = _errors(a, b, (channel,))
+def _final_difference(a: Mapping[str, NDArray[Any]], b: Mapping[str, NDArray[Any]], channel: str) -> float:
+    errors = _stack_differences(a, b, (channel,))
     return float(errors[-1]) if errors.size else nan

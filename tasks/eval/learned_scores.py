@@ -1,7 +1,7 @@
-"""Learned judges behind one protocol: a video in, one number out. Their weights are somebody else's file.
+"""Learned quality scores behind one protocol: a video in, one number out. Users supply the weights.
 
-A judge is whatever maps frames to a score; what wraps a network here takes a TorchScript module that is already in
-memory, so nothing in this module reads a file, and nothing anywhere asks a network for one.
+A judge maps frames to a score. The classes here wrap a TorchScript module that is already in memory: this module reads
+no file and downloads nothing.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ CLIP_STD = (0.26862954, 0.26130258, 0.27577711)
 """Input side [px] and colour statistics [1] of CLIP (Radford et al. 2021, arXiv:2103.00020)."""
 
 PAIRS = 40
-"""Neighbouring frames that temporal LPIPS looks at (paper, Appendix D); which is not printed: evenly spread [1]."""
+"""Pairs of neighbouring frames in temporal LPIPS (paper, Appendix D, which does not say which): evenly spread [1]."""
 ROADSIDE, ROADSIDE_FRAME = ((0, 60, 150, 240), (330, 60, 480, 240)), (480, 320)
 """Its two regions as left, top, right, bottom, and the width and height of their frame (paper, Appendix D) [px]."""
 FARNEBACK = (0.5, 4, 21, 4, 7, 1.5, 0)
@@ -36,10 +36,10 @@ Network = Callable[..., Any]
 
 
 class VideoJudge(Protocol):
-    """What gives a video a number."""
+    """Anything that scores a video."""
 
     def score(self, frames: NDArray[np.uint8]) -> float:
-        """The number.
+        """Return the score.
 
         Parameters
         ----------
@@ -49,7 +49,7 @@ class VideoJudge(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class ClipWeather:
-    """How much a video looks like one weather rather than dry (paper, Appendix D, severity score).
+    """Similarity of a video to one weather less that to dry weather, by CLIP (paper, Appendix D, severity score).
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ class ClipWeather:
     dry: NDArray[np.floating]
 
     def score(self, frames: NDArray[np.uint8]) -> float:
-        """Mean over 16 frames of f^T g_weather - f^T g_dry, with f of length 1."""
-        pictures = np.stack([_clip_input(frame) for frame in sampled(frames)])
+        """Return the mean over 16 frames of f^T g_weather - f^T g_dry, with f of length 1."""
+        pictures = np.stack([_clip_input(frame) for frame in sample_frames(frames)])
         with torch.inference_mode():
             features = self.encode_image(torch.from_numpy(pictures)).double().numpy()
         features /= np.linalg.norm(features, axis=1, keepdims=True)
@@ -82,28 +82,28 @@ class WholeVideo:
 
     network: Network
 
-    def numbers(self, frames: NDArray[np.uint8]) -> tuple[float, ...]:
-        """All that the network says of all frames."""
+    def evaluate_network(self, frames: NDArray[np.uint8]) -> tuple[float, ...]:
+        """Return all outputs of the network for all frames."""
         video = torch.from_numpy(np.ascontiguousarray(frames.transpose(3, 0, 1, 2)[None])).float() / 255
         with torch.inference_mode():
             return tuple(float(x) for x in self.network(video).reshape(-1))
 
     def score(self, frames: NDArray[np.uint8]) -> float:
-        """The one number that the network says.
+        """Return the single output of the network.
 
         Raises
         ------
         InputError
-            If it says more.
+            If it has more than one output.
         """
-        found = self.numbers(frames)
+        found = self.evaluate_network(frames)
         if len(found) != 1:
             raise InputError(f"A video judge's module must give one number; it gives {len(found)}.")
         return found[0]
 
 
 def dover_scores(numbers: tuple[float, ...]) -> dict[str, float]:
-    """DOVER's scores by name: the overall one alone, or the two raw ones and what its authors' code makes of them [1].
+    """Return DOVER's scores by name: the overall one, or the two raw ones and their fusion by the authors' code [1].
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def dover_scores(numbers: tuple[float, ...]) -> dict[str, float]:
     Raises
     ------
     InputError
-        If there are neither one nor two.
+        If there are neither one nor two numbers.
     """
     if len(numbers) == 1:
         return {"dover_overall": numbers[0]}
@@ -131,10 +131,10 @@ def dover_scores(numbers: tuple[float, ...]) -> dict[str, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class FlowAlignedDistance:
-    """Perceptual distance of a frame and its predecessor laid over it by flow (paper, Appendix D, temporal LPIPS).
+    """Perceptual distance of a frame and its predecessor warped onto it by flow (paper, Appendix D, temporal LPIPS).
 
-    Declared, since the paper prints no more: the flow's constants are T-IoU's, the predecessor is sampled bilinearly
-    with edges held, both regions count alike, and they scale with the frame.
+    The paper does not print these choices: the flow has T-IoU's constants, the predecessor is sampled bilinearly with
+    edges held, both regions have the same weight, and they scale with the frame.
 
     Parameters
     ----------
@@ -144,16 +144,16 @@ class FlowAlignedDistance:
     network: Network
 
     def score(self, frames: NDArray[np.uint8]) -> float:
-        """Mean over 40 pairs and the two roadside regions; not a number for fewer than two frames."""
+        """Return the mean over 40 pairs and the two roadside regions; NaN for fewer than two frames."""
         if len(frames) < 2:
             return float("nan")
         later = np.linspace(1, len(frames) - 1, min(PAIRS, len(frames) - 1)).astype(int)
-        return float(np.mean([self._distance(frames[k - 1], frames[k]) for k in later]))
+        return float(np.mean([self._measure_distance(frames[k - 1], frames[k]) for k in later]))
 
-    def _distance(self, before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> float:
+    def _measure_distance(self, before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> float:
         pictures = [
             torch.from_numpy(picture.transpose(2, 0, 1)[None].astype(np.float32)) / 127.5 - 1
-            for picture in (laid_over(before, frame), frame)
+            for picture in (warp_to_successor(before, frame), frame)
         ]
         height, width = frame.shape[:2]
         scale = np.array((width, height) * 2) / (ROADSIDE_FRAME * 2)
@@ -168,8 +168,8 @@ class FlowAlignedDistance:
             )
 
 
-def laid_over(before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A picture warped onto its successor by Farneback's backward flow (Farneback 2003, DOI 10.1007/3-540-45103-X_50).
+def warp_to_successor(before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Warp a picture onto its successor by Farneback's backward flow (Farneback 2003, DOI 10.1007/3-540-45103-X_50).
 
     Parameters
     ----------
@@ -184,13 +184,13 @@ def laid_over(before: NDArray[np.uint8], frame: NDArray[np.uint8]) -> NDArray[np
     return np.asarray(warped, np.uint8)
 
 
-def sampled(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """At most 16 of the frames, evenly from the first to the last."""
+def sample_frames(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return at most 16 of the frames, evenly from the first to the last."""
     return frames[np.unique(np.linspace(0, len(frames) - 1, min(SAMPLED_FRAMES, len(frames))).astype(int))]
 
 
 def _clip_input(frame: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """The middle square of a frame, float32 [3, 224, 224], as CLIP was trained on it."""
+    """Return the middle square of a frame, float32 [3, 224, 224], in the form that CLIP was trained on."""
     height, width = frame.shape[:2]
     scale = CLIP_SIDE / min(height, width)
     size = (round(width * scale), round(height * scale))

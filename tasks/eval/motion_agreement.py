@@ -1,4 +1,4 @@
-"""Whether the motion seen in the pixels is the motion that the telemetry claims."""
+"""Agreement of the motion recovered from the pixels with the motion that the telemetry claims."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class PoseThresholds:
-    """What a clip must reach to pass. None leaves a figure unjudged.
+    """Thresholds that a clip must keep to pass; None leaves a figure unjudged.
 
     Parameters
     ----------
     pitch_rmse_deg : largest RMSE of pitch [deg]
-    pitch_relative_error : largest RMSE of pitch over the RMS of the claimed pitch; it sees a wrong
+    pitch_relative_error : largest RMSE of pitch over the RMS of the claimed pitch; it detects a wrong
         amplitude or a delay that is small in degrees [1]
     pitch_correlation : least correlation of recovered and claimed pitch [1]
     response_deg : RMS of the claimed pitch below which there is too little response to judge the
@@ -74,10 +74,10 @@ def pose_verdict(
 
     Parameters
     ----------
-    recovered : what a pose check saw
+    recovered : result of a pose check
     claimed_pitch : float64 [F] nose-down positive [rad]
     claimed_station : float64 [F] [m]
-    thresholds : what must be reached
+    thresholds : thresholds of the verdict
 
     Raises
     ------
@@ -96,14 +96,14 @@ def pose_verdict(
     claimed = np.rad2deg(claimed_pitch - claimed_pitch[0])[seen]
     pitch = np.rad2deg(recovered.pitch)[seen]
     way = (claimed_station - claimed_station[0])[seen]
-    pitch_rmse, response = _rms(pitch - claimed), _rms(claimed)
+    pitch_rmse, response = rms(pitch - claimed), rms(claimed)
     judged = response >= thresholds.response_deg
     relative = pitch_rmse / response if judged else float("nan")
     varies = bool(np.ptp(pitch) > 0 and np.ptp(claimed) > 0)
     correlation = float(np.corrcoef(pitch, claimed)[0, 1]) if varies else float("nan")
-    progress_rmse = _rms(recovered.progress[seen] - way)
+    progress_rmse = rms(recovered.progress[seen] - way)
     moved = way[-1] > 0
-    normalised = _rms(recovered.normalised_path[seen, 0] - way / way[-1]) if moved else float("nan")
+    normalised = rms(recovered.normalised_path[seen, 0] - way / way[-1]) if moved else float("nan")
     failed = int(recovered.failed.sum())
 
     reasons = []
@@ -118,7 +118,7 @@ def pose_verdict(
     if moved:
         limits.append(("normalised progress RMSE", normalised, thresholds.normalised_progress_rmse, ""))
     for name, value, limit, unit in limits:
-        # written so that NaN fails
+        # in this form NaN fails
         if limit is not None and not value <= limit:
             reasons.append(f"{name} is {value:.4g} {unit}".rstrip() + f", at most {limit:g} is allowed")
     if judged and not correlation >= thresholds.pitch_correlation:
@@ -139,5 +139,6 @@ def pose_verdict(
     )
 
 
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+def rms(values: Floats) -> float:
+    """Return the root mean square [any]."""
+    return float(np.sqrt(np.mean(np.square(values))))

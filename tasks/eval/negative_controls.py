@@ -1,4 +1,4 @@
-"""Can a metric see a fault at all? Scores of sound and of desynchronised claims, and how well they part."""
+"""Sensitivity of a metric to a fault: scores of sound and of desynchronised claims, and how well they separate."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -7,17 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from tasks.errors import InputError
+from tasks.eval.motion_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.rigid import Floats
-from tasks.eval.video_motion import geometry_error, reference_progress, rms
+from tasks.eval.video_motion import geometry_error, reference_progress
 
 SEES, PARTLY = 0.9, 0.5
-"""Detection rates without a false alarm from which a metric sees a fault, and sees it partly [1]."""
+"""Least detection rates without a false alarm at which a metric detects a fault, and detects it partly [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """What telemetry says of a clip's frames.
+    """Telemetry claimed for the frames of a clip.
 
     Parameters
     ----------
@@ -29,20 +30,20 @@ class Claim:
     station: Floats
 
 
-def delayed(claim: Claim, frames: int) -> Claim:
-    """The claim late by whole frames, its first value held.
+def delay_claim(claim: Claim, frames: int) -> Claim:
+    """Return the claim delayed by whole frames, its first value held.
 
     Parameters
     ----------
     claim : to delay
-    frames : by how many [1]
+    frames : delay [frames]
     """
     rows = np.maximum(np.arange(len(claim.pitch)) - frames, 0)
     return Claim(pitch=claim.pitch[rows], station=claim.station[rows])
 
 
-def scaled(claim: Claim, factor: float) -> Claim:
-    """The claim with its pitch, counted from frame 0, times a factor; -1 flips the sign.
+def scale_claimed_pitch(claim: Claim, factor: float) -> Claim:
+    """Return the claim with its pitch, counted from frame 0, times a factor; -1 flips the sign.
 
     Parameters
     ----------
@@ -53,30 +54,30 @@ def scaled(claim: Claim, factor: float) -> Claim:
     return Claim(pitch=rest + factor * (claim.pitch - rest), station=claim.station)
 
 
-def differs(claim: Claim, other: Claim, least_pitch: float, least_way: float) -> bool:
-    """Whether two claims say something different enough to be told apart by anyone.
+def claims_differ(claim: Claim, other: Claim, least_pitch: float, least_way: float) -> bool:
+    """Return whether two claims differ by more than a least pitch or a least distance.
 
     Parameters
     ----------
     claim, other : of one clip
-    least_pitch : largest pitch difference that is none [rad]
-    least_way : the same of the way [m]
+    least_pitch : largest pitch difference that counts as equal [rad]
+    least_way : the same for the station [m]
     """
     pitch = (claim.pitch - claim.pitch[0]) - (other.pitch - other.pitch[0])
     way = (claim.station - claim.station[0]) - (other.station - other.station[0])
     return bool(np.abs(pitch).max() > least_pitch or np.abs(way).max() > least_way)
 
 
-def claim_scores(
+def score_claim(
     recovered: RecoveredMotion, claim: Claim, response: float, times: Floats, opening: float | None
 ) -> dict[str, float]:
-    """How badly a claim fits what was seen, by every metric that can be formed; larger is worse.
+    """Return the misfit of a claim to the recovered motion by every metric that can be formed; larger is worse.
 
     Parameters
     ----------
     recovered : from the pixels, with a pose in every frame
     claim : to be judged
-    response : RMS of claimed pitch below which relative figures say nothing [rad]
+    response : RMS of claimed pitch below which relative figures are left out [rad]
     times : [F] of the frames [s]
     opening : when the road feature's event window opens; None without a feature [s]
 
@@ -105,11 +106,11 @@ def claim_scores(
 
 @dataclass(frozen=True, kw_only=True)
 class Separation:
-    """How a metric parts faulty from sound.
+    """Separation of faulty from sound clips by a metric.
 
     Parameters
     ----------
-    threshold : smallest that accuses no sound clip; a fault above it is detected [the metric's unit]
+    threshold : smallest with no false alarm on a sound clip; a fault above it is detected [the metric's unit]
     detection_rate : share of faulty clips above it [1]
     auc : area under the ROC, ties by half [1]
     false_alarms, detections : the ROC at every threshold from high to low [1]
@@ -124,8 +125,8 @@ class Separation:
     verdict: str
 
 
-def separate(sound: Sequence[float], faulty: Sequence[float]) -> Separation:
-    """Threshold, ROC and verdict of one metric on one fault.
+def compute_separation(sound: Sequence[float], faulty: Sequence[float]) -> Separation:
+    """Return threshold, ROC and verdict of one metric on one fault.
 
     Parameters
     ----------

@@ -9,14 +9,14 @@ BLOCK, SEGMENT = 16, 6
 ACTIVE, FLAT = 0.1, 0.1
 """Variance from which a block is spatially active, and deviation below which a segment shows no texture [1]."""
 STRIDE = 4
-"""Every how many-th pair of frames the temporal error looks at [frames]."""
+"""The temporal error is taken over every pair of frames with this stride [frames]."""
 
 
 def piqe(picture: NDArray[np.uint8]) -> float:
     """Perception-based image quality evaluator; 0 is best, 100 worst [1].
 
-    Share of distortion in the blocks that the eye looks at: flat stretches along a block's edges (compression, blur)
-    and a centre as rough as its surround (noise).
+    Share of distortion in the spatially active blocks: flat stretches along a block's edges (compression, blur) and a
+    centre as rough as its surround (noise).
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def piqe(picture: NDArray[np.uint8]) -> float:
     luma = cv2.cvtColor(picture, cv2.COLOR_RGB2YCrCb)[..., 0].astype(np.float64)
     rows, columns = (-(-side // BLOCK) * BLOCK for side in luma.shape)
     luma = np.pad(luma, ((0, rows - luma.shape[0]), (0, columns - luma.shape[1])), mode="symmetric")
-    tiles = _normalised(luma).reshape(rows // BLOCK, BLOCK, columns // BLOCK, BLOCK)
+    tiles = _normalise_contrast(luma).reshape(rows // BLOCK, BLOCK, columns // BLOCK, BLOCK)
     blocks = tiles.swapaxes(1, 2).reshape(-1, BLOCK, BLOCK)
     variance = blocks.var(axis=(1, 2), ddof=1)
     active = variance > ACTIVE
@@ -37,26 +37,26 @@ def piqe(picture: NDArray[np.uint8]) -> float:
     return float(100.0 * (distortion.sum() + 1.0) / (active.sum() + 1.0))
 
 
-def _normalised(luma: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normalise_contrast(luma: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean-subtracted, contrast-normalised luma (7 x 7 Gaussian, one unit of stabilisation)."""
 
-    def blurred(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def blur_luma(values: NDArray[np.float64]) -> NDArray[np.float64]:
         return cv2.GaussianBlur(values, (7, 7), 7 / 6, borderType=cv2.BORDER_REPLICATE)
 
-    mean = blurred(luma)
-    spread = np.sqrt(np.abs(blurred(luma * luma) - mean * mean))
+    mean = blur_luma(luma)
+    spread = np.sqrt(np.abs(blur_luma(luma * luma) - mean * mean))
     return (luma - mean) / (spread + 1.0)
 
 
 def _has_flat_edge(blocks: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether any segment along any of a block's four edges shows no texture, bool [N]."""
+    """Return whether any segment along any of a block's four edges shows no texture, bool [N]."""
     edges = np.stack([blocks[:, 0], blocks[:, -1], blocks[:, :, 0], blocks[:, :, -1]], axis=1)
     segments = np.lib.stride_tricks.sliding_window_view(edges, SEGMENT, axis=2)
     return np.asarray((segments.std(axis=-1, ddof=1) < FLAT).any(axis=(1, 2)))
 
 
 def _is_noisy(blocks: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether a block's deviation is above twice its distance from that of centre over surround, bool [N]."""
+    """Return whether a block's deviation is above twice its distance from centre over surround, bool [N]."""
     middle = BLOCK // 2
     centre = blocks[:, :, middle - 1 : middle + 1]
     surround = np.delete(blocks, [middle - 1, middle], axis=2)
@@ -79,7 +79,7 @@ def temporal_error(frames: NDArray[np.uint8]) -> float:
     errors = []
     for k in range(0, len(frames) - 1, STRIDE):
         here, there = (cv2.cvtColor(frames[i], cv2.COLOR_RGB2GRAY) for i in (k, k + 1))
-        forward, backward = _flow(here, there), _flow(there, here)
+        forward, backward = _estimate_flow(here, there), _estimate_flow(there, here)
         y, x = np.mgrid[: here.shape[0], : here.shape[1]].astype(np.float32)
         at = x + forward[..., 0], y + forward[..., 1]
         back = cv2.remap(backward, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=1e3)
@@ -92,6 +92,6 @@ def temporal_error(frames: NDArray[np.uint8]) -> float:
     return float(np.mean(errors)) if errors else float("nan")
 
 
-def _flow(here: NDArray[np.uint8], there: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _estimate_flow(here: NDArray[np.uint8], there: NDArray[np.uint8]) -> NDArray[np.float32]:
     guess = np.zeros((*here.shape, 2), np.float32)
     return np.asarray(cv2.calcOpticalFlowFarneback(here, there, guess, 0.5, 4, 21, 3, 7, 1.5, 0), np.float32)

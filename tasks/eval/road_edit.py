@@ -1,6 +1,6 @@
-"""Is a road feature visible where it should be, and only there? (paper, Appendix A.6)
+"""Visibility of a road feature where it is prescribed, and only there (paper, Appendix A.6).
 
-A feature clip is held against its flat control: registered by the background, compared in Lab, masked.
+A feature clip is compared with its flat control: registered by the background, compared in Lab, masked.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, kw_only=True)
 class RoadEditSettings:
-    """The constants of Appendix A.6; the search region's borders are declared here, the paper prints none.
+    """Constants of Appendix A.6; the borders of the search region are this project's choice, the paper prints none.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class RoadEditScore:
 def register_background(
     moving: NDArray[np.uint8], fixed: NDArray[np.uint8], background: Mask, settings: RoadEditSettings
 ) -> tuple[NDArray[np.uint8], bool]:
-    """The moving picture laid over the fixed one by affine ECC on the background (Evangelidis 2008).
+    """Warp the moving picture onto the fixed one by affine ECC on the background (Evangelidis 2008).
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def register_background(
 
     Returns
     -------
-    The moved picture, and whether the registration converged.
+    The warped picture, and whether the registration converged.
     """
     grey = [cv2.cvtColor(p, cv2.COLOR_RGB2GRAY) for p in (fixed, moving)]
     end = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, settings.ecc_iterations, settings.ecc_tolerance)
@@ -107,10 +107,10 @@ def paired_residual(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.fl
     return np.abs(lab[0] - lab[1]).mean(axis=2)
 
 
-def detected_edit(
+def detect_edit(
     feature: NDArray[np.uint8], flat: NDArray[np.uint8], target: Mask, settings: RoadEditSettings
 ) -> tuple[Mask, bool]:
-    """What changed about the target between a feature frame and its flat control.
+    """Return the pixels about the target that differ between a feature frame and its flat control.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def detected_edit(
 
     Returns
     -------
-    The detected mask, empty where the change does not count as one; and whether the registration converged.
+    The detected mask, empty where the change is below the thresholds; and whether the registration converged.
     """
     height, width = target.shape
     reach = 2 * settings.dilation_px + 1
@@ -188,7 +188,7 @@ def score_road_edit(
     diagonal = float(np.hypot(*targets[0].shape))
     masks, distances, unregistered = {}, [], 0
     for k in active:
-        masks[k], converged = detected_edit(feature[k], flat[k], targets[k], chosen)
+        masks[k], converged = detect_edit(feature[k], flat[k], targets[k], chosen)
         unregistered += not converged
         if masks[k].any():
             apart = np.argwhere(masks[k]).mean(axis=0) - np.argwhere(targets[k]).mean(axis=0)

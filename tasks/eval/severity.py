@@ -1,6 +1,6 @@
-"""Does the picture's weather grow with the weather? Named image statistics, ranked against the rate.
+"""Image statistics that should grow with the precipitation rate, ranked against it.
 
-These are stand-ins: no learned judge's weights are at hand. Each is what it is named, not a perceptual score.
+They replace a learned judge, whose weights are not available. They are no perceptual scores.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 SAMPLED_FRAMES = 16
-"""Frames of a clip that are looked at, evenly spread (as in the paper's Section 4.3) [1]."""
+"""Frames of a clip that are evaluated, evenly spread (as in the paper's Section 4.3) [1]."""
 DARK_WINDOW = 15
 """Side of the dark channel's window (He et al. 2011, DOI 10.1109/TPAMI.2010.168) [px]."""
 SPECULAR = 0.85
@@ -19,7 +19,7 @@ SPECULAR = 0.85
 
 
 def sampled_frames(count: int) -> NDArray[np.int64]:
-    """Which of a clip's frames are looked at, evenly spread from the first to the last."""
+    """Return the numbers of the frames that are evaluated, evenly spread from the first to the last."""
     return np.unique(np.linspace(0, count - 1, min(SAMPLED_FRAMES, count)).astype(np.int64))
 
 

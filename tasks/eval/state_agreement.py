@@ -1,4 +1,4 @@
-"""How well a model's states follow a reference trace: the paper's Appendix A.2, case by case.
+"""Agreement of a model's states with a reference trace: the paper's Appendix A.2, case by case.
 
 Signals stay on their original time axis and keep the static pitch offset; nothing is aligned, shifted
 or left out. The model is sampled at the reference's timestamps.
@@ -34,7 +34,7 @@ FIGURES = ("speed_rmse_m_s", "pitch_rmse_deg", "slip_rmse", "wheel_load_rmse_n",
 
 @dataclass(frozen=True, kw_only=True)
 class CaseFacts:
-    """What is known about a case besides its trace.
+    """Known facts of a case besides its trace.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class CaseFacts:
 
     @property
     def kind(self) -> Literal["flat", "hump", "depression"]:
-        """The group the paper's tables put the case in."""
+        """Group of the case in the paper's tables."""
         if self.hazard_height == 0:
             return "flat"
         return "hump" if self.hazard_height > 0 else "depression"
@@ -118,11 +118,11 @@ class GroupAgreement:
 def case_agreement(
     reference: Mapping[str, Floats], model: Mapping[str, Floats], facts: CaseFacts, static_pitch: float
 ) -> CaseAgreement:
-    """Score one case as the paper's Appendix A.2 lays down.
+    """Score one case by the paper's Appendix A.2.
 
     The window of a flat case ends one second after the reference stops, that of a road case half a
-    metre behind the rear axle's exit. A reference that ends before that is scored to its end: holding
-    its last pitch, which a stopped car lets go, would score the model against an invention.
+    metre behind the rear axle's exit. A reference that ends before that is scored to its end: its last pitch
+    cannot be held, because a stopped car releases its pitch.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def case_agreement(
         [deg], braking slip [1] and load [N] of each wheel
     model : columns `MODEL_COLUMNS` with the names and units of `tasks.conventions.TICK_CHANNELS`
     facts : what is known about the case
-    static_pitch : pitch of the model's vehicle at rest, which its pitch is counted from [rad]
+    static_pitch : pitch of the model's vehicle at rest, from which its pitch is counted [rad]
 
     Raises
     ------
@@ -174,12 +174,12 @@ def case_agreement(
     )
 
 
-def aggregate(cases: Sequence[CaseAgreement]) -> dict[str, GroupAgreement]:
-    """Mean and maximum over flat, hump, depression and all cases, as the paper's tables have them.
+def summarise_groups(cases: Sequence[CaseAgreement]) -> dict[str, GroupAgreement]:
+    """Return mean and maximum over flat, hump, depression and all cases, as in the paper's tables.
 
     Parameters
     ----------
-    cases : one per case; hand in one split at a time
+    cases : one per case, all of one split
 
     Returns
     -------
@@ -187,10 +187,10 @@ def aggregate(cases: Sequence[CaseAgreement]) -> dict[str, GroupAgreement]:
     """
     groups = {kind: [c for c in cases if c.kind == kind] for kind in ("flat", "hump", "depression")}
     groups["all"] = list(cases)
-    return {name: _summarise(name, members) for name, members in groups.items() if members}
+    return {name: _summarise_group(name, members) for name, members in groups.items() if members}
 
 
-def _summarise(name: str, members: Sequence[CaseAgreement]) -> GroupAgreement:
+def _summarise_group(name: str, members: Sequence[CaseAgreement]) -> GroupAgreement:
     units = {c.event_unit for c in members}
     figures = {f: np.array([getattr(c, f) for c in members]) for f in FIGURES}
     if len(units) > 1:
@@ -224,16 +224,16 @@ def _check_columns(reference: Mapping[str, Floats], model: Mapping[str, Floats],
 def _event_window(reference: Mapping[str, Floats], facts: CaseFacts) -> tuple[float, float, str]:
     time, station = reference["time"], reference["station"]
     if facts.kind == "flat":
-        start = _onset(time, station, facts)
+        start = _brake_onset_time(time, station, facts)
         stop = _stop_time(time, reference["speed"], start)
         end = (time[-1] if stop is None else stop) + AFTER_STOP
     else:
         half = facts.hazard_length / 2
-        entry = _crossing(time, station, facts.hazard_center - half - AROUND_FEATURE)
+        entry = _crossing_time(time, station, facts.hazard_center - half - AROUND_FEATURE)
         if entry is None:
             raise InputError(f"Case {facts.case}: the reference never reaches the road feature.")
         start = entry
-        leave = _crossing(time, station, facts.hazard_center + half + facts.wheelbase + AROUND_FEATURE)
+        leave = _crossing_time(time, station, facts.hazard_center + half + facts.wheelbase + AROUND_FEATURE)
         end = np.inf if leave is None else leave
     if end <= time[-1] + 1e-9:
         return start, float(end), ""
@@ -253,7 +253,7 @@ def _event_error(
         return abs(speeds[1] - speeds[0]) * 3.6, "km/h"
     distances = []
     for t, columns in ((reference["time"], reference), (model_time, model)):
-        onset = _onset(t, columns["station"], facts)
+        onset = _brake_onset_time(t, columns["station"], facts)
         stop = _stop_time(t, columns["speed"], onset)
         if stop is None and columns is model:
             raise InputError(
@@ -267,10 +267,10 @@ def _event_error(
     return abs(distances[1] - distances[0]), "m"
 
 
-def _onset(time: Floats, station: Floats, facts: CaseFacts) -> float:
+def _brake_onset_time(time: Floats, station: Floats, facts: CaseFacts) -> float:
     if facts.brake_onset is not None:
         return facts.brake_onset
-    onset = _crossing(time, station, facts.brake_onset_station or 0.0)
+    onset = _crossing_time(time, station, facts.brake_onset_station or 0.0)
     if onset is None:
         raise InputError(
             f"Case {facts.case}: no brake onset, station {facts.brake_onset_station} m is never reached."
@@ -284,7 +284,7 @@ def _stop_time(time: Floats, speed: Floats, onset: float) -> float | None:
     return float(time[standing[0]]) if standing.size else None
 
 
-def _crossing(time: Floats, station: Floats, mark: float) -> float | None:
+def _crossing_time(time: Floats, station: Floats, mark: float) -> float | None:
     """Time at which `station` first reaches `mark` [s]."""
     beyond = np.flatnonzero(station >= mark)
     if not beyond.size:
@@ -295,5 +295,5 @@ def _crossing(time: Floats, station: Floats, mark: float) -> float | None:
 
 def _speed_at(time: Floats, station: Floats, speed: Floats, mark: float) -> float:
     """Speed at a station [m/s]; 0 for a vehicle that stops short of it."""
-    when = _crossing(time, station, mark)
+    when = _crossing_time(time, station, mark)
     return 0.0 if when is None else float(np.interp(when, time, speed))

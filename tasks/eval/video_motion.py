@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from tasks.errors import InputError
+from tasks.eval.motion_agreement import rms
 from tasks.eval.poses.rigid import Floats
 
 WINDOWS: tuple[int | None, ...] = (None, 5, 7, 9)
-"""Smoothing windows that figures are given at [frames]."""
+"""Smoothing windows for which figures are reported [frames]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionProtocol:
-    """The fixed choices of Appendix A.5. The paper's event window opens 2.2 s into a clip; here the caller says when.
+    """Fixed choices of Appendix A.5. The paper's event window opens 2.2 s into a clip; here the caller gives the time.
 
     Parameters
     ----------
@@ -36,8 +37,8 @@ class MotionProtocol:
     grid: int = 101
 
 
-def smoothed(values: Floats, window: int | None, order: int = 2) -> Floats:
-    """Savitzky-Golay smoothing; without a window the values as they are.
+def smooth_signal(values: Floats, window: int | None, order: int = 2) -> Floats:
+    """Smooth by Savitzky and Golay; without a window return a copy.
 
     Parameters
     ----------
@@ -49,10 +50,10 @@ def smoothed(values: Floats, window: int | None, order: int = 2) -> Floats:
 
 
 def normalised_progress(forward: Floats, window: int | None, order: int = 2) -> Floats:
-    """A monocular forward coordinate as braking progress in [0, 1].
+    """Return a monocular forward coordinate as braking progress in [0, 1].
 
-    Smoothed, turned so that it ends ahead, min-max normalised, smoothed again, made monotone by its running
-    maximum, clipped.
+    It is smoothed, given the sign with which it ends ahead, min-max normalised, smoothed again, made monotone by its
+    running maximum, and clipped.
 
     Parameters
     ----------
@@ -64,16 +65,16 @@ def normalised_progress(forward: Floats, window: int | None, order: int = 2) -> 
     InputError
         If the car does not move.
     """
-    x = smoothed(forward, window, order)
+    x = smooth_signal(forward, window, order)
     x = x * (1.0 if x[-1] >= x[0] else -1.0)
     if not np.ptp(x) > 0:
         raise InputError("Progress cannot be normalised: the recovered car does not move.")
-    x = smoothed((x - x.min()) / np.ptp(x), window, order)
+    x = smooth_signal((x - x.min()) / np.ptp(x), window, order)
     return np.clip(np.maximum.accumulate(x), 0.0, 1.0)
 
 
 def reference_progress(station: Floats) -> Floats:
-    """The reference station, shifted to start at zero and divided by its maximum.
+    """Return the reference station, shifted to start at zero and divided by its maximum.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def weather_error(
 
 
 def event_response(times: Floats, pitch: Floats, opening: float, protocol: MotionProtocol) -> Floats:
-    """Pitch in the event window less the line through its two flanks, [N] in the unit of `pitch`.
+    """Return the pitch in the event window less the line through its two flanks, [N] in the unit of `pitch`.
 
     Parameters
     ----------
@@ -116,10 +117,10 @@ def event_response(times: Floats, pitch: Floats, opening: float, protocol: Motio
     """
     since = times - opening
 
-    def within(span: tuple[float, float]) -> NDArray[np.bool_]:
+    def in_span(span: tuple[float, float]) -> NDArray[np.bool_]:
         return (since >= span[0] - 1e-9) & (since <= span[1] + 1e-9)
 
-    before, after, event = within(protocol.before), within(protocol.after), within(protocol.event)
+    before, after, event = in_span(protocol.before), in_span(protocol.after), in_span(protocol.event)
     if before.sum() < 2 or after.sum() < 2 or event.sum() < 3:
         raise InputError(
             f"The event window opens at {opening:.2f} s; the clip must hold"
@@ -149,7 +150,7 @@ def geometry_error(
     """
     chosen = protocol or MotionProtocol()
     meant = event_response(times, reference, opening, chosen)
-    seen = event_response(times, smoothed(pitch, window, chosen.order), opening, chosen)
+    seen = event_response(times, smooth_signal(pitch, window, chosen.order), opening, chosen)
     return rms(seen - meant) / rms(meant)
 
 
@@ -177,7 +178,7 @@ def motion_retention(
 ) -> float:  # fmt: skip
     """Absolute correlation of the road event's pitch in an editor's input and output [1].
 
-    The matching braking pitch is taken off each, and the line through the frames outside the event.
+    The matching braking pitch is subtracted from each, and the line through the frames outside the event.
 
     Parameters
     ----------
@@ -193,8 +194,3 @@ def motion_retention(
         outside = (frame < event[0]) | (frame > event[1])
         curves.append((change - np.polyval(np.polyfit(frame[outside], change[outside], 1), frame))[inside])
     return float(abs(np.corrcoef(curves[0], curves[1])[0, 1]))
-
-
-def rms(values: Floats) -> float:
-    """Root mean square [any]."""
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 
 from tasks.campaign.campaign import Campaign, Run, Tolerances
-from tasks.campaign.planned_runs import RICH, TRAINING, Drive, planned_run
+from tasks.campaign.planned_runs import RICH, TRAINING, RunPlan, make_planned_run
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.inference.evidence import SESSION_INDEX
 from tasks.identification.inference.forward import SUBSTEPS, instrument_readings, run_model, simulate_run
@@ -48,7 +48,7 @@ def synthetic_campaign(
     seed: int,
     *,
     slots: tuple[Slot, ...] = (),
-    design: Sequence[Drive] = RICH,
+    design: Sequence[RunPlan] = RICH,
 ) -> Campaign:
     """A campaign of a car that has what ``truth`` says.
 
@@ -79,7 +79,7 @@ def synthetic_campaign(
 
 
 def _measure_run(
-    drive: Drive,
+    drive: RunPlan,
     number: int,
     direction: int,
     vehicle: Vehicle,
@@ -88,7 +88,7 @@ def _measure_run(
     slots: tuple[Slot, ...],
     rng: np.random.Generator,
 ) -> Run:
-    run = planned_run(drive, f"run-{number + 1:02d}", direction, held_out=number >= TRAINING)
+    run = make_planned_run(drive, f"run-{number + 1:02d}", direction, held_out=number >= TRAINING)
     pressure, count = run.pressure, len(run.pressure)
     model = run_model(run, vehicle, surface)
     own = theta.copy()

@@ -1,9 +1,11 @@
-"""The derivative of blending: how each Gaussian's colour, opacity and place would mend a picture.
+"""The derivative of blending with respect to each Gaussian's colour, opacity and place.
 
 The picture is ``C = sum_i T_i a_i c_i + T_end sky`` with ``T_i`` the transmittance in front of Gaussian i.
 Then ``dC/dc_i = T_i a_i`` and ``dC/da_i = T_i (c_i - B_i)``, where ``B_i`` is what is seen behind Gaussian i.
 Front to back, ``B_i`` is the finished picture less what has been blended so far, over the transmittance left.
 """
+
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -37,13 +39,23 @@ COLOUR, WEIGHT, OPACITY, OPACITY_SQUARE, ALONG_X, ALONG_Y, SQUARE_XX, SQUARE_XY,
 SUMS = 11
 
 _PLANE = TILE_WIDTH * TILE_HEIGHT + 16
-_LIGHT, _RED, _GREEN, _BLUE, _MISS_RED, _MISS_GREEN, _MISS_BLUE, _WEIGHT = (
-    np.uint64(k * _PLANE) for k in range(8)
+# the first plane is the light that is left
+_RED, _GREEN, _BLUE, _MISS_RED, _MISS_GREEN, _MISS_BLUE, _WEIGHT = (
+    np.uint64(k * _PLANE) for k in range(1, 8)
 )
 _LOG_CUT, _ZERO, _HALF, _ONE, _TWO = (np.float32(c) for c in (LOG_CUT, 0, 0.5, 1, 2))
 _MAX_ALPHA, _TINY, _DARK = (np.float32(c) for c in (0.999, 1e-4, 0.01))
 _SHARE, _SIXTH, _TWENTYFOURTH = (np.float32(1 / n) for n in (64, 6, 24))
 _BOTTOM = np.float32(TILE_HEIGHT - 1)
+
+
+class _Tile(NamedTuple):
+    """A tile's part of the splat list, and its first column and row [px]."""
+
+    start: int
+    end: int
+    x: int
+    y: int
 
 
 def blend_and_derive(
@@ -52,12 +64,12 @@ def blend_and_derive(
     weight: NDArray[np.float32],
     sky: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The blended picture, and per splat the sums of derivative times residual and of derivative squared.
+    """Return the blended picture, and per splat the sums of derivative times residual and of derivative squared.
 
     Parameters
     ----------
-    records : float32 [V, 16] splats, from `tasks.render.rasterise.projection.project`
-    target : float32 [H, W, 3] the picture wanted; where negative, blended values above its modulus are as good
+    records : float32 [V, 16] splats, from `tasks.render.rasterise.projection.project_gaussians`
+    target : float32 [H, W, 3] the target picture; where negative, any value above its modulus matches
     weight : float32 [H, W] of a pixel's squared residual [1]
     sky : float32 [H, W, 3] what is seen where no splat is [1]
 
@@ -75,10 +87,10 @@ def blend_and_derive(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _opacity(p):  # type: ignore[no-untyped-def]
-    """Opacity of logarithm p, 0 where the rasteriser draws nothing: exp as the 64th power of four Taylor terms.
+def _opacity_of_logarithm(p):  # type: ignore[no-untyped-def]
+    """Return the opacity of logarithm p, 0 where the rasteriser draws nothing: the 64th power of four Taylor terms.
 
-    The library's exponential would keep the loops from being vectorised; this one is right to 3e-6.
+    The library's exponential would prevent vectorisation of the loops; the error of this one is 3e-6.
     """
     x = p * _SHARE
     e = _ONE + x * (_ONE + x * (_HALF + x * (_SIXTH + x * _TWENTYFOURTH)))
@@ -106,7 +118,8 @@ def _blend_and_derive(records, starts, splats, planes):  # type: ignore[no-untyp
         for y in range(rows):
             for x in range(columns):
                 s[np.uint64(y * TILE_WIDTH + x)] = _ONE
-        last = _blend_tile(s, records, splats, starts[tile], starts[tile + 1], x_tile, y_tile)
+        part = _Tile(starts[tile], starts[tile + 1], x_tile, y_tile)
+        last = _blend_tile(s, records, splats, part)
         for y in range(rows):
             for x in range(columns):
                 l = np.uint64(y * TILE_WIDTH + x)
@@ -122,7 +135,7 @@ def _blend_and_derive(records, starts, splats, planes):  # type: ignore[no-untyp
                     s[_MISS_RED + np.uint64(c * _PLANE) + l] = miss
                 s[_WEIGHT + l] = q
                 s[l] = _ONE
-        _derive_tile(s, lanes, records, splats, starts[tile], last, x_tile, y_tile, sums)
+        _derive_tile(s, lanes, records, splats, _Tile(part.start, last, x_tile, y_tile), sums)
     return picture, sums
 
 
@@ -134,8 +147,9 @@ def _row_range(records, splat, y_tile):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _blend_tile(s, records, splats, start, end, x_tile, y_tile):  # type: ignore[no-untyped-def]
-    """Blend colours front to back; returns the end of the splats that still got light."""
+def _blend_tile(s, records, splats, tile):  # type: ignore[no-untyped-def]
+    """Blend colours front to back; return the end of the splats that still received light."""
+    start, end, x_tile, y_tile = tile
     for i in range(start, end):
         if (i - start) % 64 == 0:
             open_pixels = 0
@@ -159,7 +173,7 @@ def _blend_tile(s, records, splats, start, end, x_tile, y_tile):  # type: ignore
             for x in range(TILE_WIDTH):
                 l = base + np.uint64(x)
                 dx = np.float32(x) - middle
-                w = s[l] * _opacity(row - falloff * dx * dx)
+                w = s[l] * _opacity_of_logarithm(row - falloff * dx * dx)
                 s[l] -= w
                 s[_RED + l] += w * r
                 s[_GREEN + l] += w * g
@@ -168,7 +182,8 @@ def _blend_tile(s, records, splats, start, end, x_tile, y_tile):  # type: ignore
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _derive_tile(s, lanes, records, splats, start, end, x_tile, y_tile, sums):  # type: ignore[no-untyped-def]
+def _derive_tile(s, lanes, records, splats, tile, sums):  # type: ignore[no-untyped-def]
+    start, end, x_tile, y_tile = tile
     for i in range(start, end):
         splat = np.uint64(splats[i])
         first, final = _row_range(records, splat, y_tile)
@@ -190,11 +205,11 @@ def _derive_tile(s, lanes, records, splats, start, end, x_tile, y_tile, sums):  
                 l = base + np.uint64(x)
                 dx = np.float32(x) - middle
                 before = s[l]
-                a = _opacity(row - falloff * dx * dx)
+                a = _opacity_of_logarithm(row - falloff * dx * dx)
                 w = before * a
                 after = before - w
                 s[l] = after
-                # The finished picture less this splat: over the light left, it is what lies behind.
+                # The finished picture less this splat, over the light left, is the colour behind the splat.
                 left_r, left_g, left_b = s[_RED + l] - w * r, s[_GREEN + l] - w * g, s[_BLUE + l] - w * b
                 s[_RED + l], s[_GREEN + l], s[_BLUE + l] = left_r, left_g, left_b
                 share = before / max(after, _TINY)

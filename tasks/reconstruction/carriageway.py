@@ -1,4 +1,4 @@
-"""Which part of the ground is carriageway, and what class a surface point belongs to."""
+"""Extent of the carriageway, and the class of a surface point."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ FARTHEST = 60.0
 GROUND = 0.3
 """Points within this height of the route, off the carriageway, are terrain [m]."""
 GROUND_REACH = 15.0
-"""Farther to the side nothing is said about the ground [m]."""
+"""Farther to the side, points are not classified as ground [m]."""
 
 
 def carriageway_extents(
@@ -35,7 +35,7 @@ def carriageway_extents(
     route_length: float,
     limit: float,
 ) -> tuple[float, float]:
-    """How far the level strip around the route reaches to the left (positive) and right (negative) [m].
+    """Return the extent of the level strip around the route to the left (positive) and right (negative) [m].
 
     A kerb, a verge or parked cars end it: in either direction the first strip in which too few of the
     points near the ground are level with the route.
@@ -59,13 +59,13 @@ def carriageway_extents(
     return max(left, NARROWEST), -max(right, NARROWEST)
 
 
-def classify(
+def classify_points(
     lateral: NDArray[np.float64],
     height: NDArray[np.float64],
     depth: NDArray[np.float64],
     extents: tuple[float, float],
 ) -> NDArray[np.uint8]:
-    """ROAD on the carriageway, TERRAIN on the ground beside it, OTHER elsewhere.
+    """Classify points: ROAD on the carriageway, TERRAIN on the ground beside it, OTHER elsewhere.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The Gaussians of the samples: on the road where they are road, classed, and small where a car may come near."""
+"""The Gaussians of the samples: road samples moved onto the road, classified, and small where a car may come near."""
 
 from dataclasses import dataclass
 
@@ -7,29 +7,29 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
-from tasks.reconstruction.carriageway import carriageway_extents, classify
-from tasks.reconstruction.normals import turned_to_camera
-from tasks.reconstruction.surfels import COVERAGE, Surfels, ellipses
+from tasks.reconstruction.carriageway import carriageway_extents, classify_points
+from tasks.reconstruction.normals import turn_to_camera
+from tasks.reconstruction.surfels import COVERAGE, Surfels, derive_discs
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 from tasks.scene.spherical_harmonics import C0
 
 INITIAL_OPACITY = 0.9
 LEAST_COSINE = 0.25
-"""Surfaces other than the ground are not taken to be seen flatter than this [1]."""
+"""Least cosine between a surface's normal and the ray, for surfaces other than the ground [1]."""
 SADDLE = 0.02
-"""The road surface deviates this much from the route's plane [m]."""
+"""Standard deviation of the road surface from the route's plane [m]."""
 DISPARITY_ERROR = 0.3
 """Standard deviation of a disparity [px]."""
 FAR_GROUND = 14.0
-"""Ground farther from the camera than this is taken to be level, its measured normal being noise [m]."""
+"""Ground farther from the camera than this counts as level, since its measured normal is noise [m]."""
 LONGEST = 0.15
 """Largest standard deviation of a Gaussian on the ground [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cloud:
-    """Gaussians with what else is known about them.
+    """Gaussians with the ray of each and the carriageway's extent.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Cloud:
     extents: tuple[float, float]
 
 
-def cloud_of(
+def build_cloud(
     surfels: Surfels,
     T_world_camera: NDArray[np.float64],
     route: Route,
@@ -51,7 +51,7 @@ def cloud_of(
     disparity_scale: float,
     carriageway_limit: float,
 ) -> Cloud:
-    """Place, class, turn and size the samples.
+    """Build Gaussians from the samples: place, class, orientation and size.
 
     Parameters
     ----------
@@ -66,23 +66,23 @@ def cloud_of(
     rays = np.einsum("nij,nj->ni", R, surfels.rays)
     station, lateral, height = route.project(rays * surfels.depth[:, None] + t)
     extents = carriageway_extents(station, lateral, height, surfels.depth, route.length, carriageway_limit)
-    class_id = classify(lateral, height, surfels.depth, extents)
+    class_id = classify_points(lateral, height, surfels.depth, extents)
     up = route.pose(np.clip(station, 0, route.length))[:, :3, 2]
 
     road = class_id == SemanticClass.ROAD
     depth = surfels.depth.copy()
-    depth[road] *= _onto_route(
+    depth[road] *= _depth_factor_onto_route(
         height[road], -(rays[road] * up[road]).sum(axis=1), depth[road], disparity_scale
     )
 
     level = road | ((class_id == SemanticClass.TERRAIN) & (depth > FAR_GROUND))
-    normals = turned_to_camera(surfels.normals, surfels.rays, LEAST_COSINE)
+    normals = turn_to_camera(surfels.normals, surfels.rays, LEAST_COSINE)
     normals[level] = np.einsum("nji,nj->ni", R[level], up[level])
-    rotation, scales = ellipses(surfels.rays, depth, normals, surfels.spacing, focal_length)
+    rotation, scales = derive_discs(surfels.rays, depth, normals, surfels.spacing, focal_length)
     rotation = R @ rotation
 
     ground = np.isin(class_id, (SemanticClass.ROAD, SemanticClass.TERRAIN))
-    of, offset = _split(scales[:, 0], ground)
+    of, offset = _split_long_discs(scales[:, 0], ground)
     pieces = np.bincount(of, minlength=len(scales))
     means = rays * depth[:, None] + t
     means = means[of] + offset[:, None] * rotation[of, :, 0]
@@ -100,16 +100,16 @@ def cloud_of(
     return Cloud(gaussians=gaussians, rays=rays[of], extents=extents)
 
 
-def _onto_route(
+def _depth_factor_onto_route(
     height: NDArray[np.float64],
     descent: NDArray[np.float64],
     depth: NDArray[np.float64],
     disparity_scale: float,
 ) -> NDArray[np.float64]:
-    """Factor by which a road point's depth changes so that its height becomes the likeliest one.
+    """Return the factor of a road point's depth that makes its height the most likely one.
 
-    Stereo's error of height grows as depth squared times the ray's descent; the route says that the height
-    is 0 but for the saddle of the road. Near the camera stereo is right, far away the route is.
+    The height error of stereo grows as depth squared times the ray's descent; on the route the height is 0 except for
+    the unevenness of the road. Near the camera the stereo height dominates, far away the route.
 
     Parameters
     ----------
@@ -123,13 +123,13 @@ def _onto_route(
     return np.clip(1 + lowered / np.maximum(descent * depth, 1e-3), 0.5, 2.0)
 
 
-def _split(
+def _split_long_discs(
     length: NDArray[np.float64], splittable: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Pieces that replace Gaussians which are too long: whose piece each is, and how far along its first axis.
+    """Split Gaussians that are too long: return the parent of each piece, and its offset along the first axis.
 
-    A disc seen at a grazing angle from afar is metres long; a camera that later drives over it would see it
-    smeared over the whole picture, since a Gaussian's picture is taken to be an ellipse around its middle.
+    A disc seen at a grazing angle from afar is metres long. For a camera that later drives over it, it would cover the
+    whole picture, since a Gaussian is projected as an ellipse around its middle.
 
     Parameters
     ----------

@@ -11,11 +11,11 @@ SHARPENING_WINDOW, SHARPENING_STEPS = 9, 2
 SHARPENING_DAMPING = 4.0
 """Squared slope of the picture, in pixel values of 255, below which the steps shorten [px^-2]."""
 LARGEST_LEAN = 0.5
-"""The steps stay within this of the first match [px]."""
+"""Largest distance of the steps from the first match [px]."""
 
 
-def match(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
-    """Sub-pixel disparity of the left picture, NaN where the match is not confirmed from the right picture.
+def match_stereo(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
+    """Return sub-pixel disparity of the left picture, NaN where the right picture does not confirm the match.
 
     Semi-global matching over three paths (Hirschmueller, doi:10.1109/TPAMI.2007.1166) runs once for
     each view; a pixel stays when the two disparities differ by at most one pixel and its patch of
@@ -43,11 +43,11 @@ def match(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -
     speckles = np.where(agreed, forward * 16, 0).astype(np.int16)
     cv2.filterSpeckles(speckles, 0, 60, 32)
     confirmed = np.where(speckles > 0, forward, np.nan).astype(np.float32)
-    return _sharpened(left, right, confirmed)
+    return _refine_disparity(left, right, confirmed)
 
 
 def _semi_global(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities: int) -> NDArray[np.float32]:
-    """Raw disparity [px]; the pictures are widened so that the left border is matched as well."""
+    """Return the raw disparity [px]; the pictures are widened so that the left border is matched as well."""
     matcher = cv2.StereoSGBM.create(
         minDisparity=0,
         numDisparities=disparities,
@@ -62,13 +62,13 @@ def _semi_global(left: NDArray[np.uint8], right: NDArray[np.uint8], disparities:
     return matcher.compute(*widened)[:, disparities:].astype(np.float32) / 16
 
 
-def _sharpened(
+def _refine_disparity(
     left: NDArray[np.uint8], right: NDArray[np.uint8], disparity: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Disparity after Gauss-Newton steps on the local squared difference of the pictures.
+    """Refine disparity by Gauss-Newton steps on the local squared difference of the pictures.
 
-    Semi-global matching leans towards whole pixels by up to a fifth of one. Lucas and Kanade's step
-    (IJCAI 1981) within a window, on pictures freed of their local mean, takes that lean away.
+    Semi-global matching is biased towards whole pixels by up to a fifth of one. Lucas and Kanade's step
+    (IJCAI 1981) within a window, on pictures without their local mean, removes that bias.
     """
     columns, rows = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in left.shape[::-1]))
     window = (SHARPENING_WINDOW, SHARPENING_WINDOW)
@@ -87,16 +87,16 @@ def _sharpened(
     return np.where(np.isnan(disparity), disparity, found)
 
 
-def filled(disparity: NDArray[np.float32], background: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Disparity with a guess where there was none: the farther of the neighbours left and right in the row.
+def fill_disparity(disparity: NDArray[np.float32], background: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Fill unknown disparity with the farther of the neighbours left and right in the row.
 
-    What one camera sees and the other does not is mostly the background beside an object, so the farther
+    A surface that only one camera sees is mostly the background beside an object, so the farther
     neighbour is the better guess; at the picture's border the only neighbour is taken.
 
     Parameters
     ----------
     disparity : float32 [H, W] NaN where unknown [px]
-    background : bool [H, W] sky: neither filled nor taken as a neighbour
+    background : bool [H, W] sky: neither filled nor used as a neighbour
     """
     known = np.isfinite(disparity) & ~background
     columns = np.broadcast_to(np.arange(disparity.shape[1]), disparity.shape)

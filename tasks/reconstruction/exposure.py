@@ -1,4 +1,4 @@
-"""How bright each picture was taken, from surfaces seen by several of them."""
+"""Exposure of each picture, from surfaces that several pictures show."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ DARKEST, BRIGHTEST = 12, 245
 MATCHED = 1.0
 """Largest difference between predicted and measured disparity of one surface [px]."""
 SPREAD = 0.05
-"""Log ratios that deviate by more count less and less [1]."""
+"""Deviation of log ratios above which they count less and less [1]."""
 PRIOR = 0.1
 """Weight, against one pixel's, of the pull of every unknown towards 0 [1]."""
 ROBUST_ROUNDS = 8
@@ -40,12 +40,12 @@ class Exposure:
     gains: NDArray[np.float64]
     falloff: NDArray[np.float32]
 
-    def radiance(self, picture: NDArray[np.uint8], frame: int) -> NDArray[np.float32]:
-        """Scene radiance of an sRGB-encoded picture [H, W, 3] taken as ``frame`` [1]."""
+    def to_radiance(self, picture: NDArray[np.uint8], frame: int) -> NDArray[np.float32]:
+        """Return the scene radiance of an sRGB-encoded picture [H, W, 3] taken as ``frame`` [1]."""
         return _LINEAR[picture] / (np.float32(self.gains[frame]) * self.falloff[..., None])
 
-    def picture(self, radiance: NDArray[np.float32], frame: int) -> NDArray[np.float32]:
-        """Display values 0 to 1 of the radiance [H, W, 3] as the camera would have taken ``frame`` [1]."""
+    def to_picture(self, radiance: NDArray[np.float32], frame: int) -> NDArray[np.float32]:
+        """Return display values 0 to 1 of the radiance [H, W, 3] at the exposure of ``frame`` [1]."""
         exposed = radiance * (np.float32(self.gains[frame]) * self.falloff[..., None])
         return to_display(exposed)
 
@@ -58,14 +58,14 @@ def estimate_exposure(
     T_world_camera: NDArray[np.float64],
     training: NDArray[np.int64],
 ) -> Exposure:
-    """Gains of all pictures and the lens's radial falloff, from surfaces that two pictures show.
+    """Estimate gains of all pictures and the lens's radial falloff from surfaces that two pictures show.
 
     The logarithms of corresponding pixel values differ by the difference of log gains plus
     ``a (r2^2 - r1^2) + b (r2^4 - r1^4) + c log(z1 / z2)``, r the distance from the principal point over
-    the focal length and z the depth. On a forward drive everything moves outward and nearer, into the
-    lens's shade and towards steeper view; without a, b and c that would be mistaken for an exposure that
-    falls without end. All pairs of training pictures are fitted at once by reweighted least squares.
-    Other pictures are not looked at: their gain is interpolated between the neighbouring training ones.
+    the focal length and z the depth. On a forward drive every surface moves outward and nearer, where the lens shades
+    more and the view is steeper; without a, b and c the fit would explain this by an exposure that keeps falling. All
+    pairs of training pictures are fitted at once by reweighted least squares. Other pictures are not read: their gain
+    is interpolated between the neighbouring training ones.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def estimate_exposure(
 
 
 def _calm_above_horizon(picture: NDArray[np.uint8], intrinsics: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Pixels of the upper half whose neighbourhood is so even that parallax does not matter: mostly sky."""
+    """Return pixels of the upper half whose neighbourhood is so even that parallax has no effect: mostly sky."""
     grey = picture.astype(np.float32)
     mean = cv2.blur(grey, (15, 15))
     variance = cv2.blur(grey * grey, (15, 15)) - mean * mean
@@ -131,17 +131,17 @@ def corresponding_directions(
     intrinsics: NDArray[np.float64],
     relative: NDArray[np.float64],
 ) -> tuple[tuple[NDArray[np.int64], NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Rows and columns of pixels that look in one direction from two places, on a coarse grid.
+    """Return rows and columns of pixels with equal directions in two pictures, on a coarse grid.
 
     Parameters
     ----------
     calm, other_calm : bool [H, W] pixels to compare
     intrinsics : float64 [3, 3] camera matrix [px]
-    relative : float64 [4, 4] camera coordinates of the first to those of the other; only turned
+    relative : float64 [4, 4] camera coordinates of the first to those of the other; only its rotation is used
     """
-    rows, columns = _grid(calm)
+    rows, columns = _coarse_grid_pixels(calm)
     rays = np.stack([columns, rows, np.ones(len(rows))], axis=1) @ np.linalg.inv(intrinsics).T
-    first, second = _seen(rows, columns, rays @ relative[:3, :3].T, intrinsics, calm.shape)[:2]
+    first, second = _find_visible_points(rows, columns, rays @ relative[:3, :3].T, intrinsics, calm.shape)[:2]
     same = other_calm[second]
     return (first[0][same], first[1][same]), (second[0][same], second[1][same])
 
@@ -153,7 +153,7 @@ def corresponding_pixels(
     disparity_scale: float,
     relative: NDArray[np.float64],
 ) -> tuple[tuple[NDArray[np.int64], NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Rows and columns of pixels in one picture and of the same surfaces in another, on a coarse grid.
+    """Return rows and columns of pixels in one picture and of the same surfaces in another, on a coarse grid.
 
     Parameters
     ----------
@@ -162,32 +162,32 @@ def corresponding_pixels(
     disparity_scale : focal length times baseline [px m]
     relative : float64 [4, 4] camera coordinates of the first to those of the other
     """
-    rows, columns = _grid(disparity > 1)
+    rows, columns = _coarse_grid_pixels(disparity > 1)
     rays = np.stack([columns, rows, np.ones(len(rows))], axis=1) @ np.linalg.inv(intrinsics).T
     points = (
         rays * (disparity_scale / disparity[rows, columns])[:, None] @ relative[:3, :3].T + relative[:3, 3]
     )
-    first, second, depth = _seen(rows, columns, points, intrinsics, disparity.shape)
+    first, second, depth = _find_visible_points(rows, columns, points, intrinsics, disparity.shape)
     same = np.abs(other_disparity[second] - disparity_scale / depth) < MATCHED
     return (first[0][same], first[1][same]), (second[0][same], second[1][same])
 
 
-def _grid(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of the wanted pixels on a coarse grid."""
+def _coarse_grid_pixels(wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return rows and columns of the wanted pixels on a coarse grid."""
     coarse = np.zeros_like(wanted)
     coarse[STRIDE // 2 :: STRIDE, STRIDE // 2 :: STRIDE] = True
     rows, columns = np.nonzero(wanted & coarse)
     return rows, columns
 
 
-def _seen(
+def _find_visible_points(
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
     points: NDArray[np.float64],
     intrinsics: NDArray[np.float64],
     shape: tuple[int, ...],
 ) -> tuple[tuple[NDArray[np.int64], ...], tuple[NDArray[np.int64], ...], NDArray[np.float64]]:
-    """The pixels whose points lie in the picture of the other camera, where they are there, and how deep [m]."""
+    """Return the pixels whose points lie in the other camera's picture, their places there, and their depth [m]."""
     z = np.maximum(points[:, 2], 1e-6)
     pixel = np.rint((points @ intrinsics.T)[:, :2] / z[:, None])
     inside = (points[:, 2] > 0.5) & (pixel >= 0).all(axis=1) & (pixel < (shape[1], shape[0])).all(axis=1)

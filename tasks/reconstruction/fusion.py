@@ -1,4 +1,6 @@
-"""Depth maps checked against each other: what several pictures agree on, and who sees it best."""
+"""Fusion of depth maps: surfaces that several pictures confirm, and the picture that shows each one largest."""
+
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -7,13 +9,20 @@ from numpy.typing import NDArray
 AGREEMENT = 1.0
 """Largest difference of predicted and measured disparity of one surface [px]."""
 SEE_THROUGH = 1.5
-"""Disparity deficit from which another picture looks through the surface [px]."""
+"""Disparity deficit above which another picture sees through the surface [px]."""
 CHECK_OFFSETS = (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6)
 """Places in the training sequence whose depth is compared with a picture's own [1]."""
 FINER_OFFSETS = (1, 2, 3, 4, 6, 8, 11, 15, 20, -1, -2, -3, -4, -6)
 """Places in the training sequence that may show a surface larger [1]."""
 FINER = 0.985
 """A surface at less than this share of the depth is seen finer [1]."""
+
+
+class _Neighbours(NamedTuple):
+    """Pictures that a picture is compared with: their numbers [M], and its camera's pose in each camera [M, 4, 4]."""
+
+    numbers: NDArray[np.int64]
+    relative: NDArray[np.float64]
 
 
 def fuse_depth(
@@ -23,14 +32,13 @@ def fuse_depth(
     disparity_scale: float,
     T_world_camera: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Average each picture's depth with what its neighbours measure, and find out what is confirmed.
+    """Average each picture's depth with that of its neighbours, and return which of it is confirmed.
 
     A pixel's point is projected into the neighbouring pictures. A neighbour whose own depth there agrees
-    supports the point and contributes its depth with weight z^-4 (stereo depth errors grow as z^2); one
-    that looks through the point, into sky or onto something farther, contradicts it; one that sees
-    something nearer says nothing. A measured point is confirmed by more supporters than contradict it, or
-    where no other picture can tell. A guessed point has no say about others; it is confirmed where nobody
-    contradicts it and nobody has measured the same surface.
+    supports the point and contributes its depth with weight z^-4 (stereo depth errors grow as z^2); one that sees
+    through the point, into sky or onto a farther surface, contradicts it; one that sees a nearer surface does not
+    count. A measured point is confirmed if more neighbours support than contradict it, or if no neighbour counts. A
+    guessed point does not count for others; it is confirmed if no neighbour contradicts it or has measured it.
 
     Parameters
     ----------
@@ -48,13 +56,12 @@ def fuse_depth(
     fused = depth.copy()
     confirmed = np.zeros(depth.shape, dtype=np.bool_)
     for n in range(len(depth)):
-        others = [n + o for o in CHECK_OFFSETS if 0 <= n + o < len(depth)]
-        relative = np.linalg.inv(T_world_camera[others]) @ T_world_camera[n]
-        _check(n, depth, guessed, np.array(others), relative, intrinsics, disparity_scale, fused, confirmed)
+        neighbours = _find_neighbours(n, CHECK_OFFSETS, T_world_camera)
+        _compare_with_neighbours(n, depth, guessed, neighbours, intrinsics, disparity_scale, fused, confirmed)
     return fused, confirmed
 
 
-def seen_finest(
+def find_finest_view(
     n: int,
     fused: NDArray[np.float32],
     confirmed: NDArray[np.bool_],
@@ -62,16 +69,22 @@ def seen_finest(
     disparity_scale: float,
     T_world_camera: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Confirmed pixels of picture n whose surface no other picture shows larger, bool [H, W]; see `fuse_depth`."""
-    others = [n + o for o in FINER_OFFSETS if 0 <= n + o < len(fused)]
-    relative = np.linalg.inv(T_world_camera[others]) @ T_world_camera[n]
+    """Return the confirmed pixels of picture n whose surface no other picture shows larger, bool [H, W]."""
+    neighbours = _find_neighbours(n, FINER_OFFSETS, T_world_camera)
     keep = confirmed[n].copy()
-    _drop_coarser(n, fused, confirmed, np.array(others), relative, intrinsics, disparity_scale, keep)
+    _drop_coarser(n, fused, confirmed, neighbours, intrinsics, disparity_scale, keep)
     return keep
 
 
+def _find_neighbours(n: int, offsets: tuple[int, ...], T_world_camera: NDArray[np.float64]) -> _Neighbours:
+    numbers = [n + offset for offset in offsets if 0 <= n + offset < len(T_world_camera)]
+    relative = np.linalg.inv(T_world_camera[numbers]) @ T_world_camera[n]
+    return _Neighbours(np.array(numbers), relative)
+
+
 @numba.njit(cache=True, nogil=True)
-def _check(n, depth, guessed, others, relative, K, bf, fused, confirmed):  # type: ignore[no-untyped-def]
+def _compare_with_neighbours(n, depth, guessed, neighbours, K, bf, fused, confirmed):  # type: ignore[no-untyped-def]
+    others, relative = neighbours
     height, width = depth.shape[1:]
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     for v in range(height):
@@ -119,7 +132,8 @@ def _check(n, depth, guessed, others, relative, K, bf, fused, confirmed):  # typ
 
 
 @numba.njit(cache=True, nogil=True)
-def _drop_coarser(n, depth, confirmed, others, relative, K, bf, keep):  # type: ignore[no-untyped-def]
+def _drop_coarser(n, depth, confirmed, neighbours, K, bf, keep):  # type: ignore[no-untyped-def]
+    others, relative = neighbours
     height, width = depth.shape[1:]
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     for v in range(height):

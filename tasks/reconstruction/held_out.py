@@ -1,30 +1,31 @@
-"""How well a scene shows pictures that its build never saw."""
+"""Quality of a scene on held-out pictures: those that its build never read."""
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES
+from tasks.eval.image_quality import WINDOW, psnr, ssim
 from tasks.reconstruction.camera import rasteriser_intrinsics
 from tasks.reconstruction.exposure import Exposure
-from tasks.reconstruction.fidelity import psnr, ssim_map
 from tasks.reconstruction.sequence import StereoSequence
 from tasks.reconstruction.sky import sky_view
-from tasks.render.camera import viewmat
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.camera import world_to_camera
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeldOutFrame:
-    """How well one picture that the build never saw is shown.
+    """Quality of one held-out picture, figures of `tasks.eval.image_quality`.
 
     Parameters
     ----------
     frame : number in the sequence [1]
     psnr_db, ssim : over the whole picture [dB], [1]
-    road_psnr_db, road_ssim : over the pixels that the scene shows as road [dB], [1]
+    road_psnr_db, road_ssim : over the pixels that the scene shows as road; NaN where there is none [dB], [1]
     road_share, covered_share : of the picture that is road, and that Gaussians more than half cover [1]
     """
 
@@ -37,7 +38,7 @@ class HeldOutFrame:
     covered_share: float
 
 
-def judge(
+def score_held_out_frames(
     scene: Scene,
     sequence: StereoSequence,
     T_world_camera: NDArray[np.float64],
@@ -54,23 +55,24 @@ def judge(
     exposure : gains of all frames
     frames : int [M] numbers of the frames to judge [1]
     """
-    prepared = prepare(scene.gaussians)
+    prepared = prepare_gaussians(scene.gaussians)
     K = rasteriser_intrinsics(sequence.intrinsics)
     height, width = sequence.left.shape[1:3]
     rows = []
     for i in map(int, frames):
-        gbuffer = rasterise(prepared, viewmat(T_world_camera[i]), K, width, height)
+        gbuffer = rasterise(prepared, world_to_camera(T_world_camera[i]), K, width, height)
         sky = sky_view(scene.environment, (height, width), sequence.intrinsics, T_world_camera[i])
-        shown = exposure.picture(gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky, i)
-        wanted = sequence.left[i] / np.float32(255)
+        shown = exposure.to_picture(gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky, i)
+        shown = np.rint(shown * np.float32(255)).astype(np.uint8)
+        wanted = sequence.left[i]
         road = np.isin(gbuffer.class_id, ROAD_CLASSES)
-        similarity = ssim_map(shown, wanted)
+        edge = WINDOW // 2
         rows.append(HeldOutFrame(
             frame=i,
-            psnr_db=psnr(shown, wanted),
-            ssim=float(similarity.mean()),
-            road_psnr_db=psnr(shown, wanted, road),
-            road_ssim=float(similarity[road].mean()) if road.any() else float("nan"),
+            psnr_db=psnr(wanted, shown),
+            ssim=ssim(wanted, shown),
+            road_psnr_db=psnr(wanted, shown, road) if road.any() else nan,
+            road_ssim=ssim(wanted, shown, road) if road[edge:-edge, edge:-edge].any() else nan,
             road_share=float(road.mean()),
             covered_share=float((gbuffer.alpha > 0.5).mean()),
         ))  # fmt: skip

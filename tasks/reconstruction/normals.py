@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 RADIUS = 3
 """Half side of the window in which a plane is fitted [px]."""
 SAME_SURFACE = 1.0
-"""Disparities further apart belong to different surfaces [px]."""
+"""Largest difference between disparities of one surface [px]."""
 STIFFNESS = 2.0
-"""Pull towards a surface of constant depth, which keeps thin patches sound [px^2]."""
+"""Weight of a prior of constant depth, which stabilises thin patches [px^2]."""
 
 
 def camera_normals(
     depth: NDArray[np.float32], intrinsics: NDArray[np.float64], disparity_scale: float
 ) -> NDArray[np.float32]:
-    """Unit normals in camera coordinates, facing the camera; NaN where the depth is not finite.
+    """Return unit normals in camera coordinates, facing the camera; NaN where the depth is not finite.
 
     A plane is linear in disparity, d = a u + b v + c with u and v from the principal point, and its normal
     lies along (a fx, b fy, c). The slopes come from least squares over the pixels of a window that lie on
@@ -69,10 +69,10 @@ def _plane_normals(disparity, K):  # type: ignore[no-untyped-def]
     return normals
 
 
-def turned_to_camera(
+def turn_to_camera(
     normals: NDArray[np.floating], rays: NDArray[np.floating], least_cosine: float
 ) -> NDArray[np.float64]:
-    """Normals turned just so far that a surface is not seen flatter than a least cosine.
+    """Turn normals as little as needed so that no surface is seen at less than a least cosine.
 
     Parameters
     ----------

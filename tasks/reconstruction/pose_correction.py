@@ -1,4 +1,4 @@
-"""Small corrections that make the given poses agree with the pictures, by visual odometry on a graph."""
+"""Correction of the given poses by the pictures: visual odometry on a pose graph."""
 
 import cv2
 import numpy as np
@@ -9,11 +9,11 @@ FRAME_GAPS = (1, 2, 4)
 TRACKS = 1500
 """Corners tracked per pair."""
 HUBER = 0.5
-"""Residual beyond which a track counts linearly [px]."""
+"""Residual above which a track counts linearly [px]."""
 GROSS = 3.0
-"""Residual beyond which a track is a mismatch once the poses have settled [px]."""
+"""Residual above which a track is a mismatch in the last iterations [px]."""
 PRIOR_ROTATION, PRIOR_TRANSLATION = np.radians(0.5), 0.1
-"""How far the given poses are trusted [rad], [m]."""
+"""Standard deviations of the prior on the given poses [rad], [m]."""
 ITERATIONS = 6
 
 
@@ -25,12 +25,12 @@ def correct_poses(
     T_origin_camera: NDArray[np.float64],
     training: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Poses after the smallest correction under which tracked corners reproject.
+    """Return the poses after the smallest correction under which tracked corners reproject.
 
     Corners of one training picture get their depth from its disparity and are tracked into the next
     training pictures; Gauss-Newton over all poses at once minimises the Huber-weighted reprojection
-    error plus a weak prior on the given poses. Pictures that are not training frames are not looked
-    at: their poses receive the correction interpolated between the neighbouring training frames.
+    error plus a weak prior on the given poses. Pictures that are not training frames are not read:
+    their poses receive the correction interpolated between the neighbouring training frames.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def correct_poses(
     pairs = []
     for gap in FRAME_GAPS:
         for i, j in zip(training[:-gap], training[gap:], strict=True):
-            points, pixels = _tracks(
+            points, pixels = _track_corners(
                 pictures[i],
                 pictures[j],
                 disparity[i],
@@ -74,22 +74,22 @@ def correct_poses(
             information, gradient = _reprojection_normal_equations(
                 relative, points, pixels, intrinsics, np.inf if iteration < 2 else GROSS
             )
-            A = _adjoint(relative)
+            A = _adjoint_matrix(relative)
             for a, left in ((row[i], A.T), (row[j], -np.eye(6))):
                 b[a] += left @ gradient
                 for c, right in ((row[i], A), (row[j], -np.eye(6))):
                     H[a, :, c, :] += left @ information @ right
         size = 6 * len(row)
         step = np.linalg.solve(H.reshape(size, size), b.reshape(size)).reshape(-1, 6)
-        poses = {i: poses[i] @ exponential(step[n]) for i, n in row.items()}
+        poses = {i: poses[i] @ exponential_map(step[n]) for i, n in row.items()}
 
     corrections = np.array([_small_log(np.linalg.inv(given[i]) @ poses[i]) for i in row])
     frames = np.arange(len(given))
     everywhere = np.stack([np.interp(frames, training, corrections[:, k]) for k in range(6)], axis=1)
-    return np.array([given[i] @ exponential(everywhere[i]) for i in frames])
+    return np.array([given[i] @ exponential_map(everywhere[i]) for i in frames])
 
 
-def _tracks(
+def _track_corners(
     first: NDArray[np.uint8],
     second: NDArray[np.uint8],
     disparity: NDArray[np.float32],
@@ -97,7 +97,7 @@ def _tracks(
     disparity_scale: float,
     relative: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of the first picture as camera points [m] and where they are in the second [px]."""
+    """Return corners of the first picture as camera points [m], and their places in the second [px]."""
     matched = np.isfinite(disparity)
     corners = cv2.goodFeaturesToTrack(first, TRACKS, 0.003, 7, mask=matched.astype(np.uint8))
     if corners is None:
@@ -114,19 +114,19 @@ def _tracks(
     if not len(corners):
         return np.empty((0, 3)), np.empty((0, 2))
 
-    found, ok = _flow(first, second, corners, guess)
-    back, ok_back = _flow(second, first, found, corners)
+    found, ok = _track_points(first, second, corners, guess)
+    back, ok_back = _track_points(second, first, found, corners)
     good = ok & ok_back & (np.abs(back - corners).max(axis=1) < 0.5)
     return points[good], found[good].astype(np.float64)
 
 
-def _flow(
+def _track_points(
     first: NDArray[np.uint8],
     second: NDArray[np.uint8],
     start: NDArray[np.float32],
     guess: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Where points of the first picture are in the second, by Lucas and Kanade's method, and which were found."""
+    """Track points of the first picture to the second by Lucas and Kanade's method; return also which were found."""
     found, ok, _ = cv2.calcOpticalFlowPyrLK(
         first,
         second,
@@ -146,7 +146,7 @@ def _reprojection_normal_equations(
     intrinsics: NDArray[np.float64],
     gross: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Information matrix and right-hand side of a left increment (rotation, translation) of the relative pose."""
+    """Return information matrix and right-hand side of a left increment (rotation, translation) of the pose."""
     p = points @ relative[:3, :3].T + relative[:3, 3]
     front = p[:, 2] > 0.5
     p, pixels = p[front], pixels[front]
@@ -173,14 +173,14 @@ def _cross_matrices(v: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-def _adjoint(T: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Carries a right increment (rotation, translation) of T's source to a left increment of T."""
+def _adjoint_matrix(T: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the matrix that takes a right increment (rotation, translation) of T to a left increment of T."""
     R, t = T[:3, :3], T[:3, 3]
     return np.block([[R, np.zeros((3, 3))], [_cross_matrices(t) @ R, R]])
 
 
-def exponential(increment: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rigid motion of a small increment: rotation vector [rad], then translation [m]."""
+def exponential_map(increment: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rigid motion of a small increment: rotation vector [rad], then translation [m]."""
     T = np.eye(4)
     T[:3, :3] = cv2.Rodrigues(increment[:3])[0]
     T[:3, 3] = increment[3:]
@@ -188,5 +188,5 @@ def exponential(increment: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _small_log(T: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inverse of `exponential`."""
+    """Inverse of `exponential_map`."""
     return np.concatenate([cv2.Rodrigues(T[:3, :3])[0][:, 0], T[:3, 3]])

@@ -1,4 +1,4 @@
-"""The whole way from a posed stereo sequence to a street one can drive, and how well it shows what it never saw."""
+"""Reconstruction of a drivable street from a posed stereo sequence, with its quality on held-out pictures."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,30 +8,30 @@ from numpy.typing import NDArray
 
 from tasks.errors import InputError
 from tasks.reconstruction.camera import rasteriser_intrinsics
-from tasks.reconstruction.cloud import cloud_of
-from tasks.reconstruction.disparity import filled, match
+from tasks.reconstruction.cloud import build_cloud
+from tasks.reconstruction.disparity import fill_disparity, match_stereo
 from tasks.reconstruction.exposure import Exposure, estimate_exposure
-from tasks.reconstruction.fusion import fuse_depth, seen_finest
-from tasks.reconstruction.held_out import HeldOutFrame, judge
+from tasks.reconstruction.fusion import find_finest_view, fuse_depth
+from tasks.reconstruction.held_out import HeldOutFrame, score_held_out_frames
 from tasks.reconstruction.normals import camera_normals
 from tasks.reconstruction.pose_correction import correct_poses
-from tasks.reconstruction.refinement import TrainingView, refine
-from tasks.reconstruction.road_plane import fit_road_plane, route_below, settled
+from tasks.reconstruction.refinement import TrainingView, refine_gaussians
+from tasks.reconstruction.road_plane import fit_road_plane, lay_route_below, settle_route
 from tasks.reconstruction.sequence import StereoSequence, StereoSettings
-from tasks.reconstruction.sky import fit_sky, panorama, sky_mask, sky_view
-from tasks.reconstruction.surfels import Surfels, joined, sample
-from tasks.render.camera import viewmat
+from tasks.reconstruction.sky import build_panorama, fit_sky, sky_mask, sky_view
+from tasks.reconstruction.surfels import Surfels, join_samples, sample_picture
+from tasks.render.camera import world_to_camera
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene
-from tasks.scene.surroundings import with_surroundings
+from tasks.scene.surroundings import add_surroundings
 
 CLIPPED = 254
-"""Pixel values from here on may stand for any brighter light."""
+"""Pixel values of at least this may stand for any brighter light."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reconstruction:
-    """A scene and what is known about it.
+    """A scene and the record of its reconstruction.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ class Reconstruction:
     T_world_camera: NDArray[np.float64]
     exposure: Exposure
 
-    def figures(self) -> dict[str, Any]:
-        """Means over the held-out frames and the table, in plain numbers."""
+    def summarise(self) -> dict[str, Any]:
+        """Return means over the held-out frames and the table, in plain numbers."""
         frames = [vars(frame) for frame in self.held_out]
         means = {
             f"held_out_{name}": float(np.nanmean([frame[name] for frame in frames]))
@@ -56,11 +56,11 @@ class Reconstruction:
         return means | {"held_out_frames": frames}
 
 
-def reconstruct(sequence: StereoSequence, settings: StereoSettings | None = None) -> Reconstruction:
+def reconstruct_street(sequence: StereoSequence, settings: StereoSettings | None = None) -> Reconstruction:
     """Build a Gaussian street from a posed stereo sequence.
 
-    The held-out frames are left out of everything: their pose receives the correction, and their exposure
-    the gain, interpolated between the neighbouring training frames.
+    No step of the build reads a held-out frame: its pose correction and its gain are interpolated between the
+    neighbouring training frames.
 
     Parameters
     ----------
@@ -85,17 +85,17 @@ def reconstruct(sequence: StereoSequence, settings: StereoSettings | None = None
         )
     disparity = np.full(sequence.left.shape[:3], np.nan, dtype=np.float32)
     for i in training:
-        disparity[i] = match(sequence.left[i], sequence.right[i], settings.disparities)
-    poses, route = _poses_and_route(sequence, disparity, training, settings)
+        disparity[i] = match_stereo(sequence.left[i], sequence.right[i], settings.disparities)
+    poses, route = _find_poses_and_route(sequence, disparity, training, settings)
     grey = sequence.left[..., 1]
     exposure = estimate_exposure(
         grey, disparity, sequence.intrinsics, sequence.disparity_scale, poses, training
     )
-    environment, is_sky = _sky(sequence, exposure, poses, training, settings)
-    depth, confirmed = _fused(sequence, disparity[training], is_sky, poses[training], settings)
-    route, poses = _on_the_road(route, poses, depth, confirmed, sequence, training)
-    surfels, picture = _surfels(sequence, exposure, depth, confirmed, poses, training, settings)
-    cloud = cloud_of(
+    environment, is_sky = _find_sky(sequence, exposure, poses, training, settings)
+    depth, confirmed = _fuse_depth_maps(sequence, disparity[training], is_sky, poses[training], settings)
+    route, poses = _settle_on_road(route, poses, depth, confirmed, sequence, training)
+    surfels, picture = _sample_surfels(sequence, exposure, depth, confirmed, poses, training, settings)
+    cloud = build_cloud(
         surfels,
         poses[training][picture],
         route,
@@ -110,9 +110,9 @@ def reconstruct(sequence: StereoSequence, settings: StereoSettings | None = None
     def training_view(n: int) -> TrainingView:
         i = int(training[n])
         return TrainingView(
-            viewmat=viewmat(poses[i]),
+            viewmat=world_to_camera(poses[i]),
             K=K,
-            radiance=exposure.radiance(sequence.left[i], i),
+            radiance=exposure.to_radiance(sequence.left[i], i),
             clipped=sequence.left[i].min(axis=2) >= CLIPPED,
             gain=exposure.falloff * np.float32(exposure.gains[i]),
             sky=sky_view(environment, shape, sequence.intrinsics, poses[i]),
@@ -120,9 +120,9 @@ def reconstruct(sequence: StereoSequence, settings: StereoSettings | None = None
 
     scene = Scene(
         name=sequence.name,
-        gaussians=with_surroundings(
-            refine(
-                with_surroundings(cloud.gaussians),
+        gaussians=add_surroundings(
+            refine_gaussians(
+                add_surroundings(cloud.gaussians),
                 cloud.rays,
                 training_view,
                 len(training),
@@ -136,77 +136,77 @@ def reconstruct(sequence: StereoSequence, settings: StereoSettings | None = None
     )
     return Reconstruction(
         scene=scene,
-        held_out=judge(scene, sequence, poses, exposure, held_out),
+        held_out=score_held_out_frames(scene, sequence, poses, exposure, held_out),
         T_world_camera=poses,
         exposure=exposure,
     )
 
 
-def _poses_and_route(
+def _find_poses_and_route(
     sequence: StereoSequence,
     disparity: NDArray[np.float32],
     training: NDArray[np.int64],
     settings: StereoSettings,
 ) -> tuple[NDArray[np.float64], Route]:
-    """Corrected poses and the route, in the rig frame at the start of the route."""
+    """Return corrected poses and the route, in the rig frame at the start of the route."""
     scale = sequence.disparity_scale
     poses = correct_poses(
         sequence.left[..., 1], disparity, sequence.intrinsics, scale, sequence.T_origin_camera, training
     )
     planes = np.array([fit_road_plane(disparity[i], sequence.intrinsics, scale) for i in training])
-    route = route_below(
+    route = lay_route_below(
         poses[training],
         planes,
         settings.camera_ahead_of_front_axle,
         settings.first_station,
         settings.extension,
     )
-    return _from_start(route, poses)
+    return _move_to_start(route, poses)
 
 
-def _from_start(route: Route, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], Route]:
-    """Poses and route in the frame of the route's first pose."""
+def _move_to_start(route: Route, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], Route]:
+    """Return poses and route in the frame of the route's first pose."""
     T = np.linalg.inv(route.T_world_rig[0])
     return T @ poses, Route(station=route.station, T_world_rig=T @ route.T_world_rig)
 
 
-def _sky(
+def _find_sky(
     sequence: StereoSequence,
     exposure: Exposure,
     poses: NDArray[np.float64],
     training: NDArray[np.int64],
     settings: StereoSettings,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """The panorama, and the sky pixels of each training picture."""
-    radiance = [exposure.radiance(sequence.left[i], int(i)) for i in training]
+    """Return the panorama, and the sky pixels of each training picture."""
+    radiance = [exposure.to_radiance(sequence.left[i], int(i)) for i in training]
     sky = fit_sky(radiance, sequence.intrinsics, poses[training])
     masks = [
         sky_mask(picture, sky, sequence.intrinsics, poses[i])
         for picture, i in zip(radiance, training, strict=True)
     ]
-    environment = panorama(
+    environment = build_panorama(
         sky, radiance, masks, sequence.intrinsics, poses[training], settings.environment_rows
     )
     return environment, np.array(masks)
 
 
-def _fused(
+def _fuse_depth_maps(
     sequence: StereoSequence,
     disparity: NDArray[np.float32],
     is_sky: NDArray[np.bool_],
     poses: NDArray[np.float64],
     settings: StereoSettings,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Depth of the training pictures, filled, averaged over neighbours, and which of it is confirmed."""
+    """Return the depth of the training pictures, filled, averaged over neighbours, and which of it is confirmed."""
     scale = sequence.disparity_scale
-    complete = np.array([filled(d, sky) for d, sky in zip(disparity, is_sky, strict=True)])
+    complete = np.array([fill_disparity(d, sky) for d, sky in zip(disparity, is_sky, strict=True)])
     guessed = np.isnan(disparity) & np.isfinite(complete)
     depth = np.minimum(scale / np.maximum(complete, 1e-3), settings.maximum_depth).astype(np.float32)
     depth[is_sky] = np.inf
     return fuse_depth(depth, guessed, sequence.intrinsics, scale, poses)
 
 
-def _on_the_road(
+def _settle_on_road(
     route: Route,
     poses: NDArray[np.float64],
     depth: NDArray[np.float32],
@@ -214,7 +214,7 @@ def _on_the_road(
     sequence: StereoSequence,
     training: NDArray[np.int64],
 ) -> tuple[Route, NDArray[np.float64]]:
-    """Route settled on the measured road, and everything in the frame of its new start."""
+    """Return the route moved onto the measured road, and the poses in the frame of its new start."""
     stride = 4
     points, distances = [], []
     for n, i in enumerate(training):
@@ -224,11 +224,13 @@ def _on_the_road(
         rays = np.stack([columns, rows, np.ones(len(z))], axis=1) @ np.linalg.inv(sequence.intrinsics).T
         points.append(rays * z[:, None] @ poses[i, :3, :3].T + poses[i, :3, 3])
         distances.append(z)
-    poses, route = _from_start(settled(route, np.concatenate(points), np.concatenate(distances)), poses)
+    poses, route = _move_to_start(
+        settle_route(route, np.concatenate(points), np.concatenate(distances)), poses
+    )
     return route, poses
 
 
-def _surfels(
+def _sample_surfels(
     sequence: StereoSequence,
     exposure: Exposure,
     depth: NDArray[np.float32],
@@ -237,19 +239,19 @@ def _surfels(
     training: NDArray[np.int64],
     settings: StereoSettings,
 ) -> tuple[Surfels, NDArray[np.int64]]:
-    """Samples of all training pictures, each surface from the picture that shows it largest, and which one."""
+    """Return samples of all training pictures, each surface from the picture that shows it largest, and its number."""
     K, scale = sequence.intrinsics, sequence.disparity_scale
     parts = [
-        sample(
-            seen_finest(n, depth, confirmed, K, scale, poses[training]),
+        sample_picture(
+            find_finest_view(n, depth, confirmed, K, scale, poses[training]),
             depth[n],
             camera_normals(depth[n], K, scale),
             sequence.left[i],
-            exposure.radiance(sequence.left[i], int(i)),
+            exposure.to_radiance(sequence.left[i], int(i)),
             K,
             scale,
             settings.spacing,
         )
         for n, i in enumerate(training)
     ]
-    return joined(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    return join_samples(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])

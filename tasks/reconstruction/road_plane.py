@@ -1,4 +1,4 @@
-"""The road under the drive: one plane per picture, joined to a route that lies on the road."""
+"""The road under the drive: one plane per picture, joined to a route on the road."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +11,19 @@ STATION_STEP = 0.5
 BANDWIDTH = 4.0
 """Length over which the route is smoothed [m]."""
 ROAD_SPREAD = 0.3
-"""Disparity error at which a pixel no longer counts fully as road [px]."""
+"""Disparity error above which a pixel counts less as road [px]."""
 LANE = 1.2
 """Half width of the strip whose height the route takes [m]."""
 SURFACE_REACH = 14.0
-"""Road nearer than this to a camera is measured well enough to settle the route on it [m]."""
+"""Road nearer than this to a camera is measured precisely enough to correct the route by it [m]."""
 SURFACE_SPREAD = 0.03
-"""Height above the road at which a point no longer counts fully as road [m]."""
+"""Height above the road above which a point counts less as road [m]."""
 
 
 def fit_road_plane(
     disparity: NDArray[np.float32], intrinsics: NDArray[np.float64], disparity_scale: float
 ) -> NDArray[np.float64]:
-    """Plane of the road ahead in camera coordinates, from one disparity picture.
+    """Fit the plane of the road ahead in camera coordinates to one disparity picture.
 
     A plane is linear in disparity: d(u, v) = a u + b v + c. Robust least squares over a trapezoid that
     narrows towards the vanishing point, as a lane does, gives a, b, c.
@@ -59,17 +59,17 @@ def fit_road_plane(
     return np.append(-m / norm, 1 / norm)
 
 
-def route_below(
+def lay_route_below(
     T_origin_camera: NDArray[np.float64],
     planes: NDArray[np.float64],
     camera_ahead_of_front_axle: float,
     first_station: float,
     extension: float,
 ) -> Route:
-    """Route on the road below the cameras, in the poses' own frame.
+    """Return the route on the road below the cameras, in the frame of the poses.
 
-    Every camera is dropped onto its plane; the foot points and the planes' normals are smoothed along the
-    drive; the rig's x axis follows the path. Beyond the last foot point the route runs straight on.
+    Every camera is projected onto its plane; the projections and the planes' normals are smoothed along the
+    drive; the rig's x axis follows the path. Beyond the last projection the route continues straight.
 
     Parameters
     ----------
@@ -99,16 +99,16 @@ def route_below(
         )
     up = np.einsum("fij,fj->fi", R, planes[known, :3])
     at = np.arange(first_station, driven[-1], STATION_STEP)
-    path, direction = _smoothed(driven, centre - up * planes[known, 3:], at)
-    normal, _ = _smoothed(driven, up, at)
-    poses = _facing(path, direction, normal)
+    path, direction = _smooth_path(driven, centre - up * planes[known, 3:], at)
+    normal, _ = _smooth_path(driven, up, at)
+    poses = _poses_along_path(path, direction, normal)
     poses[:, :3, 3] -= camera_ahead_of_front_axle * poses[:, :3, 0]
     beyond = driven[-1] - at[-1] + extension
     return extend_route(route_from_poses(poses), beyond, STATION_STEP)
 
 
-def settled(route: Route, points: NDArray[np.floating], depth: NDArray[np.floating]) -> Route:
-    """The route moved up or down, and rolled, onto the measured road surface.
+def settle_route(route: Route, points: NDArray[np.floating], depth: NDArray[np.floating]) -> Route:
+    """Move the route up or down, and roll it, onto the measured road surface.
 
     Parameters
     ----------
@@ -142,13 +142,13 @@ def settled(route: Route, points: NDArray[np.floating], depth: NDArray[np.floati
     poses[:, :3, 3] += rise * poses[:, :3, 2]
     poses[:, :3, 2] -= crossfall * poses[:, :3, 1]
     direction = np.gradient(poses[:, :3, 3], route.station, axis=0)
-    return route_from_poses(_facing(poses[:, :3, 3], direction, poses[:, :3, 2]))
+    return route_from_poses(_poses_along_path(poses[:, :3, 3], direction, poses[:, :3, 2]))
 
 
-def _facing(
+def _poses_along_path(
     path: NDArray[np.float64], direction: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Poses on a path with x along the direction and z as near to the normal as can be."""
+    """Return poses on a path with x along the direction and z as close to the normal as possible."""
     x = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     z = normal - (normal * x).sum(axis=1, keepdims=True) * x
     z /= np.linalg.norm(z, axis=1, keepdims=True)
@@ -158,10 +158,10 @@ def _facing(
     return poses
 
 
-def _smoothed(
+def _smooth_path(
     s: NDArray[np.float64], values: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Value and slope by local linear regression with a Gaussian window."""
+    """Return value and slope by local linear regression with a Gaussian window."""
     out, slope = np.empty((len(at), values.shape[1])), np.empty((len(at), values.shape[1]))
     for k, x in enumerate(at):
         A = np.stack([np.ones(len(s)), s - x], axis=1)

@@ -1,4 +1,4 @@
-"""What goes in: rectified stereo pairs with poses, and the settings of the reconstruction."""
+"""Input of the reconstruction: rectified stereo pairs with poses, and settings."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ class StereoSequence:
 
     Parameters
     ----------
-    name : what the scene will be called
+    name : name of the scene
     left, right : uint8 [F, H, W, 3] pictures, sRGB-encoded [1]
     intrinsics : float64 [3, 3] camera matrix of both cameras, pixel centres at whole numbers [px]
     baseline : distance from the left to the right camera along camera +x [m]
@@ -46,11 +46,11 @@ class StereoSettings:
     ----------
     disparities : disparity range searched, a multiple of 16 [px]
     held_out_every, held_out_first : which frames are left out of the whole build and judged afterwards.
-        By default 4, 12, 20 ...: the first and the last picture stay in, since no other shows what they show
+        By default 4, 12, 20 ...: the first and the last picture stay in, since they show surfaces that no other shows
     camera_ahead_of_front_axle : position of the camera along the rig's x axis [m]
     first_station : the route starts this far behind the first pose, because no picture shows nearer road [m]
     extension : straight road added to the route beyond the last pose [m]
-    maximum_depth : what is farther is put at this depth [m]
+    maximum_depth : farther surfaces are placed at this depth [m]
     carriageway_limit : largest lateral extent of the carriageway on either side of the route [m]
     spacing : distance between neighbouring Gaussians in the picture that shows them largest [px]
     refinement_passes : how often colour, opacity and place are corrected over all training pictures [1]
@@ -89,5 +89,5 @@ class StereoSettings:
             raise InputError(problems)
 
     def held_out(self, count: int) -> NDArray[np.int64]:
-        """Numbers of the frames, of ``count``, that the build never sees [1]."""
+        """Return the numbers of the frames, of ``count``, that the build never reads [1]."""
         return np.arange(self.held_out_first, count, self.held_out_every)

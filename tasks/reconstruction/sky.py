@@ -1,4 +1,4 @@
-"""The sky: what stands still while the camera drives, as a smooth model, as masks and as a panorama."""
+"""The sky: directions of constant light during the drive, as a smooth model, as masks and as a panorama."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.reconstruction.camera import pixel_rays, rasteriser_intrinsics
-from tasks.render.camera import viewmat
+from tasks.render.camera import world_to_camera
 from tasks.render.environment import environment_view
 
 BIN = 12
@@ -19,9 +19,9 @@ EVEN = 0.05
 STEADY = 0.10
 """Sky changes less than this over the drive: interquartile range as a share of the median [1]."""
 CLIPPED = 0.98
-"""A direction this bright may be a white wall as well as sky, and does not decide [1]."""
+"""A direction this bright may be a white wall as well as sky, and is not used in the fit [1]."""
 FIT_SPREAD = 0.05
-"""Relative error at which a direction no longer counts fully in the fit [1]."""
+"""Relative error above which a direction counts less in the fit [1]."""
 ENOUGH = 20
 """Steady directions needed for a sky [1]."""
 MATCHING = 0.14
@@ -29,11 +29,11 @@ MATCHING = 0.14
 HORIZON = np.radians(0.5)
 """Nothing below this elevation is sky [rad]."""
 SMALLEST_PATCH = 12
-"""Smaller patches cannot be told from a leaf of the sky's brightness [px]."""
+"""Smaller patches cannot be distinguished from a leaf of the sky's brightness [px]."""
 SMOOTHING = np.radians(0.7)
 """Standard deviation of the panorama's smoothing [rad]."""
 MODEL_WEIGHT = 4.0
-"""The smooth model counts as much as this many pixels in the panorama [1]."""
+"""Weight of the smooth model in the panorama, in pixels [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,19 +50,21 @@ class Sky:
     azimuth: tuple[float, float]
     elevation: tuple[float, float]
 
-    def radiance(self, azimuth: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Linear light [..., 3] along directions [rad]."""
-        terms = _terms(np.clip(azimuth, *self.azimuth), np.clip(elevation, *self.elevation))
+    def radiance_along(
+        self, azimuth: NDArray[np.float64], elevation: NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """Return linear light [..., 3] along directions [rad]."""
+        terms = _polynomial_terms(np.clip(azimuth, *self.azimuth), np.clip(elevation, *self.elevation))
         return np.maximum(terms @ self.coefficients, 0).astype(np.float32)
 
 
 def azimuth_elevation(rays: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Azimuth from +x towards +y, and elevation [rad], of world rays [..., 3]."""
+    """Return azimuth from +x towards +y, and elevation [rad], of world rays [..., 3]."""
     x, y, z = np.moveaxis(rays, -1, 0)
     return np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
 
 
-def _terms(azimuth: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDArray[np.float64]:
+def _polynomial_terms(azimuth: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     a, e = azimuth, elevation
     return np.stack([np.ones_like(a), a, e, a * a, a * e, e * e], axis=-1)
 
@@ -70,7 +72,7 @@ def _terms(azimuth: NDArray[np.float64], elevation: NDArray[np.float64]) -> NDAr
 def fit_sky(
     radiance: list[NDArray[np.float32]], intrinsics: NDArray[np.float64], T_world_camera: NDArray[np.float64]
 ) -> Sky | None:
-    """The sky from directions that are even and keep their colour over the whole drive.
+    """Fit the sky to directions that are even and keep their colour over the whole drive.
 
     Parameters
     ----------
@@ -108,7 +110,7 @@ def fit_sky(
     if steady.sum() < ENOUGH:
         return None
     a, e = (cells[steady] + 0.5).T * bin_size
-    A, target = _terms(a, e), median[steady].astype(np.float64)
+    A, target = _polynomial_terms(a, e), median[steady].astype(np.float64)
     weight = np.ones(len(A))
     for _ in range(20):
         W = A * weight[:, None]
@@ -129,7 +131,7 @@ def sky_mask(
     intrinsics: NDArray[np.float64],
     T_world_camera: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Pixels of one picture that show sky, bool [H, W].
+    """Return the pixels of one picture that show sky, bool [H, W].
 
     Parameters
     ----------
@@ -143,7 +145,7 @@ def sky_mask(
     azimuth, elevation = azimuth_elevation(
         pixel_rays(radiance.shape[:2], intrinsics) @ T_world_camera[:3, :3].T
     )
-    expected = sky.radiance(azimuth, elevation)
+    expected = sky.radiance_along(azimuth, elevation)
     near = np.abs(radiance - expected).max(axis=2) < MATCHING * expected.mean(axis=2)
     near &= elevation > HORIZON
     _, labels, stats, _ = cv2.connectedComponentsWithStats(near.astype(np.uint8), connectivity=4)
@@ -152,7 +154,7 @@ def sky_mask(
     return large[labels]
 
 
-def panorama(
+def build_panorama(
     sky: Sky | None,
     radiance: list[NDArray[np.float32]],
     masks: list[NDArray[np.bool_]],
@@ -160,9 +162,9 @@ def panorama(
     T_world_camera: NDArray[np.float64],
     rows: int,
 ) -> NDArray[np.float32]:
-    """Equirectangular sky: the mean of the sky pixels seen, drawn towards the smooth model.
+    """Return the equirectangular sky: the mean of the sky pixels, weighted with the smooth model.
 
-    Below the horizon it has the median radiance of what is not sky, so that a gap in the street looks dark.
+    Below the horizon it has the median radiance of the other pixels, so that a gap in the street looks dark.
 
     Parameters
     ----------
@@ -185,7 +187,7 @@ def panorama(
     azimuth = np.pi * (1 - (2 * np.arange(columns) + 1) / columns)
     elevation = np.pi * (0.5 - (np.arange(rows) + 0.5) / rows)
     upper = elevation > 0
-    model = sky.radiance(*np.meshgrid(azimuth, elevation[upper]))
+    model = sky.radiance_along(*np.meshgrid(azimuth, elevation[upper]))
     total, count = MODEL_WEIGHT * model.astype(np.float64), np.full(model.shape[:2], MODEL_WEIGHT)
     rays = pixel_rays(masks[0].shape, intrinsics)
     for picture, mask, pose in zip(radiance, masks, T_world_camera, strict=True):
@@ -208,7 +210,7 @@ def sky_view(
     intrinsics: NDArray[np.float64],
     T_world_camera: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """The panorama as one picture [H, W, 3] of the sequence sees it."""
+    """Return the part of the panorama that one picture [H, W, 3] of the sequence shows."""
     return environment_view(
-        environment, viewmat(T_world_camera), rasteriser_intrinsics(intrinsics), shape[1], shape[0]
+        environment, world_to_camera(T_world_camera), rasteriser_intrinsics(intrinsics), shape[1], shape[0]
     )

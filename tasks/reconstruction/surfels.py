@@ -1,4 +1,4 @@
-"""From confirmed pixels to Gaussians: where, how large, how turned."""
+"""Samples of confirmed pixels: place, size and orientation of the Gaussians."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +23,7 @@ THICKNESS = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class Surfels:
-    """Samples of surfaces, each as the picture that shows it largest sees it.
+    """Samples of surfaces, each from the picture that shows it largest.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Surfels:
         return len(self.depth)
 
 
-def sample(
+def sample_picture(
     wanted: NDArray[np.bool_],
     depth: NDArray[np.float32],
     normals: NDArray[np.float32],
@@ -70,31 +70,33 @@ def sample(
     rays = pixel_rays(depth.shape, intrinsics)
     disparity = np.where(wanted, disparity_scale / depth, 0)
     smooth = cv2.blur(picture.max(axis=2), (3, 3)).astype(np.int64)
-    even = np.logical_and.reduce(_blocks(wanted, COARSE), axis=(1, 3))
+    even = np.logical_and.reduce(_view_blocks(wanted, COARSE), axis=(1, 3))
     for values, limit in ((smooth, EVEN), (disparity, ONE_SURFACE)):
-        cells = _blocks(values, COARSE)
+        cells = _view_blocks(values, COARSE)
         even &= cells.max(axis=(1, 3)) - cells.min(axis=(1, 3)) <= limit
     in_even = np.zeros(wanted.shape, dtype=np.bool_)
-    _blocks(in_even, COARSE)[...] = even[:, None, :, None]
+    _view_blocks(in_even, COARSE)[...] = even[:, None, :, None]
 
     parts = []
     for cell, chosen in ((COARSE, even), (spacing, None)):
         # A cell is represented by its middle; its depth and normal are those of the pixel beside it.
-        middle = _blocks(wanted & ~in_even, cell)[:, cell // 2, :, cell // 2] if chosen is None else chosen
+        middle = (
+            _view_blocks(wanted & ~in_even, cell)[:, cell // 2, :, cell // 2] if chosen is None else chosen
+        )
         rows, columns = (cell * k + cell // 2 for k in np.nonzero(middle))
         shift = 0.5 if cell % 2 == 0 else 0.0
         parts.append(Surfels(
             rays=rays[rows, columns] - shift * np.append(1 / intrinsics[[0, 1], [0, 1]], 0),
             depth=depth[rows, columns].astype(np.float64),
             normals=normals[rows, columns].astype(np.float64),
-            radiance=_blocks(radiance, cell).mean(axis=(1, 3))[middle],
+            radiance=_view_blocks(radiance, cell).mean(axis=(1, 3))[middle],
             spacing=np.full(len(rows), float(cell)),
         ))  # fmt: skip
-    return joined(parts)
+    return join_samples(parts)
 
 
-def _blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
-    """View of [H, W, ...] as [H / side, side, W / side, side, ...], without the rest at the far edges."""
+def _view_blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
+    """Return [H, W, ...] viewed as [H / side, side, W / side, side, ...], without the rest at the far edges."""
     rows, columns = (n // side for n in values.shape[:2])
     cut = values[: rows * side, : columns * side]
     shape, strides = cut.shape, cut.strides
@@ -105,20 +107,20 @@ def _blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
     )
 
 
-def joined(parts: list[Surfels]) -> Surfels:
-    """All samples in one."""
+def join_samples(parts: list[Surfels]) -> Surfels:
+    """Concatenate the samples."""
     names = ("rays", "depth", "normals", "radiance", "spacing")
     return Surfels(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
-def ellipses(
+def derive_discs(
     rays: NDArray[np.float64],
     depth: NDArray[np.float64],
     normals: NDArray[np.float64],
     spacing: NDArray[np.float64],
     focal_length: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Axes and standard deviations of discs in the surface whose picture is round.
+    """Return axes and standard deviations of discs in the surface whose picture is round.
 
     In the camera that took the sample, the disc's picture is a Gaussian of standard deviation
     ``COVERAGE * spacing``.
@@ -136,7 +138,7 @@ def ellipses(
     rotation : float64 [N, 3, 3] local axes as columns, camera coordinates: the longest, the one across, the normal
     scales : float64 [N, 3] standard deviations [m]
     """
-    # How the surface point moves per pixel to the right and per pixel down.
+    # Motion of the surface point per pixel to the right and per pixel down.
     along = (rays * normals).sum(axis=1, keepdims=True)
     unit = depth[:, None] / focal_length
     right = unit * (np.array([1.0, 0, 0]) - rays * normals[:, :1] / along)

@@ -1,4 +1,4 @@
-"""The camera: intrinsics, mount, and where heave and pitch put it (paper, Eq. camera_pose)."""
+"""The camera: intrinsics, mount, and its pose under heave and pitch (paper, Eq. camera_pose)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -45,12 +45,12 @@ class Camera:
 
     @property
     def plain(self) -> bool:
-        """A pinhole whose rows are all exposed at once, at one pose: what is drawn is what it sees."""
+        """Whether the camera is a pinhole with one pose for all rows, so that the drawn picture needs no resampling."""
         return self.lens is None and not self.moves
 
     @property
     def moves(self) -> bool:
-        """A frame sees more than one pose."""
+        """Whether a frame is exposed at more than one pose."""
         return self.line_delay_s != 0 or self.motion_blur
 
     @property
@@ -75,7 +75,7 @@ def body_poses(
     cg_behind_front_axle: float,
     cg_height: float,
 ) -> NDArray[np.float64]:
-    """P(t) = P_0(s) (+) (z_s, theta): the body pitched about its centre of gravity and lifted.
+    """Return P(t) = P_0(s) (+) (z_s, theta): the body pitched about its centre of gravity and lifted.
 
     Parameters
     ----------
@@ -110,10 +110,10 @@ def continuous_rig(
     cg_behind_front_axle: float,
     cg_height: float,
 ) -> RigAt:
-    """Rig poses at any time of a clip, for rows and exposures between its ticks.
+    """Return a function that gives rig poses at any time of a clip, for rows and exposures between its ticks.
 
-    Before the first tick and after the last the body goes on as it did within: the motion is turned about the
-    clip's end pose, T(-t) = T(0) T(t)^-1 T(0), which is exact for a steady motion.
+    Before the first tick and after the last the motion is extrapolated by a point reflection in the clip's end pose,
+    T(-t) = T(0) T(t)^-1 T(0), which is exact for a steady motion.
 
     Parameters
     ----------
@@ -125,10 +125,10 @@ def continuous_rig(
     Returns
     -------
     Callable
-        Frame number and times from the frame's own to poses.
+        Frame number and times relative to the frame's own time, to poses.
     """
 
-    def inside(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pose_within_clip(t: NDArray[np.float64]) -> NDArray[np.float64]:
         at = (np.interp(t, time, column) for column in (station, heave, pitch))
         return body_poses(route, *at, cg_behind_front_axle=cg_behind_front_axle, cg_height=cg_height)
 
@@ -137,15 +137,17 @@ def continuous_rig(
         end = np.clip(t, time[0], time[-1])
         beyond = t != end
         if not beyond.any():
-            return inside(t)
-        turn = inside(end)
-        return np.where(beyond[:, None, None], turn @ np.linalg.inv(inside(2 * end - t)) @ turn, turn)
+            return pose_within_clip(t)
+        turn = pose_within_clip(end)
+        return np.where(
+            beyond[:, None, None], turn @ np.linalg.inv(pose_within_clip(2 * end - t)) @ turn, turn
+        )
 
     return rig_at
 
 
-def viewmat(T_world_camera: NDArray[np.float64]) -> NDArray[np.float64]:
-    """World-to-camera matrix [4, 4] of a camera pose [4, 4]."""
+def world_to_camera(T_world_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the world-to-camera matrix [4, 4] of a camera pose [4, 4]."""
     view = np.eye(4)
     view[:3, :3] = T_world_camera[:3, :3].T
     view[:3, 3] = -view[:3, :3] @ T_world_camera[:3, 3]

@@ -1,133 +1,170 @@
 """A clip's frames, one after the other, from rig poses to finished pictures in their weather."""
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.render.camera import Camera, RigAt, viewmat
-from tasks.render.composition import compose, encode_8bit, round_depth
+from tasks.render.camera import Camera, RigAt, world_to_camera
+from tasks.render.composition import compose_over_sky, encode_8bit, round_depth
 from tasks.render.environment import environment_view
 from tasks.render.labels import clip_flow, forward_flow, frame_labels, row_flow
 from tasks.render.rasterise.backend import Backend
-from tasks.render.readout import sensor_field
-from tasks.render.road_edit import Profile, RoadRelief
-from tasks.render.sensor import photographed
-from tasks.render.sight import as_drawn, through_sensor
+from tasks.render.readout import Field, sensor_field
+from tasks.render.road_edit import RoadRelief
+from tasks.render.sensor import apply_sensor
+from tasks.render.sight import take_drawn_frame, take_frame_through_sensor
 from tasks.render.weather.attribution import paper_picture
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layers import apply_weather, weather_scene
-from tasks.render.weather.parameters import WeatherParameters, WeatherState
-from tasks.scene.gaussians import Gaussians
-from tasks.scene.route import Route
+from tasks.render.weather.parameters import WeatherParameters
+from tasks.scene.scene import Scene
+from tasks.surface.state import SurfaceState
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigMotion:
+    """Motion of the rig during a clip.
+
+    Parameters
+    ----------
+    T_world_rig : float64 [F, 4, 4] rig poses with heave and pitch, one a frame [m]
+    frame_rate_hz : frames per second [Hz]
+    rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
+    """
+
+    T_world_rig: NDArray[np.float64]
+    frame_rate_hz: float
+    rig_at: RigAt | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClipConditions:
+    """The weather of a clip and its appearance.
+
+    Parameters
+    ----------
+    state : what falls, and what lies on the road
+    parameters : optical parameters of the weather
+    seed : visual seed; it moves particles and snow, and nothing else [1]
+    """
+
+    state: SurfaceState
+    parameters: WeatherParameters
+    seed: int
 
 
 def render_clip(
-    gaussians: Gaussians,
-    environment: NDArray[np.float32],
-    route: Route,
+    scene: Scene,
     camera: Camera,
-    T_world_rig: NDArray[np.float64],
-    *,
-    frame_rate_hz: float,
-    weather: WeatherState,
-    looks: WeatherParameters,
-    seed: int,
+    motion: RigMotion,
+    conditions: ClipConditions,
     backend: Backend,
+    *,
     relief: RoadRelief | None = None,
-    to_sun: NDArray[np.float64] | None = None,
-    labelled: Profile | None = None,
-    rig_at: RigAt | None = None,
+    labels: bool = False,
     composition: Literal["linear", "paper"] = "linear",
 ) -> dict[str, NDArray[np.generic]]:
     """Render every frame of a clip.
 
     Parameters
     ----------
-    gaussians : the street with the clip's road edit in it
-    environment : float32 [He, We, 3] clear sky and far field, as in `Scene.environment` [1]
-    route : along which wheels have left tracks in the snow
+    scene : the street with the clip's road edit in it; along its route wheels have left tracks in the snow
     camera : intrinsics, mount, lens and shutter
-    T_world_rig : float64 [F, 4, 4] rig poses with heave and pitch
-    frame_rate_hz : frames per second [Hz]
-    weather : what falls, and what lies on the road
-    looks : how that looks
-    seed : visual seed; it moves particles and snow, and nothing else [1]
+    motion : rig poses
+    conditions : weather and its appearance
     backend : the rasteriser
-    relief : the road feature, as the light meets it; None for a flat road
-    to_sun : float64 [3] as in `Scene.to_sun` [1]
-    labelled : H_g(s) of the clip; with it the clip gets the labels of `tasks.render.labels` too
-    rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
+    relief : the road feature, which shapes light, water and labels; None for a flat road
+    labels : the clip gets the labels of `tasks.render.labels` too
     composition : ``paper`` finishes pictures as `paper_picture` does, without lens, shutter and sensor
 
     Returns
     -------
     ``rgb`` uint8 [F, H, W, 3] sRGB, ``depth`` float32 [F, H, W] camera z [m] (NaN where nothing is seen),
     ``class`` uint8 [F, H, W] `SemanticClass`; with labels ``normal``, ``road``, ``marks`` and ``flow``
+
+    Raises
+    ------
+    InputError
+        The camera moves during a frame, and ``motion`` has no poses between frames.
     """
-    focal_px = float(camera.K[0, 0])
-    scene, clip_weather = weather_scene(
-        gaussians, environment, weather, looks, focal_px, seed, route, relief, to_sun
-    )
-    prepared = backend.prepare(scene)
+    weathered, weather = weather_scene(
+        scene.gaussians, scene.environment, conditions.state, conditions.parameters, float(camera.K[0, 0]),
+        conditions.seed, scene.route, relief, scene.to_sun,
+    )  # fmt: skip
+    prepared = backend.prepare(weathered)
     field = sensor_field(camera)
-    T_world_camera = T_world_rig @ camera.T_rig_camera
-    T_world_rows = _row_poses(camera, T_world_camera, rig_at)
-    velocity = np.gradient(T_world_camera[:, :3, 3], 1 / frame_rate_hz, axis=0)
+    T_world_camera = motion.T_world_rig @ camera.T_rig_camera
+    T_world_rows = _row_poses(camera, T_world_camera, motion.rig_at)
+    velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
     frames: list[dict[str, NDArray[np.generic]]] = []
     for frame, pose in enumerate(T_world_camera):
-        view = viewmat(pose)
+        view = world_to_camera(pose)
         gbuffer = backend.rasterise(prepared, view, field.K, field.width, field.height)
-        sky = environment_view(environment, view, field.K, field.width, field.height)
+        sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         shutter = Shutter(
             T_world_camera=pose,
             K=field.K,
             width=field.width,
             height=field.height,
             velocity=velocity[frame],
-            time_s=frame / frame_rate_hz,
+            time_s=frame / motion.frame_rate_hz,
             exposure_s=camera.exposure_s,
         )
-        clear = compose(gbuffer, sky, gaussians.display_encoded)
-        finished = apply_weather(clip_weather, clear, gbuffer, shutter, particles=camera.plain)
-        of_frame = (clip_weather, finished, gbuffer, shutter)
+        clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
+        finished = apply_weather(weather, clear, gbuffer, shutter, particles=camera.plain)
+        drawn = (weather, finished, gbuffer, shutter)
         if T_world_rows is None:
-            seen = as_drawn(*of_frame, labelled is not None)
+            seen = take_drawn_frame(*drawn, labels)
         else:
-            seen = through_sensor(*of_frame, camera, field, T_world_rows[frame], labelled is not None)
+            seen = take_frame_through_sensor(*drawn, camera, field, T_world_rows[frame], labels)
         developed = (
             paper_picture(finished)
             if composition == "paper"
-            else encode_8bit(photographed(seen.picture, camera.sensor, seed, frame))
+            else encode_8bit(apply_sensor(seen.picture, camera.sensor, conditions.seed, frame))
         )
         buffers: dict[str, NDArray[np.generic]] = {
             "rgb": developed,
             "depth": round_depth(seen.depth),
             "class": seen.class_id,
         }
-        if labelled is not None and seen.points is not None and seen.changes is not None:
-            buffers |= frame_labels(seen.normal, seen.class_id, seen.points, seen.changes, route, labelled)
+        if seen.points is not None and seen.changes is not None:
+            elevation = None if relief is None else relief.elevation
+            buffers |= frame_labels(
+                seen.normal, seen.class_id, seen.points, seen.changes, scene.route, elevation
+            )
         frames.append(buffers)
     clip = {name: np.stack([buffers[name] for buffers in frames]) for name in frames[0]}
-    if labelled is not None:
-        depth = clip["depth"]
-
-        def flow_from(k: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-            pair = depth[k], depth[k + 1]
-            if T_world_rows is None:
-                return forward_flow(*pair, camera.K, T_world_camera[k], T_world_camera[k + 1])
-            return row_flow(*pair, field.directions, camera, T_world_rows[k][1], T_world_rows[k + 1][1])
-
-        clip["flow"], occluded = clip_flow(depth, flow_from)
+    if labels:
+        clip["flow"], occluded = _label_flow(clip["depth"], camera, field, T_world_camera, T_world_rows)
         clip["marks"] |= occluded
     return clip
+
+
+def _label_flow(
+    depth: NDArray[np.float32],
+    camera: Camera,
+    field: Field,
+    T_world_camera: NDArray[np.float64],
+    T_world_rows: list[NDArray[np.float64]] | None,
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Return flow and occlusion marks as `clip_flow` does, for either kind of shutter."""
+
+    def flow_from(k: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        pair = depth[k], depth[k + 1]
+        if T_world_rows is None:
+            return forward_flow(*pair, camera.K, T_world_camera[k], T_world_camera[k + 1])
+        return row_flow(*pair, field.directions, camera, T_world_rows[k][1], T_world_rows[k + 1][1])
+
+    return clip_flow(depth, flow_from)
 
 
 def _row_poses(
     camera: Camera, T_world_camera: NDArray[np.float64], rig_at: RigAt | None
 ) -> list[NDArray[np.float64]] | None:
-    """Camera poses [3, H, 4, 4] of each frame at its rows' times; None where one pose says it all."""
+    """Return camera poses [3, H, 4, 4] of each frame at its rows' times; None where one pose serves all rows."""
     if camera.plain:
         return None
     if not camera.moves:

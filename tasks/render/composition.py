@@ -1,4 +1,4 @@
-"""From blended buffers to a finished picture, in linear light until the last step."""
+"""Composition of blended buffers to a finished picture, in linear light until the last step."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,25 +6,25 @@ from numpy.typing import NDArray
 from tasks.render.rasterise.gbuffer import GBuffer
 
 DEPTH_BITS_DROPPED = 10
-"""Of the 23 explicit mantissa bits; 13 stay, a relative error below 6.2e-5."""
+"""Number of the 23 explicit mantissa bits that are dropped; 13 stay, a relative error below 6.2e-5."""
 
 
 def to_linear(display: NDArray[np.float32]) -> NDArray[np.float32]:
-    """sRGB-encoded values in [0, 1] to linear light (IEC 61966-2-1); negative values become 0."""
+    """Convert sRGB-encoded values in [0, 1] to linear light (IEC 61966-2-1); negative values become 0."""
     x = np.maximum(display, 0)
     return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def to_display(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Linear light, clipped to [0, 1], to sRGB-encoded values (IEC 61966-2-1)."""
+    """Convert linear light, clipped to [0, 1], to sRGB-encoded values (IEC 61966-2-1)."""
     x = np.clip(linear, 0, 1)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
 
 
-def compose(
+def compose_over_sky(
     gbuffer: GBuffer, environment_rgb: NDArray[np.float32], display_encoded: bool
 ) -> NDArray[np.float32]:
-    """The Gaussians over the sky, in linear light.
+    """Compose the Gaussians over the sky, in linear light.
 
     Parameters
     ----------
@@ -43,12 +43,12 @@ def compose(
 
 
 def encode_8bit(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """sRGB bytes of a linear picture, rounded half to even, without dither."""
+    """Return the sRGB bytes of a linear picture, rounded half to even, without dither."""
     return np.rint(to_display(linear) * np.float32(255)).astype(np.uint8)
 
 
 def round_depth(depth: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Depth rounded to 13 mantissa bits, so that it compresses; NaN stays NaN.
+    """Round depth to 13 mantissa bits, so that it compresses; NaN stays NaN.
 
     Parameters
     ----------

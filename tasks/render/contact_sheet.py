@@ -1,4 +1,4 @@
-"""A contact sheet: a row a clip, a column a moment, with the speed and pitch curves beside the pictures."""
+"""A contact sheet: one row per clip, one column per time, with speed and pitch curves beside the pictures."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,7 +15,7 @@ CURVE_COLOURS = {"speed": (30, 90, 200), "pitch": (200, 70, 20)}
 Row = tuple[str, Sequence[NDArray[np.uint8]], Mapping[str, NDArray[np.float64]]]
 
 
-def contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz: float) -> NDArray[np.uint8]:
+def draw_contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz: float) -> NDArray[np.uint8]:
     """Draw the sheet.
 
     Parameters
@@ -34,7 +34,7 @@ def contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz: flo
     sheet = np.full(
         (len(rows) * step_y + MARGIN, len(frames) * step_x + CURVE_WIDTH + 2 * MARGIN, 3), PAPER, np.uint8
     )
-    limits = {name: _limits([row[2][name] for row in rows]) for name in CURVE_COLOURS}
+    limits = {name: _curve_limits([row[2][name] for row in rows]) for name in CURVE_COLOURS}
     for i, (label, pictures, curves) in enumerate(rows):
         top = i * step_y + MARGIN
         for j, (frame, picture) in enumerate(zip(frames, pictures, strict=True)):
@@ -44,18 +44,18 @@ def contact_sheet(rows: Sequence[Row], frames: Sequence[int], frame_rate_hz: flo
             caption = label if j == 0 else f"{frame / frame_rate_hz:.1f} s"
             # a label may be longer than its picture is wide: times stand at the right
             shift = 0 if j == 0 else tile[0] - cv2.getTextSize(caption, *FONT)[0][0]
-            _text(sheet, caption, (left + shift, top + CAPTION - 6))
+            _put_text(sheet, caption, (left + shift, top + CAPTION - 6))
         left = len(frames) * step_x + MARGIN
         box = sheet[top + CAPTION : top + CAPTION + tile[1], left : left + CURVE_WIDTH]
         _draw_curves(box, curves, limits)
         for part, (name, colour) in enumerate(CURVE_COLOURS.items()):
             origin = (left + part * CURVE_WIDTH // len(CURVE_COLOURS), top + CAPTION - 6)
-            _text(sheet, _legend(name, limits[name]), origin, colour)
+            _put_text(sheet, _legend_text(name, limits[name]), origin, colour)
     return sheet
 
 
-def picture_sheet(rows: Sequence[Sequence[tuple[str, NDArray[np.uint8]]]]) -> NDArray[np.uint8]:
-    """Captioned pictures in rows.
+def draw_picture_sheet(rows: Sequence[Sequence[tuple[str, NDArray[np.uint8]]]]) -> NDArray[np.uint8]:
+    """Draw captioned pictures in rows.
 
     Parameters
     ----------
@@ -75,23 +75,23 @@ def picture_sheet(rows: Sequence[Sequence[tuple[str, NDArray[np.uint8]]]]) -> ND
             top, left = i * step_y + MARGIN, j * step_x + MARGIN
             small = cv2.resize(picture, tile, interpolation=cv2.INTER_AREA)
             sheet[top + CAPTION : top + CAPTION + tile[1], left : left + tile[0]] = small
-            _text(sheet, caption, (left, top + CAPTION - 6))
+            _put_text(sheet, caption, (left, top + CAPTION - 6))
     return sheet
 
 
 def encode_png(picture: NDArray[np.uint8]) -> bytes:
-    """PNG bytes of an RGB picture."""
+    """Return the PNG bytes of an RGB picture."""
     done, content = cv2.imencode(".png", picture[..., ::-1])
     assert done
     return content.tobytes()
 
 
-def _limits(curves: list[NDArray[np.float64]]) -> tuple[float, float]:
+def _curve_limits(curves: list[NDArray[np.float64]]) -> tuple[float, float]:
     low, high = min(c.min() for c in curves), max(c.max() for c in curves)
     return float(low), float(high) if high > low else float(low) + 1.0
 
 
-def _legend(name: str, limits: tuple[float, float]) -> str:
+def _legend_text(name: str, limits: tuple[float, float]) -> str:
     if name == "speed":
         return f"speed 0-{limits[1] * 3.6:.0f} km/h"
     return f"pitch {np.degrees(limits[0]):.1f}..{np.degrees(limits[1]):.1f} deg"
@@ -115,7 +115,7 @@ def _draw_curves(
     box[:] = canvas
 
 
-def _text(
+def _put_text(
     sheet: NDArray[np.uint8], text: str, origin: tuple[int, int], colour: tuple[int, int, int] = INK
 ) -> None:
     face, scale, thickness = FONT

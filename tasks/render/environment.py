@@ -12,7 +12,7 @@ def environment_view(
     width: int,
     height: int,
 ) -> NDArray[np.float32]:
-    """The panorama as a view sees it, bilinear, wrapped in azimuth.
+    """Return the part of the panorama that a view sees, bilinear, wrapped in azimuth.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def environment_view(
 
 
 def plain_sky(rows: int = 64) -> NDArray[np.float32]:
-    """A cloudless gradient from blue zenith to pale horizon over grey ground, for scenes without a sky.
+    """Return a cloudless gradient from blue zenith to pale horizon over grey ground, for scenes without a sky.
 
     Parameters
     ----------

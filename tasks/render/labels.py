@@ -1,4 +1,4 @@
-"""Ground truth of a frame beyond depth and class: where on the road, where it moves to, and what changed it."""
+"""Ground truth of a frame beyond depth and class: road coordinates, flow, and marks of what changed a pixel."""
 
 from collections.abc import Callable
 
@@ -15,11 +15,11 @@ from tasks.render.weather.attribution import LAYER_BITS
 from tasks.scene.route import Route
 
 OCCLUDED, HAZARD = 32, 64
-"""Bits of `marks` beside those of the layers: out of sight in the next frame; on the road feature."""
+"""Bits of `marks` beside those of the layers: hidden in the next frame; on the road feature."""
 MARK_BITS = LAYER_BITS | {"occluded": OCCLUDED, "hazard": HAZARD}
 """Bit of each mark."""
 OCCLUSION_TOLERANCE = 0.05
-"""Share of its depth by which a point must lie behind what the next frame shows to be hidden there [1]."""
+"""A point is hidden in the next frame if it lies behind the surface there by more than this share of its depth [1]."""
 NORMAL_STEPS = 127
 """Steps of a stored normal's component from 0 to 1 [1]."""
 
@@ -31,7 +31,7 @@ def forward_flow(
     T_world_camera: NDArray[np.float64],
     next_T_world_camera: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Where each pixel's point lies in the next frame: the street stands still, so depth and poses say it all.
+    """Return the optical flow to the next frame: the street does not move, so depth and poses determine it.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def forward_flow(
     Returns
     -------
     flow : float32 [H, W, 2] right and down; NaN without depth, and where the point falls behind the camera [px]
-    occluded : bool [H, W] the point leaves the picture or lies behind what the next frame shows there
+    occluded : bool [H, W] the point leaves the picture or lies behind the surface that the next frame shows there
     """
     height, width = depth.shape
     u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -50,7 +50,7 @@ def forward_flow(
     T = np.linalg.inv(next_T_world_camera) @ T_world_camera
     x, y, z = np.moveaxis((rays * depth[..., None]) @ T[:3, :3].T + T[:3, 3], -1, 0)
     z = np.where(z > 0, z, np.nan)
-    return landing(depth, next_depth, K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2], z)
+    return flow_and_occlusion(depth, next_depth, K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2], z)
 
 
 def row_flow(
@@ -61,7 +61,7 @@ def row_flow(
     T_world_rows: NDArray[np.float64],
     next_T_world_rows: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """`forward_flow` of a camera behind a lens or read out row by row, between pixels as they are stored.
+    """Return `forward_flow` for a camera with a lens or a rolling shutter, between pixels as they are stored.
 
     Parameters
     ----------
@@ -76,17 +76,17 @@ def row_flow(
     """
     points = row_points(directions, depth, T_world_rows)
     there = project_by_rows(points, next_T_world_rows, camera)
-    return landing(depth, next_depth, there[..., 0], there[..., 1], there[..., 2])
+    return flow_and_occlusion(depth, next_depth, there[..., 0], there[..., 1], there[..., 2])
 
 
-def landing(
+def flow_and_occlusion(
     depth: NDArray[np.float32],
     next_depth: NDArray[np.float32],
     there_u: NDArray[np.float64],
     there_v: NDArray[np.float64],
     z: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Flow and occlusion of points that are known to lie at (there_u, there_v) of the next frame, z deep.
+    """Return flow and occlusion of points that lie at (there_u, there_v) of the next frame, at depth z.
 
     Parameters
     ----------
@@ -111,12 +111,12 @@ def landing(
 def road_coordinates(
     class_id: NDArray[np.uint8], points: NDArray[np.floating], route: Route
 ) -> NDArray[np.float32]:
-    """Station along the route and lateral position of every road pixel.
+    """Return the station along the route and the lateral position of every road pixel.
 
     Parameters
     ----------
     class_id : uint8 [H, W] classes of one view
-    points : [H, W, 3] what its pixels see, world frame; NaN where nothing is seen [m]
+    points : [H, W, 3] points that its pixels show, world frame; NaN where nothing is seen [m]
     route : the undisturbed route
 
     Returns
@@ -131,7 +131,7 @@ def road_coordinates(
 
 
 def hazard_mark(place: NDArray[np.float32], elevation: Profile) -> NDArray[np.uint8]:
-    """`HAZARD` where the road profile lifts or lowers the road, by road coordinates [H, W, 2] and H_g(s) [m]."""
+    """Return `HAZARD` where the profile H_g(s) [m] moves the road at road coordinates [H, W, 2], else 0."""
     on_road = np.isfinite(place[..., 0])
     lifted = elevation(np.where(on_road, place[..., 0], -1e9).astype(np.float64)) != 0
     return np.where(on_road & lifted, HAZARD, 0).astype(np.uint8)
@@ -143,16 +143,16 @@ def frame_labels(
     points: NDArray[np.floating],
     changes: NDArray[np.uint8],
     route: Route,
-    elevation: Profile,
+    elevation: Profile | None,
 ) -> dict[str, NDArray[np.generic]]:
-    """What one frame says of its pixels by itself.
+    """Return the labels of a frame that need no other frame.
 
     Parameters
     ----------
     normal : float32 [H, W, 3] world normals, zero where nothing is seen [1]
     class_id, points, route : as `road_coordinates` takes them
     changes : uint8 [H, W] `LAYER_BITS` of the layers that changed each pixel
-    elevation : H_g(s) [m] at stations [m]
+    elevation : H_g(s) [m] at stations [m]; None for a flat road
 
     Returns
     -------
@@ -163,14 +163,14 @@ def frame_labels(
     return {
         "normal": np.rint(normal * NORMAL_STEPS).astype(np.int8),
         "road": round_depth(place),
-        "marks": changes | hazard_mark(place, elevation),
+        "marks": changes if elevation is None else changes | hazard_mark(place, elevation),
     }
 
 
 def clip_flow(
     depth: NDArray[np.float32], flow_from: Callable[[int], tuple[NDArray[np.float32], NDArray[np.bool_]]]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Flow of every frame to its next, and the mark of what is out of sight there; the last frame has neither.
+    """Return the flow of every frame to the next, and the mark of points hidden there; the last frame has neither.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Lens distortion by Brown and Conrady, in OpenCV's convention: where the glass puts what a pinhole would see."""
+"""Lens distortion by Brown and Conrady, in OpenCV's convention."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from tasks.errors import InputError
 
 NEWTON_STEPS = 20
 ROUNDING = 1e-14
-"""Distance from the distorted place at which further steps are rounding [1]."""
+"""Distance from the distorted point below which further steps only change rounding [1]."""
 CLOSED = 1e-9
 """Largest distance from its distorted place at which an undistorted point counts as found [1]."""
 
@@ -38,8 +38,8 @@ class Lens:
 
 
 @numba.njit(cache=True, nogil=True)
-def distorted(x, y, coefficients):  # type: ignore[no-untyped-def]
-    """Where the lens puts the ray (x, y, 1): the same for scalars and for arrays, in kernels and outside.
+def distort_rays(x, y, coefficients):  # type: ignore[no-untyped-def]
+    """Return the distorted place of the ray (x, y, 1), for scalars and arrays, in kernels and outside.
 
     Parameters
     ----------
@@ -59,10 +59,10 @@ def distorted(x, y, coefficients):  # type: ignore[no-untyped-def]
     )
 
 
-def undistorted(
+def undistort_points(
     x: NDArray[np.float64], y: NDArray[np.float64], lens: Lens
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The rays that the lens puts at given places, by Newton's method.
+    """Return the rays that the lens maps to given places, by Newton's method.
 
     Parameters
     ----------
@@ -76,15 +76,15 @@ def undistorted(
     Raises
     ------
     InputError
-        Some place has no ray: the polynomial turns back inside the picture.
+        Some place has no ray: the polynomial is not monotonic inside the picture.
     """
     k = lens.coefficients
     step = 1e-6
     found_x, found_y = x.copy(), y.copy()
     for _ in range(NEWTON_STEPS):
-        here_x, here_y = distorted(found_x, found_y, k)
-        right = distorted(found_x + step, found_y, k)
-        below = distorted(found_x, found_y + step, k)
+        here_x, here_y = distort_rays(found_x, found_y, k)
+        right = distort_rays(found_x + step, found_y, k)
+        below = distort_rays(found_x, found_y + step, k)
         a, c = (right[0] - here_x) / step, (right[1] - here_y) / step
         b, d = (below[0] - here_x) / step, (below[1] - here_y) / step
         area = a * d - b * c
@@ -94,7 +94,7 @@ def undistorted(
         if max(np.abs(off_x).max(), np.abs(off_y).max()) < ROUNDING:
             break
         found_x, found_y = found_x + (d * off_x - b * off_y) / area, found_y + (a * off_y - c * off_x) / area
-    here_x, here_y = distorted(found_x, found_y, k)
+    here_x, here_y = distort_rays(found_x, found_y, k)
     miss = np.hypot(here_x - x, here_y - y)
     if not (miss <= CLOSED).all():
         raise InputError(
@@ -107,7 +107,7 @@ def undistorted(
 def pixel_directions(
     K: NDArray[np.float64], width: int, height: int, lens: Lens | None
 ) -> NDArray[np.float64]:
-    """Directions that a camera's pixels look in.
+    """Return the directions of a camera's pixels.
 
     Parameters
     ----------
@@ -122,11 +122,11 @@ def pixel_directions(
     Raises
     ------
     InputError
-        The lens does not spread the whole picture.
+        The lens model is not monotonic over the whole picture.
     """
     x, y = np.meshgrid(
         (np.arange(width) + 0.5 - K[0, 2]) / K[0, 0], (np.arange(height) + 0.5 - K[1, 2]) / K[1, 1]
     )
     if lens is not None:
-        x, y = undistorted(x, y, lens)
+        x, y = undistort_points(x, y, lens)
     return np.stack((x, y), axis=-1)

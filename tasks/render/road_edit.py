@@ -1,4 +1,4 @@
-"""The visible half of the road-elevation profile: H_g moves and tilts the road's Gaussians."""
+"""The road-elevation profile in the picture: H_g moves and tilts the road's Gaussians."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 
 STANDING_CLASSES = (SemanticClass.VEHICLE, SemanticClass.POLE, SemanticClass.OTHER)
-"""Classes that stand on the road and ride with it, inside the carriageway and below `STANDING_HEIGHT`."""
+"""Classes that stand on the road and move with it, inside the carriageway and below `STANDING_HEIGHT`."""
 STANDING_HEIGHT = 4.0
 """Tallest road vehicle (Council Directive 96/53/EC, Annex I); wires, lamps and crowns hang above it [m]."""
 
@@ -21,7 +21,7 @@ Profile = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 @dataclass(frozen=True, kw_only=True)
 class RoadRelief:
-    """A road feature on its route, for what shapes, paints or lights it.
+    """A road feature on its route, as the steps that shape, paint and light it take it.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ class RoadRelief:
     far: float
 
 
-def road_lift(gaussians: Gaussians, relief: RoadRelief) -> NDArray[np.float64]:
-    """Height H_g of the feature under every road Gaussian, float64 [N]; 0 for all that is no road [m].
+def measure_road_lift(gaussians: Gaussians, relief: RoadRelief) -> NDArray[np.float64]:
+    """Return the height H_g of the feature under every road Gaussian, float64 [N]; 0 for other Gaussians [m].
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def apply_road_profile(
 ) -> tuple[Gaussians, NDArray[np.bool_]]:
     """Lift the road along the route's normal by H_g(s) and turn its Gaussians by the slope.
 
-    A rigid turn of each Gaussian keeps its footprint; the road's surface grows by sqrt(1 + H_g'^2), which
-    is 0.2 % at a 75 mm x 3.7 m hump's steepest point and 0.8 % at an 80 mm x 2 m depression's.
+    A rigid rotation of each Gaussian keeps its footprint, while the road's surface grows by sqrt(1 + H_g'^2): by 0.2 %
+    at the steepest point of a 75 mm x 3.7 m hump and by 0.8 % at that of an 80 mm x 2 m depression.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def apply_road_profile(
         return gaussians, moved
     frame = relief.route.pose(np.clip(station[moved], 0, relief.route.length))[:, :3, :3]
     left, up = frame[:, :, 1], frame[:, :, 2]
-    # a climbing road turns its normal backward: a negative rotation about the leftward axis
+    # a rising road turns its normal backward: a negative rotation about the leftward axis
     turn = Rotation.from_rotvec(-np.arctan(relief.slope(station[moved]))[:, None] * left)
     means, quats, normals = gaussians.means.copy(), gaussians.quats_wxyz.copy(), gaussians.normals.copy()
     means[moved] = means[moved] + lift[moved, None] * up

@@ -26,7 +26,7 @@ class HazardMarking:
     gap: tuple[float, float, float]
 
 
-def painted(
+def paint_feature(
     gaussians: Gaussians,
     relief: RoadRelief,
     marking: HazardMarking,
@@ -34,10 +34,10 @@ def painted(
     carriageway_right: float,
     asphalt_albedo: float,
 ) -> Gaussians:
-    """The flat street with the paint of a feature on its road, in the light that lies there.
+    """Paint a feature's marking on the flat street, in the light that falls on the road there.
 
-    Marks become class marking; the gaps between them keep theirs. The middle of a mark lies on the route, so that
-    what is laid out is the same whichever way the carriageway widens.
+    Marks become class marking; the gaps between them keep their class. The middle of a mark lies on the route, so that
+    the layout does not depend on the side to which the carriageway widens.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def painted(
     relief : the feature
     marking : its paint
     carriageway_left, carriageway_right : lateral extent of the carriageway, leftward positive [m]
-    asphalt_albedo : reflectance of the road, from which its light is read [1]
+    asphalt_albedo : reflectance of the road, from which the incident light follows [1]
     """
     road = np.flatnonzero(np.isin(gaussians.class_id, ROAD_CLASSES))
     station, lateral, _ = relief.route.project(gaussians.means[road])

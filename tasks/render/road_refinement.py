@@ -1,7 +1,7 @@
-"""Road Gaussians cut along the road, so that they are short enough to follow a feature's shape and shading.
+"""Division of road Gaussians along the road, so that they are short enough to follow a feature's shape and shading.
 
-A Gaussian is as long as the picture of a flat road needs it; on a hump half a metre long it would smear the flank
-over the crest. Cut ones add up to what they came from: the flat road looks the same.
+The length of a Gaussian suits a flat road; on a hump half a metre long it would blur the flank over the crest. The
+pieces add up to the original Gaussian: the flat road looks the same.
 """
 
 from dataclasses import fields, replace
@@ -16,21 +16,21 @@ from tasks.render.road_edit import RoadRelief
 from tasks.scene.gaussians import Gaussians
 
 LENGTH_BY_FEATURE = 1 / 15
-"""Longest standard deviation along the road by the feature's length: a flank is seven or more long."""
+"""Longest standard deviation along the road over the feature's length: a flank is seven or more of them long."""
 SPACING = 1.6
-"""Distance of pieces by their standard deviation: a row of them is even to a thousandth."""
+"""Distance of pieces over their standard deviation: the sum of a row of them varies by a thousandth."""
 REACH = 3.0
-"""Standard deviations out to which a Gaussian is cut into pieces, and to which it touches the feature."""
+"""Extent of a Gaussian in standard deviations, for its division and for its contact with the feature."""
 _PEAK = np.linspace(0, 0.995, 400)
 _MASS = (_PEAK[:, None] ** np.arange(1, 1000) / np.arange(1, 1000) ** 1.5).sum(axis=1)
 """Peak opacity of a Gaussian, and its optical depth added up over a line by sqrt(2 pi) standard deviations."""
 
 
-def refined_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
-    """The scene with the road Gaussians about a feature cut into pieces along the road.
+def refine_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
+    """Return the scene with the road Gaussians about a feature cut into pieces along the road.
 
-    A Gaussian of peak opacity o has optical depth -ln(1 - o exp(-u^2 / 2)) at u standard deviations. Its pieces
-    carry the optical depth of their places, so that together they dim what lies behind as much as the whole did.
+    A Gaussian of peak opacity o has optical depth -ln(1 - o exp(-u^2 / 2)) at u standard deviations. Its pieces have
+    the optical depth of their places, so that together they absorb as much light as the whole Gaussian.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def refined_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
     Returns
     -------
     Gaussians
-        Pieces come last; what is short enough or away from the feature is bitwise unchanged and keeps its order.
+        Pieces come last; Gaussians that are short enough or off the feature are bitwise unchanged, in their order.
     """
     longest = LENGTH_BY_FEATURE * (relief.far - relief.near)
     middle = relief.route.pose((relief.near + relief.far) / 2)
@@ -56,7 +56,7 @@ def refined_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
     if not len(cut):
         return gaussians
     pieces = [
-        _pieces(gaussians, road[k], axes[k, :, axis[k]], int(axis[k]), float(length[k] / longest))
+        _cut_gaussian(gaussians, road[k], axes[k, :, axis[k]], int(axis[k]), float(length[k] / longest))
         for k in cut
     ]
     joined: dict[str, Any] = {
@@ -68,13 +68,13 @@ def refined_road(gaussians: Gaussians, relief: RoadRelief) -> Gaussians:
     return replace(gaussians, **joined)
 
 
-def _pieces(
+def _cut_gaussian(
     gaussians: Gaussians, k: int, direction: NDArray[np.float64], axis: int, times: float
 ) -> dict[str, NDArray[Any]]:
-    """Pieces of Gaussian k, ``times`` shorter along one of its axes, whose world direction is given."""
+    """Cut Gaussian k into pieces ``times`` shorter along one of its axes, whose world direction is given."""
     scale = float(gaussians.scales[k, axis])
     short = scale / times
-    # the row of middles is shorter than the whole by what a piece reaches beyond its middle
+    # the row of middles is shorter than the whole Gaussian, since a piece extends beyond its middle
     row = np.sqrt(scale**2 - short**2)
     half = int(np.ceil(REACH * row / (SPACING * short)))
     place = SPACING * short * np.arange(-half, half + 1)
@@ -88,6 +88,6 @@ def _pieces(
     out["scales"][:, axis] = short
     out["opacities"] = opacity[kept].astype(np.float32)
     if "surroundings" in out:
-        # They dim as the whole did, but cover more: opacity adds up where optical depth is shared out.
+        # Pieces absorb as the whole did, but their opacities add up to more than its opacity.
         out["surroundings"][:, 0] *= opacity[kept].sum() / (times * gaussians.opacities[k])
     return out

@@ -1,4 +1,4 @@
-"""What the camera's sensor does to the light: exposure, photon noise and read noise; off unless asked for."""
+"""The camera's sensor: exposure, photon noise and read noise; without noise by default."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class Sensor:
     ----------
     exposure_ev : exposure over that of the clear clip, in steps of 2 [EV]
     full_well : electrons of a pixel at the brightest value; None for a sensor without noise [e-]
-    read_noise : standard deviation of what reading a pixel adds [e-]
+    read_noise : standard deviation of the noise that reading a pixel adds [e-]
     """
 
     exposure_ev: float = 0.0
@@ -24,8 +24,8 @@ class Sensor:
     read_noise: float = 0.0
 
 
-def photographed(picture: NDArray[np.float32], sensor: Sensor, seed: int, frame: int) -> NDArray[np.float32]:
-    """The light that a picture is developed from.
+def apply_sensor(picture: NDArray[np.float32], sensor: Sensor, seed: int, frame: int) -> NDArray[np.float32]:
+    """Return the light that the sensor records.
 
     Photons arrive by Poisson's law, here its normal limit, so that a pixel of N electrons has a variance of
     N + read noise squared (EMVA Standard 1288, release 4.0, 2021, section 2).
@@ -44,7 +44,7 @@ def photographed(picture: NDArray[np.float32], sensor: Sensor, seed: int, frame:
     exposed = picture if sensor.exposure_ev == 0 else picture * np.float32(2**sensor.exposure_ev)
     if sensor.full_well is None:
         return exposed
-    # what is brighter than the well holds is cut off before it is read
+    # light above the full well is clipped before it is read
     electrons = np.clip(exposed, 0, 1) * np.float32(sensor.full_well)
     random = np.random.Generator(np.random.Philox(key=[stream_key(seed, "sensor"), frame]))
     noise = random.standard_normal(picture.shape, dtype=np.float32)

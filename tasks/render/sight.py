@@ -1,11 +1,11 @@
-"""One frame as the sensor has it, and the ground truth of the same pixels: drawn as it is, or read out row by row."""
+"""One frame of the sensor and the ground truth of its pixels: as drawn, or read out row by row."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.camera import Camera, viewmat
+from tasks.render.camera import Camera, world_to_camera
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.readout import Field, read_out
 from tasks.render.weather.attribution import attribution, changed
@@ -15,8 +15,8 @@ from tasks.render.weather.layers import ClipWeather, WeatherFrame, particle_laye
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sight:
-    """What a frame's pixels show.
+class SensorFrame:
+    """Light and ground truth of a frame's pixels.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Sight:
     depth : float32 [H, W] z in the camera at the pixel's own time; NaN where nothing is seen [m]
     class_id : uint8 [H, W] `SemanticClass`
     normal : float32 [H, W, 3] world normal [1]
-    points : [H, W, 3] what is seen, world frame; NaN where nothing is. None without labels [m]
+    points : [H, W, 3] points that the pixels show, world frame; NaN where there are none. None without labels [m]
     changes : uint8 [H, W] bits of the layers that changed the pixel; None without labels
     """
 
@@ -36,10 +36,10 @@ class Sight:
     changes: NDArray[np.uint8] | None
 
 
-def as_drawn(
+def take_drawn_frame(
     weather: ClipWeather, finished: WeatherFrame, gbuffer: GBuffer, shutter: Shutter, labelled: bool
-) -> Sight:
-    """The frame of a pinhole whose rows are all exposed at once.
+) -> SensorFrame:
+    """Return the frame of a pinhole whose rows are all exposed at once.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def as_drawn(
     labelled : with `points` and `changes`
     """
     eye = shutter.T_world_camera[:3, 3]
-    return Sight(
+    return SensorFrame(
         picture=finished.picture,
         depth=gbuffer.depth,
         class_id=gbuffer.class_id,
@@ -57,7 +57,7 @@ def as_drawn(
     )
 
 
-def through_sensor(
+def take_frame_through_sensor(
     weather: ClipWeather,
     still: WeatherFrame,
     gbuffer: GBuffer,
@@ -66,8 +66,8 @@ def through_sensor(
     field: Field,
     T_world_rows: NDArray[np.float64],
     labelled: bool,
-) -> Sight:
-    """The frame behind a lens, read out row by row and averaged over the exposure, as the camera asks for.
+) -> SensorFrame:
+    """Return the frame behind a lens, read out row by row and averaged over the exposure, as the camera defines.
 
     Parameters
     ----------
@@ -83,21 +83,25 @@ def through_sensor(
         Labels are those of the middle of the exposure, each from one pixel of the wide picture.
     """
     seen = read_out(
-        still.picture, gbuffer.depth, field, viewmat(wide.T_world_camera) @ T_world_rows, camera.motion_blur
+        still.picture,
+        gbuffer.depth,
+        field,
+        world_to_camera(wide.T_world_camera) @ T_world_rows,
+        camera.motion_blur,
     )
     picture = seen.picture
     changes = attribution(weather, still, gbuffer, wide).ravel()[seen.source] if labelled else None
-    if weather.falling is not None:
+    if weather.overcast is not None and weather.overcast.population is not None:
         own = Shutter(
             T_world_camera=wide.T_world_camera, K=camera.K, width=camera.width, height=camera.height,
             velocity=wide.velocity, time_s=wide.time_s, exposure_s=wide.exposure_s, lens=camera.lens,
             line_delay_s=camera.line_delay_s,
         )  # fmt: skip
-        layer = particle_layer(weather, weather.falling, seen.depth, own)
+        layer = particle_layer(weather, weather.overcast.population, weather.overcast.sky, seen.depth, own)
         picture = recompose(seen.picture, (layer,))
         if changes is not None:
             changes |= changed(seen.picture, picture, layer)
-    return Sight(
+    return SensorFrame(
         picture=picture,
         depth=seen.depth,
         class_id=gbuffer.class_id.ravel()[seen.source],
@@ -110,7 +114,7 @@ def through_sensor(
 def row_points(
     directions: NDArray[np.float64], depth: NDArray[np.float32], T_world_rows: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What the pixels of a sensor read row by row see, in the world.
+    """Return the world points that the pixels of a sensor show when it is read row by row.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Which surface of a picture with depth a ray meets that starts close beside the picture's own camera.
+"""Intersection of a ray with the surfaces of a picture with depth; the ray starts near the picture's own camera.
 
-The ray is that of a pixel of another pose, a readout away: ``ray + w shift``, in axes of the picture's camera, is the
-point of inverse depth w on it, times w. Its way through the picture is searched between the nearest and the farthest
-depth that the picture has about there, from near to far, so that near things hide far ones.
+The ray belongs to a pixel at another pose of the same readout: ``ray + w shift``, in axes of the picture's camera, is
+the point of inverse depth w on it, times w. The search runs along its image from the nearest to the farthest depth of
+that neighbourhood, so that near surfaces hide far ones.
 """
 
 import numba
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 TILE = 16
 """Side of the tiles over which the nearest and farthest surfaces are noted; no point may move farther [px]."""
 KINK = 0.1
-"""Spread of inverse depth over a pixel's neighbours from which they are two surfaces [1]."""
+"""Relative range of inverse depth over a pixel's neighbours above which they belong to two surfaces [1]."""
 
 SLOPE = 0.01
-"""Growth of inverse depth over a step up to which a ray that has come to lie behind a surface has met it [1]."""
+"""Largest growth of inverse depth over a step at which a ray that lies behind a surface has met it [1]."""
 
 
 def depth_bounds(near: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Least and largest inverse depth of each tile and the eight around it [m-1]."""
+    """Return the least and the largest inverse depth of each tile and the eight around it [m-1]."""
     rows, columns = (-(-n // TILE) for n in near.shape)
     padded = np.pad(
         near, ((0, rows * TILE - near.shape[0]), (0, columns * TILE - near.shape[1])), mode="edge"
@@ -35,7 +35,7 @@ def depth_bounds(near: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArra
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _inverse_depth(near, u, v):  # type: ignore[no-untyped-def]
-    """Inverse depth at a place of the picture: bilinear, exact on planes; the nearest pixel's at an edge [m-1]."""
+    """Return inverse depth at a place: bilinear, exact on planes; at an edge that of the nearest pixel [m-1]."""
     height, width = near.shape
     x = min(max(u - 0.5, 0.0), width - 1.001)
     y = min(max(v - 0.5, 0.0), height - 1.001)
@@ -49,59 +49,59 @@ def _inverse_depth(near, u, v):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def place_on(K, ray, shift, w):  # type: ignore[no-untyped-def]
-    """Where the wide picture shows the point of inverse depth w on a row's ray [px]."""
+def project_onto_picture(K, ray, shift, w):  # type: ignore[no-untyped-def]
+    """Return the place in the wide picture of the point of inverse depth w on a row's ray [px]."""
     z = ray[2] + w * shift[2]
     return K[0] * (ray[0] + w * shift[0]) / z + K[2], K[1] * (ray[1] + w * shift[1]) / z + K[3]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _on_ray(q, ray, shift):  # type: ignore[no-untyped-def]
-    """Inverse depth in the row's camera of the ray's point whose inverse depth in the wide camera is q [m-1]."""
+def _row_inverse_depth(q, ray, shift):  # type: ignore[no-untyped-def]
+    """Return inverse depth in the row's camera of the ray's point of inverse depth q in the wide camera [m-1]."""
     return ray[2] * q / max(1 - shift[2] * q, 0.1)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _about(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
-    """Inverse depths in the row's camera of a ray's points at the nearest and the farthest depth hereabouts [m-1]."""
-    u, v = place_on(K, ray, shift, 0.0)
+def _inverse_depth_range(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+    """Return inverse depths in the row's camera of the ray's points at the nearest and farthest depth nearby [m-1]."""
+    u, v = project_onto_picture(K, ray, shift, 0.0)
     row = min(max(int(v), 0), near.shape[0] - 1) // TILE
     column = min(max(int(u), 0), near.shape[1] - 1) // TILE
     return (
-        _on_ray(np.float64(nearest[row, column]), ray, shift),
-        _on_ray(np.float64(farthest[row, column]), ray, shift),
+        _row_inverse_depth(np.float64(nearest[row, column]), ray, shift),
+        _row_inverse_depth(np.float64(farthest[row, column]), ray, shift),
     )
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def parallax_about(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
-    """How far apart in the wide picture those two points lie [px]."""
-    w, last = _about(near, nearest, farthest, K, ray, shift)
-    u, v = place_on(K, ray, shift, w)
-    far_u, far_v = place_on(K, ray, shift, last)
+def parallax_range(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
+    """Return the distance of those two points in the wide picture [px]."""
+    w, last = _inverse_depth_range(near, nearest, farthest, K, ray, shift)
+    u, v = project_onto_picture(K, ray, shift, w)
+    far_u, far_v = project_onto_picture(K, ray, shift, last)
     return max(abs(far_u - u), abs(far_v - v))
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def nearest_surface(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
-    """The nearest surface on a ray: its place in the wide picture [px] and inverse depth in the row's camera [m-1]."""
-    w, last = _about(near, nearest, farthest, K, ray, shift)
-    u, v = place_on(K, ray, shift, w)
-    far_u, far_v = place_on(K, ray, shift, last)
+    """Return the nearest surface on a ray: place in the wide picture [px], inverse depth in the row's camera [m-1]."""
+    w, last = _inverse_depth_range(near, nearest, farthest, K, ray, shift)
+    u, v = project_onto_picture(K, ray, shift, w)
+    far_u, far_v = project_onto_picture(K, ray, shift, last)
     way = max(abs(far_u - u), abs(far_v - v))
     found = w
     if way > 0.05:
-        # from the nearest that there is about here to the farthest, a third of a pixel at a time
+        # from the nearest depth nearby to the farthest, in steps of a third of a pixel
         steps = int(3 * way) + 1
         step = (w - last) / steps
         beside_u, beside_v, beside = u, v, last
         hit = False
         for k in range(steps + 1):
             here = w - k * step
-            u, v = place_on(K, ray, shift, here)
-            found = _on_ray(_inverse_depth(near, u, v), ray, shift)
+            u, v = project_onto_picture(K, ray, shift, here)
+            found = _row_inverse_depth(_inverse_depth(near, u, v), ray, shift)
             if found >= here - 1e-9:
-                # far in front of the ray's point is another thing, behind which the ray passes
+                # a surface far in front of the ray's point is another object, and the ray passes behind it
                 if found <= here + step + SLOPE * found:
                     hit = True
                     break
@@ -110,10 +110,10 @@ def nearest_surface(near, nearest, farthest, K, ray, shift):  # type: ignore[no-
         if not hit:
             return int(beside_u) + 0.5, int(beside_v) + 0.5, beside
     else:
-        found = _on_ray(_inverse_depth(near, u, v), ray, shift)
+        found = _row_inverse_depth(_inverse_depth(near, u, v), ray, shift)
     for _ in range(2):
-        next_u, next_v = place_on(K, ray, shift, found)
-        again = _on_ray(_inverse_depth(near, next_u, next_v), ray, shift)
+        next_u, next_v = project_onto_picture(K, ray, shift, found)
+        again = _row_inverse_depth(_inverse_depth(near, next_u, next_v), ray, shift)
         if abs(again - found) > KINK * found:
             break
         u, v, found = next_u, next_v, again

@@ -1,4 +1,4 @@
-"""A frame with the vehicle's traces below it: what the car does at the moment that the picture shows."""
+"""A frame with traces of the vehicle's telemetry below it, up to the time of the frame."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -42,10 +42,10 @@ TRACES = (
 )
 
 
-def with_traces(
+def add_traces(
     picture: NDArray[np.uint8], columns: Mapping[str, NDArray[np.float64]], frame: int
 ) -> NDArray[np.uint8]:
-    """The picture over a strip with one small plot a trace, up to this frame bright and after it faint.
+    """Return the picture over a strip with one small plot per trace, bright up to this frame and faint after it.
 
     Parameters
     ----------
@@ -62,11 +62,11 @@ def with_traces(
     for k, trace in enumerate(TRACES):
         left, right = k * width // len(TRACES) + 4, (k + 1) * width // len(TRACES) - 4
         values = trace.factor * columns[trace.column]
-        _plot(strip, trace, values, frame, left, right)
+        _draw_plot(strip, trace, values, frame, left, right)
     return np.concatenate([picture, strip])
 
 
-def _plot(
+def _draw_plot(
     strip: NDArray[np.uint8], trace: Trace, values: NDArray[np.float64], frame: int, left: int, right: int
 ) -> None:
     low, high = min(float(values.min()), 0.0), float(values.max())
@@ -75,22 +75,24 @@ def _plot(
     x = np.linspace(left, right, len(values))
     y = bottom - (values - low) / (high - low) * (bottom - top)
     points = np.stack([x, y], axis=1).round().astype(np.int32)
-    _line(strip, points, _FAINT)
-    _line(strip, points[: frame + 1], trace.colour)
+    _draw_line(strip, points, _FAINT)
+    _draw_line(strip, points[: frame + 1], trace.colour)
     cv2.circle(strip, tuple(points[frame].tolist()), 2, _INK, -1, cv2.LINE_AA)
-    _write(strip, trace.caption, (left, _CAPTION - 2), trace.colour)
-    _write(strip, f"{values[frame]:.{_decimals(high)}f} {trace.unit}", (left, 2 * _CAPTION - 2), _INK)
+    _write_text(strip, trace.caption, (left, _CAPTION - 2), trace.colour)
+    _write_text(
+        strip, f"{values[frame]:.{_decimal_places(high)}f} {trace.unit}", (left, 2 * _CAPTION - 2), _INK
+    )
 
 
-def _decimals(largest: float) -> int:
+def _decimal_places(largest: float) -> int:
     return 0 if largest >= 20 else 1 if largest >= 2 else 2
 
 
-def _line(strip: NDArray[np.uint8], points: NDArray[np.int32], colour: tuple[int, int, int]) -> None:
+def _draw_line(strip: NDArray[np.uint8], points: NDArray[np.int32], colour: tuple[int, int, int]) -> None:
     cv2.polylines(strip, [points], False, colour, 1, cv2.LINE_AA)
 
 
-def _write(
+def _write_text(
     strip: NDArray[np.uint8], text: str, origin: tuple[int, int], colour: tuple[int, int, int]
 ) -> None:
     cv2.putText(strip, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.36, colour, 1, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""Which Gaussians of an unlabelled cloud are road: by the route, the height above it, and the normal."""
+"""Classification of the road Gaussians of an unlabelled cloud by route, height and normal."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ UPRIGHT = np.cos(np.radians(30.0))
 def classify_road(
     gaussians: Gaussians, route: Route, carriageway_left: float, carriageway_right: float
 ) -> Gaussians:
-    """The cloud with the class ROAD on the carriageway; other classes stay. Road normals point up.
+    """Return the cloud with the class ROAD on the carriageway; other classes stay. Road normals point up.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from tasks.errors import InputError
 LARGEST = 1e18
 """Greatest coordinate and standard deviation [m]: the square of a larger one is infinite in single precision."""
 UNIT_TOLERANCE = 1e-2
-"""How far a quaternion's or normal's length may be from 1 [1]."""
+"""Largest deviation of a quaternion's or normal's length from 1 [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +28,8 @@ class Gaussians:
     normals : float32 [N, 3] unit normals, world frame [1]
     class_id : uint8 [N] `SemanticClass`
     surroundings : float32 [N, 2] overlap of the surface about each Gaussian, and root mean square size of its
-        neighbours by its own, see `tasks.scene.surroundings`: the cloud is drawn without the painter's bias
-        (`tasks.render.rasterise.painters_bias`) [1]; None: as its trainer drew it, bias and all
+        neighbours over its own, see `tasks.scene.surroundings`: the cloud is drawn without the painter's bias
+        (`tasks.render.rasterise.painters_bias`) [1]; None: as its trainer drew it, with the bias
     antialiased : splats narrower than a pixel fade instead of growing (Yu et al. 2024, Mip-Splatting,
         doi:10.1109/CVPR52733.2024.01839); False: the rule of the INRIA code, for which most files are made
     display_encoded : the colours blend in sRGB display space (scenes trained on pictures) and the
@@ -109,7 +109,7 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
 
 
 def _is_unit(vectors: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Whether each of the vectors [N, D] is 1 long; a square beyond single precision is infinite, and is not."""
+    """Return whether each of the vectors [N, D] has length 1; one whose square overflows single precision has not."""
     return np.abs(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)) - 1) <= UNIT_TOLERANCE
 
 

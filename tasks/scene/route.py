@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation, Slerp
 from tasks.errors import InputError
 
 SAMPLING = 0.25
-"""Step of the samples from which points find their foot on the route [m]."""
+"""Step of the samples from which a point's projection onto the route is found [m]."""
 
 
 LONGEST_ROUTE = 1e5
-"""Length of a route [m]: its samples take 50 MB, and no clip drives a hundredth of it."""
+"""Greatest length of a route [m]: its samples take 50 MB, and no clip is a hundredth of it long."""
 FARTHEST = 1e8
 """Greatest coordinate of a route [m]: more than ten times the radius of the Earth."""
 
@@ -63,7 +63,7 @@ class Route:
                 f" they start at {self.station[0]:g} and the smallest step is {steps.min():g} m"
             )
         R = self.T_world_rig[:, :3, :3]
-        # what is far beyond a rotation's numbers could not be multiplied
+        # entries far above 1 would overflow in the product
         off = np.abs(R).max(axis=(1, 2)) - 1
         if off.max() <= 1e-6:
             off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
@@ -83,7 +83,7 @@ class Route:
         return float(self.station[-1])
 
     def pose(self, station: ArrayLike) -> NDArray[np.float64]:
-        """P_0(s): position by a cubic through the poses along their headings, attitude by quaternion slerp.
+        """Return P_0(s): position by a cubic through the poses along their headings, attitude by quaternion slerp.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class Route:
     def project(
         self, points: NDArray[np.floating]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Route coordinates of points: station along the route, lateral leftward, height above the road.
+        """Return route coordinates of points: station along the route, lateral leftward, height above the road.
 
         Points before the start or beyond the end get stations along the end poses' headings.
 
@@ -130,8 +130,8 @@ class Route:
         _, nearest = self._tree.query(points[:, :2])
         pose = fine.pose[nearest]
         x, y, z = np.einsum("nji,nj->in", pose[:, :3, :3], points - pose[:, :3, 3])
-        # From the nearest sample on, the frame advances by t and turns by w for every metre of station; the
-        # foot of the point is where its x vanishes. Beyond the ends the frame no longer turns.
+        # From the nearest sample on, the frame moves by t and turns by w per metre of station; the projection of the
+        # point is where its x vanishes. Beyond the ends the frame no longer turns.
         ends = ((nearest == 0) & (x < 0)) | ((nearest == len(fine.station) - 1) & (x > 0))
         wx, wy, wz = np.where(ends, 0.0, fine.turn[nearest].T)
         tx, ty, tz = np.where(ends, [[1.0], [0.0], [0.0]], fine.tangent[nearest].T)
@@ -178,7 +178,7 @@ class _Samples:
 
 
 def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01) -> Route:
-    """A route through poses, with stations by chord length; poses at a standstill are dropped.
+    """Return a route through poses, with stations by chord length; poses at a standstill are dropped.
 
     Parameters
     ----------
@@ -192,13 +192,13 @@ def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01)
     """
     if problems := _range_problems(T_world_rig[:, :3, 3]):
         raise InputError(problems)
-    poses = T_world_rig[_moving(T_world_rig[:, :3, 3], standstill)]
+    poses = T_world_rig[_drop_standstill(T_world_rig[:, :3, 3], standstill)]
     steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     return Route(station=np.concatenate([[0.0], np.cumsum(steps)]), T_world_rig=poses)
 
 
 def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.01) -> Route:
-    """A route through points on the road, facing along its tangent with the roof up.
+    """Return a route through points on the road, with x along its tangent and z up.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
     """
     if problems := _range_problems(positions):
         raise InputError(problems)
-    kept = positions[_moving(positions, standstill)]
+    kept = positions[_drop_standstill(positions, standstill)]
     if len(kept) < 2:
         raise InputError(f"a route needs two points {standstill:g} m apart or more; it has {len(kept)}")
     steps = np.linalg.norm(np.diff(kept, axis=0), axis=1)
@@ -240,8 +240,8 @@ def _range_problems(positions: NDArray[np.float64]) -> list[str]:
     ]
 
 
-def _moving(positions: NDArray[np.float64], standstill: float) -> list[int]:
-    """Numbers of the positions that lie farther than ``standstill`` from the last one kept, NaN included."""
+def _drop_standstill(positions: NDArray[np.float64], standstill: float) -> list[int]:
+    """Return the numbers of the positions farther than ``standstill`` from the last one kept, NaN included."""
     kept: list[int] = []
     for i, position in enumerate(positions):
         if not kept or not np.linalg.norm(position - positions[kept[-1]]) <= standstill:
@@ -250,7 +250,7 @@ def _moving(positions: NDArray[np.float64], standstill: float) -> list[int]:
 
 
 def extend_route(route: Route, ahead_m: float, spacing_m: float = 1.0) -> Route:
-    """The route with a straight extension along its last pose.
+    """Return the route with a straight extension along its last pose.
 
     Parameters
     ----------

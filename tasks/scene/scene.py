@@ -1,4 +1,4 @@
-"""A street one can drive: Gaussians, the route through them, what lies beyond them, and what lights them."""
+"""A drivable street: Gaussians, the route through them, the environment beyond them, and the sun."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 
 LOWEST_SUN_DEG = 1.0
-"""A lower sun lights the flat road by less than a fiftieth: its share cannot be read off the road [deg]."""
+"""A lower sun gives the flat road less than a fiftieth of its light, which cannot be measured on the road [deg]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +48,7 @@ class Scene:
 
 
 def sun_problems(sun_direction_deg: tuple[float, float] | None) -> list[str]:
-    """What is wrong with a sun's azimuth and elevation [deg], each as one sentence; empty when it is sound."""
+    """Return the problems of a sun's azimuth and elevation [deg], one sentence each; empty when there are none."""
     if sun_direction_deg is None or (
         np.isfinite(sun_direction_deg).all() and LOWEST_SUN_DEG <= sun_direction_deg[1] <= 90
     ):

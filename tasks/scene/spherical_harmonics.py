@@ -18,7 +18,7 @@ C3 = (
 
 
 def sh_basis(directions: NDArray[np.floating], count: int) -> NDArray[np.float64]:
-    """Values of the first ``count`` basis functions (Kerbl et al. 2023, doi:10.1145/3592433, their code's order).
+    """Return the first ``count`` basis functions (Kerbl et al. 2023, doi:10.1145/3592433, their code's order).
 
     Parameters
     ----------

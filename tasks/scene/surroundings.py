@@ -1,4 +1,4 @@
-"""How densely the surface about each Gaussian is covered by its neighbours, and how large they are."""
+"""Surroundings of each Gaussian in its surface: overlap of its neighbours, and their size."""
 
 from dataclasses import replace
 
@@ -10,21 +10,21 @@ from scipy.spatial import cKDTree
 from tasks.scene.gaussians import Gaussians
 
 NEIGHBOURS = 24
-"""Nearest Gaussians that are looked at [1]."""
+"""Number of nearest Gaussians that are evaluated [1]."""
 ALIKE, IN_PLANE = 0.8, 0.3
 """Neighbours of one surface: least cosine between the normals, and largest sine of the angle between the plane of
 the Gaussian and the line to its neighbour [1]."""
 OPAQUE = 100.0
-"""No overlap is counted larger: nothing is seen through so much [1]."""
+"""Largest overlap that is counted: a surface with more is opaque [1]."""
 _AT_ONCE = 65536
 
 
-def with_surroundings(gaussians: Gaussians) -> Gaussians:
-    """The cloud with `Gaussians.surroundings`, as `tasks.render.rasterise.painters_bias` wants them.
+def add_surroundings(gaussians: Gaussians) -> Gaussians:
+    """Return the cloud with `Gaussians.surroundings`, as `tasks.render.rasterise.painters_bias` takes them.
 
     The overlap of a surface is its Gaussians' opacity times area, added up, per area. It is counted over the
-    `NEIGHBOURS` next Gaussians, out to the last of them, as far as they belong to the same surface. A random scatter
-    has one less than that number within that radius, a regular grid just that number: half of one is taken off.
+    `NEIGHBOURS` nearest Gaussians of the same surface, within the distance of the last of them. A random scatter has
+    one less than that number within that radius, a regular grid exactly that number: one half is subtracted.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def with_surroundings(gaussians: Gaussians) -> Gaussians:
     if count < 1:
         alone = np.tile(np.array([0, 1], np.float32), (len(gaussians), 1))
         return replace(gaussians, surroundings=alone)
-    sizes = in_surface(gaussians.scales)
+    sizes = surface_scales(gaussians.scales)
     area = 2 * np.pi * sizes[:, 0] * sizes[:, 1] * gaussians.opacities
     square = (sizes**2).sum(axis=1)
     tree = cKDTree(gaussians.means)
@@ -42,12 +42,14 @@ def with_surroundings(gaussians: Gaussians) -> Gaussians:
     for first in range(0, len(gaussians), _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
         distance, near = tree.query(gaussians.means[part], k=count + 1)
-        _look_about(first, near, distance[:, -1], gaussians.means, gaussians.normals, area, square, out[part])
+        _measure_surroundings(
+            first, near, distance[:, -1], gaussians.means, gaussians.normals, area, square, out[part]
+        )
     return replace(gaussians, surroundings=out)
 
 
-def in_surface(scales: NDArray[np.floating]) -> NDArray[np.float64]:
-    """The two standard deviations along the surface: all but the smallest, float64 [N, 2] [m].
+def surface_scales(scales: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return the two standard deviations along the surface: all but the smallest, float64 [N, 2] [m].
 
     Parameters
     ----------
@@ -57,7 +59,7 @@ def in_surface(scales: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _look_about(first, near, radius, means, normals, area, square, out):  # type: ignore[no-untyped-def]
+def _measure_surroundings(first, near, radius, means, normals, area, square, out):  # type: ignore[no-untyped-def]
     for i in range(len(near)):
         own = first + i
         covered, spread = area[own], area[own] * square[own]
@@ -75,6 +77,6 @@ def _look_about(first, near, radius, means, normals, area, square, out):  # type
                 spread += area[j] * square[j]
         counted = (near.shape[1] - 1.5) / near.shape[1]
         disc = np.pi * radius[i] * radius[i]
-        # Coincident points cover more than any number says.
+        # Coincident points have an unbounded overlap.
         out[i, 0] = min(counted * covered / disc, OPAQUE) if disc > 0 else OPAQUE
         out[i, 1] = np.sqrt(spread / covered / square[own])

@@ -1,4 +1,4 @@
-"""Moving, turning and scaling a cloud of Gaussians, its view-dependent colour included."""
+"""Translation, rotation and scaling of a cloud of Gaussians, its view-dependent colour included."""
 
 from dataclasses import replace
 
@@ -10,13 +10,13 @@ from tasks.scene.gaussians import Gaussians, check_gaussians
 from tasks.scene.spherical_harmonics import sh_basis
 
 BANDS = ((1, 4), (4, 9), (9, 16))
-"""First and last coefficient of the bands 1, 2 and 3; band 0 does not turn."""
+"""First and last coefficient of the bands 1, 2 and 3; band 0 is invariant under rotation."""
 SAMPLES = 64
 """Directions of the fit below: it is exact for any number of directions that spans the largest band."""
 
 
-def moved(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussians:
-    """The cloud in another frame.
+def transform_gaussians(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussians:
+    """Transform a cloud to another frame.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def moved(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussian
     Raises
     ------
     InputError
-        If the cloud has values in that frame that no cloud may have.
+        If the transformed cloud has values out of range.
     """
     scale = np.cbrt(np.linalg.det(T_world_source[:3, :3]))
     R = T_world_source[:3, :3] / scale
@@ -41,14 +41,14 @@ def moved(gaussians: Gaussians, T_world_source: NDArray[np.float64]) -> Gaussian
         scales=scales,
         quats_wxyz=quats.astype(np.float32),
         normals=(gaussians.normals @ R.T).astype(np.float32),
-        sh=rotated_sh(gaussians.sh, R),
+        sh=rotate_sh(gaussians.sh, R),
     )
     check_gaussians(turned, "the cloud along the route")
     return turned
 
 
-def rotated_sh(sh: NDArray[np.float32], rotation: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Coefficients of the turned colour function: ``f'(d) = f(R^T d)``.
+def rotate_sh(sh: NDArray[np.float32], rotation: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return the coefficients of the rotated colour function: ``f'(d) = f(R^T d)``.
 
     Each band is invariant under rotation, so its matrix follows from values at enough directions:
     ``Y(d) c' = Y(R^T d) c`` in the band.
@@ -59,7 +59,7 @@ def rotated_sh(sh: NDArray[np.float32], rotation: NDArray[np.float64]) -> NDArra
     rotation : float64 [3, 3] source to world [1]
     """
     count = sh.shape[1]
-    # a spiral over the sphere: spread evenly, the same every time
+    # a spiral over the sphere: even and deterministic
     z = np.linspace(-0.98, 0.98, SAMPLES)
     azimuth = np.pi * (3 - np.sqrt(5)) * np.arange(SAMPLES)
     ring = np.sqrt(1 - z**2)

@@ -107,7 +107,7 @@ def fit_brake_gain(events: Sequence[Event], vehicle: Vehicle, surface: SurfacePa
     surface : pavement
     """
     models = [_event_model(event, vehicle, surface) for event in events]
-    measured = [-event.change("longitudinal_acceleration") for event in events]
+    measured = [-event.subtract_baseline("longitudinal_acceleration") for event in events]
 
     def residual(log_factor: NDArray[np.float64]) -> NDArray[np.float64]:
         theta = np.zeros(len(EFFECT_TABLE))
@@ -115,7 +115,7 @@ def fit_brake_gain(events: Sequence[Event], vehicle: Vehicle, surface: SurfacePa
         parts = []
         for event, model, truth in zip(events, models, measured, strict=True):
             driven = simulate_run(model, theta, initial_speed=event.start_speed)
-            evaluated = event.within(event.protocol.evaluation)[_driven(event)]
+            evaluated = event.mask_window(event.protocol.evaluation)[_driven(event)]
             predicted = -driven.column("longitudinal_acceleration")
             parts.append((predicted - truth[_driven(event)])[evaluated])
         return np.concatenate(parts)
@@ -137,10 +137,13 @@ def fit_pitch(
     damping_ratio : given for the pitch-only calibration; None finds it from pitch and rate together [1]
     """
     joint = damping_ratio is None
-    inputs = [-event.change("longitudinal_acceleration") for event in events]
-    dives = [event.dive[event.within(event.protocol.evaluation)] for event in events]
+    inputs = [-event.subtract_baseline("longitudinal_acceleration") for event in events]
+    dives = [event.dive[event.mask_window(event.protocol.evaluation)] for event in events]
     rates = (
-        [event.change("pitch_rate")[event.within(event.protocol.evaluation)] for event in events]
+        [
+            event.subtract_baseline("pitch_rate")[event.mask_window(event.protocol.evaluation)]
+            for event in events
+        ]
         if joint
         else []
     )
@@ -159,7 +162,7 @@ def fit_pitch(
         for i, event in enumerate(events):
             interval = float(event.time[1] - event.time[0])
             dive, rate = dive_of_deceleration(vehicle, model, inputs[i], interval)
-            inside = event.within(event.protocol.evaluation)
+            inside = event.mask_window(event.protocol.evaluation)
             parts.append((dive[inside] - dives[i]) / dive_scale)
             if joint:
                 parts.append((rate[inside] - rates[i]) / rate_scale)
@@ -206,20 +209,20 @@ def predict_event(event: Event, vehicle: Vehicle, model: DiveModel, surface: Sur
     # the gain multiplies the moment of the sprung mass, the model's that of the whole vehicle
     theta[PARAMETER_INDEX["pitch_gain"]] = model.pitch_gain * car.sprung_mass / car.mass - 1.0
     driven = simulate_run(prepared, theta, initial_speed=event.start_speed)
-    inside = event.within(event.protocol.evaluation)
+    inside = event.mask_window(event.protocol.evaluation)
     kept = inside[_driven(event)]
     return Prediction(
         time=event.time[inside],
         dive=event.dive[inside],
         predicted_dive=np.degrees(driven.column("pitch")[kept]),
-        rate=event.change("pitch_rate")[inside] if "pitch_rate" in event.columns else None,
+        rate=event.subtract_baseline("pitch_rate")[inside] if "pitch_rate" in event.columns else None,
         predicted_rate=np.degrees(driven.column("pitch_rate")[kept]),
     )
 
 
 def _driven(event: Event) -> NDArray[np.bool_]:
     """Samples that are simulated: from the end of the baseline to the end of the evaluation."""
-    return event.within((event.protocol.baseline[1], event.protocol.evaluation[1]))
+    return event.mask_window((event.protocol.baseline[1], event.protocol.evaluation[1]))
 
 
 def _event_model(event: Event, vehicle: Vehicle, surface: SurfaceParameters) -> RunModel:
@@ -233,6 +236,6 @@ def _event_model(event: Event, vehicle: Vehicle, surface: SurfaceParameters) -> 
         snow_accumulation_h=event.weather.snow_accumulation_h, direction=1,
         disc_rise=0.0, hazard_center=0.0, hazard_length=0.0, hazard_height=0.0,
         interval=float(event.time[1] - event.time[0]),
-        pressure=np.maximum(event.change("brake_pressure")[driven], 0.0), response=response,
+        pressure=np.maximum(event.subtract_baseline("brake_pressure")[driven], 0.0), response=response,
     )  # fmt: skip
     return run_model(run, vehicle, surface)

@@ -9,6 +9,8 @@ from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
 from tasks.campaign.signals import Signal
 from tasks.studies.brake_dive import DiveModel, with_model
 from tasks.surface.road_profile import FLAT_ROAD
+from tasks.surface.state import SurfaceState
+from tasks.surface.weather import DRY
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.half_car import half_car, integrate_half_car
 from tasks.vehicle.parameters import Vehicle
@@ -162,7 +164,8 @@ def _braking(
     )
     controls = Controls(initial_speed=start, brake=command, hold_speed_until_brake=True)
     duration = round(LEAD_S + ramp + hold + release + SETTLING_S, 3)
-    ride = rollout(car, "dry", friction, controls, FLAT_ROAD, mode="coupled", duration_s=duration).columns
+    dry = SurfaceState(kind=DRY, friction=friction)
+    ride = rollout(car, dry, controls, FLAT_ROAD, mode="coupled", duration_s=duration).columns
     count = len(ride["speed"]) - 1
     turning = _bump(count) if curved else np.zeros(count)
     side = float(rng.choice((-1.0, 1.0)))

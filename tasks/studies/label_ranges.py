@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.studies.sensitivity import StudyProtocol, latin_hypercube
-from tasks.surface.friction import surface_friction
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import Weather, surface_state
 
 PERCENTILES = (5, 50, 95)
 DRIVEN_PERCENTILES = (5, 25, 50, 75, 95)
@@ -26,7 +26,8 @@ def sampled_friction(
 
     Parameters
     ----------
-    weather : of the clip; in dry weather the hypercube of rain is drawn, of which dry friction is all that matters
+    weather : of the clip; a kind that the study does not vary draws every parameter that has bounds, of which those
+        of its own law alone matter
     surface : nominal parameters with their bounds
     study : sampling of the study
 
@@ -34,13 +35,15 @@ def sampled_friction(
     -------
     mu_c of each sample, shape (samples,) [1]
     """
-    varied = study.snow if weather.kind == "snow" else study.rain
-    columns = latin_hypercube(surface.bounds, varied.parameters, study.samples, varied.seed)
+    varied = study.weathers.get(weather.kind)
+    names = varied.parameters if varied else tuple(surface.bounds)
+    seed = (varied or next(iter(study.weathers.values()))).seed
+    columns = latin_hypercube(surface.bounds, names, study.samples, seed)
     rows: list[dict[str, Any]] = [
         {name: float(values[n]) for name, values in columns.items()} for n in range(study.samples)
     ]
     drawn = [replace(surface, **row) for row in rows]
-    return np.array([surface_friction(weather, surface_state(weather, one), one) for one in drawn])
+    return np.array([surface_state(weather, one).friction for one in drawn])
 
 
 def label_ranges(

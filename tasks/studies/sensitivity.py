@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.surface.friction import surface_friction
-from tasks.surface.state import SurfaceParameters, Weather, WeatherKind, surface_state
+from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import DRY, Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.paper.wheels import stopping_run, wheels_of
 from tasks.vehicle.parameters import Vehicle, surface_response
@@ -23,14 +23,14 @@ class WeatherStudy:
 
     Parameters
     ----------
-    kind : rain or snow
+    kind : name of the kind of weather
     seed : of the Latin hypercube
     parameters : fields of ``SurfaceParameters``, in the order in which they are drawn
     highest_rate : of the precipitation [mm/h]
     sampled_rates, nominal_rates : how many rates from 0 on, for the samples and for the nominal curve
     """
 
-    kind: WeatherKind
+    kind: str
     seed: int
     parameters: tuple[str, ...]
     highest_rate: float
@@ -52,7 +52,7 @@ class StudyProtocol:
     snow_accumulation_h : [h]
     samples : size of each Latin hypercube
     percentiles : lower and upper edge of the envelopes [%]
-    rain, snow : what is varied
+    weathers : what is varied, by kind of weather; the paper's are rain and snow
     """
 
     initial_speed: float
@@ -63,8 +63,7 @@ class StudyProtocol:
     snow_accumulation_h: float
     samples: int
     percentiles: tuple[float, float]
-    rain: WeatherStudy
-    snow: WeatherStudy
+    weathers: Mapping[str, WeatherStudy]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,8 +123,9 @@ def sensitivity_study(
     Spearman's rho of the stop with each varied parameter; the number of solver cases; and for each kind of
     weather the nominal curve and the envelope over the rates.
     """
-    rain = weather_curves(vehicle, surface, protocol, protocol.rain)
-    snow = weather_curves(vehicle, surface, protocol, protocol.snow)
+    rain, snow = (
+        weather_curves(vehicle, surface, protocol, protocol.weathers[kind]) for kind in ("rain", "snow")
+    )
     percentiles = protocol.percentiles
     return {
         "rain50_stop_m": _envelope_at(rain, "stop_m", 50.0, percentiles),
@@ -226,7 +226,7 @@ def _stops(
     vehicle: Vehicle,
     surfaces: Sequence[SurfaceParameters],
     protocol: StudyProtocol,
-    kind: WeatherKind,
+    kind: str,
     rates: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     wheels = wheels_of(replace(vehicle, coast_deceleration=protocol.coast_deceleration))
@@ -242,12 +242,12 @@ def _stops(
     mu, stop_m = np.empty((len(surfaces), len(rates))), np.empty((len(surfaces), len(rates)))
     for column, rate in enumerate(rates):
         weather = Weather(
-            kind=kind if rate > 0 else "dry",
+            kind=kind if rate > 0 else DRY,
             precipitation_mm_h=float(rate),
             snow_accumulation_h=protocol.snow_accumulation_h,
         )
         for row, surface in enumerate(surfaces):
-            friction = surface_friction(weather, surface_state(weather, surface), surface)
+            friction = surface_state(weather, surface).friction
             tyre = surface_response(vehicle, weather.kind, friction).tyre
             mu[row, column] = friction
             stop_m[row, column], _ = stopping_run(

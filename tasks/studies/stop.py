@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.episodes import pressure_episodes
-from tasks.campaign.events import Drive
+from tasks.campaign.events import RecordedRun
 
 ACTIVE = 0.12
 """Pressure from which the brake is on, as in the paper's Appendix C.5 [MPa]."""
@@ -68,7 +68,7 @@ class StopErrors:
     rebound_acceleration_rmse: float
 
 
-def stop_of(drive: Drive, lead: float) -> Stop | None:
+def stop_of(drive: RecordedRun, lead: float) -> Stop | None:
     """The longest brake application of a run that ends at rest; None if there is none.
 
     Parameters

@@ -1,26 +1,10 @@
-"""Weather to the state of the road surface: water film, snow depth and snow coverage."""
+"""Numbers of the pavement, and what lies on it: the state that the vehicle and the renderer share."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from math import isfinite, nan
 
-WeatherKind = Literal["dry", "rain", "snow"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Weather:
-    """The precipitation that falls on the road (paper, Eq. surface_state: w, r, tau_s).
-
-    Parameters
-    ----------
-    kind : dry, rain or snow; also the name of the tyre family
-    precipitation_mm_h : rain rate, or water-equivalent snow rate [mm/h]
-    snow_accumulation_h : time over which the snow has fallen [h]
-    """
-
-    kind: WeatherKind
-    precipitation_mm_h: float = 0.0
-    snow_accumulation_h: float = 0.0
+from tasks.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +26,8 @@ class SurfaceParameters:
     fresh_snow_density : rho_s [kg/m3]
     water_density : rho_w [kg/m3]
     full_cover_depth_mm : snow depth that covers the whole pavement, h_cover [mm]
+    glaze_mm : clear ice after freezing rain, from the bottom of the texture; NaN where no entry of ice was read [mm]
+    ice_friction : friction of that ice, mu_ice; NaN where no entry of ice was read [1]
     bounds : declared range of each parameter that the sensitivity study varies, by field name
     """
 
@@ -61,84 +47,44 @@ class SurfaceParameters:
     fresh_snow_density: float
     water_density: float
     full_cover_depth_mm: float
+    glaze_mm: float = nan
+    ice_friction: float = nan
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceState:
-    """What lies on the road (paper, Eq. surface_state: h_t, h_s, c_s); zero outside its weather.
+    """What lies on the road and how it grips (paper, Eq. surface_state: w, r, h_t, h_s, c_s; mu_c).
 
     Parameters
     ----------
-    film_depth_mm : total water depth from the bottom of the texture, h_t [mm]
-    free_film_mm : water above the texture peaks, h_f, a diagnostic [mm]
-    texture_fill : share of the texture depth that the water fills, a diagnostic [1]
+    kind : kind of weather, a row of ``tasks.surface.weather.WEATHERS``
+    precipitation_mm_h : what falls, water equivalent [mm/h]
+    film_depth_mm : total depth of the film from the bottom of the texture, h_t [mm]
     snow_depth_mm : h_s [mm]
     snow_coverage : share of the tyre contact on snow, c_s [1]
+    friction : reference surface coefficient, mu_c; NaN where only the picture is asked for [1]
+
+    Raises
+    ------
+    InputError
+        Listing every number that is out of its range.
     """
 
-    film_depth_mm: float
-    free_film_mm: float
-    texture_fill: float
-    snow_depth_mm: float
-    snow_coverage: float
+    kind: str
+    precipitation_mm_h: float = 0.0
+    film_depth_mm: float = 0.0
+    snow_depth_mm: float = 0.0
+    snow_coverage: float = 0.0
+    friction: float = nan
 
-
-def film_depth(precipitation_mm_h: float, parameters: SurfaceParameters) -> float:
-    """Steady water depth on a draining pavement [mm], by the metric Gallaway relation.
-
-    Parameters
-    ----------
-    precipitation_mm_h : rain rate, not negative [mm/h]
-    parameters : the pavement
-
-    References
-    ----------
-    Paper, Appendix E; Gallaway et al. 1979, FHWA-RD-79-31.
-    """
-    p = parameters
-    return (
-        p.film_coefficient
-        * p.texture_depth_mm**p.film_texture_exponent
-        * p.drainage_length**p.film_length_exponent
-        * precipitation_mm_h**p.film_rate_exponent
-        * p.crossfall**p.film_crossfall_exponent
-    )
-
-
-def snow_depth(precipitation_mm_h: float, accumulation_h: float, parameters: SurfaceParameters) -> float:
-    """Fresh snow on the ground [mm] (paper, Eq. surface_evolution).
-
-    Parameters
-    ----------
-    precipitation_mm_h : water-equivalent snow rate [mm/h]
-    accumulation_h : how long it has fallen [h]
-    parameters : holds the densities of water and fresh snow
-    """
-    return precipitation_mm_h * accumulation_h * parameters.water_density / parameters.fresh_snow_density
-
-
-def surface_state(weather: Weather, parameters: SurfaceParameters) -> SurfaceState:
-    """What the weather leaves on the pavement, Phi_surf (paper, Eqs. surface_state and surface_evolution).
-
-    Parameters
-    ----------
-    weather : kind, rate and accumulation time
-    parameters : the pavement
-
-    Returns
-    -------
-    SurfaceState
-        Quantities of another kind of weather are zero.
-    """
-    h_t = film_depth(weather.precipitation_mm_h, parameters) if weather.kind == "rain" else 0.0
-    h_s = 0.0
-    if weather.kind == "snow":
-        h_s = snow_depth(weather.precipitation_mm_h, weather.snow_accumulation_h, parameters)
-    return SurfaceState(
-        film_depth_mm=h_t,
-        free_film_mm=max(0.0, h_t - parameters.texture_depth_mm),
-        texture_fill=min(1.0, h_t / parameters.texture_depth_mm),
-        snow_depth_mm=h_s,
-        snow_coverage=min(1.0, h_s / parameters.full_cover_depth_mm),
-    )
+    def __post_init__(self) -> None:
+        problems = [
+            f"weather: {name} must be a number of 0 or more; it is {value:g}"
+            for name in ("precipitation_mm_h", "film_depth_mm", "snow_depth_mm", "snow_coverage")
+            if not (isfinite(value := getattr(self, name)) and value >= 0)
+        ]
+        if self.snow_coverage > 1:
+            problems.append(f"weather: snow_coverage must not exceed 1; it is {self.snow_coverage:g}")
+        if problems:
+            raise InputError(problems)

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tasks.errors import InputError
+from tasks.surface.weather import find_weather
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.tyres.burckhardt import scale_burckhardt
 from tasks.vehicle.tyres.contract import Tyre
@@ -65,7 +67,8 @@ class Vehicle:
     stop_speed : the vehicle stands at or below it [m/s]
     lock_speed : in coupled mode, wheel speed below which brake friction turns proportional to it [rad/s]
     gravity : g [m/s2]
-    families : tyre family of each kind of weather
+    families : its own tyre family of each kind of weather that it was fitted in
+    shared_families : tyre families that the kinds of weather bring, for the others
     tyre : Magic Formula of every wheel; None where the families' Burckhardt curves are the tyre
     effects : numbers of ``tasks.vehicle.effects.table`` that the model adds; none in the paper's model
     forms : what the model adds that no effect of the library has; none in the paper's model
@@ -105,6 +108,28 @@ class Vehicle:
     tyre: MagicFormula | None = None
     effects: Mapping[str, float] = field(default_factory=dict)
     forms: tuple[Form, ...] = ()
+    shared_families: Mapping[str, TyreFamily] = field(default_factory=dict)
+
+    def tyre_family(self, weather: str) -> TyreFamily:
+        """The tyre family in a kind of weather: the vehicle's own, else the one that the kind brings.
+
+        Parameters
+        ----------
+        weather : name of the kind
+
+        Raises
+        ------
+        InputError
+            If there is no such kind, or neither has a family for it.
+        """
+        find_weather(weather)
+        family = self.families.get(weather, self.shared_families.get(weather))
+        if family is None:
+            raise InputError(
+                f"vehicle {self.name} has no tyre family for weather {weather}, only for {', '.join(self.families)}:"
+                f" add families.{weather} to its file"
+            )
+        return family
 
     @property
     def mass(self) -> float:
@@ -155,10 +180,10 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
     Parameters
     ----------
     vehicle : holds the tables
-    family : dry, rain or snow
+    family : name of a kind of weather
     surface_friction : mu_c [1]
     """
-    table = vehicle.families[family]
+    table = vehicle.tyre_family(family)
     knots = table.surface_friction
 
     def at(values: tuple[float, ...]) -> float:
@@ -178,5 +203,5 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
         hold_s=at(table.hold_s),
         release_s=at(table.release_s),
         extrapolated=not knots[0] - rounding <= surface_friction <= knots[-1] + rounding,
-        wet=family == "rain",
+        wet=find_weather(family).wet,
     )

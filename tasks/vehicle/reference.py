@@ -24,7 +24,7 @@ def burckhardt(slip: ArrayLike, vehicle: Vehicle, family: str, response: Surface
     slip : braking slip [1]
     vehicle, family, response : give the base curve, its peak and slip stiffness
     """
-    c1, c2, c3 = vehicle.families[family].burckhardt
+    c1, c2, c3 = vehicle.tyre_family(family).burckhardt
 
     def base(kappa: Array) -> Array:
         return c1 * (1 - np.exp(-c2 * kappa)) - c3 * kappa

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.history import History
 from tasks.vehicle.model.brake_input import brake_command
@@ -84,14 +85,12 @@ class Rollout:
 
 def rollout(
     vehicle: Vehicle,
-    family: str,
-    surface_friction: float,
+    surface: SurfaceState,
     controls: Controls,
     hazard: RoadHazard,
     *,
     mode: Mode,
     duration_s: float,
-    snow_depth_mm: float = 0.0,
     step_s: float = INTERNAL_STEP_S,
 ) -> Rollout:
     """Drive one scenario; after a stop the vehicle rests and its body comes to rest too.
@@ -99,13 +98,11 @@ def rollout(
     Parameters
     ----------
     vehicle : the vehicle
-    family : tyre family: dry, rain or snow
-    surface_friction : mu_c [1]
+    surface : kind of weather, mu_c, and the snow that wheels plough where the vehicle has that effect
     controls : initial speed and brake
     hazard : road feature
     mode : paper follows the publication, coupled is the physical model
     duration_s : length of the telemetry, whole milliseconds [s]
-    snow_depth_mm : of the snow on the road, which wheels plough where the vehicle has that effect [mm]
     step_s : internal step, a whole fraction of a millisecond [s]
 
     Raises
@@ -113,6 +110,7 @@ def rollout(
     InputError
         Listing every argument that breaks a rule.
     """
+    family, surface_friction, snow_depth_mm = surface.kind, surface.friction, surface.snow_depth_mm
     per_tick = _check(vehicle, family, surface_friction, mode, duration_s, step_s)
     response = surface_response(vehicle, family, surface_friction)
     ticks = round(duration_s * 1000)
@@ -168,8 +166,10 @@ def _check(
     problems = []
     if mode not in MODES:
         problems.append(f"mode must be one of {', '.join(MODES)}; it is {mode}")
-    if family not in vehicle.families:
-        problems.append(f"tyre family {family}: no such family; there are: {', '.join(vehicle.families)}")
+    try:
+        vehicle.tyre_family(family)
+    except InputError as error:
+        problems += error.problems
     if not (isfinite(surface_friction) and surface_friction > 0):
         problems.append(f"surface_friction must be a positive number; it is {surface_friction}")
     whole = (

@@ -50,7 +50,7 @@ tolerances_1sigma:
 """
 
 
-def logged(columns: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+def log_signal(columns: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
     """The same motion in the units, directions and names of the map's logger."""
     late = np.interp(columns["time"] - 0.05, columns["time"], columns["pitch_rate"])
     front = columns["wheel_speed_front"] * 30 / np.pi

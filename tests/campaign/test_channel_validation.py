@@ -47,11 +47,11 @@ def test_sound_runs_raise_no_alarm(runs: list[Columns]) -> None:
     assert [problem for run in runs for problem in problems_of(run)] == []
 
 
-def scaled(*names: str, factor: float) -> Callable[[Columns], Columns]:
+def scale_channel(*names: str, factor: float) -> Callable[[Columns], Columns]:
     return lambda run: run | {name: run[name] * factor for name in names}
 
 
-def held(name: str) -> Callable[[Columns], Columns]:
+def hold_channel(name: str) -> Callable[[Columns], Columns]:
     def damage(run: Columns) -> Columns:
         values = run[name].copy()
         values[100:180] = values[100]
@@ -60,26 +60,26 @@ def held(name: str) -> Callable[[Columns], Columns]:
     return damage
 
 
-def shifted(seconds: float) -> Callable[[Columns], Columns]:
+def shift_channel(seconds: float) -> Callable[[Columns], Columns]:
     return lambda run: run | {"time": run["time"] + seconds * (np.arange(len(run["time"])) > 150)}
 
 
 @pytest.mark.parametrize(
     ("fault", "damage", "share"),
     [
-        ("pitch turned over", scaled("pitch", factor=-1), 1.0),
-        ("pitch rate turned over", scaled("pitch_rate", factor=-1), 1.0),
-        ("pitch and pitch rate turned over", scaled("pitch", "pitch_rate", factor=-1), 0.8),
-        ("acceleration turned over", scaled("longitudinal_acceleration", factor=-1), 1.0),
-        ("acceleration in g", scaled("longitudinal_acceleration", factor=1 / 9.81), 1.0),
-        ("speed in km/h", scaled("speed", factor=3.6), 1.0),
-        ("pressure in bar", scaled("brake_pressure", factor=10), 0.9),
-        ("pressure a tenth", scaled("brake_pressure", factor=0.1), 1.0),
-        ("pitch in rad", scaled("pitch", factor=np.pi / 180), 1.0),
-        ("frozen pitch", held("pitch"), 1.0),
-        ("frozen speed", held("speed"), 1.0),
-        ("clock jumps on", shifted(0.4), 1.0),
-        ("clock jumps back", shifted(-0.2), 1.0),
+        ("pitch turned over", scale_channel("pitch", factor=-1), 1.0),
+        ("pitch rate turned over", scale_channel("pitch_rate", factor=-1), 1.0),
+        ("pitch and pitch rate turned over", scale_channel("pitch", "pitch_rate", factor=-1), 0.8),
+        ("acceleration turned over", scale_channel("longitudinal_acceleration", factor=-1), 1.0),
+        ("acceleration in g", scale_channel("longitudinal_acceleration", factor=1 / 9.81), 1.0),
+        ("speed in km/h", scale_channel("speed", factor=3.6), 1.0),
+        ("pressure in bar", scale_channel("brake_pressure", factor=10), 0.9),
+        ("pressure a tenth", scale_channel("brake_pressure", factor=0.1), 1.0),
+        ("pitch in rad", scale_channel("pitch", factor=np.pi / 180), 1.0),
+        ("frozen pitch", hold_channel("pitch"), 1.0),
+        ("frozen speed", hold_channel("speed"), 1.0),
+        ("clock jumps on", shift_channel(0.4), 1.0),
+        ("clock jumps back", shift_channel(-0.2), 1.0),
     ],
 )
 def test_a_fault_in_a_braking_run_is_found(

@@ -9,7 +9,7 @@ from tasks.campaign.manoeuvres import manoeuvre_errors
 T = np.arange(500) * 0.01
 
 
-def braked(deceleration: float, dip: float) -> np.ndarray:
+def make_braked(deceleration: float, dip: float) -> np.ndarray:
     y = np.zeros((500, 7))
     y[:, CHANNELS.index("speed")] = 20.0 - deceleration * np.maximum(T - 1.0, 0.0)
     y[:, CHANNELS.index("pitch")] = np.where(T > 1.0, dip, 0.0)
@@ -20,7 +20,7 @@ PRESSURE = np.where(T >= 1.0, 2.0, 0.0)
 
 
 def test_the_distance_is_that_to_the_lowest_speed_that_all_reach() -> None:
-    measured, harder, softer = braked(4.0, 1.0), braked(4.4, 1.2), braked(3.6, 0.9)
+    measured, harder, softer = make_braked(4.0, 1.0), make_braked(4.4, 1.2), make_braked(3.6, 0.9)
     errors = manoeuvre_errors(measured, np.array([harder, softer]), PRESSURE, 0.01)
     assert errors is not None
     reached = 20.0 - 3.6 * 3.99
@@ -33,12 +33,12 @@ def test_the_distance_is_that_to_the_lowest_speed_that_all_reach() -> None:
 
 
 def test_a_run_that_coasts_has_no_stopping_distance() -> None:
-    coasting = braked(0.2, 0.0)
+    coasting = make_braked(0.2, 0.0)
     assert manoeuvre_errors(coasting, coasting[None], np.zeros(500), 0.01) is None
     assert manoeuvre_errors(coasting, coasting[None], PRESSURE, 0.01) is None
 
 
 def test_a_model_that_is_the_measurement_is_not_wrong() -> None:
-    measured = braked(5.0, 1.0)
+    measured = make_braked(5.0, 1.0)
     errors = manoeuvre_errors(measured, measured[None], PRESSURE, 0.01)
     assert errors is not None and np.array_equal(errors, np.zeros((1, 2)))

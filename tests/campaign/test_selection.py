@@ -7,8 +7,8 @@ import pytest
 
 from catalogs.protocols import load_protocol
 from tasks.campaign.attrition import attrition_table
-from tasks.campaign.events import Drive, Event
-from tasks.campaign.selection import QUANTITIES, judge, select_events
+from tasks.campaign.events import Event, RecordedRun
+from tasks.campaign.selection import QUANTITIES, judge_event, select_events
 
 PROTOCOL = load_protocol("brake-dive")
 INTERVAL = 0.01
@@ -29,12 +29,12 @@ def good_columns() -> dict[str, np.ndarray]:
     }  # fmt: skip
 
 
-def drive(columns: dict[str, np.ndarray], name: str = "one") -> Drive:
-    return Drive(name=name, drive=name, interval=INTERVAL, columns=columns)
+def make_drive(columns: dict[str, np.ndarray], name: str = "one") -> RecordedRun:
+    return RecordedRun(name=name, drive=name, interval=INTERVAL, columns=columns)
 
 
 def only_event(columns: dict[str, np.ndarray]) -> Event:
-    (judged,) = select_events([drive(columns)], PROTOCOL).judged
+    (judged,) = select_events([make_drive(columns)], PROTOCOL).judged
     return judged.event
 
 
@@ -49,7 +49,7 @@ def test_the_catalogue_holds_the_papers_twelve_rules_and_failure_counts() -> Non
 
 
 def test_a_clean_event_is_retained() -> None:
-    selection = select_events([drive(good_columns())], PROTOCOL)
+    selection = select_events([make_drive(good_columns())], PROTOCOL)
     assert (selection.episodes, len(selection.judged), len(selection.retained)) == (1, 1, 1)
     assert selection.retained[0].at == pytest.approx(ONSET)
 
@@ -77,7 +77,7 @@ def test_each_rule_refuses_its_own_fault_and_the_attrition_table_counts_it(rule:
     columns = good_columns()
     for channel, damage in FAULTS[rule].items():
         columns[channel] = damage(columns[channel])
-    selection = select_events([drive(columns), drive(good_columns(), "two")], PROTOCOL)
+    selection = select_events([make_drive(columns), make_drive(good_columns(), "two")], PROTOCOL)
     assert rule in selection.judged[0].failed
     assert len(selection.retained) == 1
     row = next(row for row in attrition_table(selection, PROTOCOL) if row.rule == rule)
@@ -90,7 +90,7 @@ def test_all_rules_are_tried_and_failures_overlap() -> None:
     columns = good_columns()
     columns["yaw_rate"] = columns["yaw_rate"] + 5.0
     columns["steering_angle"] = columns["steering_angle"] + 50.0
-    selection = select_events([drive(columns)], PROTOCOL)
+    selection = select_events([make_drive(columns)], PROTOCOL)
     assert selection.judged[0].failed == ("steering_p95", "yaw_rate_p95")
     rows = {row.rule: row for row in attrition_table(selection, PROTOCOL)}
     assert (rows["steering_p95"].fails, rows["steering_p95"].fails_only_here, rows["yaw_rate_p95"].left) == (
@@ -103,7 +103,7 @@ def test_all_rules_are_tried_and_failures_overlap() -> None:
 def test_a_rule_without_its_channel_is_not_assessed_and_refuses_nothing() -> None:
     columns = good_columns()
     del columns["roll_rate"]
-    selection = select_events([drive(columns)], PROTOCOL)
+    selection = select_events([make_drive(columns)], PROTOCOL)
     assert selection.unassessed == ("roll_rate_p95",) and len(selection.retained) == 1
     row = next(row for row in attrition_table(selection, PROTOCOL) if row.rule == "roll_rate_p95")
     assert row.fails is None
@@ -111,7 +111,7 @@ def test_a_rule_without_its_channel_is_not_assessed_and_refuses_nothing() -> Non
 
 def test_an_event_without_its_whole_window_is_no_candidate() -> None:
     cut = {name: values[80:] for name, values in good_columns().items()}
-    selection = select_events([drive(cut)], PROTOCOL)
+    selection = select_events([make_drive(cut)], PROTOCOL)
     assert (selection.episodes, len(selection.judged)) == (1, 0)
 
 
@@ -138,4 +138,4 @@ def test_no_rule_sees_the_pitch_after_the_onset() -> None:
     event = only_event(good_columns())
     after = event.time > 1e-6
     moved = replace(event, columns={**event.columns, "pitch": event.columns["pitch"] + 5.0 * after})
-    assert judge(event, PROTOCOL.rules).values == judge(moved, PROTOCOL.rules).values
+    assert judge_event(event, PROTOCOL.rules).values == judge_event(moved, PROTOCOL.rules).values

@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from tasks.campaign.assembly import assemble_run
-from tasks.campaign.channels import UNITS, likely_unit, unit_factor
+from tasks.campaign.channels import UNITS, guess_unit, unit_factor
 from tasks.campaign.episodes import pressure_episodes
-from tasks.campaign.signals import ChannelRule, Gain, Signal, as_channel, common_clock, on_clock
+from tasks.campaign.signals import (
+    ChannelRule,
+    Gain,
+    Signal,
+    convert_to_channel,
+    make_common_clock,
+    resample_on_clock,
+)
 from tasks.errors import InputError
 
 
@@ -36,14 +43,14 @@ def test_units_of_different_things_are_refused() -> None:
     [("m/s", 3.6, "km/h"), ("deg", 1 / 57.3, "rad"), ("MPa", 10.0, "bar"), ("m/s", 1.3, None)],
 )
 def test_a_ratio_names_the_unit_that_explains_it(target: str, ratio: float, unit: str | None) -> None:
-    assert likely_unit(target, ratio) == unit
+    assert guess_unit(target, ratio) == unit
 
 
 def test_sign_scale_offset_and_delay_act_as_the_map_says() -> None:
     rule = ChannelRule(
         channel="pitch", sources=("x",), unit="rad", sign=-1, scale=1.1, offset=0.2, delay=0.03
     )
-    found = as_channel(Signal(time=np.array([1.0, 2.0]), values=np.array([0.0, np.pi / 180])), rule)
+    found = convert_to_channel(Signal(time=np.array([1.0, 2.0]), values=np.array([0.0, np.pi / 180])), rule)
     np.testing.assert_allclose(found.values, [0.2, -1.1 + 0.2])
     np.testing.assert_allclose(found.time, [0.97, 1.97])
 
@@ -56,23 +63,25 @@ def test_a_gain_changes_the_quantity() -> None:
 
 def test_a_slow_signal_is_linear_between_its_samples() -> None:
     slow = Signal(time=np.array([0.0, 0.5, 1.0]), values=np.array([0.0, 1.0, 0.0]))
-    np.testing.assert_allclose(on_clock(slow, np.array([0.0, 0.25, 0.5, 0.75])), [0.0, 0.5, 1.0, 0.5])
+    np.testing.assert_allclose(
+        resample_on_clock(slow, np.array([0.0, 0.25, 0.5, 0.75])), [0.0, 0.5, 1.0, 0.5]
+    )
 
 
 def test_a_fast_signal_keeps_its_mean_and_does_not_fold_into_the_clock() -> None:
     t = np.arange(20001) / 10_000
     tone = Signal(time=t, values=3.0 + np.sin(2 * np.pi * 100.0 * t + 0.9))
     clock = np.arange(10, 190) / 100
-    np.testing.assert_allclose(on_clock(tone, clock), 3.0, atol=2e-3)
+    np.testing.assert_allclose(resample_on_clock(tone, clock), 3.0, atol=2e-3)
 
 
 def test_the_common_clock_covers_only_what_all_signals_have() -> None:
     def signal(start: float, end: float) -> Signal:
         return Signal(time=np.linspace(start, end, 50), values=np.zeros(50))
 
-    clock = common_clock([signal(0.0, 2.0), signal(0.5, 3.0)], 10.0)
+    clock = make_common_clock([signal(0.0, 2.0), signal(0.5, 3.0)], 10.0)
     assert (clock[0], clock[-1], len(clock)) == (0.5, 2.0, 16)
-    assert not len(common_clock([signal(0.0, 1.0), signal(2.0, 3.0)], 10.0))
+    assert not len(make_common_clock([signal(0.0, 1.0), signal(2.0, 3.0)], 10.0))
 
 
 def test_a_run_with_a_problem_gives_no_columns() -> None:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from catalogs.entries import find_entry
-from catalogs.vehicles import FOLDER, load_vehicle
+from catalogs.entries import FOLDERS, entry_folder, entry_names, find_entry
+from catalogs.vehicles import load_vehicle
 from tasks.errors import InputError
 
 
@@ -33,12 +33,19 @@ def test_a_name_that_is_none_is_one_short_sentence_with_those_that_exist(name):
 
 def test_a_folder_or_pipe_that_ends_like_a_file_is_no_entry(tmp_path):
     (tmp_path / "folder.yaml").mkdir()
-    with pytest.raises(InputError, match="no such thing"):
-        find_entry(tmp_path, tmp_path / "folder.yaml", "thing")
+    with pytest.raises(InputError, match="no such vehicle"):
+        find_entry("vehicle", tmp_path / "folder.yaml")
 
 
 def test_a_name_is_looked_up_and_a_file_is_taken_as_it_is(tmp_path):
     file = tmp_path / "my car.yaml"
     file.write_text("{}")
-    assert find_entry(FOLDER, file, "vehicle") == file
-    assert find_entry(FOLDER, "bmw-m8", "vehicle") == FOLDER / "bmw-m8.yaml"
+    assert find_entry("vehicle", file) == file
+    assert find_entry("vehicle", "bmw-m8") == entry_folder("vehicle") / "bmw-m8.yaml"
+
+
+@pytest.mark.parametrize("kind", FOLDERS)
+def test_every_name_of_a_kind_is_found_in_its_folder(kind):
+    names = entry_names(kind)
+    assert names
+    assert {find_entry(kind, name).parent for name in names} == {entry_folder(kind)}

@@ -137,7 +137,7 @@ def test_the_weather_of_a_stranger_asks_for_no_more_size_classes_than_a_frame_ca
     for path in WEATHER.glob("*.yaml"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
     rain = yaml.safe_load((tmp_path / "rain.yaml").read_text())
-    rain["classes"]["value"] = count
+    rain["particles"]["classes"]["value"] = count
     (tmp_path / "rain.yaml").write_text(yaml.safe_dump(rain))
     with pytest.raises(InputError, match=f"classes must be a whole number from 1 to 100; it is {count}"):
         load_weather(tmp_path)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from catalogs.scenes.gaussian_files import read_gaussians, write_gaussians
 from tasks.errors import InputError
-from tasks.scene.transform import moved
+from tasks.scene.transform import transform_gaussians
 from tests.toy_street import toy_street
 
 SCENE = toy_street()
@@ -200,7 +200,7 @@ def test_quaternions_of_any_length_become_unit_ones(tmp_path, value):
     rows = bytearray((tmp_path / "a.ply").read_bytes())
     rows[-16:] = np.full(4, value, "<f4").tobytes()
     (tmp_path / "a.ply").write_bytes(rows)
-    cloud = moved(read_gaussians(tmp_path / "a.ply"), np.eye(4))
+    cloud = transform_gaussians(read_gaussians(tmp_path / "a.ply"), np.eye(4))
     np.testing.assert_allclose(np.linalg.norm(cloud.quats_wxyz, axis=1), 1, atol=1e-6)
 
 

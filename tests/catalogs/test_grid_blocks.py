@@ -1,7 +1,6 @@
 """The ways to write a grid down, what it leaves out, its splits, and its place in the calibrated range."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +8,8 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from catalogs.calibrated_range import calibration_tag, load_calibrated_range
-from catalogs.grids import GRID_FOLDER, GridFile, expand_grid
+from catalogs.entries import entry_names, find_entry
+from catalogs.grids import GridFile, expand_grid
 from catalogs.grids.schema import grid_schema
 from catalogs.scenario import Scenario
 from catalogs.studies import load_conditions
@@ -149,7 +149,7 @@ def test_one_changed_control_moves_a_scenario_of_the_grid(change, tag):
 def test_the_json_schema_takes_every_grid_that_ships_and_refuses_what_the_reader_refuses():
     Draft202012Validator.check_schema(grid_schema())
     validator = Draft202012Validator(grid_schema())
-    for path in sorted(Path(GRID_FOLDER).glob("*.yaml")):
+    for path in (find_entry("grid", name) for name in entry_names("grid")):
         assert list(validator.iter_errors(yaml.safe_load(path.read_text()))) == [], path.name
     for wrong in ({"name": "t", "colour": "red"}, {"name": "t", "frames": 1}, {"axes": {}},
                   {"name": "t", "scenarios": {"a": {"weather": "hail"}}}):  # fmt: skip

@@ -2,7 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from catalogs.grids import grid_names, load_grid
+from catalogs.entries import entry_names
+from catalogs.grids import load_grid
 from catalogs.scenario import Scenario, route_problems, scenario_problems
 from tasks.errors import InputError
 
@@ -13,7 +14,7 @@ def grid_file(tmp_path: Path, body: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", grid_names())
+@pytest.mark.parametrize("name", entry_names("grid"))
 def test_every_grid_that_ships_is_sound(name):
     assert load_grid(name).scenarios
 

@@ -12,7 +12,7 @@ from catalogs.scenes.route_files import read_route
 from flows.making.scenes import scene_import
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.scene.transform import moved
+from tasks.scene.transform import transform_gaussians
 from tests.toy_street import toy_street
 
 SCENE = toy_street()
@@ -167,7 +167,7 @@ def test_a_unit_of_its_own_scales_route_and_cloud_alike(tmp_path):
     plain, _ = read_route(tmp_path / "k.txt", 1.65)
     route, T_world_source = read_route(tmp_path / "k.txt", 1.65, metres_per_unit=2.5)
     assert route.length == pytest.approx(2.5 * plain.length)
-    cloud = moved(SCENE.gaussians, T_world_source)
+    cloud = transform_gaussians(SCENE.gaussians, T_world_source)
     np.testing.assert_allclose(cloud.scales, 2.5 * SCENE.gaussians.scales, rtol=1e-6)
     apart = np.linalg.norm(cloud.means[0] - cloud.means[9])
     assert apart == pytest.approx(

@@ -12,7 +12,7 @@ import pytest
 from catalogs.scenes import load_scene, write_scene
 from catalogs.scenes.folder import read_scene, scene_hash
 from tasks.errors import InputError
-from tasks.scene.surroundings import with_surroundings
+from tasks.scene.surroundings import add_surroundings
 from tests.toy_street import toy_street
 
 SCENE = toy_street()
@@ -113,7 +113,7 @@ def test_a_scene_json_with_a_wrong_entry_is_refused_with_its_key(tmp_path, key, 
 
 
 def test_surroundings_are_kept_where_a_cloud_has_them_and_are_part_of_its_hash(tmp_path):
-    level = replace(SCENE, gaussians=with_surroundings(replace(SCENE.gaussians, antialiased=True)))
+    level = replace(SCENE, gaussians=add_surroundings(replace(SCENE.gaussians, antialiased=True)))
     for name, scene in (("plain", SCENE), ("level", level)):
         write_scene(scene, tmp_path / name, {})
     assert read_scene(tmp_path / "plain").gaussians.surroundings is None

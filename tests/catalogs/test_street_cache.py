@@ -20,7 +20,7 @@ from tests.toy_street import toy_street
 def cache(tmp_path, monkeypatch) -> Path:
     """An empty cache, and a street that is built at once."""
     monkeypatch.setenv("MUSYNC_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(street_cache, "_built", toy_street)
+    monkeypatch.setattr(street_cache, "_build_street", toy_street)
     return tmp_path / "cache"
 
 
@@ -36,7 +36,7 @@ def break_byte(path: Path) -> None:
 
 def test_a_street_is_made_once(cache, monkeypatch):
     first = cached_street()
-    monkeypatch.setattr(street_cache, "_built", None)
+    monkeypatch.setattr(street_cache, "_build_street", None)
     assert cached_street() == first
     assert names(cache) == [first.name, "street.lock"]
 
@@ -110,7 +110,7 @@ def slow_street(seed: int):
 
 def make(folder: str, built: str) -> None:
     os.environ["MUSYNC_CACHE"] = folder
-    street_cache._built = {"slow": slow_street, "never": lambda seed: time.sleep(60)}[built]
+    street_cache._build_street = {"slow": slow_street, "never": lambda seed: time.sleep(60)}[built]
     with open(f"{folder}.{os.getpid()}", "w") as told:
         told.write(str(cached_street()))
 

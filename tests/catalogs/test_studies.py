@@ -28,7 +28,9 @@ def test_held_out_conditions_change_one_control_each():
 
 def test_the_study_samples_the_published_parameters():
     protocol, printed = load_sensitivity_study()
-    assert protocol.rain.parameters[0] == protocol.snow.parameters[0] == "dry_friction"
-    assert (len(protocol.rain.parameters), len(protocol.snow.parameters)) == (6, 5)
-    assert (protocol.samples, protocol.rain.seed) == (128, 20260725)
+    assert (
+        protocol.weathers["rain"].parameters[0] == protocol.weathers["snow"].parameters[0] == "dry_friction"
+    )
+    assert (len(protocol.weathers["rain"].parameters), len(protocol.weathers["snow"].parameters)) == (6, 5)
+    assert (protocol.samples, protocol.weathers["rain"].seed) == (128, 20260725)
     assert sum(figure.unit == "m" for figure in printed) == 7

@@ -1,14 +1,18 @@
 """Surface entries: the shipped one, and how a wrong one is refused."""
 
+import shutil
+
 import pytest
 import yaml
 
-from catalogs.surfaces import FOLDER, load_surface, surface_names
+from catalogs.entries import entry_names, find_entry
+from catalogs.surfaces import SurfaceEntry, load_surface
+from catalogs.weather.grip import FOLDER as WEATHER
 from tasks.errors import InputError
 
 
 def broken(tmp_path, **changes):
-    content = yaml.safe_load((FOLDER / "dense-asphalt.yaml").read_text())
+    content = yaml.safe_load(find_entry("surface", "dense-asphalt").read_text())
     for name, change in changes.items():
         content[name] = content.get(name, {}) | change if isinstance(change, dict) else change
     path = tmp_path / "broken.yaml"
@@ -16,7 +20,7 @@ def broken(tmp_path, **changes):
     return path
 
 
-@pytest.mark.parametrize("name", surface_names())
+@pytest.mark.parametrize("name", entry_names("surface"))
 def test_every_surface_loads_with_bounds_around_its_values(name):
     surface = load_surface(name)
     for field, (low, high) in surface.bounds.items():
@@ -27,7 +31,7 @@ def test_dense_asphalt_holds_the_papers_values_and_bounds():
     asphalt = load_surface("dense-asphalt")
     assert (asphalt.dry_friction, asphalt.texture_depth_mm, asphalt.crossfall) == (0.82, 0.5, 0.02)
     assert asphalt.bounds["flooded_friction"] == (0.306, 0.374)
-    assert len(asphalt.bounds) == 10
+    assert len(asphalt.bounds.keys() & SurfaceEntry.model_fields.keys()) == 10
 
 
 def test_an_unknown_name_lists_what_exists():
@@ -73,3 +77,15 @@ def test_a_file_that_is_no_table_is_refused(tmp_path, text):
     path.write_text(text)
     with pytest.raises(InputError, match="a surface must be"):
         load_surface(path)
+
+
+def test_a_number_that_no_pavement_takes_is_refused(tmp_path):
+    """A kind of weather may bring fields of the surface that pavements do not have, and no others."""
+    catalogue = tmp_path / "weather"
+    shutil.copytree(WEATHER, catalogue)
+    number = {"value": 0.1, "unit": "1", "bounds": [0.05, 0.15], "source": "a book"}
+    rain = yaml.safe_load((catalogue / "rain.yaml").read_text())
+    for name in ("slush_friction", "snow_friction"):
+        (catalogue / "rain.yaml").write_text(yaml.safe_dump(rain | {"surface": {name: number}}))
+        with pytest.raises(InputError, match=f"surface: {name}: no number"):
+            load_surface("dense-asphalt", catalogue)

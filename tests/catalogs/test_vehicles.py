@@ -1,17 +1,21 @@
 """Vehicle entries: the shipped one against the paper's tables, and how a wrong one is refused."""
 
+import shutil
 from math import degrees
 
 import pytest
 import yaml
 
-from catalogs.vehicles import FOLDER, load_vehicle, vehicle_names
+from catalogs.entries import entry_names, find_entry
+from catalogs.vehicles import load_vehicle
+from catalogs.weather.grip import FOLDER as WEATHER
 from tasks.errors import InputError
+from tasks.surface.weather import WEATHERS
 
 
 @pytest.fixture
 def entry():
-    return yaml.safe_load((FOLDER / "paper-reference.yaml").read_text())
+    return yaml.safe_load(find_entry("vehicle", "paper-reference").read_text())
 
 
 def saved(tmp_path, entry):
@@ -20,10 +24,10 @@ def saved(tmp_path, entry):
     return path
 
 
-@pytest.mark.parametrize("name", vehicle_names())
+@pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_vehicle_loads(name):
     vehicle = load_vehicle(name)
-    assert vehicle.name == name and set(vehicle.families) == {"dry", "rain", "snow"}
+    assert vehicle.name == name and all(vehicle.tyre_family(kind) for kind in WEATHERS)
 
 
 def test_the_reference_vehicle_has_the_papers_loads_and_offsets():
@@ -74,3 +78,27 @@ def test_all_problems_of_a_file_are_listed_at_once(tmp_path, entry):
     ):
         assert expected in said
     assert len(error.value.problems) == 10
+
+
+def test_a_kind_of_weather_brings_tyres_to_a_vehicle_that_has_none_for_it(tmp_path, entry):
+    catalogue = tmp_path / "weather"
+    shutil.copytree(WEATHER, catalogue)
+    snow = entry["families"].pop("snow")
+    path = saved(tmp_path, entry)
+    with pytest.raises(
+        InputError, match=r"has no tyre family for weather snow, only for dry, rain: add families\.snow"
+    ):
+        load_vehicle(path, catalogue).tyre_family("snow")
+    look = yaml.safe_load((catalogue / "snow.yaml").read_text())
+    (catalogue / "snow.yaml").write_text(yaml.safe_dump(look | {"tyre": snow}))
+    assert (
+        load_vehicle(path, catalogue).tyre_family("snow") == load_vehicle("paper-reference").families["snow"]
+    )
+    own = load_vehicle("paper-reference", catalogue)
+    assert own.tyre_family("snow") is own.families["snow"]
+
+
+def test_a_family_of_no_kind_of_weather_is_refused(tmp_path, entry):
+    entry["families"]["hail"] = entry["families"]["snow"]
+    with pytest.raises(InputError, match=r"families\.hail: must be dry, rain"):
+        load_vehicle(saved(tmp_path, entry))

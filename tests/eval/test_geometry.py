@@ -5,22 +5,23 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from benchmarks.synthetic_street import camera_matrix, mount
+from benchmarks.synthetic_street import camera_matrix, make_mount
 from tasks.eval.poses.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
 from tasks.eval.poses.rigid import (
-    adjoint,
+    adjoint_matrix,
     advance_pose,
     invert_pose,
     pose_from_twist,
-    project,
+    project_points,
     projection_jacobian,
-    skew,
+    skew_matrix,
     viewing_rays,
 )
-from tasks.eval.poses.solve_pnp import solve_pnp
+from tasks.eval.poses.solve_pnp import PnpLimits, solve_pnp
 from tasks.eval.poses.warp import bilinear_taps, view_from, warp_map
 
 K = camera_matrix()
+LIMITS = PnpLimits(min_inliers=100, noise_floor=1e-6, noise_ceiling=2.0)
 MOTION = pose_from_twist(np.array([0.03, -0.05, -0.9, 0.01, -0.02, 0.005]))
 """T_later_earlier of a car that goes 0.9 m ahead and nods."""
 
@@ -32,14 +33,14 @@ def cloud(count: int = 400, seed: int = 2) -> np.ndarray:
 
 
 def seen_by_both(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return project(points, K), project(points @ MOTION[:3, :3].T + MOTION[:3, 3], K)
+    return project_points(points, K), project_points(points @ MOTION[:3, :3].T + MOTION[:3, 3], K)
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 0.7, 2.5])
 def test_twists_are_the_matrix_exponential(size: float) -> None:
     twist = size * np.array([0.4, -1.0, 0.3, 0.2, 0.5, -0.6])
     generator = np.zeros((4, 4))
-    generator[:3, :3], generator[:3, 3] = skew(twist[3:]), twist[:3]
+    generator[:3, :3], generator[:3, 3] = skew_matrix(twist[3:]), twist[:3]
     np.testing.assert_allclose(pose_from_twist(twist), expm(generator), atol=1e-12)
 
 
@@ -51,12 +52,12 @@ def test_an_inverse_undoes_and_keeps_nan() -> None:
 
 def test_the_adjoint_carries_a_twist_to_the_other_frame() -> None:
     twist = 1e-3 * np.arange(1.0, 7.0)
-    carried = pose_from_twist(adjoint(MOTION) @ twist)
+    carried = pose_from_twist(adjoint_matrix(MOTION) @ twist)
     np.testing.assert_allclose(carried, MOTION @ pose_from_twist(twist) @ invert_pose(MOTION), atol=1e-12)
 
 
 def test_an_advance_is_along_the_rig_s_axis_whatever_the_mount() -> None:
-    T = mount() @ advance_pose(2.0, mount()) @ invert_pose(mount())
+    T = make_mount() @ advance_pose(2.0, make_mount()) @ invert_pose(make_mount())
     np.testing.assert_allclose(T[:3, 3], [2.0, 0.0, 0.0], atol=1e-15)
 
 
@@ -68,7 +69,7 @@ def test_the_projection_s_jacobian_is_its_difference_quotient() -> None:
         quotient = []
         for sign in (1, -1):
             T = pose_from_twist(sign * twist)
-            quotient.append(project(points @ T[:3, :3].T + T[:3, 3], K))
+            quotient.append(project_points(points @ T[:3, :3].T + T[:3, 3], K))
         np.testing.assert_allclose(J[:, :, axis], (quotient[0] - quotient[1]) / 2e-6, rtol=1e-5, atol=1e-4)
 
 
@@ -76,7 +77,7 @@ def test_exact_points_place_the_camera_exactly_though_a_third_of_them_lie() -> N
     points = cloud()
     _, pixels = seen_by_both(points)
     pixels[::3] += np.random.default_rng(1).uniform(5, 40, pixels[::3].shape)
-    step = solve_pnp(points, pixels, np.eye(4), K, min_inliers=100, noise_floor=1e-6, noise_ceiling=2)
+    step = solve_pnp(points, pixels, np.eye(4), K, LIMITS)
     assert not step.failure and step.inliers == 266
     np.testing.assert_allclose(invert_pose(step.T_earlier_later), MOTION, atol=1e-9)
 
@@ -87,7 +88,7 @@ def test_the_point_solver_agrees_with_opencv_and_states_its_spread() -> None:
     errors, theirs = [], []
     for _ in range(300):
         pixels = exact + rng.normal(0, 0.3, exact.shape)
-        step = solve_pnp(points, pixels, np.eye(4), K, min_inliers=100, noise_floor=1e-6, noise_ceiling=2)
+        step = solve_pnp(points, pixels, np.eye(4), K, LIMITS)
         off = step.T_earlier_later @ MOTION
         errors.append([*off[:3, 3], off[2, 1], off[0, 2], off[1, 0]])
         _, r, _ = cv2.solvePnP(points, pixels, K, None, flags=cv2.SOLVEPNP_ITERATIVE)
@@ -102,22 +103,23 @@ def test_the_point_solver_agrees_with_opencv_and_states_its_spread() -> None:
 def test_points_that_do_not_agree_are_a_failure() -> None:
     points = cloud(50)
     pixels = np.random.default_rng(0).uniform(0, 300, (50, 2))
-    limits = {"min_inliers": 45, "noise_floor": 0.01, "noise_ceiling": 2.0}
-    assert "miss the best pose" in solve_pnp(points, pixels, np.eye(4), K, **limits).failure
+    limits = PnpLimits(min_inliers=45, noise_floor=0.01, noise_ceiling=2.0)
+    assert "miss the best pose" in solve_pnp(points, pixels, np.eye(4), K, limits).failure
     _, exact = seen_by_both(points)
     exact[:10] += 30.0
-    assert "40 of 50 tracked points agree" in solve_pnp(points, exact, np.eye(4), K, **limits).failure
+    assert "40 of 50 tracked points agree" in solve_pnp(points, exact, np.eye(4), K, limits).failure
 
 
 def test_an_error_of_depth_does_less_harm_where_it_is_expected() -> None:
     points, rng = cloud(), np.random.default_rng(11)
     _, exact = seen_by_both(points)
-    harm = {0.0: [], 0.02: []}  # by the depth error that the solver is told of
+    harm = {0.0: [], 0.02: []}  # by the depth error that the limits state
     for _ in range(60):
         wrong = points * (1 + rng.normal(0, 0.02, (len(points), 1)))
         pixels = exact + rng.normal(0, 0.05, exact.shape)
-        for told, turns in harm.items():
-            step = solve_pnp(wrong, pixels, np.eye(4), K, 100, 1e-6, 5.0, depth_error=told)
+        for stated, turns in harm.items():
+            limits = PnpLimits(min_inliers=100, noise_floor=1e-6, noise_ceiling=5.0, depth_error=stated)
+            step = solve_pnp(wrong, pixels, np.eye(4), K, limits)
             off = step.T_earlier_later @ MOTION
             turns.append([off[2, 1], off[0, 2], off[1, 0]])
     assert np.std(harm[0.02]) < 0.7 * np.std(harm[0.0])

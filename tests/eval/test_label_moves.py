@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.eval.label_moves import figure_moves, tick_moves
+from tasks.eval.label_moves import compare_figures, compare_ticks
 
 N = 1000
 CHANNELS = (
@@ -12,7 +12,7 @@ CHANNELS = (
 )  # fmt: skip
 
 
-def ticks() -> dict[str, np.ndarray]:
+def make_ticks() -> dict[str, np.ndarray]:
     rng = np.random.default_rng(3)
     return {name: rng.standard_normal(N) for name in CHANNELS}
 
@@ -30,9 +30,9 @@ def ticks() -> dict[str, np.ndarray]:
     ],
 )
 def test_a_shift_of_a_channel_is_its_figure(channel: str, shift: float, figure: str, value: float) -> None:
-    moved = ticks()
+    moved = make_ticks()
     moved[channel] = moved[channel] + shift
-    moves = tick_moves(ticks(), moved)
+    moves = compare_ticks(make_ticks(), moved)
     assert moves[figure] == pytest.approx(value)
     untouched = {
         k: v for k, v in moves.items() if not k.startswith(channel.rsplit("_", 1)[0]) and "station" not in k
@@ -41,16 +41,16 @@ def test_a_shift_of_a_channel_is_its_figure(channel: str, shift: float, figure: 
 
 
 def test_only_shared_ticks_count_and_a_missing_channel_is_no_number() -> None:
-    short = {name: values[:100] for name, values in ticks().items()}
-    assert tick_moves(ticks(), short)["speed_rms_m_s"] == 0.0
+    short = {name: values[:100] for name, values in make_ticks().items()}
+    assert compare_ticks(make_ticks(), short)["speed_rms_m_s"] == 0.0
     del short["pitch"]
-    assert np.isnan(tick_moves(ticks(), short)["pitch_rms_deg"])
+    assert np.isnan(compare_ticks(make_ticks(), short)["pitch_rms_deg"])
 
 
 def test_figures_change_from_a_to_b_and_nothing_stays_nothing() -> None:
     a = {"stopping_distance": 30.0, "peak_pitch": 0.05, "stop_time": None}
     b = {"stopping_distance": 33.5, "peak_pitch": 0.04, "stop_time": 4.0}
-    moves = figure_moves(a, b)
+    moves = compare_figures(a, b)
     assert moves["stopping_distance_change_m"] == pytest.approx(3.5)
     assert moves["peak_pitch_change_deg"] == pytest.approx(np.degrees(-0.01))
     assert np.isnan(moves["stop_time_change_s"]) and np.isnan(moves["tyre_peak_change"])

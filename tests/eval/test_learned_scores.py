@@ -44,18 +44,18 @@ class SquaredDistance(torch.nn.Module):
         return ((a - b) ** 2).mean()
 
 
-def video(levels) -> np.ndarray:
+def make_video(levels) -> np.ndarray:
     """Frames of one grey each."""
     return np.broadcast_to(np.array(levels, np.uint8)[:, None, None, None], (len(levels), 24, 36, 3)).copy()
 
 
-def save(module: torch.nn.Module, path: Path) -> None:
+def save_network(module: torch.nn.Module, path: Path) -> None:
     torch.jit.script(module).save(path)
 
 
 def test_clip_score_is_the_mean_difference_of_cosines():
     weather, dry = np.array((1.0, 2.0, 2.0)), np.array((3.0, 0.0, 4.0))
-    frames = video([0, 128, 255])
+    frames = make_video([0, 128, 255])
     expected = []
     for level in (0, 128, 255):
         f = (level / 255 - np.array(CLIP_MEAN)) / np.array(CLIP_STD) + 2.5
@@ -71,13 +71,13 @@ def test_clip_sees_sixteen_frames_from_first_to_last():
         seen.append(pictures)
         return torch.ones(len(pictures), 3)
 
-    ClipWeather(encode_image=encode, weather=np.ones(3), dry=np.ones(3)).score(video(range(81)))
+    ClipWeather(encode_image=encode, weather=np.ones(3), dry=np.ones(3)).score(make_video(range(81)))
     assert seen[0].shape == (16, 3, 224, 224)
     back = seen[0][:, 0, 0, 0].numpy() * CLIP_STD[0] + CLIP_MEAN[0]
     np.testing.assert_allclose(back[[0, -1]] * 255, (0, 80), atol=1e-3)
 
 
-def textured(width: int, height: int) -> np.ndarray:
+def make_textured(width: int, height: int) -> np.ndarray:
     """Smooth grey noise, uint8 [H, W, 3]."""
     noise = np.random.default_rng(3).uniform(0, 255, (height, width)).astype(np.float32)
     smooth = cv2.GaussianBlur(noise, (0, 0), 4)
@@ -86,9 +86,11 @@ def textured(width: int, height: int) -> np.ndarray:
 
 
 def test_whole_video_judges_see_their_scale():
-    assert WholeVideo(network=torch.jit.script(Brightness())).score(video([0, 255])) == pytest.approx(0.5)
+    assert WholeVideo(network=torch.jit.script(Brightness())).score(make_video([0, 255])) == pytest.approx(
+        0.5
+    )
     with pytest.raises(InputError, match="it gives 2"):
-        WholeVideo(network=lambda x: torch.ones(2)).score(video([0, 255]))
+        WholeVideo(network=lambda x: torch.ones(2)).score(make_video([0, 255]))
 
 
 def test_dover_fuses_its_raw_scores_as_the_papers_own_rows_of_them_are_fused():
@@ -102,7 +104,7 @@ def test_dover_fuses_its_raw_scores_as_the_papers_own_rows_of_them_are_fused():
 
 
 def test_temporal_distance_takes_off_what_moves_and_sees_what_flickers():
-    wide = textured(300, 160)
+    wide = make_textured(300, 160)
     moving = np.stack([wide[:, 3 * k : 3 * k + 240] for k in range(12)])
     distance = FlowAlignedDistance(network=torch.jit.script(SquaredDistance()))
     plain = np.mean((np.diff(moving.astype(float), axis=0) / 127.5) ** 2)
@@ -149,8 +151,8 @@ def clips(rates: dict[str, float]) -> list[SimpleNamespace]:
 def test_rows_hold_scores_where_there_is_a_checkpoint_and_the_reason_where_there_is_none(
     tmp_path, monkeypatch
 ):
-    save(MeanColour(), tmp_path / "clip.pt")
-    save(Brightness(), tmp_path / "dover.pt")
+    save_network(MeanColour(), tmp_path / "clip.pt")
+    save_network(Brightness(), tmp_path / "dover.pt")
     np.save(tmp_path / "prompts.npy", np.array([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]))
     (tmp_path / "judges.yaml").write_text(
         "clip: {checkpoint: clip.pt, text_features: prompts.npy, source: made here}\n"
@@ -159,7 +161,7 @@ def test_rows_hold_scores_where_there_is_a_checkpoint_and_the_reason_where_there
     )
     made = clips({"dry": 0.0, "rain-2": 2.0, "rain-10": 10.0, "rain-50": 50.0})
     levels = [200, 150, 100, 50]
-    view = SimpleNamespace(arrays=lambda index, *names: [video([levels[index]] * 3)])
+    view = SimpleNamespace(arrays=lambda index, *names: [make_video([levels[index]] * 3)])
     rows = list(learned_rows(view, made, load_judges(tmp_path / "judges.yaml")))
     by_metric = {
         metric: [row for row in rows if row["metric"] == metric] for metric in {r["metric"] for r in rows}
@@ -181,13 +183,13 @@ def test_rows_hold_scores_where_there_is_a_checkpoint_and_the_reason_where_there
 
 
 def test_temporal_lpips_stands_beside_its_excess_over_the_dry_clip_and_dover_beside_its_parts(tmp_path):
-    save(SquaredDistance(), tmp_path / "lpips.pt")
-    save(TwoSides(), tmp_path / "dover.pt")
+    save_network(SquaredDistance(), tmp_path / "lpips.pt")
+    save_network(TwoSides(), tmp_path / "dover.pt")
     (tmp_path / "judges.yaml").write_text(
         "lpips: {checkpoint: lpips.pt, source: made here}\ndover: {checkpoint: dover.pt, source: made here}\n"
     )
     steps = [10, 30]
-    view = SimpleNamespace(arrays=lambda index, *names: [video([100, 100 + steps[index]])])
+    view = SimpleNamespace(arrays=lambda index, *names: [make_video([100, 100 + steps[index]])])
     rows = list(
         learned_rows(view, clips({"dry": 0.0, "rain-50": 50.0}), load_judges(tmp_path / "judges.yaml"))
     )
@@ -212,7 +214,7 @@ def test_without_a_list_every_judge_is_missing():
 
 def test_files_that_are_no_checkpoints_are_told_at_once(tmp_path):
     (tmp_path / "bad.pt").write_text("no weights")
-    save(MeanColour(), tmp_path / "clip.pt")
+    save_network(MeanColour(), tmp_path / "clip.pt")
     np.save(tmp_path / "two.npy", np.ones((2, 3)))
     (tmp_path / "judges.yaml").write_text(
         "clip: {checkpoint: clip.pt, text_features: two.npy, source: made here}\n"

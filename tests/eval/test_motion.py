@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.synthetic_street import hump_drive, mount, rig_poses
+from benchmarks.synthetic_street import hump_drive, make_mount, rig_poses
 from tasks.eval.poses.motion import MAX_GAP, FrameStep, Placement, failed_step, integrate_motion, place_frames
 from tasks.eval.poses.rigid import invert_pose
 
@@ -12,7 +12,7 @@ from tasks.eval.poses.rigid import invert_pose
 def exact_steps(
     T_world_rig: NDArray[np.float64], anchors: list[int], variance: float = 0.0
 ) -> list[Placement]:
-    cameras = T_world_rig @ mount()
+    cameras = T_world_rig @ make_mount()
     return [
         Placement(
             anchor=a,
@@ -30,7 +30,7 @@ def exact_steps(
 def test_exact_steps_give_the_exact_motion_of_the_rig(curvature: float) -> None:
     station, heave, pitch = hump_drive(30, 10.0)
     T_world_rig = rig_poses(station, heave, pitch, curvature)
-    seen = integrate_motion("exact", exact_steps(T_world_rig, list(range(29))), mount())
+    seen = integrate_motion("exact", exact_steps(T_world_rig, list(range(29))), make_mount())
     np.testing.assert_allclose(seen.pitch, pitch, atol=1e-12)
     np.testing.assert_allclose(seen.heave, heave, atol=1e-12)
     # chords are shorter than the arc by (step / radius)^2 / 24 of the way, 2e-5 in this bend
@@ -50,11 +50,11 @@ def test_along_a_hilly_route_only_the_body_s_own_motion_remains() -> None:
     body_pitch, body_heave = 0.02 * np.sin(s), 0.03 * np.sin(0.7 * s)
     body = route @ rig_poses(0 * s, body_heave, body_pitch)
     steps = exact_steps(body, list(range(40)))
-    seen = integrate_motion("exact", steps, mount(), route_rotations=route[:, :3, :3])
+    seen = integrate_motion("exact", steps, make_mount(), route_rotations=route[:, :3, :3])
     np.testing.assert_allclose(seen.pitch, body_pitch, atol=1e-12)
     np.testing.assert_allclose(seen.progress, s, atol=0.01)
     np.testing.assert_allclose(seen.heave, body_heave, atol=0.002)
-    blind = integrate_motion("exact", steps, mount())
+    blind = integrate_motion("exact", steps, make_mount())
     assert np.abs(blind.pitch - body_pitch).max() > 0.05
 
 
@@ -72,7 +72,7 @@ def test_frames_are_placed_against_the_last_good_one_and_predicted_at_its_veloci
     placements = place_frames(7, place)
     assert [p.anchor for p in placements] == [0, 1, 2, 2, 2, 5]
     assert asked == [(0, 1, 0.0), (1, 2, 2.0), (2, 3, 2.0), (2, 4, 4.0), (2, 5, 6.0), (5, 6, 2.0)]
-    seen = integrate_motion("test", placements, mount(tilt=0.0))
+    seen = integrate_motion("test", placements, make_mount(tilt=0.0))
     assert seen.failed.tolist() == [False, False, False, True, True, False, False]
     assert seen.failures[0] == "test: frame 3 has no pose: it is dark."
     np.testing.assert_allclose(seen.progress[[2, 5, 6]], [4.0, 10.0, 12.0])
@@ -92,9 +92,11 @@ def test_a_gap_beyond_the_limit_is_never_bridged() -> None:
 def test_uncertainty_grows_with_the_root_of_the_number_of_equal_steps() -> None:
     poses = rig_poses(np.arange(17.0), np.zeros(17), np.zeros(17))
     level_camera = np.eye(4)
-    level_camera[:3, :3] = mount(tilt=0.0)[:3, :3]
+    level_camera[:3, :3] = make_mount(tilt=0.0)[:3, :3]
     seen = integrate_motion(
-        "test", exact_steps(poses @ level_camera @ invert_pose(mount()), list(range(16)), 1e-6), level_camera
+        "test",
+        exact_steps(poses @ level_camera @ invert_pose(make_mount()), list(range(16)), 1e-6),
+        level_camera,
     )
     np.testing.assert_allclose(seen.pitch_std, 1e-3 * np.sqrt(np.arange(17)), rtol=1e-9)
     np.testing.assert_allclose(seen.progress_std, 1e-3 * np.sqrt(np.arange(17)), rtol=1e-9)
@@ -119,9 +121,9 @@ def test_propagated_uncertainty_matches_a_thousand_perturbed_chains() -> None:
             )
             for p in exact
         ]
-        seen = integrate_motion("shaken", shaken, mount())
+        seen = integrate_motion("shaken", shaken, make_mount())
         pitches.append(seen.pitch[-1])
         ways.append(seen.progress[-1])
-    stated = integrate_motion("exact", exact, mount())
+    stated = integrate_motion("exact", exact, make_mount())
     assert np.std(pitches) == pytest.approx(stated.pitch_std[-1], rel=0.1)
     assert np.std(ways) == pytest.approx(stated.progress_std[-1], rel=0.1)

@@ -10,7 +10,7 @@ from tasks.eval.poses.outside_trajectory import motion_from_trajectory
 from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg, progress_rmse
 
 
-def elsewhere(poses: np.ndarray, scale: float) -> np.ndarray:
+def move_trajectory(poses: np.ndarray, scale: float) -> np.ndarray:
     """The same trajectory in another world frame and unit."""
     world = np.eye(4)
     world[:3, :3] = Rotation.from_euler("zyx", [130, -40, 25], degrees=True).as_matrix()
@@ -27,7 +27,7 @@ def poses_of(clip: Clip) -> np.ndarray:
 def test_a_true_trajectory_in_metres_gives_the_true_motion_from_any_world_frame(hump_clip: Clip) -> None:
     times = np.arange(len(hump_clip.frames)) / 16.0
     seen = motion_from_trajectory(
-        "exact", times, times, elsewhere(poses_of(hump_clip), 1.0), hump_clip.T_rig_camera, metric=True
+        "exact", times, times, move_trajectory(poses_of(hump_clip), 1.0), hump_clip.T_rig_camera, metric=True
     )
     assert pitch_rmse_deg(seen, hump_clip) < 1e-6
     assert progress_rmse(seen, hump_clip) < 2e-3  # the claimed way is along the road, the rig's over the hump
@@ -38,7 +38,12 @@ def test_an_unknown_unit_leaves_pitch_and_shape_and_no_length(hump_clip: Clip) -
     times = np.arange(len(hump_clip.frames)) / 16.0
     made = [
         motion_from_trajectory(
-            "mono", times, times, elsewhere(poses_of(hump_clip), scale), hump_clip.T_rig_camera, metric=False
+            "mono",
+            times,
+            times,
+            move_trajectory(poses_of(hump_clip), scale),
+            hump_clip.T_rig_camera,
+            metric=False,
         )
         for scale in (0.05, 20.0)
     ]

@@ -32,7 +32,7 @@ def check(method: str) -> Check:
     return {"pnp": recover_motion_pnp, "photometric": recover_motion_photometric}[method]
 
 
-def watch(check: Check, clip: Clip, upto: int | None = None, **others: object) -> RecoveredMotion:
+def recover_motion(check: Check, clip: Clip, upto: int | None = None, **others: object) -> RecoveredMotion:
     arguments: dict[str, object] = {
         "frames": clip.frames[:upto], "depth": clip.depth[:upto], "K": clip.K, "T_rig_camera": clip.T_rig_camera,
         "unusable": clip.class_id[:upto] == SemanticClass.SKY,
@@ -43,7 +43,7 @@ def watch(check: Check, clip: Clip, upto: int | None = None, **others: object) -
 def test_pitch_heave_and_progress_over_a_hump_are_recovered(
     full_clip: Clip, check: Check, method: str
 ) -> None:
-    seen = watch(check, full_clip)
+    seen = recover_motion(check, full_clip)
     assert not seen.failed.any() and seen.method == method
     assert pitch_rmse_deg(seen, full_clip) < CLEAR_DEG[method]
     assert progress_rmse(seen, full_clip) < 0.01
@@ -53,7 +53,7 @@ def test_pitch_heave_and_progress_over_a_hump_are_recovered(
 
 
 def test_a_braking_car_dives_stops_and_then_stays(stop_clip: Clip, check: Check, method: str) -> None:
-    seen = watch(check, stop_clip)
+    seen = recover_motion(check, stop_clip)
     assert pitch_rmse_deg(seen, stop_clip) < SMALL_DEG[method]
     assert progress_rmse(seen, stop_clip) < 0.01
     standing = np.flatnonzero(np.diff(stop_clip.station) == 0)[1:] + 1
@@ -65,7 +65,7 @@ def test_a_braking_car_dives_stops_and_then_stays(stop_clip: Clip, check: Check,
 def test_progress_follows_a_bend_without_being_told_the_route(
     bend_clip: Clip, check: Check, method: str
 ) -> None:
-    seen = watch(check, bend_clip)
+    seen = recover_motion(check, bend_clip)
     assert pitch_rmse_deg(seen, bend_clip) < SMALL_DEG[method]
     assert progress_rmse(seen, bend_clip) < 0.01
     np.testing.assert_allclose(seen.lateral, bend_clip.T_world_rig[:, 1, 3], atol=0.02)
@@ -73,7 +73,7 @@ def test_progress_follows_a_bend_without_being_told_the_route(
 
 def test_the_route_s_own_slope_is_not_body_pitch(hump_clip: Clip, check: Check, method: str) -> None:
     # a road that pitches exactly as this body does leaves the body level
-    seen = watch(check, hump_clip, route_rotations=hump_clip.T_world_rig[:, :3, :3])
+    seen = recover_motion(check, hump_clip, route_rotations=hump_clip.T_world_rig[:, :3, :3])
     assert np.rad2deg(np.abs(seen.pitch)).max() < 2 * SMALL_DEG[method]
     assert np.rad2deg(np.abs(hump_clip.pitch)).max() > 0.5
 
@@ -88,7 +88,7 @@ def test_weather_and_codec_at_most_double_the_allowance(
         "noise": lambda f: with_noise(f, 3.0),
         "fog": lambda f: faded(f, 0.25),
     }[weather]
-    seen = watch(check, hump_clip, frames=change(hump_clip.frames))
+    seen = recover_motion(check, hump_clip, frames=change(hump_clip.frames))
     assert not seen.failed.any()
     assert pitch_rmse_deg(seen, hump_clip) < 2 * SMALL_DEG[method]
     assert progress_rmse(seen, hump_clip) < 0.02
@@ -100,11 +100,11 @@ def test_one_picture_repeated_is_a_car_that_stands_with_particles_or_without(
     still = np.repeat(hump_clip.frames[:1], 5, axis=0)
     depth = np.repeat(hump_clip.depth[:1], 5, axis=0)
     sky = np.repeat(hump_clip.class_id[:1] == SemanticClass.SKY, 5, axis=0)
-    bare = watch(check, hump_clip, frames=still, depth=depth, unusable=sky)
+    bare = recover_motion(check, hump_clip, frames=still, depth=depth, unusable=sky)
     assert np.abs(bare.progress).max() < 1e-6 and np.abs(bare.pitch).max() < 1e-6
     assert not bare.failed.any()
     assert np.isnan(bare.normalised_path).all()
-    snowing = watch(check, hump_clip, frames=with_flakes(still), depth=depth, unusable=sky)
+    snowing = recover_motion(check, hump_clip, frames=with_flakes(still), depth=depth, unusable=sky)
     assert np.abs(snowing.progress).max() < 0.01
     assert np.rad2deg(np.abs(snowing.pitch)).max() < 0.02
 
@@ -114,7 +114,7 @@ def test_a_black_frame_fails_and_the_track_goes_on_behind_it(
 ) -> None:
     frames = hump_clip.frames[:16].copy()
     frames[6:8] = 0
-    seen = watch(check, hump_clip, upto=16, frames=frames)
+    seen = recover_motion(check, hump_clip, upto=16, frames=frames)
     assert np.flatnonzero(seen.failed).tolist() == [6, 7]
     assert len(seen.failures) == 2 and seen.failures[0].startswith(f"{method}: frame 6 has no pose: ")
     for numbers in (
@@ -133,19 +133,22 @@ def test_a_black_frame_fails_and_the_track_goes_on_behind_it(
 def test_a_track_lost_for_long_stays_lost(hump_clip: Clip, check: Check) -> None:
     frames = hump_clip.frames[:14].copy()
     frames[4:9] = 128
-    seen = watch(check, hump_clip, upto=14, frames=frames)
+    seen = recover_motion(check, hump_clip, upto=14, frames=frames)
     assert not seen.failed[:4].any() and seen.failed[4:].all()
     assert "lost in frame 4" in seen.failures[-1]
 
 
 def test_pictures_of_nothing_common_are_not_given_a_pose(hump_clip: Clip, check: Check) -> None:
     frames = np.random.default_rng(3).integers(0, 256, (4, *hump_clip.frames.shape[1:]), dtype=np.uint8)
-    seen = watch(check, hump_clip, upto=4, frames=frames)
+    seen = recover_motion(check, hump_clip, upto=4, frames=frames)
     assert seen.failed[1:].all() and np.isnan(seen.pitch[1:]).all()
 
 
 def test_the_error_is_within_a_few_of_its_own_uncertainties(hump_clip: Clip, check: Check) -> None:
-    clear, noisy = watch(check, hump_clip), watch(check, hump_clip, frames=with_noise(hump_clip.frames, 8.0))
+    clear, noisy = (
+        recover_motion(check, hump_clip),
+        recover_motion(check, hump_clip, frames=with_noise(hump_clip.frames, 8.0)),
+    )
     assert (np.abs(clear.pitch - hump_clip.pitch)[1:] < 5 * clear.pitch_std[1:]).all()
     assert (np.abs(clear.progress - hump_clip.station)[1:] < 5 * clear.progress_std[1:]).all()
     assert np.rad2deg(clear.pitch_std[-1]) < 0.03
@@ -153,19 +156,21 @@ def test_the_error_is_within_a_few_of_its_own_uncertainties(hump_clip: Clip, che
 
 
 def test_same_frames_give_the_same_bytes(hump_clip: Clip, check: Check) -> None:
-    first, second = (watch(check, hump_clip, upto=6) for _ in range(2))
+    first, second = (recover_motion(check, hump_clip, upto=6) for _ in range(2))
     for field in fields(first):
         np.testing.assert_array_equal(getattr(first, field.name), getattr(second, field.name))
 
 
 def test_a_single_frame_is_no_motion(hump_clip: Clip, check: Check) -> None:
-    seen = watch(check, hump_clip, upto=1)
+    seen = recover_motion(check, hump_clip, upto=1)
     assert seen.pitch.tolist() == [0.0] and seen.progress.tolist() == [0.0] and not seen.failed.any()
 
 
 def test_every_wrong_array_is_named_at_once(hump_clip: Clip, check: Check) -> None:
     with pytest.raises(InputError) as caught:
-        watch(check, hump_clip, depth=hump_clip.depth[:3], K=np.eye(4), T_rig_camera=np.full((4, 4), np.nan))
+        recover_motion(
+            check, hump_clip, depth=hump_clip.depth[:3], K=np.eye(4), T_rig_camera=np.full((4, 4), np.nan)
+        )
     assert len(caught.value.problems) == 3
     with pytest.raises(InputError, match="uint8"):
-        watch(check, hump_clip, frames=hump_clip.frames.astype(np.float32))
+        recover_motion(check, hump_clip, frames=hump_clip.frames.astype(np.float32))

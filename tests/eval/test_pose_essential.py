@@ -13,26 +13,26 @@ from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg
 from tests.eval.weathering import faded, jpeg_coded, with_flakes
 
 
-def watch(clip: Clip, frames: np.ndarray | None = None) -> RecoveredMotion:
+def recover_motion(clip: Clip, frames: np.ndarray | None = None) -> RecoveredMotion:
     return recover_motion_essential(clip.frames if frames is None else frames, clip.K, clip.T_rig_camera)
 
 
 def test_pitch_and_normalised_progress_over_a_hump_are_recovered(full_clip: Clip) -> None:
-    seen = watch(full_clip)
+    seen = recover_motion(full_clip)
     assert not seen.failed.any() and seen.method == "essential"
     assert pitch_rmse_deg(seen, full_clip) < 0.03  # half of what is allowed over 81 frames
     assert normalised_progress_rmse(seen, full_clip) < 0.0024  # the worst of a prototype
 
 
 def test_a_stop_is_seen_in_the_progress_and_the_dive(stop_clip: Clip) -> None:
-    seen = watch(stop_clip)
+    seen = recover_motion(stop_clip)
     assert pitch_rmse_deg(seen, stop_clip) < 0.1  # small pictures, and a nod of 1.3 deg within one frame
     assert normalised_progress_rmse(seen, stop_clip) < 0.005
     assert np.ptp(seen.normalised_path[-4:, 0]) < 0.002
 
 
 def test_no_scale_means_no_metres(hump_clip: Clip) -> None:
-    seen = watch(hump_clip)
+    seen = recover_motion(hump_clip)
     for lengths in (seen.progress, seen.lateral, seen.heave, seen.progress_std, seen.T_rig0_rig[:, :3, 3]):
         assert np.isnan(lengths).all()
     assert np.isfinite(seen.pitch).all() and np.isfinite(seen.normalised_path).all()
@@ -42,13 +42,13 @@ def test_no_scale_means_no_metres(hump_clip: Clip) -> None:
 @pytest.mark.parametrize("weather", ["flakes", "jpeg", "fog"])
 def test_weather_and_codec_at_most_double_the_allowance(full_clip: Clip, weather: str) -> None:
     change = {"flakes": with_flakes, "jpeg": lambda f: jpeg_coded(f, 70), "fog": lambda f: faded(f, 0.25)}
-    seen = watch(full_clip, change[weather](full_clip.frames))
+    seen = recover_motion(full_clip, change[weather](full_clip.frames))
     assert not seen.failed.any()
     assert pitch_rmse_deg(seen, full_clip) < 0.06
 
 
 def test_a_car_that_never_moves_has_no_normalised_path(hump_clip: Clip) -> None:
-    seen = watch(hump_clip, np.repeat(hump_clip.frames[:1], 4, axis=0))
+    seen = recover_motion(hump_clip, np.repeat(hump_clip.frames[:1], 4, axis=0))
     assert not seen.failed.any()
     assert np.abs(seen.pitch).max() < 1e-9
     assert np.isnan(seen.normalised_path).all()
@@ -57,7 +57,7 @@ def test_a_car_that_never_moves_has_no_normalised_path(hump_clip: Clip) -> None:
 def test_black_frames_fail_and_the_chain_keeps_its_scale_across_them(hump_clip: Clip) -> None:
     frames = hump_clip.frames.copy()
     frames[9:11] = 0
-    seen = watch(hump_clip, frames)
+    seen = recover_motion(hump_clip, frames)
     assert np.flatnonzero(seen.failed).tolist() == [9, 10]
     assert np.isnan(seen.pitch[9:11]).all() and np.isnan(seen.normalised_path[9:11]).all()
     way = hump_clip.station - hump_clip.station[0]
@@ -67,27 +67,27 @@ def test_black_frames_fail_and_the_chain_keeps_its_scale_across_them(hump_clip: 
 def test_a_track_lost_for_long_stays_lost(hump_clip: Clip) -> None:
     frames = hump_clip.frames[:14].copy()
     frames[4:9] = 128
-    seen = watch(hump_clip, frames)
+    seen = recover_motion(hump_clip, frames)
     assert not seen.failed[:4].any() and seen.failed[4:].all()
     assert "lost after frame 3" in seen.failures[-1]
 
 
 def test_same_frames_give_the_same_bytes(hump_clip: Clip) -> None:
-    first, second = (watch(hump_clip, hump_clip.frames[:6]) for _ in range(2))
+    first, second = (recover_motion(hump_clip, hump_clip.frames[:6]) for _ in range(2))
     for field in fields(first):
         np.testing.assert_array_equal(getattr(first, field.name), getattr(second, field.name))
 
 
 def test_depth_is_never_asked_for_and_wrong_frames_are_refused(hump_clip: Clip) -> None:
     with pytest.raises(InputError, match="uint8"):
-        watch(hump_clip, hump_clip.frames[..., 0])
+        recover_motion(hump_clip, hump_clip.frames[..., 0])
 
 
 def test_a_bend_turns_the_heading_and_not_the_pitch() -> None:
     clip = drive_clip(
         frames=12, frame_rate=16.0, curvature=1 / 80, hump_at=9.0, width=240, height=160, focal=200.0
     )
-    seen = watch(clip)
+    seen = recover_motion(clip)
     heading = np.arctan2(seen.T_rig0_rig[:, 1, 0], seen.T_rig0_rig[:, 0, 0])
     np.testing.assert_allclose(heading, clip.station / 80, atol=np.deg2rad(0.1))
     assert np.rad2deg(np.abs(seen.pitch)).max() < 0.06

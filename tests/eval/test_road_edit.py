@@ -13,18 +13,18 @@ SPOT = np.zeros((160, 240), bool)
 SPOT[90:106, 100:150] = True
 
 
-def shifted(picture: np.ndarray, x: float, y: float) -> np.ndarray:
+def shift_picture(picture: np.ndarray, x: float, y: float) -> np.ndarray:
     move = np.array([[1, 0, x], [0, 1, y]], np.float32)
     return cv2.warpAffine(picture, move, picture.shape[1::-1], borderMode=cv2.BORDER_REFLECT)
 
 
-def edited(picture: np.ndarray, where: np.ndarray) -> np.ndarray:
+def edit_picture(picture: np.ndarray, where: np.ndarray) -> np.ndarray:
     return np.where(where[..., None], picture // 3, picture)
 
 
 def test_an_edit_in_its_place_is_localised_through_a_moved_camera() -> None:
     flat = [GROUND] * 4
-    feature = [edited(shifted(GROUND, 0.5 * k, -0.4 * k), SPOT) for k in range(4)]
+    feature = [edit_picture(shift_picture(GROUND, 0.5 * k, -0.4 * k), SPOT) for k in range(4)]
     score = score_road_edit(feature, flat, [SPOT] * 4)
     assert score is not None and score.localised_edit_rate == 1.0
     assert score.anchor_error < 0.02 and score.temporal_iou > 0.8
@@ -32,7 +32,7 @@ def test_an_edit_in_its_place_is_localised_through_a_moved_camera() -> None:
 
 def test_no_edit_and_an_edit_elsewhere_are_missing() -> None:
     away = np.roll(SPOT, (-70, 60), axis=(0, 1))
-    for feature in (GROUND, edited(GROUND, away)):
+    for feature in (GROUND, edit_picture(GROUND, away)):
         score = score_road_edit([feature] * 3, [GROUND] * 3, [SPOT] * 3)
         assert score is not None
         assert (score.localised_edit_rate, score.anchor_error, score.temporal_iou) == (0.0, 1.0, 0.0)
@@ -45,14 +45,14 @@ def test_a_target_below_80_pixels_is_not_active() -> None:
 
 
 def test_registration_undoes_a_shift() -> None:
-    laid, converged = register_background(shifted(GROUND, 2, -1), GROUND, ~SPOT, RoadEditSettings())
+    laid, converged = register_background(shift_picture(GROUND, 2, -1), GROUND, ~SPOT, RoadEditSettings())
     assert converged
     assert np.abs(laid[10:-10, 10:-10].astype(int) - GROUND[10:-10, 10:-10]).mean() < 3
 
 
 def test_a_mask_that_moves_with_the_picture_keeps_its_overlap() -> None:
     moved = np.roll(SPOT, 3, axis=1)
-    assert temporal_iou(SPOT, moved, GROUND, shifted(GROUND, 3, 0)) > 0.85
+    assert temporal_iou(SPOT, moved, GROUND, shift_picture(GROUND, 3, 0)) > 0.85
     assert temporal_iou(SPOT, moved, GROUND, GROUND) == pytest.approx(47 / 53, abs=0.01)
     assert temporal_iou(SPOT, 0 * SPOT > 0, GROUND, GROUND) == 0.0
 

@@ -14,8 +14,8 @@ from tasks.eval.state_agreement import (
     FIGURES,
     MODEL_COLUMNS,
     CaseFacts,
-    aggregate,
     case_agreement,
+    summarise_groups,
 )
 
 Columns = dict[str, NDArray[np.float64]]
@@ -26,7 +26,7 @@ HUMP = replace(FLAT, case="hump", hazard_height=0.075, brake_onset=None)
 STATIC = np.deg2rad(0.154150)
 
 
-def drive(
+def make_drive(
     deceleration: float = 5.0, speed: float = 10.0, duration: float = 6.0, rate: float = 1000.0
 ) -> Columns:
     """A model's record: constant speed, braking from 1 s, standing."""
@@ -46,7 +46,7 @@ def drive(
 
 
 def as_reference(model: Columns, until: float = np.inf) -> Columns:
-    """What an exact reference of that model would hold, in the reference's names and units."""
+    """Return an exact reference of that model, in the reference's names and units."""
     kept = model["t_ns"] * 1e-9 <= until + 1e-9
     columns = {
         "time": model["t_ns"] * 1e-9, "station": model["station"], "speed": model["speed"],
@@ -64,14 +64,14 @@ def test_the_model_s_columns_are_those_of_the_conventions() -> None:
 
 @pytest.mark.parametrize("facts", [FLAT, HUMP])
 def test_a_model_that_is_the_reference_scores_zero(facts: CaseFacts) -> None:
-    model = drive(5.0 if facts is FLAT else 0.0)
+    model = make_drive(5.0 if facts is FLAT else 0.0)
     scored = case_agreement(as_reference(model), model, facts, STATIC)
     assert [getattr(scored, name) for name in FIGURES] == pytest.approx([0.0] * 5, abs=1e-9)
     assert scored.note == "" and scored.kind == facts.case
 
 
 def test_a_flat_window_runs_from_onset_to_one_second_after_the_reference_stops() -> None:
-    model = drive()
+    model = make_drive()
     scored = case_agreement(as_reference(model), model, FLAT, STATIC)
     # 10 m/s at 5 m/s2 from 1 s: at .05 m/s after 1.99 s
     assert scored.window == pytest.approx((1.0, 3.99), abs=1.5e-3)
@@ -82,14 +82,14 @@ def test_a_flat_window_runs_from_onset_to_one_second_after_the_reference_stops()
 
 
 def test_a_reference_that_ends_at_its_stop_is_scored_to_there_and_says_so() -> None:
-    model = drive()
+    model = make_drive()
     scored = case_agreement(as_reference(model, until=2.99), model, FLAT, STATIC)
     assert scored.window == pytest.approx((1.0, 2.99))
     assert "one second after the stop" in scored.note and "2.990 s" in scored.note
 
 
 def test_a_road_window_runs_from_half_a_metre_before_the_front_to_half_a_metre_behind_the_rear_axle() -> None:
-    model = drive(0.0)
+    model = make_drive(0.0)
     scored = case_agreement(as_reference(model), model, HUMP, STATIC)
     assert scored.window == pytest.approx(((20 - 1.85 - 0.5) / 10, (20 + 1.85 + 2.7 + 0.5) / 10))
     outside = dict(model, pitch=np.where(np.abs(model["t_ns"] * 1e-9 - 2.0) > 0.6, 1.0, model["pitch"]))
@@ -97,13 +97,13 @@ def test_a_road_window_runs_from_half_a_metre_before_the_front_to_half_a_metre_b
 
 
 def test_the_static_pitch_counts() -> None:
-    model = drive()
+    model = make_drive()
     scored = case_agreement(as_reference(model), model, FLAT, STATIC + np.deg2rad(0.1))
     assert scored.pitch_rmse_deg == pytest.approx(0.1)
 
 
 def test_constant_errors_come_out_as_they_went_in() -> None:
-    model = drive()
+    model = make_drive()
     off = dict(
         model,
         speed=model["speed"] + 0.02,
@@ -118,7 +118,7 @@ def test_constant_errors_come_out_as_they_went_in() -> None:
 
 
 def test_slip_is_scored_only_above_half_a_metre_per_second_of_the_reference() -> None:
-    model = drive()
+    model = make_drive()
     wild = dict(model, braking_slip_f=np.where(model["speed"] <= 0.5, 1.0, model["braking_slip_f"]))
     assert case_agreement(as_reference(model), wild, FLAT, STATIC).slip_rmse == 0.0
     wild = dict(model, braking_slip_f=np.where(model["speed"] <= 0.6, 1.0, model["braking_slip_f"]))
@@ -126,13 +126,13 @@ def test_slip_is_scored_only_above_half_a_metre_per_second_of_the_reference() ->
 
 
 def test_the_model_is_interpolated_at_the_reference_s_own_times() -> None:
-    coarse, fine = drive(0.0, rate=100.0), drive(0.0, rate=1000.0)
+    coarse, fine = make_drive(0.0, rate=100.0), make_drive(0.0, rate=1000.0)
     coarse["pitch"], fine["pitch"] = 0.01 * coarse["t_ns"] * 1e-9, 0.01 * fine["t_ns"] * 1e-9
     assert case_agreement(as_reference(fine), coarse, HUMP, STATIC).pitch_rmse_deg < 1e-9
 
 
 def test_nothing_is_aligned_in_time() -> None:
-    model = drive(0.0)
+    model = make_drive(0.0)
     late = dict(model, pitch=np.interp(model["t_ns"] - 0.05e9, model["t_ns"], model["pitch"]))
     error = np.rad2deg(
         0.01
@@ -143,7 +143,7 @@ def test_nothing_is_aligned_in_time() -> None:
 
 
 def test_the_flat_event_is_the_stopping_distance_from_each_onset() -> None:
-    reference, model = as_reference(drive(5.0)), drive(4.0)
+    reference, model = as_reference(make_drive(5.0)), make_drive(4.0)
     scored = case_agreement(reference, model, FLAT, STATIC)
     assert scored.event_unit == "m"
     assert scored.event_error == pytest.approx(100 / 8 - 100 / 10, abs=2e-3)
@@ -152,20 +152,20 @@ def test_the_flat_event_is_the_stopping_distance_from_each_onset() -> None:
 
 
 def test_the_road_event_is_the_speed_over_the_feature_in_km_h() -> None:
-    scored = case_agreement(as_reference(drive(0.0)), drive(0.0, speed=9.5), HUMP, STATIC)
+    scored = case_agreement(as_reference(make_drive(0.0)), make_drive(0.0, speed=9.5), HUMP, STATIC)
     assert scored.event_unit == "km/h" and scored.event_error == pytest.approx(0.5 * 3.6)
-    short = case_agreement(as_reference(drive(0.0)), drive(8.0), HUMP, STATIC)
+    short = case_agreement(as_reference(make_drive(0.0)), make_drive(8.0), HUMP, STATIC)
     assert short.event_error == pytest.approx(10 * 3.6)  # stood before it got there
 
 
 def test_a_brake_triggered_on_the_route_starts_at_each_vehicle_s_own_time() -> None:
     facts = replace(FLAT, brake_onset=None, brake_onset_station=10.0)
-    scored = case_agreement(as_reference(drive()), drive(), facts, STATIC)
+    scored = case_agreement(as_reference(make_drive()), make_drive(), facts, STATIC)
     assert scored.window[0] == pytest.approx(1.0) and scored.event_error == pytest.approx(0.0, abs=1e-9)
 
 
 def test_groups_are_the_paper_s() -> None:
-    flat, hump = drive(), drive(0.0)
+    flat, hump = make_drive(), make_drive(0.0)
     rows = [
         case_agreement(
             as_reference(flat),
@@ -176,7 +176,7 @@ def test_groups_are_the_paper_s() -> None:
         for e in (0.01, 0.03)
     ]
     rows.append(case_agreement(as_reference(hump), dict(hump, speed=hump["speed"] + 0.05), HUMP, STATIC))
-    groups = aggregate(rows)
+    groups = summarise_groups(rows)
     assert {name: g.count for name, g in groups.items()} == {"flat": 2, "hump": 1, "all": 3}
     assert groups["flat"].mean["speed_rmse_m_s"] == pytest.approx(0.02)
     assert groups["flat"].maximum["speed_rmse_m_s"] == pytest.approx(0.03)
@@ -186,7 +186,7 @@ def test_groups_are_the_paper_s() -> None:
 
 
 def test_what_cannot_be_scored_is_refused_with_its_reason() -> None:
-    model = drive()
+    model = make_drive()
     reference = as_reference(model)
     with pytest.raises(InputError) as caught:
         case_agreement({"time": reference["time"]}, {}, replace(FLAT, brake_onset=None), STATIC)
@@ -196,7 +196,7 @@ def test_what_cannot_be_scored_is_refused_with_its_reason() -> None:
     with pytest.raises(InputError, match="simulate longer"):
         case_agreement(reference, dict(model, speed=model["speed"] + 0.2), FLAT, STATIC)
     with pytest.raises(InputError, match="never reaches"):
-        case_agreement(as_reference(drive(8.0)), model, HUMP, STATIC)
+        case_agreement(as_reference(make_drive(8.0)), model, HUMP, STATIC)
 
 
 def test_every_reference_trace_agrees_with_itself_over_the_window_it_has(outside_data: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the pose checks may not look at."""
+"""Pixels that the pose checks may not read."""
 
 import numpy as np
 

@@ -12,19 +12,19 @@ from pathlib import Path
 from typing import Any
 
 import musync
-from flows.auditing.audit import audit
-from flows.auditing.dataset_diff import diff
-from flows.auditing.explain import explain
-from flows.auditing.repair import repair
-from flows.auditing.signing import sign
-from flows.auditing.verify import gc, verify
+from flows.auditing.audit import audit_dataset
+from flows.auditing.dataset_diff import compare_datasets
+from flows.auditing.explain import explain_frame
+from flows.auditing.repair import repair_dataset
+from flows.auditing.signing import sign_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
 from flows.judging.physics import audit_physics
-from flows.making.generate import generate
-from flows.reading.describe import describe
-from flows.reading.previews import preview
-from flows.reading.query import sql
-from flows.reading.report import report
-from flows.reading.sheets import sheets
+from flows.making.generate import generate_dataset
+from flows.reading.describe import describe_dataset
+from flows.reading.previews import make_films
+from flows.reading.query import query_dataset
+from flows.reading.report import make_report
+from flows.reading.sheets import draw_sheets
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -93,30 +93,32 @@ def _open_windows(stage: Stage) -> None:
 
 
 def _ask(stage: Stage) -> Any:
-    return sql(str(stage.dataset.root), "SELECT c.*, n FROM clips c, (SELECT count(*) AS n FROM frames)")
+    return query_dataset(
+        str(stage.dataset.root), "SELECT c.*, n FROM clips c, (SELECT count(*) AS n FROM frames)"
+    )
 
 
 COMMANDS: dict[str, Callable[[Stage], Any]] = {
-    "verify": lambda s: verify(str(s.dataset.root)),
-    "gc --dry-run": lambda s: gc(str(s.dataset.root), dry_run=True),
-    "describe": lambda s: describe(str(s.dataset.root)),
+    "verify": lambda s: verify_dataset(str(s.dataset.root)),
+    "gc --dry-run": lambda s: collect_garbage(str(s.dataset.root), dry_run=True),
+    "describe": lambda s: describe_dataset(str(s.dataset.root)),
     "sql": _ask,
     "open tables": _open_tables,
     "open frames": _open_frames,
     "open windows": _open_windows,
-    "explain": lambda s: explain(str(s.dataset.root), s.first_clip(), 3, out=s.out("explain")),
-    "diff": lambda s: diff(str(s.original.root), str(s.dataset.root), out=s.out("diff")),
+    "explain": lambda s: explain_frame(str(s.dataset.root), s.first_clip(), 3, out=s.out("explain")),
+    "diff": lambda s: compare_datasets(str(s.original.root), str(s.dataset.root), out=s.out("diff")),
     "audit-physics": lambda s: audit_physics(str(s.dataset.root), out=s.out("audit-physics")),
-    "sheets": lambda s: sheets(str(s.dataset.root), s.out("sheets"), station=2.0),
-    "preview": lambda s: preview(str(s.dataset.root), s.out("preview")),
-    "report": lambda s: report(str(s.dataset.root), out=s.out("report")),
-    "audit": lambda s: audit(
+    "sheets": lambda s: draw_sheets(str(s.dataset.root), s.out("sheets"), station=2.0),
+    "preview": lambda s: make_films(str(s.dataset.root), s.out("preview")),
+    "report": lambda s: make_report(str(s.dataset.root), out=s.out("report")),
+    "audit": lambda s: audit_dataset(
         str(s.dataset.root), share=0.25, out=s.out("audit"), runner="threads", workers=1
     ),
-    "repair": lambda s: repair(str(s.dataset.root), out=s.out("repair"), runner="threads", workers=1),
-    "generate": lambda s: generate(str(s.grid), str(s.dataset.root), runner="threads", workers=1),
-    "sign": lambda s: sign(str(s.dataset.root), key=str(s.world / "key.pem")),
-    "gc": lambda s: gc(str(s.dataset.root)),
+    "repair": lambda s: repair_dataset(str(s.dataset.root), out=s.out("repair"), runner="threads", workers=1),
+    "generate": lambda s: generate_dataset(str(s.grid), str(s.dataset.root), runner="threads", workers=1),
+    "sign": lambda s: sign_dataset(str(s.dataset.root), key=str(s.world / "key.pem")),
+    "gc": lambda s: collect_garbage(str(s.dataset.root)),
 }
 """In the order in which they are tried: those that write last."""
 LIGHT = (

@@ -53,7 +53,7 @@ INPUTS: dict[str, Callable[[Stage], object]] = {
     "a command in the vehicle": write_input(
         "vehicle.yaml", "!!python/object/apply:os.mkdir ['{victim}/PWNED']"
     ),
-    "a command in the weather": write_input("weather/rain.yaml", "a: !!python/name:os.system"),
+    "a command in the weather": write_input("weather/air.yaml", "a: !!python/name:os.system"),
     "a bomb of aliases": write_input("vehicle.yaml", BOMB),
     "a hundred thousand brackets": write_input("camera.yaml", "[" * 100_000),
     "nothing": write_input("vehicle.yaml", ""),

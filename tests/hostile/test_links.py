@@ -47,7 +47,7 @@ LINKS: dict[str, Callable[[Stage], object]] = {
     "metadata of an array": lambda s: link(s, "frames.zarr/rgb/zarr.json", "rgb/zarr.json"),
     "frames that turn round": lambda s: (s.dataset.frames / "rgb" / "c" / "9").symlink_to(s.dataset.root),
     "inputs, of which repair makes a file again": lambda s: link(s, "inputs", "i", missing="vehicle.yaml"),
-    "folder of inputs": lambda s: link(s, "inputs/weather", "w", missing="rain.yaml"),
+    "folder of inputs": lambda s: link(s, "inputs/weather", "w", missing="sky.yaml"),
     "one input": lambda s: link(s, "inputs/vehicle.yaml", "vehicle.yaml"),
     "previews, of which repair makes a file again": lambda s: link(
         s, "previews", "p", missing="contact_sheet.png"
@@ -80,7 +80,7 @@ def test_a_hard_link_to_somebody_s_file_in_staging_is_not_cut(stage, name):
 @pytest.mark.parametrize(
     "name",
     ["plan.json", "manifest.json", "telemetry/clips.parquet", "frames.zarr/rgb/zarr.json",
-     "frames.zarr/rgb/c/1/0/0/0/0", "inputs/vehicle.yaml", "inputs/weather/rain.yaml", "previews/contact_sheet.png",
+     "frames.zarr/rgb/c/1/0/0/0/0", "inputs/vehicle.yaml", "inputs/weather/sky.yaml", "previews/contact_sheet.png",
      ".staging/lock", ".staging/0123456789abcdef.json", "manifest.dsse.json",
      "telemetry/frames/family=dry/part-0000.parquet"],
 )  # fmt: skip

@@ -10,30 +10,30 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from flows.auditing.audit import audit
-from flows.auditing.dataset_diff import diff
-from flows.auditing.explain import explain
-from flows.auditing.repair import repair
-from flows.auditing.verify import verify
+from flows.auditing.audit import audit_dataset
+from flows.auditing.dataset_diff import compare_datasets
+from flows.auditing.explain import explain_frame
+from flows.auditing.repair import repair_dataset
+from flows.auditing.verify import verify_dataset
 from flows.cli import app
 from flows.judging.physics import audit_physics
-from flows.reading.previews import preview
-from flows.reading.report import report
-from flows.reading.sheets import sheets
+from flows.reading.previews import make_films
+from flows.reading.report import make_report
+from flows.reading.sheets import draw_sheets
 from flows.store.outputs import FORMAT, MARKER
 from tasks.errors import InputError
 from tests.flows.reseal import reseal
 from tests.hostile.stage import COMMANDS, Stage, endure, listing
 
 RESULTS: dict[str, Callable[[str, str], Any]] = {
-    "report": lambda dataset, out: report(dataset, out=out),
-    "preview": lambda dataset, out: preview(dataset, out),
-    "sheets": lambda dataset, out: sheets(dataset, out, station=2.0),
-    "verify": lambda dataset, out: verify(dataset, out=out),
-    "repair": lambda dataset, out: repair(dataset, out=out, runner="threads", workers=1),
-    "audit": lambda dataset, out: audit(dataset, share=0, out=out),
-    "explain": lambda dataset, out: explain(dataset, "dry/flat", 3, out=out),
-    "diff": lambda dataset, out: diff(dataset, dataset, out=out),
+    "report": lambda dataset, out: make_report(dataset, out=out),
+    "preview": lambda dataset, out: make_films(dataset, out),
+    "sheets": lambda dataset, out: draw_sheets(dataset, out, station=2.0),
+    "verify": lambda dataset, out: verify_dataset(dataset, out=out),
+    "repair": lambda dataset, out: repair_dataset(dataset, out=out, runner="threads", workers=1),
+    "audit": lambda dataset, out: audit_dataset(dataset, share=0, out=out),
+    "explain": lambda dataset, out: explain_frame(dataset, "dry/flat", 3, out=out),
+    "diff": lambda dataset, out: compare_datasets(dataset, dataset, out=out),
     "audit-physics": lambda dataset, out: audit_physics(dataset, out=out),
 }
 FILES = (

@@ -11,8 +11,8 @@ import pytest
 from benchmarks.fuzzing import watched
 from benchmarks.fuzzing.parsers import Parser
 from benchmarks.fuzzing.rules import FINITE
-from benchmarks.fuzzing.sound import texts
-from benchmarks.fuzzing.watched import prepare, read_watched
+from benchmarks.fuzzing.sound import write_texts
+from benchmarks.fuzzing.watched import read_watched, write_documents
 from tasks.errors import InputError
 
 kept = []
@@ -69,7 +69,7 @@ def test_what_becomes_of_an_input_is_counted(tmp_path, monkeypatch, read, outcom
         if next(changes, True):
             read(folder)
 
-    parser = Parser(name="p", write=texts({"a.yaml": "a: 1"}), read=read_changed, rules=(FINITE,))
+    parser = Parser(name="p", write=write_texts({"a.yaml": "a: 1"}), read=read_changed, rules=(FINITE,))
     monkeypatch.setattr(watched, "BY_NAME", {"p": parser})
     monkeypatch.setattr(watched, "START", "fork")
     monkeypatch.setattr(watched, "LONGEST_S", 0.5)
@@ -85,6 +85,6 @@ def test_what_becomes_of_an_input_is_counted(tmp_path, monkeypatch, read, outcom
 
 
 def test_a_sound_document_that_is_refused_ends_the_study(tmp_path):
-    parser = Parser(name="p", write=texts({"a.yaml": "a: 1"}), read=refuse)
+    parser = Parser(name="p", write=write_texts({"a.yaml": "a: 1"}), read=refuse)
     with pytest.raises(InputError):
-        prepare([parser], tmp_path)
+        write_documents([parser], tmp_path)

@@ -13,7 +13,7 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
-from tasks.campaign.planned_runs import EXPERIMENTS, RICH, planned_run
+from tasks.campaign.planned_runs import EXPERIMENTS, RICH, make_planned_run
 from tasks.identification.decision.attribution import refine_candidates
 from tasks.identification.decision.experiment import next_experiment
 from tasks.identification.decision.rivals import find_detectable_sizes
@@ -54,7 +54,7 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
 def test_a_run_that_forks_at_the_abs_threshold_is_told_from_sound_ones() -> None:
     forked = load_decision_rules().forked_misfit
     changes = [
-        step_change(run_model(planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
+        step_change(run_model(make_planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
         for drive in (RICH[0], RICH[2], RICH[11], RICH[19], replace(RICH[19], speed=12.0, peak=3.0))
     ]
     assert max(changes[:4]) < 0.5 * forked < 10.0 * forked < changes[4]

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from manifests.explain import ABSENT, input_differences, reasons, value_differences
+from manifests.explain import ABSENT, find_reasons, input_differences, value_differences
 
 
 def manifest(**changes: Any) -> dict[str, Any]:
@@ -33,8 +33,8 @@ def test_an_input_is_a_reason_only_where_it_can_reach() -> None:
     look = manifest(inputs={"vehicle.yaml": "v1", "weather/snow.yaml": "s2"})
     files = {"weather/snow.yaml": b"a: 1"}, {"weather/snow.yaml": b"a: 2"}
     rows = input_differences(manifest(), look, *files)
-    assert reasons(["rgb"], rows) == ["weather/snow.yaml"]
-    assert reasons(["rgb", "ticks"], rows) == [], "a look cannot move the car"
+    assert find_reasons(["rgb"], rows) == ["weather/snow.yaml"]
+    assert find_reasons(["rgb", "ticks"], rows) == [], "a look cannot move the car"
 
 
 def test_every_group_of_the_manifest_is_looked_at() -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from manifests.canonical import canonical_bytes, sha256_of
-from manifests.manifest import MANIFEST_FORMAT, damaged_files, freeze
+from manifests.manifest import MANIFEST_FORMAT, damaged_files, freeze_manifest
 
 
 @pytest.fixture
@@ -13,13 +13,13 @@ def sealed(tmp_path: Path) -> tuple[Path, dict]:
         (tmp_path / name).write_bytes(name.encode() * 100)
     digest = {name: sha256_of([name.encode() * 100]) for name in ("a.bin", "b.bin", "shared.bin")}
     clips = [{"clip_id": c, "artifacts": {f"{c}.bin": digest[f"{c}.bin"]}} for c in "ab"]
-    manifest = json.loads(freeze({"run_id": "r"}, clips, {"shared.bin": digest["shared.bin"]}, {}))
+    manifest = json.loads(freeze_manifest({"run_id": "r"}, clips, {"shared.bin": digest["shared.bin"]}, {}))
     return tmp_path, manifest
 
 
 def test_a_manifest_is_its_own_canonical_form(sealed):
     _, manifest = sealed
-    frozen = freeze(manifest, manifest["clips"], manifest["artifacts"], {})
+    frozen = freeze_manifest(manifest, manifest["clips"], manifest["artifacts"], {})
     assert frozen == canonical_bytes(manifest)
     assert manifest["format"] == MANIFEST_FORMAT
 

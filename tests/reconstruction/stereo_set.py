@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.reconstruction.sequence import StereoSequence
-from tasks.render.camera import viewmat
+from tasks.render.camera import world_to_camera
 from tasks.render.composition import encode_8bit
 from tasks.render.environment import environment_view
-from tasks.render.rasterise.rasteriser import PreparedGaussians, prepare, rasterise
+from tasks.render.rasterise.rasteriser import PreparedGaussians, prepare_gaussians, rasterise
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 
@@ -44,7 +44,7 @@ class StereoSet:
 
 def stereo_set(frames: int = 7, step: float = 0.7) -> StereoSet:
     """Pictures every ``step`` metres, with gains that change from frame to frame."""
-    street, environment = prepare(_street()), _sky()
+    street, environment = prepare_gaussians(_build_street()), _build_sky()
     K = np.array([[FOCAL, 0, WIDTH / 2], [0, FOCAL, HEIGHT / 2 - 10], [0, 0, 1]])
     poses = np.tile(np.eye(4), (frames, 1, 1))
     poses[:, :3, :3] = AXES
@@ -56,7 +56,7 @@ def stereo_set(frames: int = 7, step: float = 0.7) -> StereoSet:
         for side, pictures in ((0.0, left), (BASELINE, right)):
             pose = poses[i].copy()
             pose[:3, 3] += side * AXES[:, 0]
-            view = viewmat(pose)
+            view = world_to_camera(pose)
             gbuffer = rasterise(street, view, K, WIDTH, HEIGHT)
             sky = environment_view(environment, view, K, WIDTH, HEIGHT)
             light = gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky
@@ -78,7 +78,7 @@ def stereo_set(frames: int = 7, step: float = 0.7) -> StereoSet:
     return StereoSet(sequence=sequence, street=street, environment=environment, T_street_camera=poses, K=K)
 
 
-def _street() -> Gaussians:
+def _build_street() -> Gaussians:
     """Road between kerbs, raised ground beside it, and two walls, all speckled at two scales."""
     draw = np.random.Generator(np.random.Philox(11))
     up, left, right = (0, 0, 1), (0, 1, 0), (0, -1, 0)
@@ -89,19 +89,19 @@ def _street() -> Gaussians:
         SemanticClass.BUILDING,
     )
     parts = [
-        _sheet(draw, up, 0.0, (KERB_RIGHT, KERB_LEFT), 0.08, road, 0.2),
-        _sheet(draw, up, KERB_HEIGHT, (KERB_LEFT, 6), 0.1, ground, 0.1),
-        _sheet(draw, up, KERB_HEIGHT, (-6, KERB_RIGHT), 0.1, ground, 0.1),
-        _sheet(draw, right, KERB_LEFT, (0, KERB_HEIGHT), 0.05, kerb, 0.05),
-        _sheet(draw, left, KERB_RIGHT, (0, KERB_HEIGHT), 0.05, kerb, 0.4),
-        _sheet(draw, right, 6.0, (0, 3.2), 0.1, wall, 0.35),
-        _sheet(draw, left, -6.0, (0, 2.4), 0.1, wall, 0.3),
+        _build_sheet(draw, up, 0.0, (KERB_RIGHT, KERB_LEFT), 0.08, road, 0.2),
+        _build_sheet(draw, up, KERB_HEIGHT, (KERB_LEFT, 6), 0.1, ground, 0.1),
+        _build_sheet(draw, up, KERB_HEIGHT, (-6, KERB_RIGHT), 0.1, ground, 0.1),
+        _build_sheet(draw, right, KERB_LEFT, (0, KERB_HEIGHT), 0.05, kerb, 0.05),
+        _build_sheet(draw, left, KERB_RIGHT, (0, KERB_HEIGHT), 0.05, kerb, 0.4),
+        _build_sheet(draw, right, 6.0, (0, 3.2), 0.1, wall, 0.35),
+        _build_sheet(draw, left, -6.0, (0, 2.4), 0.1, wall, 0.3),
     ]
     names = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
     return Gaussians(**{name: np.concatenate([part[name] for part in parts]) for name in names})
 
 
-def _sheet(
+def _build_sheet(
     draw: np.random.Generator,
     normal: tuple[int, int, int],
     offset: float,
@@ -129,7 +129,7 @@ def _sheet(
     }
 
 
-def _sky() -> NDArray[np.float32]:
+def _build_sky() -> NDArray[np.float32]:
     """Brighter towards the horizon, and a little towards the left."""
     elevation = np.pi * (0.5 - (np.arange(64) + 0.5) / 64)
     azimuth = np.pi * (1 - (2 * np.arange(128) + 1) / 128)

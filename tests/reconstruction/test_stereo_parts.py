@@ -5,15 +5,15 @@ import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.reconstruction.camera import pixel_rays
-from tasks.reconstruction.carriageway import carriageway_extents, classify
-from tasks.reconstruction.cloud import LONGEST, _onto_route, _split
-from tasks.reconstruction.disparity import filled, match
+from tasks.reconstruction.carriageway import carriageway_extents, classify_points
+from tasks.reconstruction.cloud import LONGEST, _depth_factor_onto_route, _split_long_discs
+from tasks.reconstruction.disparity import fill_disparity, match_stereo
 from tasks.reconstruction.exposure import estimate_exposure
-from tasks.reconstruction.fusion import fuse_depth, seen_finest
-from tasks.reconstruction.normals import camera_normals, turned_to_camera
-from tasks.reconstruction.road_plane import fit_road_plane, route_below, settled
-from tasks.reconstruction.sky import Sky, fit_sky, panorama, sky_mask
-from tasks.reconstruction.surfels import COVERAGE, ellipses, sample
+from tasks.reconstruction.fusion import find_finest_view, fuse_depth
+from tasks.reconstruction.normals import camera_normals, turn_to_camera
+from tasks.reconstruction.road_plane import fit_road_plane, lay_route_below, settle_route
+from tasks.reconstruction.sky import Sky, build_panorama, fit_sky, sky_mask
+from tasks.reconstruction.surfels import COVERAGE, derive_discs, sample_picture
 from tasks.render.composition import to_display
 from tasks.scene.route import Route
 
@@ -40,7 +40,7 @@ def smooth_noise(shape: tuple[int, int], seed: int) -> np.ndarray:
     return 128 + 45 * picture / picture.std()
 
 
-def shifted(picture: np.ndarray, by: float) -> np.ndarray:
+def shift_picture(picture: np.ndarray, by: float) -> np.ndarray:
     """The periodic picture moved to the left by a part of a pixel, by its spectrum."""
     phase = np.exp(2j * np.pi * np.fft.rfftfreq(picture.shape[1]) * by)
     return np.fft.irfft(np.fft.rfft(picture, axis=1) * phase, picture.shape[1], axis=1)
@@ -49,8 +49,8 @@ def shifted(picture: np.ndarray, by: float) -> np.ndarray:
 @pytest.mark.parametrize("disparity", [12.0, 12.4, 7.75])
 def test_disparity_is_found_to_a_fraction_of_a_pixel(disparity: float) -> None:
     left = smooth_noise((80, 200), 1)
-    to_bytes = [np.clip(np.rint(p), 0, 255).astype(np.uint8) for p in (left, shifted(left, disparity))]
-    found = match(*to_bytes, 32)
+    to_bytes = [np.clip(np.rint(p), 0, 255).astype(np.uint8) for p in (left, shift_picture(left, disparity))]
+    found = match_stereo(*to_bytes, 32)
     inner = found[10:-10, 40:-10]
     assert np.isfinite(inner).mean() > 0.97
     assert np.nanmedian(np.abs(inner - disparity)) < 0.08
@@ -58,7 +58,7 @@ def test_disparity_is_found_to_a_fraction_of_a_pixel(disparity: float) -> None:
 
 def test_what_the_right_camera_does_not_see_has_no_disparity() -> None:
     left = smooth_noise((80, 200), 2).clip(0, 255).astype(np.uint8)
-    found = match(left, shifted(left.astype(float), 15.0).clip(0, 255).astype(np.uint8), 32)
+    found = match_stereo(left, shift_picture(left.astype(float), 15.0).clip(0, 255).astype(np.uint8), 32)
     assert np.isnan(found[:, :10]).mean() > 0.9
 
 
@@ -66,10 +66,10 @@ def test_a_gap_is_filled_with_the_farther_neighbour() -> None:
     n = np.nan
     disparity = np.array([[n, 9, n, n, 4, n], [n, n, n, n, n, n]], dtype=np.float32)
     sky = np.zeros((2, 6), bool)
-    np.testing.assert_array_equal(filled(disparity, sky)[0], [9, 9, 4, 4, 4, 4])
-    assert np.isnan(filled(disparity, sky)[1]).all()
+    np.testing.assert_array_equal(fill_disparity(disparity, sky)[0], [9, 9, 4, 4, 4, 4])
+    assert np.isnan(fill_disparity(disparity, sky)[1]).all()
     sky[0, 5] = True
-    assert np.isnan(filled(disparity, sky)[0, 5])
+    assert np.isnan(fill_disparity(disparity, sky)[0, 5])
 
 
 def test_plane_of_the_road_is_found_despite_a_kerb() -> None:
@@ -98,7 +98,7 @@ def test_route_lies_below_the_cameras_and_ahead_of_them() -> None:
     poses = np.tile(np.eye(4), (11, 1, 1))
     poses[:, 2, 3] = np.arange(11.0)  # along camera z
     planes = np.tile([0.0, -1.0, 0.0, 1.5], (11, 1))
-    route = route_below(poses, planes, -1.0, 2.0, 5.0)
+    route = lay_route_below(poses, planes, -1.0, 2.0, 5.0)
     np.testing.assert_allclose(route.T_world_rig[0, :3, 3], [0, 1.5, 3.0], atol=1e-6)
     np.testing.assert_allclose(route.T_world_rig[0, :3, :3].T, [[0, 0, 1], [-1, 0, 0], [0, -1, 0]], atol=1e-6)
     assert route.length == pytest.approx(10 - 2 + 5)
@@ -109,7 +109,7 @@ def test_route_settles_on_the_surface_and_rolls_with_it() -> None:
     x, y = draw.uniform(0, 12, 4000), draw.uniform(-3, 3, 4000)
     z = 0.05 + 0.03 * y
     z[:500] += 0.25  # a parked car's side, a kerb
-    route = settled(straight_route(), np.stack([x, y, z], axis=1), np.full(4000, 7.0))
+    route = settle_route(straight_route(), np.stack([x, y, z], axis=1), np.full(4000, 7.0))
     np.testing.assert_allclose(route.T_world_rig[2:-2, 2, 3], 0.05, atol=0.01)
     np.testing.assert_allclose(route.T_world_rig[2:-2, 1, 2], -0.03, atol=0.006)
 
@@ -125,7 +125,7 @@ def test_carriageway_ends_at_the_kerb_and_at_the_limit() -> None:
 
 def test_classes_follow_height_and_side() -> None:
     lateral, height = np.array([0, 0, 4, 4, 0]), np.array([0.02, 0.5, 0.1, 2.0, 0.15])
-    found = classify(lateral, height, np.array([8.0, 8, 8, 8, 40]), (2.0, -2.0))
+    found = classify_points(lateral, height, np.array([8.0, 8, 8, 8, 40]), (2.0, -2.0))
     road, ground, other = SemanticClass.ROAD, SemanticClass.TERRAIN, SemanticClass.OTHER
     assert found.tolist() == [road, other, ground, other, road]
 
@@ -142,7 +142,7 @@ def test_normals_of_a_plane_are_those_of_the_plane() -> None:
 def test_a_surface_seen_too_flat_is_turned_just_enough() -> None:
     rays = np.array([[0, 0, 1.0], [0, 0, 1]])
     normals = np.array([[0.995, 0, -0.0998749], [0, 0.6, -0.8]])
-    turned = turned_to_camera(normals, rays, 0.25)
+    turned = turn_to_camera(normals, rays, 0.25)
     assert -turned[0, 2] == pytest.approx(0.25)
     np.testing.assert_allclose(np.linalg.norm(turned, axis=1), 1)
     np.testing.assert_array_equal(turned[1], normals[1])
@@ -151,11 +151,11 @@ def test_a_surface_seen_too_flat_is_turned_just_enough() -> None:
 def test_the_picture_of_a_disc_is_round_whatever_its_slant() -> None:
     draw = np.random.Generator(np.random.Philox(7))
     rays = np.c_[draw.uniform(-0.4, 0.4, (50, 2)), np.ones(50)]
-    normals = turned_to_camera(
+    normals = turn_to_camera(
         *[v / np.linalg.norm(v, axis=1, keepdims=True) for v in (draw.normal(size=(50, 3)), rays)], 0.2
     )
     depth, spacing = draw.uniform(3, 30, 50), draw.choice([2.0, 4.0], 50)
-    rotation, scales = ellipses(rays, depth, normals, spacing, F)
+    rotation, scales = derive_discs(rays, depth, normals, spacing, F)
     np.testing.assert_allclose(np.linalg.det(rotation), 1)
     assert (scales[:, 0] >= scales[:, 1] - 1e-12).all()
     for k in range(50):
@@ -174,7 +174,7 @@ def test_even_blocks_become_one_sample_and_others_keep_the_grid() -> None:
     wanted[:20] = False
     light = picture.astype(np.float32) / 255
     normals = np.zeros((*SHAPE, 3), np.float32)
-    surfels = sample(wanted, depth, normals, picture, light, K, SCALE, 2)
+    surfels = sample_picture(wanted, depth, normals, picture, light, K, SCALE, 2)
     column, row = surfels.rays[:, 0] * F + CX, surfels.rays[:, 1] * F + CY
     inner = row < 107  # rows 108 and 109 do not fill a block of four
     assert (surfels.spacing[(column > 84) & inner] == 4).all()
@@ -186,7 +186,7 @@ def test_even_blocks_become_one_sample_and_others_keep_the_grid() -> None:
 
 def test_pieces_of_a_long_disc_cover_what_it_covered() -> None:
     length, splittable = np.array([0.6, 0.6, 0.1]), np.array([True, False, True])
-    of, offset = _split(length, splittable)
+    of, offset = _split_long_discs(length, splittable)
     assert np.bincount(of).tolist() == [4, 1, 1]
     pieces = offset[of == 0]
     assert pieces.mean() == pytest.approx(0)
@@ -199,7 +199,7 @@ def test_far_road_is_put_on_the_route_and_near_road_stays_as_measured() -> None:
     depth, camera_height = np.array([4.0, 60.0]), 1.5
     measured = np.array([0.01, 0.3])
     descent = (camera_height - measured) / depth
-    factor = _onto_route(measured, descent, depth, 380.0)
+    factor = _depth_factor_onto_route(measured, descent, depth, 380.0)
     height = camera_height - descent * depth * factor
     assert height[0] == pytest.approx(measured[0], abs=0.002)
     assert abs(height[1]) < 0.15 * measured[1]
@@ -245,11 +245,11 @@ def test_a_guess_is_kept_only_where_nobody_measured() -> None:
 def test_a_surface_is_taken_from_the_picture_that_shows_it_largest() -> None:
     depth, poses = facing_wall()
     _, confirmed = fuse_depth(depth, np.zeros(depth.shape, bool), K, SCALE, poses)
-    shares = [seen_finest(n, depth, confirmed, K, SCALE, poses)[20:90, 30:130].mean() for n in range(3)]
+    shares = [find_finest_view(n, depth, confirmed, K, SCALE, poses)[20:90, 30:130].mean() for n in range(3)]
     assert shares[2] == 1
     assert shares[0] == 0
     # the nearest picture does not show the rim of the one before it
-    assert seen_finest(1, depth, confirmed, K, SCALE, poses)[2, 40:120].all()
+    assert find_finest_view(1, depth, confirmed, K, SCALE, poses)[2, 40:120].all()
 
 
 def test_gains_and_lens_shading_are_found_together() -> None:
@@ -268,8 +268,8 @@ def test_gains_and_lens_shading_are_found_together() -> None:
     exposure = estimate_exposure(np.array(pictures), disparity, K, SCALE, poses, np.arange(4))
     np.testing.assert_allclose(exposure.gains / exposure.gains[0], gains, rtol=0.05)
     assert exposure.falloff[5, 5] == pytest.approx(falloff[5, 5], abs=0.03)
-    light = exposure.radiance(np.repeat(pictures[1][..., None], 3, axis=2), 1)
-    np.testing.assert_allclose(exposure.picture(light, 1)[..., 0], pictures[1] / 255, atol=2e-3)
+    light = exposure.to_radiance(np.repeat(pictures[1][..., None], 3, axis=2), 1)
+    np.testing.assert_allclose(exposure.to_picture(light, 1)[..., 0], pictures[1] / 255, atol=2e-3)
 
 
 CAMERA_TO_WORLD = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.5], [0, 0, 0, 1]])
@@ -309,7 +309,7 @@ def test_panorama_puts_zenith_first_and_left_to_the_left() -> None:
     )
     pictures, poses = drive_below_a_sky()
     masks = [np.zeros(SHAPE, bool) for _ in pictures]
-    out = panorama(sky, pictures, masks, K, poses, 64)
+    out = build_panorama(sky, pictures, masks, K, poses, 64)
     assert out.shape == (64, 128, 3)
     assert out[28, 64 - 8, 0] > out[28, 64 + 8, 0]  # brighter towards +y, which is left of the centre column
     assert out[31, 64, 0] == pytest.approx(0.5, abs=0.02)

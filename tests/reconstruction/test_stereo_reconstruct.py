@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.reconstruction.reconstruct import Reconstruction, reconstruct
+from tasks.reconstruction.reconstruct import Reconstruction, reconstruct_street
 from tasks.reconstruction.sequence import StereoSequence, StereoSettings
-from tasks.render.camera import viewmat
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.camera import world_to_camera
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.scene.gaussians import check_gaussians
 from tests.reconstruction.stereo_set import (
     CAMERA_HEIGHT,
@@ -45,7 +45,7 @@ def truth() -> StereoSet:
 
 @pytest.fixture(scope="module")
 def built(truth: StereoSet) -> Reconstruction:
-    return reconstruct(truth.sequence, SETTINGS)
+    return reconstruct_street(truth.sequence, SETTINGS)
 
 
 def test_a_picture_never_seen_is_shown_within_30_db(built: Reconstruction) -> None:
@@ -60,9 +60,13 @@ def test_depth_of_a_picture_never_seen_is_right_to_two_percent(
     built: Reconstruction, truth: StereoSet
 ) -> None:
     shown = rasterise(
-        prepare(built.scene.gaussians), viewmat(built.T_world_camera[HELD_OUT]), truth.K, WIDTH, HEIGHT
+        prepare_gaussians(built.scene.gaussians),
+        world_to_camera(built.T_world_camera[HELD_OUT]),
+        truth.K,
+        WIDTH,
+        HEIGHT,
     )
-    true = rasterise(truth.street, viewmat(truth.T_street_camera[HELD_OUT]), truth.K, WIDTH, HEIGHT)
+    true = rasterise(truth.street, world_to_camera(truth.T_street_camera[HELD_OUT]), truth.K, WIDTH, HEIGHT)
     both = (shown.alpha > 0.5) & (true.alpha > 0.5)
     error = np.abs(shown.depth[both] / true.depth[both] - 1)
     assert both.sum() > 0.97 * (true.alpha > 0.5).sum()
@@ -121,7 +125,7 @@ def test_held_out_pictures_leave_no_trace_in_the_scene(built: Reconstruction, tr
         pictures = getattr(truth.sequence, side).copy()
         pictures[HELD_OUT] = 0
         blind[side] = pictures
-    again = reconstruct(replace(truth.sequence, **blind), SETTINGS)
+    again = reconstruct_street(replace(truth.sequence, **blind), SETTINGS)
     for name in ("means", "opacities", "sh", "scales"):
         np.testing.assert_array_equal(
             getattr(again.scene.gaussians, name), getattr(built.scene.gaussians, name), err_msg=name
@@ -138,7 +142,7 @@ def test_poses_that_jitter_are_put_right_by_the_pictures(built: Reconstruction, 
         jitter[i, :3, :3] = Rotation.from_rotvec(np.radians(draw.uniform(-0.3, 0.3, 3))).as_matrix()
         jitter[i, :3, 3] = draw.uniform(-0.02, 0.02, 3)
     shaken = replace(truth.sequence, T_origin_camera=truth.sequence.T_origin_camera @ jitter)
-    found = reconstruct(shaken, replace(SETTINGS, refinement_passes=0)).T_world_camera
+    found = reconstruct_street(shaken, replace(SETTINGS, refinement_passes=0)).T_world_camera
     for i, j in ((0, 1), (1, 2), (2, 4), (4, 5)):
         given, steady, mended = (
             np.linalg.inv(T[i]) @ T[j] for T in (shaken.T_origin_camera, built.T_world_camera, found)
@@ -148,7 +152,7 @@ def test_poses_that_jitter_are_put_right_by_the_pictures(built: Reconstruction, 
 
 
 def test_figures_are_plain_numbers_with_a_row_per_frame(built: Reconstruction) -> None:
-    figures = built.figures()
+    figures = built.summarise()
     assert figures["held_out_psnr_db"] == built.held_out[0].psnr_db
     assert [row["frame"] for row in figures["held_out_frames"]] == [HELD_OUT]
     assert all(isinstance(value, int | float) for value in figures["held_out_frames"][0].values())
@@ -166,24 +170,24 @@ def test_settings_name_every_bad_value() -> None:
 def test_too_few_pictures_and_too_short_a_drive_are_refused(truth: StereoSet) -> None:
     first = {name: getattr(truth.sequence, name)[:3] for name in ("left", "right", "T_origin_camera")}
     with pytest.raises(InputError, match="at least 3 pictures must remain"):
-        reconstruct(replace(truth.sequence, **first), replace(SETTINGS, held_out_first=0))
+        reconstruct_street(replace(truth.sequence, **first), replace(SETTINGS, held_out_first=0))
     with pytest.raises(InputError, match="the drive must be longer than"):
-        reconstruct(truth.sequence, replace(SETTINGS, first_station=5.0))
+        reconstruct_street(truth.sequence, replace(SETTINGS, first_station=5.0))
 
 
 def test_a_real_street_is_shown_within_20_db_and_its_road_within_22(outside_data: Path) -> None:
     folder = outside_data / "measured" / "kitti_street"
     if not folder.is_dir():
         pytest.skip(f"no stereo sequence at {folder}")
-    short = _halved(read_stereo_folder(folder), slice(12, 21))
+    short = _halve_sequence(read_stereo_folder(folder), slice(12, 21))
     settings = StereoSettings(disparities=64, refinement_passes=2, extension=5.0, environment_rows=256)
-    (figure,) = reconstruct(short, settings).held_out
+    (figure,) = reconstruct_street(short, settings).held_out
     assert figure.frame == 4
     assert figure.psnr_db > 20
     assert figure.road_psnr_db > 22
 
 
-def _halved(sequence: StereoSequence, frames: slice) -> StereoSequence:
+def _halve_sequence(sequence: StereoSequence, frames: slice) -> StereoSequence:
     """Some of the pictures at half the width and height."""
     intrinsics = sequence.intrinsics.copy()
     intrinsics[:2, 2] += 0.5

@@ -16,10 +16,9 @@ from tasks.reconstruction.adjoint import (
     WEIGHT,
     blend_and_derive,
 )
-from tasks.reconstruction.fidelity import psnr, ssim_map
-from tasks.reconstruction.refinement import TrainingView, refine, scattered
-from tasks.render.rasterise.preparation import prepare
-from tasks.render.rasterise.projection import DEPTH, LOG_ALPHA, RECORD, RED, X, Y, project
+from tasks.reconstruction.refinement import TrainingView, bit_reversed_order, refine_gaussians
+from tasks.render.rasterise.preparation import prepare_gaussians
+from tasks.render.rasterise.projection import DEPTH, LOG_ALPHA, RECORD, RED, X, Y, project_gaussians
 from tasks.render.rasterise.rasteriser import rasterise
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
@@ -30,7 +29,7 @@ K = np.array([[60.0, 0, 22.5], [0, 60, 18.5], [0, 0, 1]])
 NAMES = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
 
 
-def cloud(count: int = 120, seed: int = 1) -> Gaussians:
+def make_cloud(count: int = 120, seed: int = 1) -> Gaussians:
     """Gaussians in front of a camera at the origin that looks along +z."""
     draw = np.random.Generator(np.random.Philox(seed))
     means = draw.uniform((-1.6, -1.3, 4), (1.6, 1.3, 7), (count, 3))
@@ -47,10 +46,10 @@ def cloud(count: int = 120, seed: int = 1) -> Gaussians:
 
 
 def records_of(gaussians: Gaussians) -> np.ndarray:
-    return project(prepare(gaussians), view_of(np.eye(4), K, WIDTH, HEIGHT))[0].copy()
+    return project_gaussians(prepare_gaussians(gaussians), view_of(np.eye(4), K, WIDTH, HEIGHT))[0].copy()
 
 
-def backdrop(seed: int) -> np.ndarray:
+def make_backdrop(seed: int) -> np.ndarray:
     draw = np.random.Generator(np.random.Philox(seed))
     return draw.uniform(0, 1, (HEIGHT, WIDTH, 3)).astype(np.float32)
 
@@ -59,9 +58,9 @@ ONES = np.ones((HEIGHT, WIDTH), np.float32)
 
 
 def test_the_blended_picture_is_the_rasterisers() -> None:
-    gaussians, sky = cloud(), backdrop(2)
+    gaussians, sky = make_cloud(), make_backdrop(2)
     picture, _ = blend_and_derive(records_of(gaussians), sky, ONES, sky)
-    gbuffer = rasterise(prepare(gaussians), np.eye(4), K, WIDTH, HEIGHT)
+    gbuffer = rasterise(prepare_gaussians(gaussians), np.eye(4), K, WIDTH, HEIGHT)
     np.testing.assert_allclose(picture[..., 3], 1 - gbuffer.alpha, atol=2e-5)
     np.testing.assert_allclose(
         picture[..., :3], gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky, atol=2e-5
@@ -74,7 +73,12 @@ def test_the_blended_picture_is_the_rasterisers() -> None:
 )
 def test_derivatives_are_those_of_the_picture(column: int, of: int, step: float) -> None:
     """Half the squared error falls by the derivative times residual, per unit of each quantity."""
-    records, sky, target, weight = records_of(cloud()), backdrop(2), backdrop(3), backdrop(4)[..., 0].copy()
+    records, sky, target, weight = (
+        records_of(make_cloud()),
+        make_backdrop(2),
+        make_backdrop(3),
+        make_backdrop(4)[..., 0].copy(),
+    )
 
     def loss(changed: np.ndarray) -> float:
         picture, _ = blend_and_derive(changed, target, weight, sky)
@@ -92,7 +96,7 @@ def test_derivatives_are_those_of_the_picture(column: int, of: int, step: float)
 
 
 def test_squares_of_derivatives_are_those_of_a_single_splat() -> None:
-    gaussians = cloud(1)
+    gaussians = make_cloud(1)
     records, sky = records_of(gaussians), np.zeros((HEIGHT, WIDTH, 3), np.float32)
     _, sums = blend_and_derive(records, sky, ONES, sky)
     for column, of in ((LOG_ALPHA, OPACITY_SQUARE), (X, SQUARE_XX)):
@@ -106,7 +110,7 @@ def test_squares_of_derivatives_are_those_of_a_single_splat() -> None:
 
 
 def test_a_pixel_at_the_ceiling_is_matched_by_anything_brighter() -> None:
-    records, sky = records_of(cloud()), backdrop(2)
+    records, sky = records_of(make_cloud()), make_backdrop(2)
     picture, _ = blend_and_derive(records, sky, ONES, sky)
     _, darker = blend_and_derive(records, -np.maximum(picture[..., :3] - 0.05, 1e-4), ONES, sky)
     assert (darker[:, COLOUR : COLOUR + 3] == 0).all()
@@ -115,7 +119,7 @@ def test_a_pixel_at_the_ceiling_is_matched_by_anything_brighter() -> None:
 
 
 def test_nothing_to_blend_shows_the_sky() -> None:
-    sky = backdrop(2)
+    sky = make_backdrop(2)
     picture, sums = blend_and_derive(np.empty((0, RECORD), np.float32), sky, ONES, sky)
     np.testing.assert_array_equal(picture[..., :3], sky)
     assert sums.shape[0] == 0
@@ -127,7 +131,7 @@ def views_of(gaussians: Gaussians) -> list[TrainingView]:
     for shift in (-0.4, 0.0, 0.4):
         viewmat = np.eye(4)
         viewmat[0, 3] = shift
-        gbuffer = rasterise(prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
+        gbuffer = rasterise(prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
         sky = np.full((HEIGHT, WIDTH, 3), 0.4, np.float32)
         views.append(TrainingView(
             viewmat=viewmat,
@@ -143,14 +147,14 @@ def views_of(gaussians: Gaussians) -> list[TrainingView]:
 def error_of(gaussians: Gaussians, views: list[TrainingView]) -> float:
     total = 0.0
     for view in views:
-        gbuffer = rasterise(prepare(gaussians), view.viewmat, K, WIDTH, HEIGHT)
+        gbuffer = rasterise(prepare_gaussians(gaussians), view.viewmat, K, WIDTH, HEIGHT)
         total += float(
             ((gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * view.sky - view.radiance) ** 2).mean()
         )
     return total
 
 
-def disturbed(gaussians: Gaussians) -> tuple[Gaussians, np.ndarray]:
+def disturb_cloud(gaussians: Gaussians) -> tuple[Gaussians, np.ndarray]:
     """Colours, opacities and depths that are off, and the rays along which the depths are."""
     draw = np.random.Generator(np.random.Philox(9))
     rays = gaussians.means / gaussians.means[:, 2:]
@@ -166,21 +170,21 @@ def disturbed(gaussians: Gaussians) -> tuple[Gaussians, np.ndarray]:
 
 
 def test_refinement_brings_the_pictures_back() -> None:
-    true = cloud()
+    true = make_cloud()
     views = views_of(true)
-    start, rays = disturbed(true)
-    better = refine(start, rays, lambda n: views[n], len(views), 12)
+    start, rays = disturb_cloud(true)
+    better = refine_gaussians(start, rays, lambda n: views[n], len(views), 12)
     assert error_of(better, views) < 0.05 * error_of(start, views)
 
 
 def test_refinement_moves_along_the_rays_only_and_leaves_road_where_it_is() -> None:
     true = replace(
-        cloud(),
+        make_cloud(),
         class_id=np.where(np.arange(120) < 60, SemanticClass.ROAD, SemanticClass.OTHER).astype(np.uint8),
     )
     views = views_of(true)
-    start, rays = disturbed(true)
-    better = refine(start, rays, lambda n: views[n], len(views), 3)
+    start, rays = disturb_cloud(true)
+    better = refine_gaussians(start, rays, lambda n: views[n], len(views), 3)
     assert len(better) == len(start)
     np.testing.assert_allclose(better.means[:60], start.means[:60], atol=1e-6)
     np.testing.assert_allclose(better.opacities[:60], start.opacities[:60], rtol=1e-5)
@@ -194,47 +198,28 @@ def test_refinement_moves_along_the_rays_only_and_leaves_road_where_it_is() -> N
 
 def test_what_should_not_be_there_fades_away() -> None:
     """A floater of the right colour for no picture loses its opacity, and is dropped in the end."""
-    true = cloud()
+    true = make_cloud()
     views = views_of(true)
     floater = replace(
-        cloud(1, seed=5), means=np.array([[0.1, 0.1, 2.5]], np.float32), opacities=np.array([0.6], np.float32)
+        make_cloud(1, seed=5),
+        means=np.array([[0.1, 0.1, 2.5]], np.float32),
+        opacities=np.array([0.6], np.float32),
     )
     both = Gaussians(
         **{name: np.concatenate([getattr(true, name), getattr(floater, name)]) for name in NAMES}
     )
-    refined = refine(both, both.means / both.means[:, 2:], lambda n: views[n], len(views), 10)
+    refined = refine_gaussians(both, both.means / both.means[:, 2:], lambda n: views[n], len(views), 10)
     assert len(refined) == len(true) or refined.opacities[-1] < 0.15
 
 
 def test_the_order_of_pictures_visits_each_once_and_jumps() -> None:
     for count in (1, 2, 5, 44):
-        assert sorted(scattered(count)) == list(range(count))
-    assert scattered(8) == [0, 4, 2, 6, 1, 5, 3, 7]
-
-
-def test_signal_to_noise_of_a_known_error() -> None:
-    reference = backdrop(1).astype(np.float64)
-    assert psnr(reference + 0.1, reference) == pytest.approx(20.0)
-    mask = np.zeros((HEIGHT, WIDTH), bool)
-    assert np.isnan(psnr(reference, reference, mask))
-    mask[0] = True
-    half = reference.copy()
-    half[0] += 0.01
-    assert psnr(half, reference, mask) == pytest.approx(40.0)
-
-
-def test_similarity_of_equal_pictures_is_one_and_of_a_constant_shift_is_the_luminance_term() -> None:
-    grey = np.repeat(backdrop(1)[..., :1], 3, axis=2).astype(np.float64)
-    np.testing.assert_allclose(ssim_map(grey, grey), 1)
-    a, b = np.full((40, 40, 3), 0.4), np.full((40, 40, 3), 0.6)
-    expected = (2 * 0.4 * 0.6 + 1e-4) / (0.4**2 + 0.6**2 + 1e-4)
-    np.testing.assert_allclose(ssim_map(a, b), expected)
-    noise = np.random.Generator(np.random.Philox(2)).uniform(size=grey.shape)
-    assert ssim_map(grey, noise).mean() < 0.2
+        assert sorted(bit_reversed_order(count)) == list(range(count))
+    assert bit_reversed_order(8) == [0, 4, 2, 6, 1, 5, 3, 7]
 
 
 def test_records_hold_what_the_derivative_reads() -> None:
     """The columns that the kernel addresses are the projection's own."""
-    records = records_of(cloud(1))
+    records = records_of(make_cloud(1))
     assert records.shape == (1, RECORD)
     assert 4 < records[0, DEPTH] < 7

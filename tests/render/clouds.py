@@ -29,7 +29,7 @@ def random_cloud(count: int, sh_count: int = 16, seed: int = 0) -> Gaussians:
     )
 
 
-def cloud(
+def make_cloud(
     means: object,
     scales: object = 0.1,
     opacities: object = 0.9,
@@ -58,7 +58,7 @@ def cloud(
     )
 
 
-def rotation(seed: int) -> NDArray[np.float64]:
+def rotation_matrix(seed: int) -> NDArray[np.float64]:
     """A random rotation matrix."""
     q, r = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))
     q = q * np.sign(np.diag(r))

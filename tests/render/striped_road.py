@@ -3,8 +3,8 @@
 import numpy as np
 
 from tasks.conventions import SemanticClass
-from tasks.render.camera import viewmat
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.camera import world_to_camera
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 
@@ -37,10 +37,10 @@ PHASES = np.arange(8) / 8
 def crossing_row(road: Gaussians, advance: float) -> float:
     """How far below the horizon the crossing's middle is drawn, by the first moment of its light [px]."""
     pose = np.array([[0.0, 0, 1, advance], [-1, 0, 0, 0], [0, -1, 0, 1.4], [0, 0, 0, 1]])
-    prepared, rows = prepare(road), []
+    prepared, rows = prepare_gaussians(road), []
     for phase in PHASES:
         lens = np.array([[400.0, 0, 8], [0, 400.0, 20 + phase], [0, 0, 1]])
-        got = rasterise(prepared, viewmat(pose), lens, 16, 100)
+        got = rasterise(prepared, world_to_camera(pose), lens, 16, 100)
         light = got.rgb[:, 4:12, 0].mean(axis=1) / np.maximum(got.alpha[:, 4:12].mean(axis=1), 1e-6) - DARK
         light[got.alpha[:, 8] < 0.5] = 0
         rows.append((light * (np.arange(100) + 0.5)).sum() / light.sum() - lens[1, 2])

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.render.rasterise.rasteriser import prepare, rasterise
-from tests.render.clouds import HEIGHT, WIDTH, K, cloud
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tests.render.clouds import HEIGHT, WIDTH, K, make_cloud
 from tests.render.striped_road import crossing_row, striped_road, true_row
 
 AHEAD = np.eye(4)
@@ -16,10 +16,10 @@ ANTIALIASED_VARIANCE, CLASSIC_VARIANCE = 0.1, 0.3
 def light_of(radius_px: float, antialiased: bool) -> float:
     """Sum of opacity over the picture of one disc that faces the camera, over what its Gaussian holds [1]."""
     z, opacity = 5.0, 0.5
-    disc = cloud(
+    disc = make_cloud(
         (0.0, 0, z), scales=(radius_px * z / K[0, 0], radius_px * z / K[1, 1], 1e-4), opacities=opacity
     )
-    got = rasterise(prepare(replace(disc, antialiased=antialiased)), AHEAD, K, WIDTH, HEIGHT)
+    got = rasterise(prepare_gaussians(replace(disc, antialiased=antialiased)), AHEAD, K, WIDTH, HEIGHT)
     return float(got.alpha.sum()) / (opacity * 2 * np.pi * radius_px**2)
 
 
@@ -36,9 +36,9 @@ def test_a_classic_splat_grows_by_a_pixels_variance():
 
 
 def test_splats_much_larger_than_a_pixel_are_drawn_alike():
-    big = cloud((0.3, 0.2, 5.0), scales=(1.0, 0.8, 0.5), opacities=0.7)
+    big = make_cloud((0.3, 0.2, 5.0), scales=(1.0, 0.8, 0.5), opacities=0.7)
     a, b = (
-        rasterise(prepare(replace(big, antialiased=antialiased)), AHEAD, K, WIDTH, HEIGHT).alpha
+        rasterise(prepare_gaussians(replace(big, antialiased=antialiased)), AHEAD, K, WIDTH, HEIGHT).alpha
         for antialiased in (False, True)
     )
     assert np.abs(a - b).max() < 0.01

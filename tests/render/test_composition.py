@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
 
-from tasks.render.composition import compose, encode_8bit, round_depth, to_display, to_linear
-from tasks.render.contact_sheet import CAPTION, CURVE_COLOURS, MARGIN, contact_sheet, encode_png
+from tasks.render.composition import compose_over_sky, encode_8bit, round_depth, to_display, to_linear
+from tasks.render.contact_sheet import CAPTION, CURVE_COLOURS, MARGIN, draw_contact_sheet, encode_png
 from tasks.render.environment import environment_view, plain_sky
 from tasks.render.rasterise.gbuffer import GBuffer
 
 K = np.array([[40.0, 0, 24], [0, 40.0, 16], [0, 0, 1]])
 
 
-def looking(forward: list[float], down: list[float]) -> np.ndarray:
+def look_along(forward: list[float], down: list[float]) -> np.ndarray:
     view = np.eye(4)
     view[:3, :3] = [np.cross(down, forward), down, forward]
     return view
@@ -28,7 +28,7 @@ def test_every_byte_survives_linear_light_and_back():
     assert (encode_8bit(to_linear((levels / 255).astype(np.float32))) == levels).all()
 
 
-def buffer(alpha: float) -> GBuffer:
+def make_buffer(alpha: float) -> GBuffer:
     shape = (4, 5)
     return GBuffer(
         rgb=np.full((*shape, 3), 0.4 * alpha, np.float32), depth=np.ones(shape, np.float32),
@@ -40,14 +40,18 @@ def buffer(alpha: float) -> GBuffer:
 
 def test_the_sky_fills_what_the_street_leaves():
     sky = np.full((4, 5, 3), 0.8, np.float32)
-    np.testing.assert_allclose(compose(buffer(0.25), sky, False), 0.25 * 0.4 + 0.75 * 0.8, rtol=1e-6)
-    np.testing.assert_array_equal(compose(buffer(0.0), sky, False), sky)
+    np.testing.assert_allclose(
+        compose_over_sky(make_buffer(0.25), sky, False), 0.25 * 0.4 + 0.75 * 0.8, rtol=1e-6
+    )
+    np.testing.assert_array_equal(compose_over_sky(make_buffer(0.0), sky, False), sky)
 
 
 def test_display_encoded_scenes_blend_before_they_are_linearised():
     sky = np.full((4, 5, 3), 0.8, np.float32)
-    np.testing.assert_allclose(compose(buffer(0.0), sky, True), sky, rtol=1e-5)
-    np.testing.assert_allclose(compose(buffer(1.0), sky, True), to_linear(np.float32([0.4]))[0], rtol=1e-5)
+    np.testing.assert_allclose(compose_over_sky(make_buffer(0.0), sky, True), sky, rtol=1e-5)
+    np.testing.assert_allclose(
+        compose_over_sky(make_buffer(1.0), sky, True), to_linear(np.float32([0.4]))[0], rtol=1e-5
+    )
 
 
 def test_depth_is_rounded_to_thirteen_bits_and_nan_stays():
@@ -65,7 +69,7 @@ def test_the_panorama_centre_is_forward_and_its_left_quarter_is_left(forward, co
     panorama = np.zeros((64, 128, 3), np.float32)
     at = int(column * 128)
     panorama[28:36, at - 4 : at + 4] = 1.0
-    view = environment_view(panorama, looking(forward, [0, 0, -1]), K, 48, 32)
+    view = environment_view(panorama, look_along(forward, [0, 0, -1]), K, 48, 32)
     assert view[15:17, 23:25].min() > 0.9
     assert view[:, :4].max() < 0.1
 
@@ -73,13 +77,13 @@ def test_the_panorama_centre_is_forward_and_its_left_quarter_is_left(forward, co
 def test_the_first_panorama_row_is_the_zenith():
     panorama = np.zeros((64, 128, 3), np.float32)
     panorama[:8] = 1.0
-    up = environment_view(panorama, looking([0, 0, 1], [1, 0, 0]), K, 48, 32)
+    up = environment_view(panorama, look_along([0, 0, 1], [1, 0, 0]), K, 48, 32)
     assert up[16, 24].min() > 0.99
 
 
 def test_there_is_no_seam_behind():
     panorama = plain_sky()
-    view = environment_view(panorama, looking([-1, 0, 0], [0, 0, -1]), K, 48, 32)
+    view = environment_view(panorama, look_along([-1, 0, 0], [0, 0, -1]), K, 48, 32)
     assert np.abs(np.diff(view, axis=1)).max() < 0.02
 
 
@@ -88,16 +92,16 @@ def test_a_contact_sheet_has_a_row_a_clip_and_decodes():
 
     pictures = [np.full((32, 48, 3), 200, np.uint8)] * 2
     curves = {"speed": np.linspace(16, 0, 9), "pitch": np.linspace(0, 0.03, 9)}
-    sheet = contact_sheet([("dry", pictures, curves), ("snow", pictures, curves)], [0, 8], 10.0)
+    sheet = draw_contact_sheet([("dry", pictures, curves), ("snow", pictures, curves)], [0, 8], 10.0)
     assert (cv2.imdecode(np.frombuffer(encode_png(sheet), np.uint8), 1)[..., ::-1] == sheet).all()
-    one = contact_sheet([("dry", pictures, curves)], [0, 8], 10.0)
+    one = draw_contact_sheet([("dry", pictures, curves)], [0, 8], 10.0)
     assert sheet.shape[0] > 1.8 * one.shape[0]
 
 
 def test_each_curve_is_named_in_its_own_colour():
     pictures = [np.full((32, 48, 3), 200, np.uint8)]
     curves = {"speed": np.linspace(16, 0, 9), "pitch": np.linspace(0, 0.03, 9)}
-    sheet = contact_sheet([("dry", pictures, curves)], [0], 10.0)
+    sheet = draw_contact_sheet([("dry", pictures, curves)], [0], 10.0)
     heading = sheet[: MARGIN + CAPTION]
     for colour in CURVE_COLOURS.values():
         assert (np.abs(heading.astype(int) - colour).max(axis=2) < 20).any()

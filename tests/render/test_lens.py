@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.cameras import camera_source, load_camera
+from catalogs.cameras import load_camera
+from catalogs.entries import find_entry
 from tasks.errors import InputError
-from tasks.eval.poses.undistort import undistorted as seen_by_pinhole
-from tasks.render.lens import Lens, distorted, pixel_directions, undistorted
+from tasks.eval.poses.undistort import undistort_frames as seen_by_pinhole
+from tasks.render.lens import Lens, distort_rays, pixel_directions, undistort_points
 
 LENS = Lens(k1=-0.37, k2=0.197, p1=1.4e-3, p2=5.7e-4, k3=-0.068)
 K = np.array([[400.0, 0, 240], [0, 400, 160], [0, 0, 1]])
@@ -16,15 +17,15 @@ K = np.array([[400.0, 0, 240], [0, 400, 160], [0, 0, 1]])
 
 def test_rays_land_where_opencv_puts_them():
     rays = np.random.default_rng(1).uniform((-0.8, -0.6, 1), (0.8, 0.6, 1), (500, 3))
-    ours = np.stack(distorted(rays[:, 0], rays[:, 1], LENS.coefficients), axis=-1) * 400 + (240, 160)
+    ours = np.stack(distort_rays(rays[:, 0], rays[:, 1], LENS.coefficients), axis=-1) * 400 + (240, 160)
     theirs, _ = cv2.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), K, LENS.coefficients)
     np.testing.assert_allclose(ours, theirs[:, 0], atol=1e-9)
 
 
 def test_undistortion_is_the_inverse_and_agrees_with_opencv():
     x, y = np.meshgrid(np.linspace(-0.6, 0.6, 31), np.linspace(-0.4, 0.4, 21))
-    back_x, back_y = undistorted(x, y, LENS)
-    again = distorted(back_x, back_y, LENS.coefficients)
+    back_x, back_y = undistort_points(x, y, LENS)
+    again = distort_rays(back_x, back_y, LENS.coefficients)
     np.testing.assert_allclose(again, (x, y), atol=1e-12)
     places = np.stack((x, y), axis=-1).reshape(-1, 1, 2)
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
@@ -39,7 +40,7 @@ def test_a_lens_of_zeros_is_a_pinhole():
 def test_a_polynomial_that_turns_back_inside_the_picture_is_refused(tmp_path):
     with pytest.raises(InputError, match="must spread the whole picture"):
         pixel_directions(K, 480, 320, Lens(k1=-0.9))
-    entry = yaml.safe_load(camera_source("dashcam-480x320").read_text())
+    entry = yaml.safe_load(find_entry("camera", "dashcam-480x320").read_text())
     entry["k1"] = {"value": -0.9, "unit": "1", "source": "none"}
     (tmp_path / "bent.yaml").write_text(yaml.safe_dump(entry))
     with pytest.raises(InputError, match="must spread the whole picture"):

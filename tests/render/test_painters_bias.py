@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 import torch
 
-from tasks.render.rasterise.painters_bias import FURTHEST, MOST_OVERLAP, lead, lead_terms
+from tasks.render.rasterise.painters_bias import LARGEST_SHIFT, MOST_OVERLAP, interpolate_shift, shift_terms
 from tasks.render.rasterise.painters_bias_torch import means_nearer
-from tasks.render.rasterise.projection import ANTIALIASED_LOW_PASS, X, Y, project
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.projection import ANTIALIASED_LOW_PASS, X, Y, project_gaussians
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.rasterise.reference_rasteriser import rasterise_reference
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
-from tasks.scene.surroundings import with_surroundings
-from tests.render.clouds import HEIGHT, WIDTH, K, cloud, random_cloud
+from tasks.scene.surroundings import add_surroundings
+from tests.render.clouds import HEIGHT, WIDTH, K, make_cloud, random_cloud
 from tests.render.striped_road import crossing_row, striped_road, true_row
 
 AHEAD = np.eye(4)
 
 
-def surrounded(gaussians: Gaussians, seed: int = 3) -> Gaussians:
+def surround_cloud(gaussians: Gaussians, seed: int = 3) -> Gaussians:
     """With surroundings of every kind."""
     rng = np.random.default_rng(seed)
     n = len(gaussians)
@@ -47,19 +47,19 @@ def drawn_lead(overlap: float, ratio: float, count: int = 4000) -> float:
 
 @pytest.mark.parametrize(("overlap", "ratio"), [(0.5, 1.0), (3.5, 1.0), (6.0, 1.0), (3.5, 0.3), (3.5, 2.0)])
 def test_the_lead_is_what_painting_random_discs_nearest_first_takes_away(overlap, ratio):
-    assert lead_terms(overlap, ratio)[0] == pytest.approx(drawn_lead(overlap, ratio), abs=0.012)
+    assert shift_terms(overlap, ratio)[0] == pytest.approx(drawn_lead(overlap, ratio), abs=0.012)
 
 
 def test_a_disc_without_neighbours_has_no_lead_but_for_perspective():
-    assert lead_terms(0.0, 1.0) == pytest.approx((0.0, 1.0), abs=1e-9)
+    assert shift_terms(0.0, 1.0) == pytest.approx((0.0, 1.0), abs=1e-9)
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.3, 2.0, 4.4, 11.0, MOST_OVERLAP, 1e6])
 @pytest.mark.parametrize("ratio", [0.05, 0.4, 1.0, 1.7, 20.0])
 def test_the_table_holds_the_integrals_to_a_hundredth_of_a_standard_deviation(overlap, ratio):
-    first, second = lead_terms(min(overlap, MOST_OVERLAP), ratio)
-    got = lead(np.float32(overlap), np.float32(ratio), np.float32(0.05))
-    assert got == pytest.approx(min(first + 0.05 * second, FURTHEST), abs=0.02)
+    first, second = shift_terms(min(overlap, MOST_OVERLAP), ratio)
+    got = interpolate_shift(np.float32(overlap), np.float32(ratio), np.float32(0.05))
+    assert got == pytest.approx(min(first + 0.05 * second, LARGEST_SHIFT), abs=0.02)
 
 
 def on_road(road: Gaussians, advance: float) -> float:
@@ -74,25 +74,25 @@ def test_a_level_road_of_discs_stays_while_the_camera_comes_closer():
     jitter = np.random.default_rng(1).uniform(-0.02, 0.02, (len(road), 3)) * (1, 1, 0)
     scattered = replace(road, means=(road.means + jitter).astype(np.float32))
     for discs in (road, scattered):
-        level = [on_road(with_surroundings(discs), way) for way in ways]
+        level = [on_road(add_surroundings(discs), way) for way in ways]
         biased = [on_road(discs, way) for way in ways]
         assert np.ptp(level) < 0.01 < 0.08 < np.ptp(biased)
         assert np.abs(level).max() < 0.02
 
 
 def test_the_kernel_draws_what_the_reference_integrates():
-    level = surrounded(random_cloud(600))
-    got = rasterise(prepare(level), AHEAD, K, WIDTH, HEIGHT)
+    level = surround_cloud(random_cloud(600))
+    got = rasterise(prepare_gaussians(level), AHEAD, K, WIDTH, HEIGHT)
     wanted = rasterise_reference(level, AHEAD, K, WIDTH, HEIGHT)
-    plain = rasterise(prepare(replace(level, surroundings=None)), AHEAD, K, WIDTH, HEIGHT)
+    plain = rasterise(prepare_gaussians(replace(level, surroundings=None)), AHEAD, K, WIDTH, HEIGHT)
     assert np.abs(got.rgb - wanted.rgb).max() < 2e-3
     assert np.abs(got.rgb - plain.rgb).max() > 0.1
 
 
 def test_centres_for_a_gpu_project_where_the_kernel_puts_the_splats():
-    level = surrounded(random_cloud(600))
-    prepared, view = prepare(level), view_of(AHEAD, K, WIDTH, HEIGHT)
-    records, slots = project(prepared, view)
+    level = surround_cloud(random_cloud(600))
+    prepared, view = prepare_gaussians(level), view_of(AHEAD, K, WIDTH, HEIGHT)
+    records, slots = project_gaussians(prepared, view)
     arrays = (level.means, level.quats_wxyz, level.scales, level.normals, level.surroundings)
     moved = means_nearer(*(torch.from_numpy(array) for array in arrays), view, ANTIALIASED_LOW_PASS).numpy()
     assert np.array_equal(moved[:, 2], level.means[:, 2])
@@ -103,7 +103,7 @@ def test_centres_for_a_gpu_project_where_the_kernel_puts_the_splats():
 
 
 def test_centres_in_the_camera_s_plane_stay_on_a_gpu():
-    level = surrounded(random_cloud(50))
+    level = surround_cloud(random_cloud(50))
     means = level.means.copy()
     means[::3, 2] = 0.0
     arrays = (means, level.quats_wxyz, level.scales, level.normals, level.surroundings)
@@ -115,17 +115,17 @@ def test_centres_in_the_camera_s_plane_stay_on_a_gpu():
 
 def test_a_cloud_without_surroundings_is_drawn_as_its_trainer_drew_it():
     plain = random_cloud(200)
-    prepared = prepare(plain)
-    records, slots = project(prepared, view_of(AHEAD, K, WIDTH, HEIGHT))
+    prepared = prepare_gaussians(plain)
+    records, slots = project_gaussians(prepared, view_of(AHEAD, K, WIDTH, HEIGHT))
     x, y, z = plain.means[prepared.order[slots]].T
     assert np.abs(K[0, 0] * x / z + K[0, 2] - records[:, X]).max() < 1e-3
     assert np.abs(K[1, 1] * y / z + K[1, 2] - records[:, Y]).max() < 1e-3
 
 
 def test_a_disc_that_faces_the_camera_stays():
-    facing = cloud((0.1, 0.2, 5.0), scales=(0.3, 0.3, 1e-3), normals=(0, 0, -1))
+    facing = make_cloud((0.1, 0.2, 5.0), scales=(0.3, 0.3, 1e-3), normals=(0, 0, -1))
     level = replace(facing, surroundings=np.array([[4.0, 1.0]], np.float32), antialiased=True)
-    (record,), _ = project(prepare(level), view_of(AHEAD, K, WIDTH, HEIGHT))
+    (record,), _ = project_gaussians(prepare_gaussians(level), view_of(AHEAD, K, WIDTH, HEIGHT))
     assert record[[X, Y]] == pytest.approx(K[:2, :2] @ (0.02, 0.04) + K[:2, 2], abs=1e-4)
 
 
@@ -133,9 +133,9 @@ def test_a_disc_that_its_lead_brings_into_the_picture_is_not_culled_with_its_blo
     """Balls beyond the left edge, on a surface that comes nearer to the right, one at a time."""
     drawn = 0
     for x in np.linspace(-2.2, -1.0, 25):
-        ball = cloud((x, 0.0, 2.0), scales=0.1, opacities=0.9, normals=(0.6, 0, 0.8))
+        ball = make_cloud((x, 0.0, 2.0), scales=0.1, opacities=0.9, normals=(0.6, 0, 0.8))
         level = replace(ball, surroundings=np.array([[20.0, 1.0]], np.float32), antialiased=True)
-        got = rasterise(prepare(level), AHEAD, K, WIDTH, HEIGHT).alpha
+        got = rasterise(prepare_gaussians(level), AHEAD, K, WIDTH, HEIGHT).alpha
         assert np.abs(got - rasterise_reference(level, AHEAD, K, WIDTH, HEIGHT).alpha).max() < 5e-3
         drawn += bool(got.any())
     assert 5 < drawn < 25

@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.projection import project
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.projection import project_gaussians
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.rasterise.reference_rasteriser import blend_steps, rasterise_reference
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
-from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, cloud, random_cloud, rotation
+from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, make_cloud, random_cloud, rotation_matrix
 
 AHEAD = np.eye(4)
 
 
-def draw(gaussians: Gaussians, viewmat: NDArray[np.float64] = AHEAD) -> GBuffer:
-    return rasterise(prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
+def draw_cloud(gaussians: Gaussians, viewmat: NDArray[np.float64] = AHEAD) -> GBuffer:
+    return rasterise(prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
 
 
 def all_bytes(gbuffer: GBuffer) -> list[bytes]:
@@ -37,8 +37,8 @@ def psnr(a: NDArray[np.float32], b: NDArray[np.float32], peak: float) -> float:
 @pytest.mark.parametrize(("sh_count", "seed"), [(1, 0), (4, 1), (9, 2), (16, 3)])
 def test_picture_equals_the_numpy_twin(sh_count: int, seed: int, antialiased: bool) -> None:
     gaussians = replace(random_cloud(1500, sh_count, seed), antialiased=antialiased)
-    viewmat = camera_at((0.4, -0.2, 0.1), rotation(seed))
-    got, wanted = draw(gaussians, viewmat), rasterise_reference(gaussians, viewmat, K, WIDTH, HEIGHT)
+    viewmat = camera_at((0.4, -0.2, 0.1), rotation_matrix(seed))
+    got, wanted = draw_cloud(gaussians, viewmat), rasterise_reference(gaussians, viewmat, K, WIDTH, HEIGHT)
     covered = wanted.alpha > 0
     assert covered.mean() > 0.5 and wanted.alpha.max() > 0.95
     assert psnr(got.rgb, wanted.rgb, 1.0) > 80
@@ -80,7 +80,7 @@ def test_one_gaussian_is_the_closed_form_of_its_projection() -> None:
     clear_cut = np.abs(alpha - 1 / 255) > 1e-5
     alpha[alpha < 1 / 255] = 0
 
-    got = draw(cloud(mean, scales, opacity, quat, colours=(0.2, 0.5, 0.9)))
+    got = draw_cloud(make_cloud(mean, scales, opacity, quat, colours=(0.2, 0.5, 0.9)))
     assert alpha.max() > 0.7 and (alpha > 0).sum() > 100
     assert np.abs(got.alpha - alpha)[clear_cut].max() < 2e-5
     np.testing.assert_allclose(got.rgb, got.alpha[..., None] * (0.2, 0.5, 0.9), atol=1e-6)
@@ -88,7 +88,7 @@ def test_one_gaussian_is_the_closed_form_of_its_projection() -> None:
 
 
 def test_picture_axes_are_right_and_down() -> None:
-    got = draw(cloud([(1.0, 0, 4), (0, 1.0, 4)], colours=[(1, 0, 0), (0, 1, 0)]))
+    got = draw_cloud(make_cloud([(1.0, 0, 4), (0, 1.0, 4)], colours=[(1, 0, 0), (0, 1, 0)]))
     red, green = (np.unravel_index(got.rgb[..., c].argmax(), (HEIGHT, WIDTH)) for c in (0, 1))
     assert red == (int(26.9), int(35.2 + 60 / 4))
     assert green == (int(26.9 + 58 / 4), int(35.2))
@@ -98,13 +98,13 @@ def test_opacities_multiply_as_transmittances() -> None:
     opacities = np.array((0.3, 0.05, 0.6, 0.2, 0.7))
     means = [(0, 0, 2.0 + i) for i in range(5)]
     scales = [(2.0 + i, 2.0 + i, 0.1) for i in range(5)]
-    got = draw(cloud(means, scales, opacities))
+    got = draw_cloud(make_cloud(means, scales, opacities))
     centre = got.alpha[26, 35]
     assert centre == pytest.approx(1 - np.prod(1 - opacities), abs=1e-4)
 
 
 def test_opacity_stays_between_zero_and_one() -> None:
-    got = draw(replace(random_cloud(3000, 1), opacities=np.ones(3000, dtype=np.float32)))
+    got = draw_cloud(replace(random_cloud(3000, 1), opacities=np.ones(3000, dtype=np.float32)))
     assert got.alpha.min() >= 0 and got.alpha.max() <= 1
     assert got.alpha.max() > 0.9998  # closed pixels
 
@@ -112,22 +112,22 @@ def test_opacity_stays_between_zero_and_one() -> None:
 def test_a_pixel_closes_before_the_gaussian_that_would_leave_it_no_light() -> None:
     """Behind 0.999 a second 0.999 would leave 1e-6: it is not drawn, and nothing behind it either."""
     means, wide = [(0, 0, 2.0), (0, 0, 3.0), (0, 0, 4.0)], (9.0, 9.0, 0.1)
-    got = draw(cloud(means, wide, (1.0, 1.0, 0.5), colours=np.eye(3)))
+    got = draw_cloud(make_cloud(means, wide, (1.0, 1.0, 0.5), colours=np.eye(3)))
     assert got.rgb[26, 35] == pytest.approx((0.999, 0, 0), abs=1e-6)
-    thinner = draw(cloud(means, wide, (1.0, 0.5, 0.5), colours=np.eye(3)))
+    thinner = draw_cloud(make_cloud(means, wide, (1.0, 0.5, 0.5), colours=np.eye(3)))
     assert thinner.rgb[26, 35] == pytest.approx((0.999, 0.0005, 0.00025), abs=2e-6)
 
 
 def test_an_opaque_wall_has_its_own_depth_normal_and_class() -> None:
     x, y = np.meshgrid(np.arange(-4, 4, 0.1), np.arange(-3, 3, 0.1))
-    wall = cloud(
+    wall = make_cloud(
         np.column_stack((x.ravel(), y.ravel(), np.full(x.size, 5.0))),
         scales=(0.1, 0.1, 1e-4),
         opacities=1.0,
         normals=(0, 0, 1),
         class_id=SemanticClass.BUILDING,
     )
-    got = draw(wall)
+    got = draw_cloud(wall)
     np.testing.assert_allclose(got.depth, 5.0, rtol=1e-6)
     assert got.alpha.min() > 0.95
     np.testing.assert_allclose(got.normal, np.broadcast_to((0, 0, -1), got.normal.shape), atol=1e-6)
@@ -143,7 +143,7 @@ def test_class_is_that_of_the_gaussian_at_half_transmittance() -> None:
         ((0.6, 0.4, 0.9), SemanticClass.VEHICLE),
         ((0.2, 0.2, 0.2), SemanticClass.SKY),
     ):
-        got = draw(cloud(means, wide, opacities, class_id=labels))
+        got = draw_cloud(make_cloud(means, wide, opacities, class_id=labels))
         assert got.class_id[26, 35] == label, opacities
 
 
@@ -152,12 +152,12 @@ def test_order_of_the_cloud_does_not_change_a_bit() -> None:
     shuffle = np.random.default_rng(5).permutation(len(gaussians))
     arrays = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
     shuffled = replace(gaussians, **{name: getattr(gaussians, name)[shuffle] for name in arrays})
-    assert all_bytes(draw(shuffled)) == all_bytes(draw(gaussians))
+    assert all_bytes(draw_cloud(shuffled)) == all_bytes(draw_cloud(gaussians))
 
 
 def test_threads_do_not_change_a_bit() -> None:
-    prepared = prepare(random_cloud(2000))
-    views = [camera_at((0, 0, 0), rotation(seed)) for seed in range(4)]
+    prepared = prepare_gaussians(random_cloud(2000))
+    views = [camera_at((0, 0, 0), rotation_matrix(seed)) for seed in range(4)]
     alone = [all_bytes(rasterise(prepared, view, K, WIDTH, HEIGHT)) for view in views]
     with ThreadPoolExecutor(2) as pool:
         together = list(
@@ -168,7 +168,7 @@ def test_threads_do_not_change_a_bit() -> None:
 
 def test_turning_world_and_camera_together_leaves_the_picture() -> None:
     gaussians = random_cloud(800, sh_count=1)
-    R = rotation(9)
+    R = rotation_matrix(9)
     w = np.sqrt(1 + np.trace(R)) / 2
     x, y, z = (R[2, 1] - R[1, 2]) / (4 * w), (R[0, 2] - R[2, 0]) / (4 * w), (R[1, 0] - R[0, 1]) / (4 * w)
     a, b, c, d = gaussians.quats_wxyz.T.astype(np.float64)
@@ -185,14 +185,14 @@ def test_turning_world_and_camera_together_leaves_the_picture() -> None:
         quats_wxyz=quats.astype(np.float32),
         normals=(gaussians.normals @ R.T).astype(np.float32),
     )
-    plain, moved = draw(gaussians), draw(turned, camera_at(shift, R.T))
+    plain, moved = draw_cloud(gaussians), draw_cloud(turned, camera_at(shift, R.T))
     assert psnr(moved.rgb, plain.rgb, 1.0) > 70
     assert psnr(moved.normal @ R, plain.normal, 1.0) > 60
     assert np.mean(moved.class_id != plain.class_id) < 0.005
 
 
 def test_normals_face_the_camera() -> None:
-    got = draw(random_cloud(1500))
+    got = draw_cloud(random_cloud(1500))
     y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     ray = np.stack(((x - K[0, 2]) / K[0, 0], (y - K[1, 2]) / K[1, 1], np.ones_like(x)), axis=-1)
     covered = got.alpha > 0
@@ -206,34 +206,36 @@ def test_normals_face_the_camera() -> None:
 @pytest.mark.parametrize("place", ["nowhere", "behind", "beside", "too close", "too faint"])
 def test_nothing_in_view_gives_an_empty_picture(place: str) -> None:
     gaussians = {
-        "nowhere": replace(cloud(np.zeros((0, 3))), sh=np.zeros((0, 4, 3), np.float32)),
-        "behind": cloud([(0, 0, -3.0), (1, 0, -0.2)]),
-        "beside": cloud([(20.0, 0, 3.0), (0, -30.0, 3.0)]),
-        "too close": cloud([(0, 0, 0.049), (60.0, 0, 3.0)]),
-        "too faint": cloud([(0, 0, 3.0)], opacities=0.99 / 255),
+        "nowhere": replace(make_cloud(np.zeros((0, 3))), sh=np.zeros((0, 4, 3), np.float32)),
+        "behind": make_cloud([(0, 0, -3.0), (1, 0, -0.2)]),
+        "beside": make_cloud([(20.0, 0, 3.0), (0, -30.0, 3.0)]),
+        "too close": make_cloud([(0, 0, 0.049), (60.0, 0, 3.0)]),
+        "too faint": make_cloud([(0, 0, 3.0)], opacities=0.99 / 255),
     }[place]
-    got = draw(gaussians)
+    got = draw_cloud(gaussians)
     assert not got.rgb.any() and not got.alpha.any() and not got.normal.any() and not got.class_id.any()
     assert np.isnan(got.depth).all()
 
 
 def test_needles_and_walls_through_the_eye_are_as_exact_as_the_rest() -> None:
     """The determinant of their picture covariance is a tiny difference of two huge products."""
-    gaussians = cloud(
+    gaussians = make_cloud(
         [(0.01, 0.01, 0.06), (0.1, 0, 0.1), (0.2, 0.1, 0.5), (0, 0, 5.0)],
         scales=[(50, 1e-4, 1e-4), (40, 40, 40), (30, 1e-3, 1e-3), (1e3, 1e-6, 1e-6)],
         quats_wxyz=[(0.8, 0.6, 0, 0), (1, 0, 0, 0), (0.9, 0.1, 0.2, 0.4), (0.9, 0.1, 0.3, 0.3)],
     )
     for i in range(4):
-        one = cloud(gaussians.means[i], gaussians.scales[i], quats_wxyz=gaussians.quats_wxyz[i])
-        got, wanted = draw(one), rasterise_reference(one, AHEAD, K, WIDTH, HEIGHT)
+        one = make_cloud(gaussians.means[i], gaussians.scales[i], quats_wxyz=gaussians.quats_wxyz[i])
+        got, wanted = draw_cloud(one), rasterise_reference(one, AHEAD, K, WIDTH, HEIGHT)
         assert wanted.alpha.max() > 0.2
         assert np.abs(got.alpha - wanted.alpha).max() < 1e-5
 
 
 def test_a_gaussian_beyond_single_precision_is_left_out() -> None:
     means, scales = [(0, 0, 3.0), (0, 0, 4.0)], [(1e18, 1e18, 1e18), (0.1, 0.1, 0.1)]
-    records, slots = project(prepare(cloud(means, scales)), view_of(np.eye(4), K, WIDTH, HEIGHT))
+    records, slots = project_gaussians(
+        prepare_gaussians(make_cloud(means, scales)), view_of(np.eye(4), K, WIDTH, HEIGHT)
+    )
     assert len(slots) == 1 and np.isfinite(records).all()
 
 
@@ -241,16 +243,16 @@ def test_nan_is_refused_by_name_and_number() -> None:
     gaussians = random_cloud(10)
     gaussians.means[7, 1] = np.nan
     with pytest.raises(InputError, match=r"means must be finite; 1 of 10 .* number 7"):
-        prepare(gaussians)
+        prepare_gaussians(gaussians)
 
 
 def test_an_unusable_camera_is_refused_with_every_reason() -> None:
     broken = K.copy()
     broken[0, 0] = np.nan
     with pytest.raises(InputError) as caught:
-        rasterise(prepare(random_cloud(5)), np.eye(3), broken, 0, 10)
+        rasterise(prepare_gaussians(random_cloud(5)), np.eye(3), broken, 0, 10)
     assert [problem.split(" must")[0] for problem in caught.value.problems] == [
         "camera: viewmat", "camera: K", "camera: the picture",
     ]  # fmt: skip
     with pytest.raises(InputError, match=r"focal lengths must be positive; they are 60.0 and -58.0"):
-        rasterise(prepare(random_cloud(5)), np.eye(4), np.diag((60, -58, 1.0)), 10, 10)
+        rasterise(prepare_gaussians(random_cloud(5)), np.eye(4), np.diag((60, -58, 1.0)), 10, 10)

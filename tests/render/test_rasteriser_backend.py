@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from tasks.errors import InputError
 from tasks.render.rasterise import backend
-from tasks.render.rasterise.backend import CpuBackend, probe, probe_scene, select_backend
+from tasks.render.rasterise.backend import CpuBackend, compare_with_cpu, probe_scene, select_backend
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.rasteriser import prepare, rasterise
-from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"
 
 
 def test_cpu_backend_passes_its_own_probe() -> None:
     assert select_backend("cpu").name == "cpu"
-    assert probe(CpuBackend()) == ""
+    assert compare_with_cpu(CpuBackend()) == ""
 
 
 def test_cpu_draws_the_probe_as_gsplats_own_torch_code_does() -> None:
@@ -32,7 +32,7 @@ def test_cpu_draws_the_probe_as_gsplats_own_torch_code_does() -> None:
     x, y, *_ = np.array(pixels, dtype=object).T
     wanted = np.array([pixel[2:] for pixel in pixels], dtype=np.float64)
     gaussians, viewmat, K = probe_scene()
-    got = rasterise(prepare(gaussians), viewmat, K, 64, 48)
+    got = rasterise(prepare_gaussians(gaussians), viewmat, K, 64, 48)
     at = y.astype(int), x.astype(int)
     assert np.abs(got.rgb[at] - wanted[:, :3]).max() < 5e-6
     assert np.abs(got.alpha[at] - wanted[:, 3]).max() < 5e-6
@@ -49,7 +49,7 @@ def test_probe_names_what_a_wrong_backend_draws_wrong() -> None:
             drawn = CpuBackend.rasterise(prepared, viewmat, K, width, height)
             return replace(drawn, rgb=drawn.rgb[:, ::-1], class_id=np.roll(drawn.class_id, 5))
 
-    problem = probe(Mirrored())
+    problem = compare_with_cpu(Mirrored())
     assert "rgb differs" in problem and "class differs" in problem and "depth" not in problem
 
 
@@ -65,7 +65,7 @@ def test_auto_without_a_gpu_is_the_cpu_and_does_not_import_torch() -> None:
 
 def test_auto_falls_back_to_the_cpu_where_gsplat_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(backend, "_GPU_DEVICES", (Path(__file__),))
-    monkeypatch.setattr(backend, "probe", lambda _: "rgb differs by up to 1 from the CPU's")
+    monkeypatch.setattr(backend, "compare_with_cpu", lambda _: "rgb differs by up to 1 from the CPU's")
     assert select_backend("auto").name == "cpu"
     with pytest.raises(InputError, match="gsplat cannot be used here"):
         select_backend("gsplat")
@@ -95,7 +95,10 @@ def test_gsplat_draws_the_cpus_picture() -> None:
     pytest.importorskip("gsplat", reason="gsplat is not installed; it comes with the gpu extra")
     gpu, cpu = select_backend("gsplat"), CpuBackend()
     for seed, sh_count in ((0, 16), (1, 4), (2, 1)):
-        gaussians, viewmat = random_cloud(1500, sh_count, seed), camera_at((0.1, 0.2, 0), rotation(seed))
+        gaussians, viewmat = (
+            random_cloud(1500, sh_count, seed),
+            camera_at((0.1, 0.2, 0), rotation_matrix(seed)),
+        )
         got = gpu.rasterise(gpu.prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
         wanted = cpu.rasterise(cpu.prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
         assert np.mean((got.rgb - wanted.rgb) ** 2) < 1e-6

@@ -11,8 +11,8 @@ from scipy.special import sph_harm_y
 
 from tasks.errors import InputError
 from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH, depth_order, tile_lists
-from tasks.render.rasterise.blending import absorb
-from tasks.render.rasterise.preparation import morton_order, prepare
+from tasks.render.rasterise.blending import absorb_light
+from tasks.render.rasterise.preparation import BLOCK, SH, morton_order, prepare_gaussians
 from tasks.render.rasterise.projection import (
     COLUMN_FALLOFF,
     DEPTH,
@@ -22,13 +22,14 @@ from tasks.render.rasterise.projection import (
     SLOPE,
     X,
     Y,
-    project,
+    project_gaussians,
 )
 from tasks.render.rasterise.rasteriser import rasterise, splat_back
 from tasks.render.rasterise.reference_rasteriser import blend_steps
+from tasks.render.rasterise.shading import shade_lanes
 from tasks.render.rasterise.view import view_of
 from tasks.scene.spherical_harmonics import sh_basis
-from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation
+from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
 
 
 def test_sh_basis_is_scipys_real_harmonics_with_the_condon_shortley_sign() -> None:
@@ -44,11 +45,25 @@ def test_sh_basis_is_scipys_real_harmonics_with_the_condon_shortley_sign() -> No
     np.testing.assert_allclose(sh_basis(v, 16), np.column_stack(wanted), atol=1e-12)
 
 
+@pytest.mark.parametrize("count", [1, 4, 9, 16])
+def test_a_block_is_shaded_by_the_harmonics_it_has_and_no_more(count: int) -> None:
+    rng = np.random.default_rng(count)
+    v = rng.normal(size=(BLOCK, 3))
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    planes = np.full((SH + 3 * 16, BLOCK), 1e3, np.float32)  # what lies behind the block must not be read
+    sh = rng.normal(size=(count, 3, BLOCK)).astype(np.float32)
+    planes[SH : SH + 3 * count] = sh.reshape(-1, BLOCK)
+    colours = np.empty(3 * BLOCK, np.float32)
+    shade_lanes(v.T.astype(np.float32).ravel(), planes[: SH + 3 * count], colours)
+    wanted = np.maximum(np.einsum("kcl,lk->cl", sh, sh_basis(v, count)) + 0.5, 0)
+    np.testing.assert_allclose(colours.reshape(3, BLOCK), wanted, atol=2e-6)
+
+
 def test_polynomial_exponential_keeps_its_stated_error() -> None:
     @numba.njit
     def weights(p: np.ndarray, out: np.ndarray) -> None:
         for i in range(len(p)):
-            out[i] = absorb(p[i], np.float32(1))[0]
+            out[i] = absorb_light(p[i], np.float32(1))[0]
 
     p = np.linspace(LOG_CUT, np.log(0.998), 200_001).astype(np.float32)[1:]
     got = np.empty_like(p)
@@ -77,19 +92,19 @@ def test_morton_neighbours_are_near_and_equal_points_keep_their_order() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_culling_blocks_never_loses_a_splat(seed: int) -> None:
-    prepared = prepare(random_cloud(4000, sh_count=1, seed=seed))
-    viewmat = camera_at(np.random.default_rng(seed).uniform(-4, 4, 3), rotation(seed))
+    prepared = prepare_gaussians(random_cloud(4000, sh_count=1, seed=seed))
+    viewmat = camera_at(np.random.default_rng(seed).uniform(-4, 4, 3), rotation_matrix(seed))
     view = view_of(viewmat, K, WIDTH, HEIGHT)
     everything = replace(prepared, radii=np.full_like(prepared.radii, 1e6))
-    records, slots = project(prepared, view)
-    all_records, all_slots = project(everything, view)
+    records, slots = project_gaussians(prepared, view)
+    all_records, all_slots = project_gaussians(everything, view)
     assert 50 < len(slots) < len(prepared)
     assert np.array_equal(slots, all_slots) and np.array_equal(records, all_records)
 
 
 def test_tile_lists_hold_every_splat_where_it_is_drawn_nearest_first() -> None:
-    prepared = prepare(random_cloud(600, sh_count=1))
-    records, _ = project(prepared, view_of(np.eye(4), K, WIDTH, HEIGHT))
+    prepared = prepare_gaussians(random_cloud(600, sh_count=1))
+    records, _ = project_gaussians(prepared, view_of(np.eye(4), K, WIDTH, HEIGHT))
     starts, splats = tile_lists(records, WIDTH, HEIGHT)
     y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     across = -(-WIDTH // TILE_WIDTH)
@@ -112,7 +127,7 @@ def test_tile_lists_hold_every_splat_where_it_is_drawn_nearest_first() -> None:
 def test_splat_back_sums_the_weights_that_blending_gave() -> None:
     gaussians = random_cloud(2000, sh_count=1, seed=4)
     residual = np.random.default_rng(0).standard_normal((HEIGHT, WIDTH, 5))
-    numerator, weight = splat_back(prepare(gaussians), np.eye(4), K, WIDTH, HEIGHT, residual)
+    numerator, weight = splat_back(prepare_gaussians(gaussians), np.eye(4), K, WIDTH, HEIGHT, residual)
     wanted_numerator, wanted_weight = np.zeros((2000, 5)), np.zeros(2000)
     for step in blend_steps(gaussians, np.eye(4), K, WIDTH, HEIGHT):
         wanted_weight[step.gaussian] = step.weight.sum()
@@ -125,7 +140,7 @@ def test_splat_back_sums_the_weights_that_blending_gave() -> None:
 def test_splat_back_is_the_adjoint_of_blending() -> None:
     """For any picture r: the blended picture times r is the colours times r splatted back."""
     gaussians = random_cloud(900, sh_count=1, seed=6)
-    prepared = prepare(gaussians)
+    prepared = prepare_gaussians(gaussians)
     residual = np.random.default_rng(1).uniform(0, 1, (HEIGHT, WIDTH, 3)).astype(np.float32)
     numerator, weight = splat_back(prepared, np.eye(4), K, WIDTH, HEIGHT, residual)
     got = rasterise(prepared, np.eye(4), K, WIDTH, HEIGHT)
@@ -138,4 +153,4 @@ def test_splat_back_is_the_adjoint_of_blending() -> None:
 
 def test_splat_back_refuses_a_residual_of_another_size() -> None:
     with pytest.raises(InputError, match=r"residual must have shape \(52, 72, channels\); it has \(3, 4\)"):
-        splat_back(prepare(random_cloud(3)), np.eye(4), K, WIDTH, HEIGHT, np.zeros((3, 4)))
+        splat_back(prepare_gaussians(random_cloud(3)), np.eye(4), K, WIDTH, HEIGHT, np.zeros((3, 4)))

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tasks.eval.poses.unroll import row_times, unrolled
+from tasks.eval.poses.rolling_shutter import correct_rolling_shutter, row_times
 from tasks.render.composition import encode_8bit
 from tasks.render.labels import row_flow
-from tasks.render.lens import distorted
+from tasks.render.lens import distort_rays
 from tasks.render.readout import read_out, sensor_field
 from tasks.render.sight import row_points
 from tests.render.rolling_cameras import ALL, CAMERA, LENS, ROLLING, K
@@ -17,7 +17,7 @@ from tests.render.rolling_cameras import ALL, CAMERA, LENS, ROLLING, K
 WALL = 10.0
 
 
-def moving(camera, velocity, rate=0.0):
+def moving_poses(camera, velocity, rate=0.0):
     """Poses [3, H, 4, 4] of the rows of a camera at the origin that goes steadily and turns about its y."""
     times = camera.row_times
     poses = np.tile(np.eye(4), (*times.shape, 1, 1))
@@ -27,7 +27,7 @@ def moving(camera, velocity, rate=0.0):
     return poses
 
 
-def paint(x, y):
+def paint_wall(x, y):
     """Light of a wall, by its place on it."""
     grey = 0.5 + 0.3 * np.sin(4 * x) * np.cos(3 * y)
     return np.stack((grey, 0.5 * grey, 1 - grey), axis=-1).astype(np.float32)
@@ -36,15 +36,15 @@ def paint(x, y):
 def wide_wall(field):
     u, v = np.meshgrid(np.arange(field.width) + 0.5, np.arange(field.height) + 0.5)
     x, y = (WALL * (place - field.K[i, 2]) / field.K[i, i] for i, place in enumerate((u, v)))
-    return paint(x, y), np.full(x.shape, WALL, np.float32)
+    return paint_wall(x, y), np.full(x.shape, WALL, np.float32)
 
 
 def wall_seen(directions, poses):
-    """What a ray meets of the wall, exactly: its light and its z in the row's camera."""
+    """Return the exact light of the wall on a ray, and its z in the row's camera."""
     rays = np.concatenate((directions, np.ones((*directions.shape[:2], 1))), axis=-1)
     rays = rays @ poses[:, :3, :3].swapaxes(1, 2)
     z = (WALL - poses[:, None, 2, 3]) / rays[..., 2]
-    return paint(*(poses[:, None, i, 3] + z * rays[..., i] for i in range(2))), z
+    return paint_wall(*(poses[:, None, i, 3] + z * rays[..., i] for i in range(2))), z
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def wall_seen(directions, poses):
 )
 def test_a_wall_is_seen_as_ray_and_row_time_say(camera):
     field = sensor_field(camera)
-    poses = moving(camera, np.array((3.0, 0.5, 14.0)), rate=0.4)
+    poses = moving_poses(camera, np.array((3.0, 0.5, 14.0)), rate=0.4)
     seen = read_out(*wide_wall(field), field, poses, False)
     light, z = wall_seen(field.directions, poses[1])
     np.testing.assert_allclose(seen.depth, z, rtol=1e-5)
@@ -62,7 +62,7 @@ def test_a_wall_is_seen_as_ray_and_row_time_say(camera):
 def test_blur_is_the_mean_of_the_light_along_the_way():
     camera = replace(ALL, exposure_s=0.03)
     field = sensor_field(camera)
-    poses = moving(camera, np.array((6.0, 0.0, 14.0)))
+    poses = moving_poses(camera, np.array((6.0, 0.0, 14.0)))
     seen = read_out(*wide_wall(field), field, poses, True)
     shares = (np.arange(32) + 0.5) / 32
     exact = np.mean(
@@ -84,7 +84,9 @@ def test_a_bar_is_blurred_over_its_way_and_twice_as_wide_in_twice_the_exposure()
         picture, depth = wide_wall(field)
         picture[:] = 0
         picture[:, int(field.K[0, 2])] = 1
-        seen = read_out(picture, depth, field, moving(camera, np.array((20.0, 0, 0))), True).picture[80, :, 0]
+        seen = read_out(picture, depth, field, moving_poses(camera, np.array((20.0, 0, 0))), True).picture[
+            80, :, 0
+        ]
         u = np.arange(240)
         mean = (seen * u).sum() / seen.sum()
         widths.append(np.sqrt(12 * ((seen * (u - mean) ** 2).sum() / seen.sum())))
@@ -101,7 +103,7 @@ def test_a_pole_before_a_wall_shears_by_speed_times_row_time_over_depth():
     picture = np.where(on_pole[..., None], np.float32(1), np.float32(0.2)) * np.ones(3, np.float32)
     depth = np.where(on_pole, pole, WALL).astype(np.float32)
     speed = 25.0
-    seen = read_out(picture, depth, field, moving(ROLLING, np.array((speed, 0, 0))), False)
+    seen = read_out(picture, depth, field, moving_poses(ROLLING, np.array((speed, 0, 0))), False)
     columns = np.arange(240) + 0.5
     shear = 200 * speed * ROLLING.row_times[1] / pole
     assert np.ptp(shear) > 25
@@ -123,7 +125,7 @@ def test_a_straight_line_bends_as_the_formula_says():
     columns = np.arange(240) + 0.5
     found = (seen * columns).sum(axis=1) / seen.sum(axis=1)
     y = np.linspace(-0.55, 0.55, 2001)
-    bent_x, bent_y = distorted(np.full_like(y, x0), y, LENS.coefficients)
+    bent_x, bent_y = distort_rays(np.full_like(y, x0), y, LENS.coefficients)
     rows = np.arange(160) + 0.5
     expected = 120 + 200 * np.interp((rows - 80) / 200, bent_y, bent_x)
     assert np.ptp(expected) > 3
@@ -143,7 +145,7 @@ def test_a_camera_that_stands_still_sees_what_is_drawn_bit_for_bit():
 
 def test_flow_leads_to_the_pixel_that_sees_the_same_point():
     field = sensor_field(ALL)
-    now = moving(ALL, np.array((3.0, 0.5, 14.0)), rate=0.4)[1]
+    now = moving_poses(ALL, np.array((3.0, 0.5, 14.0)), rate=0.4)[1]
     later = now.copy()
     later[:, :3, 3] += (0.2, 0.05, 1.0)
     depth, next_depth = (wall_seen(field.directions, poses)[1].astype(np.float32) for poses in (now, later))
@@ -180,7 +182,7 @@ def test_the_judge_takes_rows_back_to_one_shutter():
     still = sensor_field(CAMERA).directions
     rolled, ahead = [], np.array((3.0, 0.5, 14.0))
     for k in range(3):
-        poses = moving(ROLLING, ahead)[1]
+        poses = moving_poses(ROLLING, ahead)[1]
         poses[:, :3, 3] += 0.01 * k * ahead
         light, z = wall_seen(still, poses)
         rolled.append((encode_8bit(light), z.astype(np.float32)))
@@ -190,7 +192,7 @@ def test_the_judge_takes_rows_back_to_one_shutter():
     pinhole = K - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
     told = {"rgb": rgb, "depth": depth, "class": np.zeros(depth.shape, np.uint8)}
     times = row_times(pinhole, (160, 240), None, ROLLING.line_delay_s)
-    seen = unrolled(told, pinhole, times, SimpleNamespace(T_rig0_rig=way), np.eye(4), 0.01)
+    seen = correct_rolling_shutter(told, pinhole, times, SimpleNamespace(T_rig0_rig=way), np.eye(4), 0.01)
     middle = np.broadcast_to(np.eye(4), (160, 4, 4)).copy()
     middle[:, :3, 3] = way[1, :3, 3]
     light, z = wall_seen(still, middle)

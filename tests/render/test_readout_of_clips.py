@@ -8,17 +8,18 @@ import pytest
 from catalogs.weather import load_weather
 from tasks.errors import InputError
 from tasks.eval.image_quality import psnr
-from tasks.render.camera import body_poses, continuous_rig, viewmat
-from tasks.render.clip import render_clip
-from tasks.render.composition import compose, encode_8bit
+from tasks.render.camera import body_poses, continuous_rig, world_to_camera
+from tasks.render.clip import ClipConditions, RigMotion, render_clip
+from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import sensor_field
 from tasks.render.sight import row_points
 from tasks.render.weather.attribution import LAYER_BITS
-from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.scene_light import appended
 from tasks.scene.route import route_from_positions
+from tasks.scene.scene import Scene
+from tasks.surface.state import SurfaceState
 from tests.render.rolling_cameras import ALL, CAMERA, ROLLING
 from tests.render.weather.scenes import clear_sky, road, surfels
 
@@ -67,18 +68,29 @@ def street():
 def clip(street, camera, parameters, state=None, **more):
     at = rig()
     poses = np.concatenate([at(k, np.zeros(1)) for k in range(3)])
-    state = state or WeatherState(kind="dry")
-    return render_clip(
-        street, clear_sky(), ROUTE, camera, poses, frame_rate_hz=10, weather=state, looks=parameters, seed=1,
-        backend=CpuBackend(), rig_at=at, **more,
+    state = state or SurfaceState(kind="dry")
+    motion = RigMotion(T_world_rig=poses, frame_rate_hz=10, rig_at=at)
+    return render_clip(scene(street), camera, motion, under(state, parameters), CpuBackend(), **more)
+
+
+def scene(street):
+    return Scene(
+        name="street", gaussians=street, route=ROUTE, environment=clear_sky(), carriageway_left=3.0,
+        carriageway_right=-3.0,
     )  # fmt: skip
+
+
+def under(state, parameters):
+    return ClipConditions(state=state, parameters=parameters, seed=1)
 
 
 def drawn(street, camera, pose):
     backend = CpuBackend()
-    gbuffer = backend.rasterise(backend.prepare(street), viewmat(pose), camera.K, camera.width, camera.height)
-    sky = environment_view(clear_sky(), viewmat(pose), camera.K, camera.width, camera.height)
-    return compose(gbuffer, sky, street.display_encoded), gbuffer
+    gbuffer = backend.rasterise(
+        backend.prepare(street), world_to_camera(pose), camera.K, camera.width, camera.height
+    )
+    sky = environment_view(clear_sky(), world_to_camera(pose), camera.K, camera.width, camera.height)
+    return compose_over_sky(gbuffer, sky, street.display_encoded), gbuffer
 
 
 def test_with_all_three_off_the_bytes_are_those_of_the_plain_composition(street, parameters):
@@ -92,10 +104,9 @@ def test_with_all_three_off_the_bytes_are_those_of_the_plain_composition(street,
 
 def test_the_paper_s_composition_changes_only_pixels_of_falling_rain(street, parameters):
     """Elsewhere the 8-bit difference is none, and the picture is the linear one; dry weather has no particles."""
-    state = WeatherState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263)
+    state = SurfaceState(kind="rain", precipitation_mm_h=50, film_depth_mm=1.263)
     ours, theirs = (
-        clip(street, CAMERA, parameters, state, composition=name, labelled=lambda s: 0.0 * s)
-        for name in ("linear", "paper")
+        clip(street, CAMERA, parameters, state, composition=name, labels=True) for name in ("linear", "paper")
     )
     differs = (ours["rgb"] != theirs["rgb"]).any(axis=-1)
     assert 0 < differs.mean() < 0.5
@@ -135,35 +146,31 @@ def test_rows_and_blur_are_near_the_renders_that_they_stand_for(street, paramete
 def test_blur_of_a_camera_that_stands_leaves_falling_snow_as_it_is(street, parameters):
     """A streak has its exposure already: it is not blurred again, and nothing else moves."""
     pose = ROUTE.pose(np.array((5.0, 5.0)))
-    state = WeatherState(kind="snow", precipitation_mm_h=2, snow_depth_mm=20, snow_coverage=1.0)
+    state = SurfaceState(kind="snow", precipitation_mm_h=2, snow_depth_mm=20, snow_coverage=1.0)
+    motion = RigMotion(
+        T_world_rig=pose, frame_rate_hz=10, rig_at=lambda k, t: np.repeat(pose[:1], len(t), axis=0)
+    )
     plain, blurred = (
-        render_clip(
-            street, clear_sky(), ROUTE, camera, pose, frame_rate_hz=10, weather=state, looks=parameters, seed=1,
-            backend=CpuBackend(), rig_at=lambda k, t: np.repeat(pose[:1], len(t), axis=0),
-        )["rgb"]
+        render_clip(scene(street), camera, motion, under(state, parameters), CpuBackend())["rgb"]
         for camera in (CAMERA, replace(CAMERA, motion_blur=True))
-    )  # fmt: skip
+    )
     assert blurred.tobytes() == plain.tobytes()
     assert plain[0].tobytes() != plain[1].tobytes()
 
 
 def test_labels_follow_rows_and_lens(street, parameters):
     """Station and height of what a pixel sees come from its own ray and time: road pixels lie on the road."""
-    made = clip(street, ALL, parameters, labelled=lambda s: 0.0 * s)
+    made = clip(street, ALL, parameters, labels=True)
     field, poses = sensor_field(ALL), rig()(1, ALL.row_times[1]) @ ALL.T_rig_camera
     points = row_points(field.directions, made["depth"][1], poses)
     on_road = np.isfinite(made["road"][1][..., 0])
     assert on_road.mean() > 0.2
     assert np.quantile(np.abs(points[on_road][:, 2]), 0.99) < 0.01
     np.testing.assert_allclose(made["road"][1][on_road], points[on_road][:, :2], atol=5e-3)
-    assert (
-        clip(street, ALL, parameters, labelled=lambda s: 0.0 * s)["flow"].tobytes() == made["flow"].tobytes()
-    )
+    assert clip(street, ALL, parameters, labels=True)["flow"].tobytes() == made["flow"].tobytes()
 
 
 def test_a_camera_that_moves_during_a_frame_needs_poses_between_frames(street, parameters):
     with pytest.raises(InputError, match="needs rig poses between frames"):
-        render_clip(
-            street, clear_sky(), ROUTE, ALL, np.eye(4)[None].repeat(2, 0), frame_rate_hz=10,
-            weather=WeatherState(kind="dry"), looks=parameters, seed=1, backend=CpuBackend(),
-        )  # fmt: skip
+        motion = RigMotion(T_world_rig=np.eye(4)[None].repeat(2, 0), frame_rate_hz=10)
+        render_clip(scene(street), ALL, motion, under(SurfaceState(kind="dry"), parameters), CpuBackend())

@@ -23,7 +23,7 @@ def relief_of(hazard: RoadHazard, route: Route = SCENE.route) -> RoadRelief:
     )
 
 
-def edited(height: float) -> tuple[Gaussians, np.ndarray, RoadHazard]:
+def edit_road(height: float) -> tuple[Gaussians, np.ndarray, RoadHazard]:
     hazard = RoadHazard(center_m=10.0, length_m=3.7, height_m=height)
     cloud, moved = apply_road_profile(SCENE.gaussians, relief_of(hazard), 4.0, -4.0)
     return cloud, moved, hazard
@@ -31,7 +31,7 @@ def edited(height: float) -> tuple[Gaussians, np.ndarray, RoadHazard]:
 
 @pytest.mark.parametrize("height", [0.075, -0.08])
 def test_road_gaussians_lie_on_the_profile(height):
-    cloud, moved, hazard = edited(height)
+    cloud, moved, hazard = edit_road(height)
     x = SCENE.gaussians.means[moved, 0].astype(float)
     np.testing.assert_allclose(cloud.means[moved, 2], road_elevation(x, hazard), atol=1e-6)
     assert moved.sum() > 100
@@ -39,7 +39,7 @@ def test_road_gaussians_lie_on_the_profile(height):
 
 @pytest.mark.parametrize("height", [0.075, -0.08])
 def test_normals_and_discs_tilt_by_the_slope_of_the_profile(height):
-    cloud, moved, hazard = edited(height)
+    cloud, moved, hazard = edit_road(height)
     slope = road_slope(SCENE.gaussians.means[moved, 0].astype(float), hazard)
     expected = np.stack([-slope, 0 * slope, np.ones_like(slope)], axis=1) / np.sqrt(1 + slope**2)[:, None]
     np.testing.assert_allclose(cloud.normals[moved], expected, atol=1e-6)
@@ -49,7 +49,7 @@ def test_normals_and_discs_tilt_by_the_slope_of_the_profile(height):
 
 
 def test_what_is_not_road_or_not_on_the_feature_is_bitwise_unchanged():
-    cloud, moved, _ = edited(0.075)
+    cloud, moved, _ = edit_road(0.075)
     for name in ("means", "quats_wxyz", "normals", "scales", "sh"):
         np.testing.assert_array_equal(getattr(cloud, name)[~moved], getattr(SCENE.gaussians, name)[~moved])
     assert (SCENE.gaussians.class_id[moved] == SemanticClass.ROAD).all()
@@ -57,7 +57,7 @@ def test_what_is_not_road_or_not_on_the_feature_is_bitwise_unchanged():
 
 
 def test_a_height_of_zero_is_the_identity():
-    cloud, moved, _ = edited(0.0)
+    cloud, moved, _ = edit_road(0.0)
     assert cloud is SCENE.gaussians
     assert not moved.any()
 

@@ -1,13 +1,13 @@
-"""What a low camera sees of a depression and of a hump: as rays over the profile say, in depth, class and mask."""
+"""A depression and a hump from a low camera: depth, class and mask agree with rays over the profile."""
 
 import numpy as np
 import pytest
 
 from tasks.conventions import ROAD_CLASSES
 from tasks.render.labels import HAZARD, hazard_mark
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.road_edit import apply_road_profile
-from tasks.render.road_refinement import refined_road
+from tasks.render.road_refinement import refine_road
 from tasks.surface.road_profile import RoadHazard, road_elevation
 from tests.render.test_road_edit import relief_of
 from tests.render.weather.conftest import shutter
@@ -21,11 +21,11 @@ def seen_from(x: float, height: float, length: float):
     """Station by depth and by rays for the rows of the middle columns, and the frame's class and hazard mark."""
     hazard = RoadHazard(center_m=9.0, length_m=length, height_m=height)
     relief = relief_of(hazard)
-    cloud, _ = apply_road_profile(refined_road(road(half_width=1.5, spacing=0.03), relief), relief, 1.5, -1.5)
+    cloud, _ = apply_road_profile(refine_road(road(half_width=1.5, spacing=0.03), relief), relief, 1.5, -1.5)
     view = shutter(x=x, width=WIDTH, height=HEIGHT, focal=FOCAL)
     pose = view.T_world_camera.copy()
     pose[2, 3] = EYE
-    g = rasterise(prepare(cloud), np.linalg.inv(pose), view.K, WIDTH, HEIGHT)
+    g = rasterise(prepare_gaussians(cloud), np.linalg.inv(pose), view.K, WIDTH, HEIGHT)
     rows = np.arange(HEIGHT // 2 + 12, HEIGHT)
     by_depth = x + np.median(g.depth[rows, WIDTH // 2 - 3 : WIDTH // 2 + 3], axis=1)
     way = np.arange(0.5, 12, 0.002)

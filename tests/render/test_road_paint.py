@@ -8,7 +8,7 @@ import pytest
 from catalogs.hazard_markings import load_marking
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
-from tasks.render.road_paint import painted
+from tasks.render.road_paint import paint_feature
 from tasks.surface.road_profile import RoadHazard
 from tests.render.test_road_edit import relief_of
 from tests.render.weather.scenes import ASPHALT, road
@@ -17,15 +17,15 @@ HAZARD = RoadHazard(center_m=8.1, length_m=2.0, height_m=0.1)
 MARKING = load_marking("zebra-yellow-black")
 
 
-def colours(cloud):
+def read_colours(cloud):
     return cloud.sh[:, 0] * 0.28209479 + 0.5
 
 
 def test_marks_and_gaps_are_as_wide_as_the_catalogue_says():
     flat = road()
-    out = painted(flat, relief_of(HAZARD), MARKING, 3.0, -3.0, ASPHALT)
+    out = paint_feature(flat, relief_of(HAZARD), MARKING, 3.0, -3.0, ASPHALT)
     on = (np.abs(flat.means[:, 0] - 8.1) < 1.0) & (np.abs(flat.means[:, 1]) < 3.0)
-    yellow = (colours(out)[:, 0] > 3 * colours(out)[:, 2]) & on
+    yellow = (read_colours(out)[:, 0] > 3 * read_colours(out)[:, 2]) & on
     place = np.unique(flat.means[on, 1].round(4))
     marked = np.array([yellow[on & (flat.means[:, 1].round(4) == y)].all() for y in place])
     edges = (place[1:] + place[:-1])[np.flatnonzero(np.diff(marked.astype(int)))] / 2
@@ -36,7 +36,7 @@ def test_marks_and_gaps_are_as_wide_as_the_catalogue_says():
 
 def test_only_the_feature_within_the_carriageway_is_painted():
     flat = road()
-    out = painted(flat, relief_of(HAZARD), MARKING, 3.0, -2.0, ASPHALT)
+    out = paint_feature(flat, relief_of(HAZARD), MARKING, 3.0, -2.0, ASPHALT)
     on = (np.abs(flat.means[:, 0] - 8.1) <= 1.0) & (flat.means[:, 1] <= 3.0) & (flat.means[:, 1] >= -2.0)
     np.testing.assert_array_equal((out.sh != flat.sh).any(axis=(1, 2)), on)
     np.testing.assert_array_equal(out.means, flat.means)
@@ -47,19 +47,19 @@ def test_only_the_feature_within_the_carriageway_is_painted():
 def test_paint_sends_back_its_reflectance_of_the_light_on_the_road():
     """On an evenly lit road of known reflectance, paint by road is reflectance by reflectance."""
     flat = road()
-    out = painted(flat, relief_of(HAZARD), MARKING, 3.0, -3.0, ASPHALT)
+    out = paint_feature(flat, relief_of(HAZARD), MARKING, 3.0, -3.0, ASPHALT)
     mark = out.class_id == SemanticClass.MARKING
-    np.testing.assert_allclose(colours(out)[mark].mean(axis=0), MARKING.paint, rtol=0.03)
+    np.testing.assert_allclose(read_colours(out)[mark].mean(axis=0), MARKING.paint, rtol=0.03)
 
 
 def test_paint_in_the_shade_is_as_much_darker_as_the_road_there():
     flat = road()
     shade = flat.means[:, 1] > 0
     sh = flat.sh.copy()
-    sh[shade] = ((0.4 * colours(flat)[shade] - 0.5) / 0.28209479)[:, None]
-    out = painted(replace(flat, sh=sh), relief_of(HAZARD), MARKING, 3.0, -3.0, ASPHALT)
-    yellow = (colours(out)[:, 0] > 3 * colours(out)[:, 2]) & (np.abs(flat.means[:, 1]) > 1.5)
-    dark, bright = (colours(out)[yellow & side].mean(axis=0) for side in (shade, ~shade))
+    sh[shade] = ((0.4 * read_colours(flat)[shade] - 0.5) / 0.28209479)[:, None]
+    out = paint_feature(replace(flat, sh=sh), relief_of(HAZARD), MARKING, 3.0, -3.0, ASPHALT)
+    yellow = (read_colours(out)[:, 0] > 3 * read_colours(out)[:, 2]) & (np.abs(flat.means[:, 1]) > 1.5)
+    dark, bright = (read_colours(out)[yellow & side].mean(axis=0) for side in (shade, ~shade))
     np.testing.assert_allclose(dark / bright, 0.4, rtol=0.02)
 
 

@@ -8,7 +8,7 @@ from tasks.scene.route import Route, extend_route, route_from_poses, route_from_
 RADIUS = 50.0
 
 
-def arc(count: int = 40) -> Route:
+def make_arc(count: int = 40) -> Route:
     """A left bend of 50 m radius."""
     angle = np.linspace(0, 1.2, count)
     return route_from_positions(
@@ -17,12 +17,12 @@ def arc(count: int = 40) -> Route:
 
 
 def test_knots_are_met_exactly():
-    route = arc()
+    route = make_arc()
     np.testing.assert_allclose(route.pose(route.station), route.T_world_rig, atol=1e-12)
 
 
 def test_between_knots_the_pose_stays_on_the_arc_and_turns_with_it():
-    route = arc()
+    route = make_arc()
     distance = np.linalg.norm(route.pose(np.linspace(0, route.length, 997))[:, :2, 3] - [0, RADIUS], axis=1)
     np.testing.assert_allclose(distance, RADIUS, atol=2e-4)
     poses = route.pose(np.linspace(5, route.length - 5, 97))
@@ -31,12 +31,12 @@ def test_between_knots_the_pose_stays_on_the_arc_and_turns_with_it():
 
 
 def test_a_left_bend_turns_the_rig_to_the_left():
-    assert arc().T_world_rig[-1, 1, 0] > 0
+    assert make_arc().T_world_rig[-1, 1, 0] > 0
 
 
-def banked() -> Route:
+def make_banked() -> Route:
     """The bend again, climbing and leaning ever more into the curve."""
-    poses = arc().T_world_rig.copy()
+    poses = make_arc().T_world_rig.copy()
     lean = np.linspace(0, 0.15, len(poses))
     poses[:, :3, :3] = (
         Rotation.from_matrix(poses[:, :3, :3]) * Rotation.from_euler("x", -lean[:, None])
@@ -45,7 +45,7 @@ def banked() -> Route:
     return route_from_poses(poses)
 
 
-@pytest.mark.parametrize("route", [arc(), banked()], ids=["bend", "banked bend"])
+@pytest.mark.parametrize("route", [make_arc(), make_banked()], ids=["bend", "banked bend"])
 def test_projection_inverts_the_pose(route):
     draw = np.random.default_rng(1)
     station, lateral, height = (
@@ -60,7 +60,7 @@ def test_projection_inverts_the_pose(route):
 
 
 def test_stations_of_neighbouring_points_do_not_jump():
-    route = arc()
+    route = make_arc()
     along = np.linspace(1, route.length - 1, 20_000)
     poses = route.pose(along)
     station, _, _ = route.project(poses[:, :3, 3] - 6.0 * poses[:, :3, 1])
@@ -80,13 +80,13 @@ def test_points_beyond_the_ends_get_stations_beyond_them():
 
 
 def test_a_bend_goes_straight_on_beyond_its_end():
-    route = arc()
+    route = make_arc()
     point = route.T_world_rig[-1] @ [7.0, -3.0, 1.0, 1.0]
     np.testing.assert_allclose(np.ravel(route.project(point[None, :3])), [route.length + 7, -3, 1], atol=1e-9)
 
 
 def test_an_extension_goes_on_straight_and_keeps_what_was_there():
-    route = arc()
+    route = make_arc()
     longer = extend_route(route, 30.0)
     assert longer.length == pytest.approx(route.length + 30)
     np.testing.assert_array_equal(longer.T_world_rig[: len(route.station)], route.T_world_rig)
@@ -102,7 +102,7 @@ def test_standing_poses_are_dropped():
 
 def test_beyond_the_route_the_error_names_station_and_length():
     with pytest.raises(InputError, match=r"0 to .* m; it is 999.00 m"):
-        arc().pose(999.0)
+        make_arc().pose(999.0)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_attitude_between_two_knots_is_the_shortest_turn():
 
 def test_a_station_that_is_no_number_is_refused():
     with pytest.raises(InputError, match="it is nan m"):
-        arc().pose([1.0, np.nan])
+        make_arc().pose([1.0, np.nan])
 
 
 @pytest.mark.parametrize("positions", [np.zeros((5, 3)), np.zeros((0, 3))])

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from catalogs.scenes import load_scene
 from catalogs.scenes.street import load_street_layout
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.preparation import PreparedGaussians, rotation_matrices
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.scene.gaussians import check_gaussians
 from tasks.scene.scene import Scene
 from tasks.scene.street.build import build_street
@@ -25,12 +26,12 @@ SHORT = StreetLayout(route_length=12.0, behind=5.0, beyond=20.0, crossing_statio
 
 @pytest.fixture(scope="module")
 def street() -> Scene:
-    return build_street()
+    return load_scene("street")
 
 
 @pytest.fixture(scope="module")
 def prepared(street: Scene) -> PreparedGaussians:
-    return prepare(street.gaussians)
+    return prepare_gaussians(street.gaussians)
 
 
 def viewmat_at(street: Scene, station: float) -> NDArray[np.float64]:

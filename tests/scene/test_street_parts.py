@@ -7,13 +7,13 @@ import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.scene.street.bend import course, route
+from tasks.scene.street.bend import integrate_course, lay_route
 from tasks.scene.street.layout import StreetLayout, nearest_depth
 from tasks.scene.street.light import Casters, lit_radiance, sky_share, sun_direction
-from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import plan_street
-from tasks.scene.street.sky import panorama
-from tasks.scene.street.surfels import Surfels, box, graded_cells, panel, tube
+from tasks.scene.street.sky import draw_panorama
+from tasks.scene.street.surfels import Surfels, build_box, build_panel, build_tube, graded_cells
 
 LAYOUT = StreetLayout()
 OPEN = Casters(
@@ -23,11 +23,14 @@ OPEN = Casters(
 
 def white_floor() -> Surfels:
     """A white square metre on the lane's middle, facing up."""
-    return panel([0, -0.5, 0], [1, 0, 0], [0, 1, 0], 1.0, SemanticClass.ROAD, [1.0, 1.0, 1.0])
+    return build_panel([0, -0.5, 0], [1, 0, 0], [0, 1, 0], 1.0, SemanticClass.ROAD, [1.0, 1.0, 1.0])
 
 
 def test_course_has_unit_speed_and_the_bend_its_radius() -> None:
-    poses, station = route(LAYOUT, course(LAYOUT)).T_world_rig, route(LAYOUT, course(LAYOUT)).station
+    poses, station = (
+        lay_route(LAYOUT, integrate_course(LAYOUT)).T_world_rig,
+        lay_route(LAYOUT, integrate_course(LAYOUT)).station,
+    )
     step = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     assert np.allclose(step, np.diff(station), rtol=1e-6)
     assert np.allclose(poses[station <= LAYOUT.bend_start, :3, :3], np.eye(3), atol=1e-12)
@@ -38,13 +41,13 @@ def test_course_has_unit_speed_and_the_bend_its_radius() -> None:
 
 
 def test_world_position_keeps_the_lateral_offset() -> None:
-    line = course(LAYOUT)
+    line = integrate_course(LAYOUT)
     s = np.linspace(0, LAYOUT.route_length, 50)
     left = line.to_world(np.stack([s, np.full(50, 3.0), np.full(50, 0.7)], axis=1))
     middle = line.to_world(np.stack([s, np.zeros(50), np.zeros(50)], axis=1))
     assert np.allclose(np.linalg.norm((left - middle)[:, :2], axis=1), 3.0)
     assert np.allclose(left[:, 2], 0.7)
-    across = np.cross(line.directions(s, np.tile([1.0, 0, 0], (50, 1))), left - middle)
+    across = np.cross(line.to_world_directions(s, np.tile([1.0, 0, 0], (50, 1))), left - middle)
     assert (across[:, 2] > 0).all()
 
 
@@ -66,17 +69,19 @@ def test_cells_are_finer_beside_an_edge() -> None:
 
 
 def test_box_and_tube_face_outward() -> None:
-    block = box([0, 0, 0], [1, 2, 3], 0.5, SemanticClass.OTHER, [0.5, 0.5, 0.5])
+    block = build_box([0, 0, 0], [1, 2, 3], 0.5, SemanticClass.OTHER, [0.5, 0.5, 0.5])
     assert (np.einsum("ij,ij->i", block.axes[:, 2], block.centre - [0.5, 1.0, 1.5]) > 0).all()
-    pole = tube(np.linspace(0, 1, 5)[:, None] * [0, 0, 3.0], 0.1, 8, SemanticClass.POLE, [0.5, 0.5, 0.5])
+    pole = build_tube(
+        np.linspace(0, 1, 5)[:, None] * [0, 0, 3.0], 0.1, 8, SemanticClass.POLE, [0.5, 0.5, 0.5]
+    )
     outward = pole.centre * [1, 1, 0]
     assert (np.einsum("ij,ij->i", pole.axes[:, 2], outward) > 0).all()
 
 
 def test_sky_share_in_mid_street_is_the_closed_form() -> None:
     # Oke 1987, Boundary Layer Climates: the floor's middle sees cos(arctan(2 H / W)) of the sky
-    width = LAYOUT.front(1) - LAYOUT.front(-1)
-    middle = np.array([[50.0, (LAYOUT.front(1) + LAYOUT.front(-1)) / 2, 0.0]])
+    width = LAYOUT.front_position(1) - LAYOUT.front_position(-1)
+    middle = np.array([[50.0, (LAYOUT.front_position(1) + LAYOUT.front_position(-1)) / 2, 0.0]])
     share = sky_share(middle, np.array([[0.0, 0.0, 1.0]]), LAYOUT)
     assert share[0] == pytest.approx(np.cos(np.arctan(2 * 12.0 / width)), rel=1e-9)
 
@@ -88,7 +93,7 @@ def test_sky_share_above_the_roofs_is_whole_and_half() -> None:
 
 
 def test_open_floor_is_lit_by_lamberts_law_and_loses_the_sun_under_a_roof() -> None:
-    line, floor = course(LAYOUT), white_floor()
+    line, floor = integrate_course(LAYOUT), white_floor()
     lit = lit_radiance(floor, LAYOUT, line, OPEN)[0]
     roof = np.array([[[-30.0, -30.0, 8.0], [30.0, 30.0, 9.0]]])
     shaded = lit_radiance(floor, LAYOUT, line, replace(OPEN, boxes=roof))[0]
@@ -98,7 +103,7 @@ def test_open_floor_is_lit_by_lamberts_law_and_loses_the_sun_under_a_roof() -> N
 
 
 def test_leaves_dim_the_sun_by_the_length_of_the_path_through_them() -> None:
-    line, floor = course(LAYOUT), white_floor()
+    line, floor = integrate_course(LAYOUT), white_floor()
     on_the_way = floor.centre[0] + 10 * sun_direction(LAYOUT)
     ball = np.array([[[*on_the_way, 1.5]]])
     sunless = lit_radiance(floor, replace(LAYOUT, sun_rgb=(0.0, 0.0, 0.0)), line, OPEN)
@@ -108,7 +113,7 @@ def test_leaves_dim_the_sun_by_the_length_of_the_path_through_them() -> None:
 
 
 def test_parked_car_darkens_the_ground_beside_it() -> None:
-    line, floor = course(LAYOUT), white_floor()
+    line, floor = integrate_course(LAYOUT), white_floor()
     beside = replace(OPEN, footprints=np.array([[[-2.0, 0.6], [3.0, 2.4]]]))
     assert (lit_radiance(floor, LAYOUT, line, beside) < lit_radiance(floor, LAYOUT, line, OPEN)).all()
 
@@ -127,7 +132,7 @@ def test_nearest_depth_is_where_the_point_enters_the_picture() -> None:
 
 
 def test_brightest_sky_is_where_the_sun_stands() -> None:
-    picture = panorama(LAYOUT, 2025)
+    picture = draw_panorama(LAYOUT, 2025)
     height, width = picture.shape[:2]
     row, column = np.unravel_index(np.argmax(picture.sum(axis=2)), (height, width))
     elevation = 90 - (row + 0.5) / height * 180
@@ -137,17 +142,17 @@ def test_brightest_sky_is_where_the_sun_stands() -> None:
 
 
 def test_panorama_closes_on_itself() -> None:
-    picture = panorama(LAYOUT, 2025)
+    picture = draw_panorama(LAYOUT, 2025)
     seam = np.abs(picture[:500, 0] - picture[:500, -1]).mean()
     beside = np.abs(picture[:500, 1] - picture[:500, 0]).mean()
     assert seam < 3 * beside + 1e-3
 
 
 def test_named_streams_are_independent_and_noise_is_smooth() -> None:
-    assert not np.array_equal(stream(1, "a").random(4), stream(1, "b").random(4))
-    assert np.array_equal(stream(1, "a").random(4), stream(1, "a").random(4))
+    assert not np.array_equal(named_generator(1, "a").random(4), named_generator(1, "b").random(4))
+    assert np.array_equal(named_generator(1, "a").random(4), named_generator(1, "a").random(4))
     x = np.linspace(0, 500, 40_001)
-    noise = fractal_noise(stream(1, "a"), x, 0.3 * x, 2.0, 3)
+    noise = fractal_noise(named_generator(1, "a"), x, 0.3 * x, 2.0, 3)
     assert abs(noise.mean()) < 0.2
     assert noise.std() == pytest.approx(1.0, abs=0.25)
     assert np.abs(np.diff(noise)).max() < 0.2

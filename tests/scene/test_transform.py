@@ -4,11 +4,11 @@ from scipy.spatial.transform import Rotation
 from tasks.conventions import SemanticClass
 from tasks.scene.classify import classify_road
 from tasks.scene.spherical_harmonics import sh_basis
-from tasks.scene.transform import moved, rotated_sh
+from tasks.scene.transform import rotate_sh, transform_gaussians
 from tests.toy_street import toy_street
 
 
-def directions(count: int) -> np.ndarray:
+def draw_directions(count: int) -> np.ndarray:
     d = np.random.default_rng(4).normal(size=(count, 3))
     return d / np.linalg.norm(d, axis=1, keepdims=True)
 
@@ -16,16 +16,16 @@ def directions(count: int) -> np.ndarray:
 def test_turned_colour_is_the_colour_seen_from_the_turned_back_direction():
     turn = Rotation.from_rotvec([0.7, -1.9, 0.4]).as_matrix()
     sh = np.random.default_rng(5).normal(size=(3, 16, 3)).astype(np.float32)
-    d = directions(200)
+    d = draw_directions(200)
     expected = np.einsum("dk,nkc->ndc", sh_basis(d @ turn, 16), sh)
-    found = np.einsum("dk,nkc->ndc", sh_basis(d, 16), rotated_sh(sh, turn))
+    found = np.einsum("dk,nkc->ndc", sh_basis(d, 16), rotate_sh(sh, turn))
     np.testing.assert_allclose(found, expected, atol=1e-5)
 
 
 def test_each_band_keeps_its_energy():
     turn = Rotation.from_rotvec([0.2, 0.3, -2.0]).as_matrix()
     sh = np.random.default_rng(6).normal(size=(5, 16, 3)).astype(np.float32)
-    turned = rotated_sh(sh, turn)
+    turned = rotate_sh(sh, turn)
     for band in (slice(0, 1), slice(1, 4), slice(4, 9), slice(9, 16)):
         np.testing.assert_allclose((turned[:, band] ** 2).sum(1), (sh[:, band] ** 2).sum(1), rtol=1e-4)
 
@@ -35,7 +35,7 @@ def test_moving_there_and_back_changes_nothing():
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_euler("xyz", [90, 10, -30], degrees=True).as_matrix()
     pose[:3, 3] = [3, -2, 1]
-    back = moved(moved(cloud, pose), np.linalg.inv(pose))
+    back = transform_gaussians(transform_gaussians(cloud, pose), np.linalg.inv(pose))
     np.testing.assert_allclose(back.means, cloud.means, atol=1e-5)
     np.testing.assert_allclose(np.abs((back.quats_wxyz * cloud.quats_wxyz).sum(1)), 1, atol=1e-6)
 

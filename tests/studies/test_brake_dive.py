@@ -9,7 +9,7 @@ from catalogs.buses import load_bus
 from catalogs.protocols import load_protocol
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from tasks.campaign.events import Drive, Event
+from tasks.campaign.events import Event, RecordedRun
 from tasks.campaign.selection import select_events
 from tasks.studies.brake_dive import (
     DiveModel,
@@ -35,7 +35,7 @@ def events() -> tuple[Event, ...]:
     for number in (1, 2):
         motion = drive_motion(VEHICLE, 0.82, STRAIGHT, events=4, seed=1, drive=number)
         columns = {name: values[::10] for name, values in motion.items()}
-        drives.append(Drive(name=f"d{number}", drive=f"d{number}", interval=0.01, columns=columns))
+        drives.append(RecordedRun(name=f"d{number}", drive=f"d{number}", interval=0.01, columns=columns))
     retained = select_events(drives, load_protocol("brake-dive")).retained
     assert len(retained) >= 6
     return retained

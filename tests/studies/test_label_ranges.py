@@ -9,8 +9,9 @@ from catalogs.scenario import Scenario
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.making.driving import controls_of, drive, hazard_of, ranges_of, weather_of
+from flows.making.driving import controls_of, hazard_of, ranges_of, simulate_drive, weather_of
 from tasks.studies.label_ranges import DRIVEN_PERCENTILES, label_ranges, sampled_friction
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import rollout
 
 RAIN = {"weather": "rain", "precipitation_mm_h": 50.0}
@@ -25,8 +26,8 @@ def entries():
 
 def ranges(scenario: Scenario, entries, duration_s: float = 8.0) -> dict[str, float]:
     vehicle, surface, study = entries
-    facts, _ = drive(scenario, vehicle, surface, "paper", duration_s)
-    return ranges_of(scenario, facts, vehicle, surface, study, "paper", duration_s)
+    state, _ = simulate_drive(scenario, vehicle, surface, "paper", duration_s)
+    return ranges_of(scenario, state, vehicle, surface, study, "paper", duration_s)
 
 
 @pytest.mark.parametrize(
@@ -54,7 +55,12 @@ def test_five_drives_find_what_a_drive_of_every_sample_finds(entries):
     def again(mu: float) -> tuple[float, float]:
         driven.append(mu)
         ride = rollout(
-            vehicle, "rain", mu, controls_of(scenario), hazard_of(scenario), mode="paper", duration_s=8.0
+            vehicle,
+            SurfaceState(kind="rain", friction=mu),
+            controls_of(scenario),
+            hazard_of(scenario),
+            mode="paper",
+            duration_s=8.0,
         )
         return ride.stopping_distance, float(ride.columns["pitch"].max())
 

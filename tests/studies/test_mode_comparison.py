@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.vehicle_modes import HEADER, differences, table
+from benchmarks.vehicle_modes import HEADER, compute_differences, format_table
 from tasks.studies.mode_comparison import mode_difference
 from tests.vehicle.conftest import command
 
@@ -15,7 +15,7 @@ DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "vehicle-modes.md"
 
 @pytest.fixture(scope="module")
 def rows():
-    return differences()
+    return compute_differences()
 
 
 def numbers(line):
@@ -26,11 +26,11 @@ def numbers(line):
 def test_the_documented_table_is_the_computed_one(rows):
     """To two units of the last printed digit of a length: the Euler step of paper mode scatters by millimetres."""
     lines = DOCUMENT.read_text(encoding="utf-8").splitlines()
-    start = lines.index(table({})[0])
+    start = lines.index(format_table({})[0])
     documented = dict(numbers(line) for line in lines[start + 2 : start + 2 + len(rows)])
     assert list(documented) == list(rows)
     tolerance = (0.02, 0.02, 0.005, 0.06, 0.05, 0.02, 0.001, 20.0)
-    for name, line in zip(rows, table(rows)[2:], strict=True):
+    for name, line in zip(rows, format_table(rows)[2:], strict=True):
         for found, printed, atol, title in zip(
             numbers(line)[1], documented[name], tolerance, HEADER[1:], strict=True
         ):

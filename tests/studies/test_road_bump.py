@@ -5,7 +5,7 @@ import pytest
 
 from catalogs.bump_studies import load_bump_study
 from catalogs.vehicles import load_vehicle
-from tasks.campaign.sensor_agreement import sensor_agreement
+from tasks.campaign.sensor_agreement import measure_sensor_agreement
 from tasks.studies.brake_dive import pitch_mode
 from tasks.studies.road_bump import (
     Passage,
@@ -100,16 +100,16 @@ def slope_run(body_share: float) -> dict[str, np.ndarray]:
 
 
 def test_gravity_on_a_slope_shows_that_pitch_is_the_roads() -> None:
-    road = sensor_agreement(slope_run(0.0), INTERVAL)
+    road = measure_sensor_agreement(slope_run(0.0), INTERVAL)
     assert road.gravity_on_slope == pytest.approx(9.81, rel=0.02) and road.gravity_correlation > 0.99
-    assert abs(sensor_agreement(slope_run(1.0), INTERVAL).gravity_on_slope) < 0.3
+    assert abs(measure_sensor_agreement(slope_run(1.0), INTERVAL).gravity_on_slope) < 0.3
 
 
 def test_angle_and_rate_of_one_motion_agree_and_a_scale_is_seen() -> None:
     columns = slope_run(0.0)
-    assert sensor_agreement(columns, INTERVAL).rate_of_pitch_gain == pytest.approx(1.0, abs=0.01)
+    assert measure_sensor_agreement(columns, INTERVAL).rate_of_pitch_gain == pytest.approx(1.0, abs=0.01)
     columns["pitch_rate"] = columns["pitch_rate"] / 1.2
-    assert sensor_agreement(columns, INTERVAL).rate_of_pitch_gain == pytest.approx(1.2, abs=0.01)
+    assert measure_sensor_agreement(columns, INTERVAL).rate_of_pitch_gain == pytest.approx(1.2, abs=0.01)
 
 
 def test_the_study_that_ships_can_be_read() -> None:

@@ -61,8 +61,10 @@ def test_the_published_coast_drag_would_miss_the_printed_distances(vehicle):
         protocol,
         coast_deceleration=0.004,
         samples=2,
-        rain=replace(protocol.rain, sampled_rates=2),
-        snow=replace(protocol.snow, sampled_rates=4, nominal_rates=4),
+        weathers={
+            "rain": replace(protocol.weathers["rain"], sampled_rates=2),
+            "snow": replace(protocol.weathers["snow"], sampled_rates=4, nominal_rates=4),
+        },
     )
     result = sensitivity_study(vehicle, load_surface("dense-asphalt"), short)
     rows = {row["figure"]: row for row in beside_print(result, printed[:1])}

@@ -9,7 +9,7 @@ from catalogs.stop_studies import load_stop_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.campaign import CHANNELS
-from tasks.campaign.events import Drive
+from tasks.campaign.events import RecordedRun
 from tasks.identification.inference.forward import predict
 from tasks.studies.stop import Stop, stop_errors, stop_of, stopping_distance
 from tasks.studies.stop_findings import rebound, saturation, slip_cycles
@@ -101,7 +101,7 @@ def test_the_longest_application_that_ends_at_rest_is_the_stop() -> None:
     pressure = np.where((t > 2) & (t < 2.5), 1.0, 0.0) + np.where(t > 6, 1.0, 0.0)
     speed = np.clip(20.0 - 6.0 * np.clip(t - 6.0, 0.0, None), 0.0, 20.0)
     columns = {"brake_pressure": pressure, "speed": speed, "pitch": np.full(1200, 0.7)}
-    drive = Drive(name="d", drive="d", interval=INTERVAL, columns=columns)
+    drive = RecordedRun(name="d", drive="d", interval=INTERVAL, columns=columns)
     stop = stop_of(drive, 0.4)
     assert stop is not None and stop.onset == 40
     assert len(stop.columns["speed"]) == pytest.approx(1200 - 600 + 40, abs=2)

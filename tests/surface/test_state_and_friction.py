@@ -7,15 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catalogs.surfaces import load_surface
-from tasks.surface.friction import surface_friction
-from tasks.surface.state import SurfaceParameters, SurfaceState, Weather, surface_state
+from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.surface.weather import Weather, surface_state
 
 ASPHALT = load_surface("dense-asphalt")
 
 
 def of(weather: Weather, parameters: SurfaceParameters = ASPHALT) -> tuple[SurfaceState, float]:
     state = surface_state(weather, parameters)
-    return state, surface_friction(weather, state, parameters)
+    return state, state.friction
 
 
 def rain(rate: float) -> Weather:
@@ -56,20 +56,12 @@ def test_an_hour_of_snow_gives_the_published_friction(rate, friction):
 def test_a_dry_road_keeps_its_friction_and_carries_nothing():
     state, mu = of(Weather(kind="dry"))
     assert mu == 0.82
-    assert state == SurfaceState(
-        film_depth_mm=0, free_film_mm=0, texture_fill=0, snow_depth_mm=0, snow_coverage=0
-    )
+    assert state == SurfaceState(kind="dry", friction=0.82)
 
 
 def test_quantities_of_another_weather_are_zero():
     assert of(rain(50))[0].snow_depth_mm == of(rain(50))[0].snow_coverage == 0
-    assert of(snow(3))[0].film_depth_mm == of(snow(3))[0].free_film_mm == 0
-
-
-def test_free_film_starts_where_the_texture_is_full():
-    light, heavy = of(rain(10))[0], of(rain(50))[0]
-    assert light.free_film_mm == 0 and 0 < light.texture_fill < 1
-    assert heavy.free_film_mm == pytest.approx(heavy.film_depth_mm - 0.5) and heavy.texture_fill == 1
+    assert of(snow(3))[0].film_depth_mm == 0
 
 
 @given(st.floats(0.01, 200), st.floats(1.0001, 3))

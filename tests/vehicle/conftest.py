@@ -6,6 +6,7 @@ import pytest
 
 from catalogs.vehicles import load_vehicle
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Rollout, rollout
@@ -46,8 +47,7 @@ def drive(vehicle: Vehicle) -> Drive:
         )
         return rollout(
             car or vehicle,
-            family,
-            friction,
+            SurfaceState(kind=family, friction=friction),
             controls,
             hazard,
             mode=mode,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tasks.surface.road_profile import FLAT_ROAD
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.effects.forms import SHAPES, Form, coefficient_count
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.effects.table import EFFECT_UNITS
@@ -53,8 +54,8 @@ def test_snow_and_water_act_only_where_they_lie(vehicle, coupled):
     assert coupled(thing, surface=WET)["speed"][-1] > coupled(surface=WET)["speed"][-1] + 0.1
     coast = Controls(initial_speed=15.0, brake=command(0.0, onset=None), hold_speed_until_brake=False)
     deep, bare = (
-        rollout(replace(vehicle, effects=thing), "snow", 0.42, coast, FLAT_ROAD, mode="coupled", duration_s=1.0,
-                snow_depth_mm=depth).columns["longitudinal_acceleration"][500]
+        rollout(replace(vehicle, effects=thing), SurfaceState(kind="snow", friction=0.42, snow_depth_mm=depth), coast,
+                FLAT_ROAD, mode="coupled", duration_s=1.0).columns["longitudinal_acceleration"][500]
         for depth in (12.0, 0.0)
     )  # fmt: skip
     turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2

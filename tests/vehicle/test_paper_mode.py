@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from catalogs.surfaces import load_surface
-from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import FLAT_ROAD
-from tasks.surface.state import Weather, surface_state
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle import reference
 from tasks.vehicle.paper.paper_mode import body_response, run_paper_mode
 from tasks.vehicle.paper.wheels import stopping_run, wheels_of
@@ -28,7 +27,7 @@ def stop_of(vehicle, family, friction, *, speed_km_h=60.0, step=5e-4):
 def friction_of(kind, rate):
     surface = load_surface("dense-asphalt")
     weather = Weather(kind=kind, precipitation_mm_h=rate, snow_accumulation_h=1.0)
-    return surface_friction(weather, surface_state(weather, surface), surface)
+    return surface_state(weather, surface).friction
 
 
 @pytest.mark.parametrize(

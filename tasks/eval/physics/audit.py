@@ -1,4 +1,4 @@
-"""The verdict over one clip's telemetry: which laws it breaks, and which column that points at."""
+"""The physics verdict on one clip's telemetry: the laws that it breaks, and the column that explains them best."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,31 +10,31 @@ from numpy.typing import NDArray
 
 from tasks.eval.physics.body import body_laws, frame_laws, outcome_laws, pose_laws, surface_laws
 from tasks.eval.physics.constants import Constants
-from tasks.eval.physics.half_step import half_step
+from tasks.eval.physics.half_step import follow_half_step
 from tasks.eval.physics.laws import Law, command_laws, motion_laws, wheel_laws
 
 COPIED = "frame rows are ticks: "
-"""How the laws that tie the two tables are named."""
+"""Prefix of the names of the laws that relate the two tables."""
 
 NEAR = 3
-"""Laws by which a suspect may be worse and still be compared by its pattern [1]."""
+"""Cost by which a suspect may exceed the best one and still be compared by its pattern [1]."""
 
 TRIAL = 0.01
-"""Trial fault, of the column's value or range [1]."""
+"""Trial fault as a share of the column's value or range [1]."""
 
 FAINT = 1e-4
-"""Excess below which nothing is compared [1]."""
+"""Least excess in the comparison [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhysicsVerdict:
-    """What the laws say of one clip.
+    """Result of all laws on one clip.
 
     Parameters
     ----------
     passed : whether every law holds
     laws : all that could be evaluated
-    column : the column that the broken laws point at, as table.column; empty if none is broken
+    column : the column that explains the broken laws best, as table.column; empty if none is broken
     also : columns that explain the broken laws as well
     """
 
@@ -55,7 +55,7 @@ def audit_clip(
     facts: Mapping[str, Any],
     constants: Constants,
 ) -> PhysicsVerdict:
-    """Hold one clip's stored columns against every law.
+    """Check one clip's stored columns by every law.
 
     Parameters
     ----------
@@ -64,10 +64,10 @@ def audit_clip(
     facts : the clip's row: scenario, surface, outcome and check
     constants : frozen car and pavement
     """
-    laws = laws_of(ticks, frames, facts, constants)
-    suspects = suspects_of(laws)
+    laws = evaluate_laws(ticks, frames, facts, constants)
+    suspects = rank_suspects(laws)
     if len(suspects) > 1:
-        suspects = _by_pattern(suspects, laws, ticks, frames, facts, constants)
+        suspects = _rank_by_pattern(suspects, laws, ticks, frames, facts, constants)
     return PhysicsVerdict(
         passed=not any(x.broken for x in laws),
         laws=laws,
@@ -76,19 +76,19 @@ def audit_clip(
     )
 
 
-def laws_of(
+def evaluate_laws(
     ticks: Mapping[str, NDArray[Any]],
     frames: Mapping[str, NDArray[Any]],
     facts: Mapping[str, Any],
     constants: Constants,
 ) -> tuple[Law, ...]:
-    """Every law that can be evaluated on one clip.
+    """Evaluate every law that can be evaluated on one clip.
 
     Parameters
     ----------
     ticks, frames, facts, constants : as in ``audit_clip``
     """
-    half = half_step(ticks, facts, constants)
+    half = follow_half_step(ticks, facts, constants)
     found = [
         *wheel_laws(ticks, facts, "f", constants, half),
         *wheel_laws(ticks, facts, "r", constants, half),
@@ -103,12 +103,12 @@ def laws_of(
     return tuple(x for x in found if x is not None)
 
 
-def suspects_of(laws: tuple[Law, ...]) -> list[str]:
-    """Columns that can explain the broken laws, best first.
+def rank_suspects(laws: tuple[Law, ...]) -> list[str]:
+    """Return the columns that can explain the broken laws, best first.
 
-    A faulty column breaks laws that it enters and no other; a law that it enters may hold all the same where it
-    weighs little, so a broken law unexplained counts ten times as much as a whole one. A frame column that still
-    equals its tick column is no suspect apart from it.
+    A faulty column breaks laws that it enters and no other. A law that it enters may still hold where its weight is
+    small, so a broken law that stays unexplained costs ten times as much as a law that holds. A frame column that
+    still equals its tick column is no separate suspect.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def suspects_of(laws: tuple[Law, ...]) -> list[str]:
     return sorted((c for c in cost if cost[c] <= best + NEAR), key=lambda c: (cost[c], c))
 
 
-def _by_pattern(
+def _rank_by_pattern(
     suspects: list[str],
     laws: tuple[Law, ...],
     ticks: Mapping[str, NDArray[Any]],
@@ -140,7 +140,7 @@ def _by_pattern(
     facts: Mapping[str, Any],
     constants: Constants,
 ) -> list[str]:
-    """Suspects by how alike the excesses are that a trial fault in each of them would cause."""
+    """Sort the suspects by how similar the excesses after a trial fault in each are to the excesses found."""
     seen = {x.name: np.log10(np.clip(x.excess, FAINT, 1 / FAINT)) for x in laws}
     rows = [x.at for x in laws if x.broken and not any("frames." in c for c in x.columns)]
     part = slice(min(rows), max(rows) + 1) if rows else slice(None)
@@ -150,9 +150,10 @@ def _by_pattern(
         table, _, name = column.partition(".")
         trials = []
         for (share, shift), where in product(kinds, (slice(None), part)):
-            changed = _faulty(table, name, share, shift, where, ticks, frames, facts)
+            changed = _inject_fault(table, name, share, shift, where, ticks, frames, facts)
             excess = {
-                x.name: np.log10(np.clip(x.excess, FAINT, 1 / FAINT)) for x in laws_of(*changed, constants)
+                x.name: np.log10(np.clip(x.excess, FAINT, 1 / FAINT))
+                for x in evaluate_laws(*changed, constants)
             }
             common = [n for n in seen if n in excess and (seen[n] > 0 or excess[n] > 0)]
             trials.append(np.mean([abs(seen[n] - excess[n]) for n in common]) if common else np.inf)
@@ -160,7 +161,7 @@ def _by_pattern(
     return sorted(suspects, key=lambda c: distance[c])
 
 
-def _faulty(
+def _inject_fault(
     table: str,
     name: str,
     share: float,
@@ -170,7 +171,7 @@ def _faulty(
     frames: Mapping[str, NDArray[Any]],
     facts: Mapping[str, Any],
 ) -> tuple[Mapping[str, NDArray[Any]], Mapping[str, NDArray[Any]], Mapping[str, Any]]:
-    """The tables with rows of one column scaled by 1 + share and shifted by a share of its range."""
+    """Return the tables with rows of one column scaled by 1 + share and shifted by a share of its range."""
     if table == "clips":
         return ticks, frames, {**facts, name: facts[name] * (1 + share + shift)}
     here = ticks if table == "ticks" else frames

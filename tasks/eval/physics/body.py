@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import TICK_CHANNELS
-from tasks.eval.physics.constants import Constants, Floats, surface_of
-from tasks.eval.physics.half_step import INNER_STEP, onset_of
-from tasks.eval.physics.laws import Law, law, rounding
+from tasks.eval.physics.constants import SURFACE_FORMS, Constants, Floats, derive_surface
+from tasks.eval.physics.half_step import INNER_STEP, find_brake_onset
+from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
 from tasks.eval.poses.rigid import invert_pose
 
 DT = 0.001
@@ -19,13 +19,13 @@ ROUND = 1e-9
 """Relative rounding of closed forms [1]."""
 
 STOP_PASS = 10
-"""Ticks between the stops that the last two fixed-point passes over a road feature end in; 6 were seen [1]."""
+"""Largest distance between the stops of the last two fixed-point passes over a road feature; 6 occurred [ticks]."""
 
 
 def body_laws(
     ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
 ) -> list[Law | None]:
-    """Rates, the half-car's four equations, and the contact loads (paper, Eqs. app_half_car_complete and on).
+    """Return the laws of rates, the half-car's four equations and contact loads (paper, Eq. app_half_car_complete).
 
     Parameters
     ----------
@@ -36,14 +36,16 @@ def body_laws(
     car = constants.car
     z, dz, theta, dtheta = (ticks[c] for c in ("heave", "heave_rate", "pitch", "pitch_rate"))
     a = ticks["longitudinal_acceleration"]
-    # the brake moment follows dv/dt, so its jumps within a few ticks bend both rates
-    jumpy = _reach(_swing(ticks, facts, constants), 3)
+    # the brake moment follows dv/dt, so its jumps within a few ticks change both rates
+    jumpy = _spread_maximum(_largest_input_changes(ticks, facts, constants), 3)
     pitch_input = 1.3 * car["sprung_mass"] * car["cg_height"] / car["pitch_inertia"]
     laws: list[Law | None] = []
     for name, x, dx, per_jump in (("heave", z, dz, 0.05), ("pitch", theta, dtheta, pitch_input)):
         step = x[2:] - x[:-2] - DT / 3 * (dx[2:] + 4 * dx[1:-1] + dx[:-2])
         tolerance = DT**2 * per_jump * jumpy[1:-1] + 1e-6 * DT * np.abs(dx).max() + 1e-12
-        laws.append(law(f"{name} is the integral of its rate", f"{name} {name}_rate", step, tolerance))
+        laws.append(
+            evaluate_law(f"{name} is the integral of its rate", f"{name} {name}_rate", step, tolerance)
+        )
 
     forces = {}
     for axle, lever in (("f", -car["cg_to_front_axle"]), ("r", car["cg_to_rear_axle"])):
@@ -56,12 +58,12 @@ def body_laws(
         load, static = ticks[f"axle_load_{axle}"], constants.static_load(axle)
         squeeze = car[f"tyre_stiffness_{axle}"] * (ticks[f"road_height_{axle}"] - u)
         laws.append(
-            law(f"contact load of tyre squeeze, {axle}",
+            evaluate_law(f"contact load of tyre squeeze, {axle}",
                 f"axle_load_{axle} road_height_{axle} unsprung_heave_{axle}",
-                load - np.maximum(static + squeeze, 0.0), rounding(load))
+                load - np.maximum(static + squeeze, 0.0), rounding_tolerance(load))
         )  # fmt: skip
         laws.append(
-            law(f"contact is a load, {axle}", f"contact_{axle} axle_load_{axle}",
+            evaluate_law(f"contact is a load, {axle}", f"contact_{axle} axle_load_{axle}",
                 (ticks[f"contact_{axle}"] != (load > 0)).astype(float), 0.5)
         )  # fmt: skip
         mass = car[f"unsprung_mass_{axle}"]
@@ -70,7 +72,7 @@ def body_laws(
         push = forces[axle] + load - static
         size = np.abs(load - static).max() + np.abs(forces[axle][inner]).max() + 1e-6
         laws.append(
-            law(f"axle's own motion, {axle}",
+            evaluate_law(f"axle's own motion, {axle}",
                 f"unsprung_heave_{axle} axle_load_{axle} heave pitch heave_rate pitch_rate",
                 mass * bend - push[inner], 5e-3 * size + mass * 5 * jumpy[inner])
         )  # fmt: skip
@@ -107,12 +109,14 @@ def _sprung_laws(
         tolerance = DT * (per_jump * jumpy[k] + 1e-3 * size) + 1e-10
         columns = "heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
         braking = " longitudinal_acceleration" if name == "pitch" else ""
-        laws.append(law(f"body's {name} equation", columns + braking, step - drive, tolerance))
+        laws.append(evaluate_law(f"body's {name} equation", columns + braking, step - drive, tolerance))
     return laws
 
 
-def _swing(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> Floats:
-    """Largest change of what drives the brake moment within each tick, [N - 1] [m/s2]."""
+def _largest_input_changes(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+) -> Floats:
+    """Largest change within each tick of the acceleration that drives the brake moment, [N - 1] [m/s2]."""
     v, a = ticks["speed"], ticks["longitudinal_acceleration"]
     between = np.diff(v) / INNER_STEP - a[:-1]
     swing = np.maximum(np.abs(between - a[:-1]), np.abs(a[1:] - between))
@@ -121,15 +125,15 @@ def _swing(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Con
         tyre = constants.tyres[facts["weather"]]
         apart = 0 if facts["hazard_height_m"] == 0 else STOP_PASS
         hold, release = (tyre.at(t, facts["surface_friction"]) for t in (tyre.hold_s, tyre.release_s))
-        # the low-speed rule sets in, caps, lets go of and ends its input at these times before the stop
+        # the low-speed rule starts, caps, releases and ends its input at these times before the stop
         for before in (hold, 0.2, 0.0, -release):
             k = min(max(int(standing[0]) - round(before / DT), 1), len(swing) - 1)
             swing[max(k - 1 - apart, 0) : k + 1 + apart] = np.abs(a).max()
     return swing
 
 
-def _reach(swing: Floats, ticks: int) -> Floats:
-    """Largest change within so many ticks of each tick, [N] from [N - 1]."""
+def _spread_maximum(swing: Floats, ticks: int) -> Floats:
+    """Largest change within the given number of ticks of each tick, [N] from [N - 1]."""
     wide = np.concatenate([swing[:1], np.maximum(swing[1:], swing[:-1]), swing[-1:]])
     padded = np.pad(wide, ticks, mode="edge")
     return np.max(np.lib.stride_tricks.sliding_window_view(padded, 2 * ticks + 1), axis=1)
@@ -143,31 +147,26 @@ def surface_laws(facts: Mapping[str, Any], constants: Constants) -> list[Law | N
     facts : the clip's row
     constants : car and pavement
     """
-    expected = surface_of(
+    expected = derive_surface(
         facts["weather"], facts["precipitation_mm_h"], facts["snow_accumulation_h"], constants.surface
     )
-    feeds = {
-        "film_depth_mm": "clips.precipitation_mm_h" if facts["weather"] == "rain" else "",
-        "snow_depth_mm": "clips.precipitation_mm_h clips.snow_accumulation_h" if facts["weather"] == "snow" else "",
-        "snow_coverage": "clips.snow_depth_mm" if facts["weather"] == "snow" else "",
-        "surface_friction": {"rain": "clips.film_depth_mm", "snow": "clips.snow_coverage", "dry": ""}[facts["weather"]],
-    }  # fmt: skip
+    feeds = SURFACE_FORMS[facts["weather"]].feeds
     tyre = constants.tyres[facts["weather"]]
     eta = tyre.at(tyre.efficiency, facts["surface_friction"])
     laws = [
-        law(f"{name} of the precipitation", f"clips.{name} {feeds[name]}",
+        evaluate_law(f"{name} of the precipitation", f"clips.{name} {feeds.get(name, '')}",
             np.array([facts[name] - value]), ROUND * (1 + abs(value)))
         for name, value in expected.items()
     ]  # fmt: skip
     peak = np.array([facts["tyre_peak"] - eta * facts["surface_friction"]])
-    laws.append(law("mu_eff is eta mu_c", "clips.tyre_peak clips.surface_friction", peak, ROUND))
+    laws.append(evaluate_law("mu_eff is eta mu_c", "clips.tyre_peak clips.surface_friction", peak, ROUND))
     return laws
 
 
 def frame_laws(
     ticks: Mapping[str, Floats], frames: Mapping[str, NDArray[Any]], facts: Mapping[str, Any]
 ) -> list[Law | None]:
-    """Frame rows are the nearest ticks, their poses move with them, and their surface is the clip's.
+    """Return the laws that each frame row equals its nearest tick and that its surface is the clip's.
 
     Parameters
     ----------
@@ -178,27 +177,27 @@ def frame_laws(
     last = len(ticks["speed"]) - 1
     spacing = last / max(len(number) - 1, 1)
     laws = [
-        law("frames are counted", "frame", (frames["frame"] - number).astype(float), 0.5, "frames"),
-        law("frames show the nearest tick", "tick", tick - number * spacing, 0.5 + 1e-6, "frames"),
+        evaluate_law("frames are counted", "frame", (frames["frame"] - number).astype(float), 0.5, "frames"),
+        evaluate_law("frames show the nearest tick", "tick", tick - number * spacing, 0.5 + 1e-6, "frames"),
     ]
     rows = np.clip(tick, 0, last)
     for channel in TICK_CHANNELS:
         here = np.asarray(frames[channel.name], float)
         there = np.asarray(ticks[channel.name], float)[rows]
         laws.append(
-            law(f"frame rows are ticks: {channel.name}",
+            evaluate_law(f"frame rows are ticks: {channel.name}",
                 f"frames.{channel.name} ticks.{channel.name} frames.tick", here - there, 1e-300)
         )  # fmt: skip
     for name in ("film_depth_mm", "snow_depth_mm", "snow_coverage", "surface_friction", "tyre_peak"):
         laws.append(
-            law(f"frame rows hold the clip's {name}", f"frames.{name} clips.{name}",
+            evaluate_law(f"frame rows hold the clip's {name}", f"frames.{name} clips.{name}",
                 frames[name] - facts[name], 1e-300)
         )  # fmt: skip
     return laws
 
 
 def pose_laws(frames: Mapping[str, NDArray[Any]], constants: Constants) -> list[Law | None]:
-    """The rig pose less heave and pitch follows the route by as much as the station (paper, Eq. camera_pose).
+    """Return the laws that the rig pose without heave and pitch follows the route (paper, Eq. camera_pose).
 
     Parameters
     ----------
@@ -223,12 +222,12 @@ def pose_laws(frames: Mapping[str, NDArray[Any]], constants: Constants) -> list[
     slack = 1e-3 * gone + 1e-4
     identity = np.eye(3) - np.swapaxes(turn, 1, 2) @ turn
     return [
-        law("rig poses are rigid", "T_world_rig", np.abs(identity).max(axis=(1, 2)), 1e-9, "frames"),
-        law("rig poses end in 0 0 0 1", "T_world_rig",
+        evaluate_law("rig poses are rigid", "T_world_rig", np.abs(identity).max(axis=(1, 2)), 1e-9, "frames"),
+        evaluate_law("rig poses end in 0 0 0 1", "T_world_rig",
             np.abs(T[:, 3] - [0, 0, 0, 1]).max(axis=1), 1e-12, "frames"),
-        law("rig moves by the station", "T_world_rig station ticks.station",
+        evaluate_law("rig moves by the station", "T_world_rig station ticks.station",
             np.linalg.norm(move, axis=1) - gone, slack, "frames"),
-        law("rig less heave and pitch stays on the route", "T_world_rig heave pitch ticks.heave ticks.pitch",
+        evaluate_law("rig less heave and pitch stays on the route", "T_world_rig heave pitch ticks.heave ticks.pitch",
             across[:, 2], 0.02 * gone + 1e-4, "frames"),
     ]  # fmt: skip
 
@@ -236,7 +235,7 @@ def pose_laws(frames: Mapping[str, NDArray[Any]], constants: Constants) -> list[
 def outcome_laws(
     ticks: Mapping[str, Floats], frames: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
 ) -> list[Law | None]:
-    """Stop, distance, peak pitch and the recorded pose check, worked out again.
+    """Return the laws of stop, distance, peak pitch and the recorded pose check, each computed again.
 
     Parameters
     ----------
@@ -246,25 +245,25 @@ def outcome_laws(
     """
     s, v, pitch = ticks["station"], ticks["speed"], ticks["pitch"]
     laws = [
-        law("peak pitch is the largest", "clips.peak_pitch pitch", pitch.max() - facts["peak_pitch"], 1e-12),
-        law("static pitch is the car's", "clips.static_pitch",
+        evaluate_law("peak pitch is the largest", "clips.peak_pitch pitch", pitch.max() - facts["peak_pitch"], 1e-12),
+        evaluate_law("static pitch is the car's", "clips.static_pitch",
             np.array([facts["static_pitch"] - constants.car["static_pitch"]]), 1e-9),
     ]  # fmt: skip
     standing = np.flatnonzero(v <= 0)
     if standing.size:
         laws.append(
-            law("stop time is the first standing tick", "clips.stop_time speed",
+            evaluate_law("stop time is the first standing tick", "clips.stop_time speed",
                 np.array([facts["stop_time"] - DT * standing[0]]), DT)
         )  # fmt: skip
-        onset = onset_of(ticks, facts)
+        onset = find_brake_onset(ticks, facts)
         if np.isfinite(onset):
             way = s[-1] - np.interp(onset, DT * np.arange(len(s)), s)
             laws.append(
-                law("stopping distance from the onset", "clips.stopping_distance station",
+                evaluate_law("stopping distance from the onset", "clips.stopping_distance station",
                     np.array([facts["stopping_distance"] - way]), 1e-5)
             )  # fmt: skip
     seen = np.isfinite(frames["recovered_pitch"])
-    if not seen.any():  # telemetry alone has no verdict to work out
+    if not seen.any():  # a dataset of telemetry alone has no pose check
         return laws
     claimed = np.rad2deg(frames["pitch"] - frames["pitch"][0])[seen]
     found = np.rad2deg(frames["recovered_pitch"])[seen]
@@ -299,7 +298,7 @@ def outcome_laws(
             )
         )
     laws += [
-        law(f"{name} worked out again", f"clips.{name} {columns}",
+        evaluate_law(f"{name} worked out again", f"clips.{name} {columns}",
             np.array([facts[name] - value]), 1e-9 * (1 + abs(value)))
         for name, columns, value in checks
     ]  # fmt: skip

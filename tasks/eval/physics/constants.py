@@ -1,10 +1,10 @@
-"""What the auditor must be told of the car and the pavement, and the closed forms that it checks columns by.
+""" "Constants of the car and the pavement that the auditor takes as given, and the closed forms of its laws.
 
 Written from the paper's appendices alone: nothing here is shared with the model that made the telemetry.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,41 +142,94 @@ def pressure_at(since_onset: Floats, peak: float, ramp: float, hold: float, rele
     return np.interp(since_onset, corners, heights)
 
 
-def surface_of(weather: str, rate: float, hours: float, surface: Mapping[str, float]) -> dict[str, float]:
+def derive_surface(weather: str, rate: float, hours: float, surface: Mapping[str, float]) -> dict[str, float]:
     """Film, snow, coverage and mu_c from the precipitation (paper, Appendix E).
 
     Parameters
     ----------
-    weather : dry, rain or snow
+    weather : name of a row of `SURFACE_FORMS`
     rate : precipitation [mm/h]
     hours : snow accumulation time [h]
     surface : pavement values
     """
-    film = snow = 0.0
-    if weather == "rain":
-        film = surface["film_coefficient"] * np.prod(
-            [
-                base ** surface[f"film_{name}_exponent"]
-                for name, base in (
-                    ("texture", surface["texture_depth_mm"]),
-                    ("length", surface["drainage_length"]),
-                    ("rate", rate),
-                    ("crossfall", surface["crossfall"]),
-                )
-            ]
-        )
-    if weather == "snow":
-        snow = rate * hours * surface["water_density"] / surface["fresh_snow_density"]
+    form = SURFACE_FORMS[weather]
+    film, snow = form.film(rate, surface), form.snow(rate, hours, surface)
     cover = min(1.0, snow / surface["full_cover_depth_mm"])
-    dry, flooded, wet = surface["dry_friction"], surface["flooded_friction"], surface["bare_wet_friction"]
-    friction = {
-        "dry": dry,
-        "rain": flooded + (dry - flooded) * float(np.exp(-film / surface["film_decay_mm"])),
-        "snow": wet - (wet - surface["snow_friction"]) * cover,
-    }[weather]
     return {
-        "film_depth_mm": float(film),
+        "film_depth_mm": film,
         "snow_depth_mm": snow,
         "snow_coverage": cover,
-        "surface_friction": friction,
+        "surface_friction": form.friction(film, cover, surface),
     }
+
+
+def _draining_film(rate: float, surface: Mapping[str, float]) -> float:
+    bases = (
+        ("texture", surface["texture_depth_mm"]),
+        ("length", surface["drainage_length"]),
+        ("rate", rate),
+        ("crossfall", surface["crossfall"]),
+    )
+    return float(
+        surface["film_coefficient"]
+        * np.prod([base ** surface[f"film_{name}_exponent"] for name, base in bases])
+    )
+
+
+def _fallen_snow(rate: float, hours: float, surface: Mapping[str, float]) -> float:
+    return rate * hours * surface["water_density"] / surface["fresh_snow_density"]
+
+
+def _wet_friction(film: float, cover: float, surface: Mapping[str, float]) -> float:
+    flooded = surface["flooded_friction"]
+    return flooded + (surface["dry_friction"] - flooded) * float(np.exp(-film / surface["film_decay_mm"]))
+
+
+def _snow_friction(film: float, cover: float, surface: Mapping[str, float]) -> float:
+    wet = surface["bare_wet_friction"]
+    return wet - (wet - surface["snow_friction"]) * cover
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceForm:
+    """Closed forms of one kind of weather.
+
+    Parameters
+    ----------
+    film : rate [mm/h] and pavement to the film's depth [mm]
+    snow : rate [mm/h], hours [h] and pavement to the snow's depth [mm]
+    friction : film [mm], coverage [1] and pavement to mu_c [1]
+    feeds : columns of the clip's row that each of its columns follows from
+    """
+
+    film: Callable[[float, Mapping[str, float]], float] = lambda rate, surface: 0.0
+    snow: Callable[[float, float, Mapping[str, float]], float] = lambda rate, hours, surface: 0.0
+    friction: Callable[[float, float, Mapping[str, float]], float]
+    feeds: Mapping[str, str] = field(default_factory=dict)
+
+
+SURFACE_FORMS: Mapping[str, SurfaceForm] = {
+    "dry": SurfaceForm(friction=lambda film, cover, surface: surface["dry_friction"]),
+    "rain": SurfaceForm(
+        film=_draining_film,
+        friction=_wet_friction,
+        feeds={
+            "film_depth_mm": "clips.precipitation_mm_h",
+            "surface_friction": "clips.film_depth_mm",
+        },
+    ),
+    "snow": SurfaceForm(
+        snow=_fallen_snow,
+        friction=_snow_friction,
+        feeds={
+            "snow_depth_mm": "clips.precipitation_mm_h clips.snow_accumulation_h",
+            "snow_coverage": "clips.snow_depth_mm",
+            "surface_friction": "clips.snow_coverage",
+        },
+    ),
+    "ice": SurfaceForm(
+        film=lambda rate, surface: surface["glaze_mm"],
+        friction=lambda film, cover, surface: surface["ice_friction"],
+    ),
+}
+"""The judge's own table of weathers, by the name of the kind."""

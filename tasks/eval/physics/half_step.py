@@ -1,4 +1,4 @@
-"""What acts between two ticks: the car followed half a tick on, where the ABS may differ from both."""
+"""Forces half a tick after each tick: there the ABS may differ from both neighbouring ticks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,24 +14,24 @@ INNER_STEP = 0.0005
 
 @dataclass(frozen=True, kw_only=True)
 class HalfStep:
-    """What acts half a tick after each tick but the last, worked out from the tick's own state.
+    """State half a tick after each tick but the last, computed from the tick's own state.
 
     Parameters
     ----------
     acceleration : dv/dt [N - 1] [m/s2]
     rate : wheel acceleration [N - 1] of axles f and r [rad/s2]
-    load_doubt : largest error of each axle's load there, from its bend over the ticks around [N - 1] [N]
+    load_uncertainty : largest error of each axle's load there, from its curvature over the ticks around [N - 1] [N]
     """
 
     acceleration: Floats
     rate: Mapping[str, Floats]
-    load_doubt: Mapping[str, Floats]
+    load_uncertainty: Mapping[str, Floats]
 
 
-def half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> HalfStep:
-    """Follow the car half a tick on from each tick (paper, Eqs. app_abs_command to app_longitudinal_complete).
+def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> HalfStep:
+    """Integrate the car half a tick on from each tick (paper, Eqs. app_abs_command to app_longitudinal_complete).
 
-    The ABS lets the wheels chatter from one inner step to the next, so ticks alone do not say what drove them.
+    The ABS changes from one inner step to the next, so the ticks alone do not hold all forces that act between them.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: 
     speed = v[:-1] + INNER_STEP * a[:-1]
     station = s[:-1] + 0.5 * INNER_STEP * (v[:-1] + speed)
     time = 0.001 * np.arange(len(s) - 1, dtype=np.float64) + INNER_STEP
-    pressure = pressure_at(time - onset_of(ticks, facts), *pressure_shape(facts))
+    pressure = pressure_at(time - find_brake_onset(ticks, facts), *pressure_shape(facts))
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     analytic = constants.mode == "paper" and hump[2] == 0.0
     forward, rates, doubts = np.zeros(len(speed)), {}, {}
@@ -72,7 +72,7 @@ def half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: 
     return HalfStep(
         acceleration=forward / m - car["coast_deceleration"],
         rate=rates,
-        load_doubt=doubts,
+        load_uncertainty=doubts,
     )
 
 
@@ -88,7 +88,7 @@ def pressure_shape(facts: Mapping[str, Any]) -> tuple[float, float, float, float
     return facts["peak_pressure_mpa"], facts["ramp_s"], np.inf if endless else hold, facts["release_s"]
 
 
-def onset_of(ticks: Mapping[str, Floats], facts: Mapping[str, Any]) -> float:
+def find_brake_onset(ticks: Mapping[str, Floats], facts: Mapping[str, Any]) -> float:
     """Brake onset [s]; infinite without one.
 
     Parameters

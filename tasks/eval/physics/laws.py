@@ -1,7 +1,7 @@
-"""The laws that stored telemetry must keep, each as a residual over its tolerance at every tick.
+"""Laws that stored telemetry must satisfy, each as a residual over its tolerance at every tick.
 
-A tolerance is what 1 kHz sampling of a 0.5 ms solution leaves undecided, from the data beside the tick, and
-otherwise rounding; none is a share of the fault that is looked for.
+A tolerance is the error of sampling a 0.5 ms solution at 1 kHz, estimated from the data beside the tick, or else
+rounding. No tolerance is tuned to the size of a fault.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.eval.physics.constants import Constants, Floats, burckhardt, peak_slip, pressure_at, raised_cosine
-from tasks.eval.physics.half_step import INNER_STEP, HalfStep, onset_of, pressure_shape
+from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset, pressure_shape
 
 ROUNDING = 1e-9
 """Relative error that double-precision sums of a run may carry [1]."""
@@ -30,8 +30,8 @@ class Law:
 
     Parameters
     ----------
-    name : what it says
-    columns : the columns it ties, as table.column
+    name : the law in words
+    columns : the columns that it relates, as table.column
     excess : largest residual over its tolerance; above 1 the law is broken [1]
     at : row of the largest excess [1]
     """
@@ -47,10 +47,10 @@ class Law:
         return not self.excess <= 1.0
 
 
-def law(
+def evaluate_law(
     name: str, columns: str, residual: Floats, tolerance: Floats | float, table: str = "ticks"
 ) -> Law | None:
-    """A law from its residual; None where no row can be judged.
+    """Return a law from its residual; None where no row can be judged.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def law(
     return Law(name=name, columns=names, excess=value if np.isfinite(value) else np.inf, at=worst)
 
 
-def rounding(*terms: Floats) -> Floats:
-    """Tolerance of an algebraic law: rounding of its terms, never below that of their largest over a clip.
+def rounding_tolerance(*terms: Floats) -> Floats:
+    """Return the tolerance of an algebraic law: rounding of its terms, at least that of the largest in the clip.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def rounding(*terms: Floats) -> Floats:
 def wheel_laws(
     ticks: Mapping[str, Floats], facts: Mapping[str, Any], axle: str, constants: Constants, half: HalfStep
 ) -> list[Law | None]:
-    """Slip, tyre force, brake torque, ABS and torque balance of one axle (paper, Appendix B).
+    """Return the laws of slip, tyre force, brake torque, ABS and torque balance of one axle (paper, Appendix B).
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def wheel_laws(
     facts : the clip's row
     axle : f or r
     constants : car and pavement
-    half : what acts between the ticks
+    half : state half a tick after each tick
     """
     car, tyre = constants.car, constants.tyres[facts["weather"]]
     v, omega = ticks["speed"], ticks[f"wheel_speed_{axle}"]
@@ -112,41 +112,43 @@ def wheel_laws(
     rolls = np.flatnonzero((v[1:] > 0) & (v[:-1] > 0))
     after = half.rate[axle][rolls]
     step = np.diff(omega)[rolls] - INNER_STEP * (rate[rolls] + after)
-    doubt = radius / inertia * half.load_doubt[axle][rolls]
-    undecided = INNER_STEP * (doubt + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0))
+    uncertainty = radius / inertia * half.load_uncertainty[axle][rolls]
+    integration_tolerance = INNER_STEP * (uncertainty + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0))
     x = f"_{axle}"
     laws = [
-        law(f"slip of wheel speed, {axle}", f"braking_slip{x} wheel_speed{x} speed", kappa - slip, 1e-9),
-        law(f"tyre force of slip and load, {axle}",
+        evaluate_law(f"slip of wheel speed, {axle}", f"braking_slip{x} wheel_speed{x} speed", kappa - slip, 1e-9),
+        evaluate_law(f"tyre force of slip and load, {axle}",
             f"tyre_force{x} braking_slip{x} tyre_load{x} clips.tyre_peak",
-            force - grip * load, rounding(force, load)),
-        law(f"brake torque of pressure, {axle}", f"brake_torque{x} abs_scale{x} brake_pressure_mpa",
-            torque - q * gain * ticks["brake_pressure_mpa"], rounding(torque) + 1e-9),
-        law(f"wheel torque balance, {axle}", f"wheel_speed{x} tyre_force{x} brake_torque{x} tyre_load{x} speed"
+            force - grip * load, rounding_tolerance(force, load)),
+        evaluate_law(f"brake torque of pressure, {axle}", f"brake_torque{x} abs_scale{x} brake_pressure_mpa",
+            torque - q * gain * ticks["brake_pressure_mpa"], rounding_tolerance(torque) + 1e-9),
+        evaluate_law(f"wheel torque balance, {axle}", f"wheel_speed{x} tyre_force{x} brake_torque{x} tyre_load{x} speed"
             f" longitudinal_acceleration {ASKED}",
-            step, undecided),
-        law(f"wheel starts rolling, {axle}", f"wheel_speed{x} clips.initial_speed_km_h",
+            step, integration_tolerance),
+        evaluate_law(f"wheel starts rolling, {axle}", f"wheel_speed{x} clips.initial_speed_km_h",
             omega[:1] * radius - facts["initial_speed_km_h"] / 3.6, 1e-9),
     ]  # fmt: skip
     if car["abs_build_rate"] * INNER_STEP >= 1 and car["abs_release_rate"] * INNER_STEP >= 1:
-        laws.append(law(f"ABS command of slip, {axle}", f"abs_scale{x} braking_slip{x}", q - asked, 1e-7))
+        laws.append(
+            evaluate_law(f"ABS command of slip, {axle}", f"abs_scale{x} braking_slip{x}", q - asked, 1e-7)
+        )
     else:
         outside = np.maximum(np.maximum(-q, q - 1.0), 0.0)
-        laws.append(law(f"ABS within its bounds, {axle}", f"abs_scale{x}", outside, 1e-9))
+        laws.append(evaluate_law(f"ABS within its bounds, {axle}", f"abs_scale{x}", outside, 1e-9))
     return laws
 
 
 def motion_laws(
     ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, half: HalfStep
 ) -> list[Law | None]:
-    """Station, speed, forces, energy, loads and time (paper, Eq. app_longitudinal_complete).
+    """Return the laws of station, speed, forces, energy, loads and time (paper, Eq. app_longitudinal_complete).
 
     Parameters
     ----------
     ticks : columns of the tick table
     facts : the clip's row
     constants : car and pavement
-    half : what acts between the ticks
+    half : state half a tick after each tick
     """
     car, m, L = constants.car, constants.mass, constants.wheelbase
     s, v, a = ticks["station"], ticks["speed"], ticks["longitudinal_acceleration"]
@@ -161,7 +163,7 @@ def motion_laws(
     time = ticks["t_ns"]
 
     later = half.acceleration
-    doubt = (half.load_doubt["f"] + half.load_doubt["r"])[both - 1] / m
+    uncertainty = (half.load_uncertainty["f"] + half.load_uncertainty["r"])[both - 1] / m
     between = v[:-1] + h * a[:-1]
     way = (np.diff(s) - 0.5 * h * (v[:-1] + 2 * between + v[1:]))[both - 1]
     gained = (np.diff(v) - h * (a[:-1] + later))[both - 1]
@@ -178,23 +180,23 @@ def motion_laws(
     slope_f, slope_r = raised_cosine(s, *hump)[1], raised_cosine(s - L, *hump)[1]
     uphill = np.where(moves, -load_f * slope_f - load_r * slope_r, 0.0)
     laws = [
-        law("time counts milliseconds", "t_ns", time - 1e6 * np.arange(len(time)), 0.5),
-        law("station starts at zero", "station", s[:1], 1e-9),
-        law("speed starts as commanded", "speed clips.initial_speed_km_h",
+        evaluate_law("time counts milliseconds", "t_ns", time - 1e6 * np.arange(len(time)), 0.5),
+        evaluate_law("station starts at zero", "station", s[:1], 1e-9),
+        evaluate_law("speed starts as commanded", "speed clips.initial_speed_km_h",
             v[:1] - facts["initial_speed_km_h"] / 3.6, 1e-9),
-        law("station is the integral of speed", "station speed longitudinal_acceleration", way, 1e-10),
-        law("station rests with the car", "station speed", np.diff(s)[stays[1:] - 1], 1e-9),
-        law("speed is the integral of acceleration", "speed longitudinal_acceleration " + drives,
-            gained, h * (doubt + 1e-5)),
-        law("m dv/dt is the sum of forces", "longitudinal_acceleration tyre_force_f tyre_force_r road_force",
-            a - net, rounding(a, force / m, road / m)),
-        law("kinetic energy falls by the work done", "speed longitudinal_acceleration road_force " + drives,
+        evaluate_law("station is the integral of speed", "station speed longitudinal_acceleration", way, 1e-10),
+        evaluate_law("station rests with the car", "station speed", np.diff(s)[stays[1:] - 1], 1e-9),
+        evaluate_law("speed is the integral of acceleration", "speed longitudinal_acceleration " + drives,
+            gained, h * (uncertainty + 1e-5)),
+        evaluate_law("m dv/dt is the sum of forces", "longitudinal_acceleration tyre_force_f tyre_force_r road_force",
+            a - net, rounding_tolerance(a, force / m, road / m)),
+        evaluate_law("kinetic energy falls by the work done", "speed longitudinal_acceleration road_force " + drives,
             energy[rolling], 2e-5 * v[0] ** 2),
-        law("road force of load and slope", "road_force tyre_load_f tyre_load_r station clips.hazard_height_m"
-            " clips.hazard_center_m clips.hazard_length_m", road - uphill, rounding(load_f, load_r)),
+        evaluate_law("road force of load and slope", "road_force tyre_load_f tyre_load_r station clips.hazard_height_m"
+            " clips.hazard_center_m clips.hazard_length_m", road - uphill, rounding_tolerance(load_f, load_r)),
     ]  # fmt: skip
     if constants.mode == "paper" and hump[2] == 0.0:
-        # Euler's half step between two ticks follows from both speeds, and so does the load it asks for
+        # Euler's half step between two ticks follows from both speeds, and so does its load
         before = np.diff(v)[both - 1] / h - a[both - 1]
         moved = m * car["cg_height"] / L * before
         weight = m * car["gravity"]
@@ -202,14 +204,14 @@ def motion_laws(
             lever = car["cg_to_rear_axle" if axle == "f" else "cg_to_front_axle"] / L
             expected = np.maximum(weight * lever + sign * moved, 0.0)
             laws.append(
-                law(f"analytic load transfer, {axle}", f"tyre_load_{axle} speed longitudinal_acceleration",
+                evaluate_law(f"analytic load transfer, {axle}", f"tyre_load_{axle} speed longitudinal_acceleration",
                     load[both] - expected, 1e-4)
             )  # fmt: skip
-        laws.append(law("tyre loads sum to the weight", "tyre_load_f tyre_load_r",
+        laws.append(evaluate_law("tyre loads sum to the weight", "tyre_load_f tyre_load_r",
                         load_f + load_r - weight, 1e-6))  # fmt: skip
     else:
         laws += [
-            law(f"tyre load is the contact load, {axle}", f"tyre_load_{axle} axle_load_{axle}",
+            evaluate_law(f"tyre load is the contact load, {axle}", f"tyre_load_{axle} axle_load_{axle}",
                 ticks[f"tyre_load_{axle}"] - ticks[f"axle_load_{axle}"], 1e-6)
             for axle in "fr"
         ]  # fmt: skip
@@ -219,7 +221,7 @@ def motion_laws(
 def command_laws(
     ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
 ) -> list[Law | None]:
-    """Brake pressure and road heights as the scenario commands them.
+    """Return the laws of brake pressure and road heights as the scenario commands them.
 
     Parameters
     ----------
@@ -229,7 +231,7 @@ def command_laws(
     """
     s, v = ticks["station"], ticks["speed"]
     time: Floats = 1e-3 * np.arange(len(s), dtype=np.float64)
-    onset = onset_of(ticks, facts)
+    onset = find_brake_onset(ticks, facts)
     peak, ramp, hold, lasting = pressure_shape(facts)
     wanted = pressure_at(time - onset, peak, ramp, hold, lasting)
     steepest = peak / max(ramp, 1e-3)
@@ -239,13 +241,13 @@ def command_laws(
     columns = f"brake_pressure_mpa clips.peak_pressure_mpa clips.ramp_s clips.brake_onset_s{release}"
     if by_place:
         columns = columns.replace("brake_onset_s", "brake_onset_m")
-    laws = [law("brake pressure as commanded", columns, ticks["brake_pressure_mpa"] - wanted, slack)]
+    laws = [evaluate_law("brake pressure as commanded", columns, ticks["brake_pressure_mpa"] - wanted, slack)]
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     moves = v > 0
     for axle, behind in (("f", 0.0), ("r", constants.wheelbase)):
         height, _ = raised_cosine(s - behind, *hump)
         laws.append(
-            law(f"road height as commanded, {axle}", f"road_height_{axle} station clips.hazard_height_m"
+            evaluate_law(f"road height as commanded, {axle}", f"road_height_{axle} station clips.hazard_height_m"
                 " clips.hazard_center_m clips.hazard_length_m",
                 (ticks[f"road_height_{axle}"] - height)[moves], ROAD_PASS)
         )  # fmt: skip
@@ -253,7 +255,7 @@ def command_laws(
 
 
 def finite_rows(columns: Mapping[str, NDArray[Any]]) -> list[str]:
-    """Names of the columns that hold a value that is not finite.
+    """Return the names of the columns that hold a value that is not finite.
 
     Parameters
     ----------

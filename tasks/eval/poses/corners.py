@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 
 def corner_strength(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Smaller eigenvalue of the structure tensor at each pixel of a grey picture [H, W] [1]
+    """Return the smaller eigenvalue of the structure tensor at each pixel of a grey picture [H, W] [1]
     (Shi and Tomasi 1994, DOI 10.1109/CVPR.1994.323794)."""
     return cv2.cornerMinEigenVal(grey, blockSize=5)
 
 
 def cell_size(width: int, cells_across: int) -> int:
-    """Side of the grid cells over a picture of that width [px]."""
+    """Return the side of the grid cells over a picture of that width [px]."""
     return max(width // cells_across, 4)
 
 
@@ -25,7 +25,7 @@ def grid_corners(
     quality: float,
     hidden: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int64]:
-    """The strongest corner of each grid cell.
+    """Return the strongest corner of each grid cell.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def track_corners(
     levels: int,
     forward_backward: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Follow corners to another picture and back (Lucas and Kanade, in pyramids; Kalal et al. 2010,
-    DOI 10.1109/ICPR.2010.675, for the way back).
+    """Track corners to another picture and back (Lucas and Kanade, in pyramids; Kalal et al. 2010,
+    DOI 10.1109/ICPR.2010.675, for the track back).
 
     Parameters
     ----------

@@ -1,15 +1,22 @@
-"""Two-view geometry of tracked points with known intrinsics: turn, direction, depth and length of a step."""
+"""Two-view geometry of tracked points with known intrinsics: rotation, direction, depth and length of a step."""
 
 import cv2
 import numpy as np
 
 from tasks.eval.poses.motion import FrameStep
-from tasks.eval.poses.rigid import Floats, adjoint, invert_pose, pose_from_twist, projection_jacobian, skew
+from tasks.eval.poses.rigid import (
+    Floats,
+    adjoint_matrix,
+    invert_pose,
+    pose_from_twist,
+    projection_jacobian,
+    skew_matrix,
+)
 from tasks.eval.poses.solve_pnp import TUKEY
 
 
 def fit_rotation(rays: Floats, later_rays: Floats, focal: float) -> tuple[Floats, float]:
-    """The turn that explains most of the shift.
+    """Return the rotation that explains most of the points' shift.
 
     Parameters
     ----------
@@ -39,7 +46,7 @@ def fit_rotation(rays: Floats, later_rays: Floats, focal: float) -> tuple[Floats
 def five_point_pose(
     pixels: Floats, later_pixels: Floats, K: Floats, distance: float
 ) -> tuple[Floats, Floats, int]:
-    """Turn and direction by five points at a time, whichever most others agree with (Nister 2004).
+    """Estimate rotation and direction by the five-point method with RANSAC (Nister 2004).
 
     Parameters
     ----------
@@ -49,8 +56,8 @@ def five_point_pose(
 
     Returns
     -------
-    ``R_later_earlier`` [3, 3], the direction of ``t_later_earlier`` [3], and how many points agree; 0 where
-    the points fix no pose
+    ``R_later_earlier`` [3, 3], the direction of ``t_later_earlier`` [3], and the number of points that agree; 0
+    where the points determine no pose
     """
     E, mask = cv2.findEssentialMat(pixels, later_pixels, K, cv2.RANSAC, 0.999, distance)
     if E is None or E.shape != (3, 3):
@@ -63,7 +70,7 @@ def five_point_pose(
 def refine_essential(
     R: Floats, t: Floats, rays: Floats, later_rays: Floats, focal: float, noise_floor: float
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Gauss-Newton on Sampson's distance to the epipolar lines, with Tukey's weights.
+    """Refine a pose by Gauss-Newton on Sampson's distance to the epipolar lines, with Tukey's weights.
 
     Parameters
     ----------
@@ -71,7 +78,7 @@ def refine_essential(
     t : float64 [3] first guess of the direction of ``t_later_earlier`` [1]
     rays, later_rays : float64 [N, 3] the points in both cameras, z = 1 [1]
     focal : focal length [px]
-    noise_floor : smallest tracking error believed [px]
+    noise_floor : smallest assumed tracking error [px]
 
     Returns
     -------
@@ -90,7 +97,7 @@ def refine_essential(
         size = np.abs(residual)
         scale = max(1.4826 * float(np.median(size)), noise_floor)
         weight = np.maximum(1 - (size / (TUKEY * scale)) ** 2, 0.0) ** 2
-        tangents = _tangents(t)
+        tangents = _tangent_vectors(t)
         J = np.column_stack([np.cross(y, normal), np.cross(y, later_rays) @ tangents.T]) * gain[:, None]
         JW = J * weight[:, None]
         H = JW.T @ J
@@ -105,7 +112,7 @@ def refine_essential(
 
 
 def triangulate(rays: Floats, later_rays: Floats, R: Floats, t: Floats) -> tuple[Floats, Floats, Floats]:
-    """Depth of points by least squares, for a step of length one.
+    """Return the depth of points by least squares, for a step of length one.
 
     Parameters
     ----------
@@ -127,7 +134,7 @@ def triangulate(rays: Floats, later_rays: Floats, R: Floats, t: Floats) -> tuple
 def step_length(
     known: Floats, known_precision: Floats, unit: Floats, unit_precision: Floats
 ) -> tuple[float, float]:
-    """How long a step was, from the depth that the same points had before and have for a step of one.
+    """Return the length of a step: the ratio of the points' known depth to their depth for a step of length one.
 
     Parameters
     ----------
@@ -158,7 +165,7 @@ def step_length(
 def scaled_step(
     R: Floats, t: Floats, covariance: Floats, length: float, length_std: float, inliers: int
 ) -> FrameStep:
-    """The step of a given length, with its uncertainty.
+    """Return the step of a given length, with its uncertainty.
 
     Parameters
     ----------
@@ -170,15 +177,15 @@ def scaled_step(
     T[:3, :3], T[:3, 3] = R, length * t
     # the left twist of T that a change of (rotation, tangents of t, length) makes
     by_parameter = np.zeros((6, 6))
-    by_parameter[:3, :3], by_parameter[3:, :3] = length * skew(t), np.eye(3)
-    by_parameter[:3, 3:5], by_parameter[:3, 5] = length * _tangents(t).T, t
+    by_parameter[:3, :3], by_parameter[3:, :3] = length * skew_matrix(t), np.eye(3)
+    by_parameter[:3, 3:5], by_parameter[:3, 5] = length * _tangent_vectors(t).T, t
     full = np.zeros((6, 6))
     full[:5, :5], full[5, 5] = covariance, length_std**2
     pose = invert_pose(T)
-    carry = adjoint(pose) @ by_parameter
+    carry = adjoint_matrix(pose) @ by_parameter
     return FrameStep(T_earlier_later=pose, covariance=carry @ full @ carry.T, inliers=inliers)
 
 
-def _tangents(t: Floats) -> Floats:
+def _tangent_vectors(t: Floats) -> Floats:
     """Two unit vectors [2, 3] across a direction."""
     return np.linalg.svd(t[None])[2][1:]

@@ -1,6 +1,6 @@
 """Pose check without depth: a chain of essential matrices, by corners and intrinsics alone.
 
-It never sees a renderer's data, so it can judge any video; the price is an unknown scale.
+It reads no data of a renderer, so it can judge any video; in return, the scale stays unknown.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ from tasks.eval.poses.motion import (
 )
 from tasks.eval.poses.point_pairs import PointPairs, track_pairs
 from tasks.eval.poses.rigid import Floats, invert_pose
-from tasks.eval.poses.solve_pnp import solve_pnp
+from tasks.eval.poses.solve_pnp import PnpLimits, solve_pnp
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,10 +46,10 @@ class EssentialSettings:
     search_levels : the same where they are not: at the start, and after a failure [1]
     forward_backward : largest distance between a point and its track there and back [px]
     epipolar : RANSAC's largest distance from the epipolar line [px]
-    min_parallax : median shift that no turn explains, below which two frames share one place [px]
+    min_parallax : median shift that no rotation explains, below which the camera counts as standing [px]
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
-    noise_floor, noise_ceiling : smallest tracking error believed, and largest that is still a track [px]
+    noise_floor, noise_ceiling : smallest assumed tracking error, and largest error of a valid track [px]
     link_span : frames that the longer steps beside the chain span [1]
     link_stride : frames between their starts [1]
     """
@@ -71,8 +71,8 @@ class EssentialSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Key:
-    """The frame that later ones are placed against, and what is known of its depth, in the chain's unit."""
+class _KeyFrame:
+    """The frame against which later ones are placed, and the known depth of its corners, in the chain's unit."""
 
     index: int
     grey: NDArray[np.uint8]
@@ -89,13 +89,12 @@ def recover_motion_essential(
     route_rotations: Floats | None = None,
     settings: EssentialSettings | None = None,
 ) -> RecoveredMotion:
-    """Ego motion up to scale by frame-to-frame essential matrices (Nister 2004, DOI 10.1109/TPAMI.2004.17).
+    """Recover ego motion up to scale by frame-to-frame essential matrices (Nister 2004, DOI 10.1109/TPAMI.2004.17).
 
-    Each step's turn and direction come from the five-point method, refined on Sampson's error; its length
-    from the depth that the step before gave the same corners. Steps over more frames tie the chain together.
-    While the car stands, frames are placed against the last one that moved. Path and heave are those of
-    the camera: the way from there to the rig's origin is in metres, which the chain's unknown unit cannot
-    express.
+    The rotation and direction of each step come from the five-point method, refined on Sampson's error, and its
+    length from the depth of the same corners in the step before. Steps over more frames constrain the chain further.
+    While the car stands, frames are placed against the last one that moved. Path and heave are those of the camera:
+    its offset from the rig's origin is in metres, which the chain's unknown unit cannot express.
 
     Parameters
     ----------
@@ -113,24 +112,24 @@ def recover_motion_essential(
     """
     check_clip(frames, K, T_rig_camera, route_rotations=route_rotations)
     chosen = settings or EssentialSettings()
-    key = _key(0, frames[0], chosen)
+    key = _make_key_frame(0, frames[0], chosen)
     placements: list[Placement] = []
-    poses, passed, links = [np.eye(4)], dict[int, _Key](), list[Link]()
+    poses, passed, links = [np.eye(4)], dict[int, _KeyFrame](), list[Link]()
     missed, velocity, T_key_last, last = 0, np.eye(4), np.eye(4), 0
     for k in range(1, len(frames)):
-        anchor, later = key.index, _key(k, frames[k], chosen)
+        anchor, later = key.index, _make_key_frame(k, frames[k], chosen)
         if missed > MAX_GAP:
             step, moved_on = failed_step(f"the track was lost after frame {last} and not found again", 0), key
         else:
             predicted = T_key_last @ np.linalg.matrix_power(velocity, k - last)
-            step, moved_on = _place(key, later, predicted, K, chosen)
+            step, moved_on = _place_frame(key, later, predicted, K, chosen)
         missed = missed + 1 if step.failure else 0
         placements.append(Placement(anchor=anchor, step=step))
         poses.append(poses[anchor] @ step.T_earlier_later)
         start = passed.pop(k - chosen.link_span, None)
         if start is not None and start.index % chosen.link_stride == 0 and not step.failure:
             between = invert_pose(poses[start.index]) @ poses[k]
-            link, _ = _solve(start, later, between, chosen.track_levels, K, chosen, trusted=True)
+            link, _ = _solve_step(start, later, between, chosen.track_levels, K, chosen, trusted=True)
             links.append(Link(earlier=start.index, later=k, step=link))
         if not step.failure:
             if k - last == 1:
@@ -146,13 +145,13 @@ def recover_motion_essential(
     )
 
 
-def _key(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> _Key:
+def _make_key_frame(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> _KeyFrame:
     grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
     corners = grid_corners(
         corner_strength(grey), settings.cells_across, settings.window // 2, settings.corner_quality
     )
     unknown = np.zeros(len(corners))
-    return _Key(
+    return _KeyFrame(
         index=index,
         grey=grey,
         corners=corners.astype(np.float32),
@@ -162,25 +161,25 @@ def _key(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> _Ke
     )
 
 
-def _place(
-    key: _Key, later: _Key, predicted: Floats, K: Floats, settings: EssentialSettings
-) -> tuple[FrameStep, _Key]:
-    """The step to a frame, and the frame that the next one is to be placed against."""
+def _place_frame(
+    key: _KeyFrame, later: _KeyFrame, predicted: Floats, K: Floats, settings: EssentialSettings
+) -> tuple[FrameStep, _KeyFrame]:
+    """Return the step to a frame, and the frame against which the next one is placed."""
     fewest = min(len(key.corners), len(later.corners))
     if fewest < settings.min_points:
         return failed_step(
             f"{fewest} points to track, at least {settings.min_points} are needed", fewest
         ), key
     if (key.precision > 0).any():
-        found = _solve(key, later, predicted, settings.track_levels, K, settings)
+        found = _solve_step(key, later, predicted, settings.track_levels, K, settings)
         if not found[0].failure:
             return found
-    # nothing to predict by: find motion and depth from the bare pictures, then again with their help
+    # without a prediction: find motion and depth from the pictures alone, then again from that first result
     blind = replace(key, inverse_depth=np.zeros_like(key.inverse_depth))
-    step, rough = _solve(blind, later, np.eye(4), settings.search_levels, K, settings)
+    step, rough = _solve_step(blind, later, np.eye(4), settings.search_levels, K, settings)
     if step.failure or rough is blind:
         return step, key
-    return _solve(
+    return _solve_step(
         replace(key, inverse_depth=rough.inverse_depth),
         later,
         step.T_earlier_later,
@@ -190,16 +189,16 @@ def _place(
     )
 
 
-def _solve(
-    key: _Key,
-    later: _Key,
+def _solve_step(
+    key: _KeyFrame,
+    later: _KeyFrame,
     predicted: Floats,
     levels: int,
     K: Floats,
     settings: EssentialSettings,
     trusted: bool = False,
-) -> tuple[FrameStep, _Key]:
-    """The step by the tracked points; a trusted prediction stands in for the random draws' first guess."""
+) -> tuple[FrameStep, _KeyFrame]:
+    """Solve the step by the tracked points; a trusted prediction replaces the RANSAC first guess."""
     focal = float(K[0, 0] + K[1, 1]) / 2
     tracker = (settings.window, levels, settings.forward_backward)
     pairs = track_pairs(
@@ -236,13 +235,13 @@ def _solve(
         if np.isnan(length):
             if (key.precision[pairs.kept] > 0).sum() < settings.min_points:
                 return failed_step("no point links this step's length to the one before", inliers), key
-            # a nod on the spot: too short a way to see depth by, so the depth known before must do
+            # the car pitches without moving: the baseline is too short for depth, so the known depth is used
             return _standing_step(key, turn, pairs, K, settings), key
     placed = replace(
         later,
-        depth=_scatter(later_depth[split:] * length, pairs.later_kept),
-        precision=_scatter(precision[split:], pairs.later_kept),
-        inverse_depth=_spread(
+        depth=_scatter_values(later_depth[split:] * length, pairs.later_kept),
+        precision=_scatter_values(precision[split:], pairs.later_kept),
+        inverse_depth=_spread_inverse_depth(
             pairs.later_pixels[precision > 0],
             1 / (later_depth[precision > 0] * length),
             later.grey.shape,
@@ -253,9 +252,9 @@ def _solve(
 
 
 def _standing_step(
-    key: _Key, turn: Floats, pairs: PointPairs, K: Floats, settings: EssentialSettings
+    key: _KeyFrame, turn: Floats, pairs: PointPairs, K: Floats, settings: EssentialSettings
 ) -> FrameStep:
-    """A frame taken from about where the key frame was: by the depth of its corners, or else as a turn."""
+    """Return the step to a frame taken near the key frame: by the depth of its corners, or else as a rotation."""
     T = np.eye(4)
     T[:3, :3] = turn
     split = int(pairs.kept.sum())
@@ -263,17 +262,20 @@ def _standing_step(
     if known.sum() >= settings.min_points:
         points = pairs.rays[:split][known] * key.depth[pairs.kept][known, None]
         seen = pairs.later_pixels[:split][known]
-        return solve_pnp(
-            points, seen, T, K, settings.min_points, settings.noise_floor, settings.noise_ceiling
+        limits = PnpLimits(
+            min_inliers=settings.min_points,
+            noise_floor=settings.noise_floor,
+            noise_ceiling=settings.noise_ceiling,
         )
+        return solve_pnp(points, seen, T, K, limits)
     covariance = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]) * (settings.min_parallax / K[0, 0]) ** 2
     return FrameStep(T_earlier_later=invert_pose(T), covariance=covariance, inliers=len(pairs.rays))
 
 
-def _spread(
+def _spread_inverse_depth(
     pixels: Floats, inverse_depth: Floats, shape: tuple[int, ...], settings: EssentialSettings
 ) -> NDArray[np.float32]:
-    """A smooth guess of inverse depth for every pixel, by normalised convolution over the grid cells."""
+    """Return a smooth guess of inverse depth for every pixel, by normalised convolution over the grid cells."""
     cell = cell_size(shape[1], settings.cells_across)
     rows, columns = -(-shape[0] // cell), -(-shape[1] // cell)
     at = np.clip((pixels[:, ::-1] / cell).astype(np.int64), 0, [rows - 1, columns - 1])
@@ -286,7 +288,7 @@ def _spread(
     return cv2.resize(guess.astype(np.float32), (columns * cell, rows * cell))[: shape[0], : shape[1]]
 
 
-def _scatter(values: Floats, where: NDArray[np.bool_]) -> Floats:
+def _scatter_values(values: Floats, where: NDArray[np.bool_]) -> Floats:
     spread = np.zeros(len(where))
     spread[where] = values
     return spread

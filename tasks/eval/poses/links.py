@@ -1,4 +1,4 @@
-"""Longer steps beside a chain of short ones: what every short step gets wrong alike, a long one gets wrong once."""
+"""Longer steps beside a chain of short ones: an error common to all short steps enters a long step only once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tasks.eval.poses.motion import FrameStep, Placement
-from tasks.eval.poses.rigid import Floats, adjoint, invert_pose, pose_from_twist
+from tasks.eval.poses.rigid import Floats, adjoint_matrix, invert_pose, pose_from_twist
 
 LEAST_STD = 1e-7
-"""Error below which no step is believed [m, rad]: a step that states none would leave nothing to share out."""
+"""Least standard error of a step [m, rad]: with an error of 0 a step could not be adjusted at all."""
 PASSES = 2
-"""Linear solutions in a row; the corrections are milliradians, so that the second already is rounding."""
+"""Linear solutions one after the other; corrections are milliradians, so that the second one is at rounding level."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class Link:
 
 
 def chained_poses(placements: Sequence[Placement]) -> list[Floats]:
-    """Camera poses [4, 4] in the camera of frame 0 [m]; NaN where a frame has none."""
+    """Return camera poses [4, 4] in the camera of frame 0 [m]; NaN where a frame has none."""
     poses = [np.eye(4)]
     for placed in placements:
         poses.append(poses[placed.anchor] @ placed.step.T_earlier_later)
@@ -38,10 +38,10 @@ def chained_poses(placements: Sequence[Placement]) -> list[Floats]:
 
 
 def link_placements(placements: Sequence[Placement], links: Sequence[Link]) -> list[Placement]:
-    """Share out between chain and links what they disagree on, by least squares over all poses.
+    """Adjust the chain to the links by least squares over all poses.
 
-    The covariances stay those of the chain, an upper bound: the errors of links are no more independent of
-    each other than those of the short steps are.
+    The covariances stay those of the chain, an upper bound: the errors of the links are as dependent on each other
+    as those of the short steps.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def link_placements(placements: Sequence[Placement], links: Sequence[Link]) -> l
     ]
     edges = chain + useful
     for _ in range(PASSES):
-        poses = poses @ np.stack([pose_from_twist(twist) for twist in _corrections(poses, edges)])
+        poses = poses @ np.stack([pose_from_twist(twist) for twist in _solve_corrections(poses, edges)])
     return [
         placed
         if placed.step.failure
@@ -76,8 +76,8 @@ def link_placements(placements: Sequence[Placement], links: Sequence[Link]) -> l
     ]
 
 
-def _corrections(poses: Floats, edges: Sequence[Link]) -> Floats:
-    """Right twists [F, 6] that bring the poses nearest to all edges, to first order; 0 in frame 0."""
+def _solve_corrections(poses: Floats, edges: Sequence[Link]) -> Floats:
+    """Return right twists [F, 6] that bring the poses nearest to all edges, to first order; 0 in frame 0."""
     count = len(poses)
     H, gradient = np.zeros((count, 6, count, 6)), np.zeros((count, 6))
     for edge in edges:
@@ -94,7 +94,7 @@ def _corrections(poses: Floats, edges: Sequence[Link]) -> Floats:
         )
         error[3:] /= 2
         weight = np.linalg.inv(edge.step.covariance + np.eye(6) * LEAST_STD**2)
-        by_later = -adjoint(between)
+        by_later = -adjoint_matrix(between)
         H[a, :, a] += weight
         H[b, :, b] += by_later.T @ weight @ by_later
         H[a, :, b] += weight @ by_later

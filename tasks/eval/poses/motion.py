@@ -1,4 +1,4 @@
-"""What every pose check returns, and how frame-to-frame steps are chained into it."""
+"""The result of every pose check, and the chain of frame-to-frame steps that leads to it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,22 +7,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.eval.poses.rigid import Floats, adjoint, invert_pose
+from tasks.eval.poses.rigid import Floats, adjoint_matrix, invert_pose
 
 MAX_GAP = 3
 """Frames in a row that may fail before the track counts as lost: the next one is placed against the
-last good frame, and past three frames a road at speed has left too little of it in view."""
+last good frame, and after three frames at speed too little of that road is still in view."""
 
 LEAST_PROGRESS = 1e-3
-"""Way below which a car counts as standing [m], or in steps where the scale is unknown."""
+"""Distance below which a car counts as standing [m], or in steps where the scale is unknown."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecoveredMotion:
-    """The ego motion that a judge saw in the pixels, relative to frame 0.
+    """Ego motion that a pose check recovered from the pixels, relative to frame 0.
 
-    Every field is NaN in a failed frame. Lengths are NaN throughout where the method cannot know the
-    scale; `normalised_path` is then what there is.
+    Every field is NaN in a failed frame. Lengths are NaN throughout where the method does not know the
+    scale; `normalised_path` is then the only path.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class RecoveredMotion:
     pitch : float64 [F] nose-down positive, less that of frame 0 [rad]
     heave : float64 [F] rise of the rig origin [m]
     lateral : float64 [F] path offset to the left [m]
-    progress : float64 [F] way made along the heading [m]
+    progress : float64 [F] distance along the heading [m]
     normalised_path : float64 [F, 3] progress, lateral and heave over the clip's whole progress [1];
         NaN where the car stood
     pitch_std : float64 [F] standard uncertainty of `pitch`, from residuals and Jacobian, with the errors of
@@ -87,7 +87,7 @@ class FrameStep:
 
 
 def failed_step(reason: str, inliers: int) -> FrameStep:
-    """A step that could not be made, with the reason as the end of a sentence."""
+    """Return a step that could not be made, with the reason as the end of a sentence."""
     return FrameStep(
         T_earlier_later=np.full((4, 4), np.nan),
         covariance=np.full((6, 6), np.nan),
@@ -141,7 +141,7 @@ def integrate_motion(
 ) -> RecoveredMotion:
     """Chain the steps and resolve the chain into pitch, heave, lateral offset and progress.
 
-    Without `route_rotations` the route is taken as level: progress is the way made along the recovered
+    Without `route_rotations` the route is taken as level: progress is the distance along the recovered
     heading, lateral and heave are coordinates in frame 0. With them, all four are resolved along the route.
 
     Parameters
@@ -166,11 +166,11 @@ def integrate_motion(
         a, step = placed.anchor, placed.step
         if step.failure:
             failures.append(f"{method}: frame {k} has no pose: {step.failure}.")
-        Ad = adjoint(T_rig_camera)
+        Ad = adjoint_matrix(T_rig_camera)
         step_pose = T_rig_camera @ step.T_earlier_later @ invert_pose(T_rig_camera)
         step_cov = Ad @ step.covariance @ Ad.T
         T[k] = T[a] @ step_pose
-        carry = adjoint(T[a])
+        carry = adjoint_matrix(T[a])
         cov[k] = cov[a] + carry @ step_cov @ carry.T
 
         frame_axes = np.eye(3) if route is None else route[k]
@@ -181,7 +181,7 @@ def integrate_motion(
 
         moved = T[k, :3, 3] - T[a, :3, 3]
         if route is None:
-            heading = _level(T[a, :3, 0]) + _level(T[k, :3, 0])
+            heading = _level_direction(T[a, :3, 0]) + _level_direction(T[k, :3, 0])
             along = heading @ moved / np.linalg.norm(heading)
             path[k] = path[a, 0] + along, T[k, 1, 3], T[k, 2, 3]
         else:
@@ -214,7 +214,7 @@ def integrate_motion(
     )
 
 
-def _level(direction: Floats) -> Floats:
+def _level_direction(direction: Floats) -> Floats:
     return np.array([direction[0], direction[1], 0.0]) / np.hypot(direction[0], direction[1])
 
 

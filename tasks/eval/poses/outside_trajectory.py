@@ -1,4 +1,4 @@
-"""A camera trajectory that somebody else recovered, as a pose check of its own."""
+"""A camera trajectory recovered by another tool, as a pose check of its own."""
 
 from dataclasses import replace
 
@@ -19,14 +19,14 @@ def motion_from_trajectory(
     metric: bool,
     route_rotations: Floats | None = None,
 ) -> RecoveredMotion:
-    """Resolve a trajectory into pitch, progress, lateral path and heave, as the pose checks are.
+    """Resolve a trajectory into pitch, progress, lateral path and heave, as the pose checks do.
 
-    Every frame takes the nearest pose; one with none within half a frame has failed. The trajectory says
-    nothing of its uncertainty, so there `pitch_std` and `progress_std` are NaN.
+    Every frame takes the nearest pose; a frame without a pose within half a frame has failed. A trajectory does not
+    state its uncertainty, so `pitch_std` and `progress_std` are NaN.
 
     Parameters
     ----------
-    method : name of what made it
+    method : name of the tool that made it
     frame_times : float64 [F] rising [s]
     pose_times : float64 [N] rising, on the same clock [s]
     T_world_camera : float64 [N, 4, 4] camera-to-world poses in any world frame, camera axes as OpenCV's [m]

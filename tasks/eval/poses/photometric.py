@@ -7,15 +7,15 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.eval.poses.depth_chain import Attempt, invert_depth, place_frames_by_depth, prepare_on_demand
 from tasks.eval.poses.motion import (
     FrameStep,
     RecoveredMotion,
     check_clip,
     failed_step,
     integrate_motion,
-    place_frames,
 )
-from tasks.eval.poses.rigid import Floats, adjoint, advance_pose, invert_pose, pose_from_twist
+from tasks.eval.poses.rigid import Floats, adjoint_matrix, advance_pose, invert_pose, pose_from_twist
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,13 +30,13 @@ class PhotometricSettings:
     search_advances : ways ahead to try as first guesses where it is not [m]
     iterations : most Gauss-Newton steps per level [1]
     converged : motion of a step, in the picture, at which a level is done [px]
-    smoothing : Gaussian blur of the pictures, which evens out what bilinear resampling does [px]
-    least_gradient : grey levels per pixel below which a pixel says nothing [1]
+    smoothing : Gaussian blur of the pictures, which reduces the effect of bilinear resampling [px]
+    least_gradient : grey levels per pixel below which a pixel is left out [1]
     depth_kink : largest relative bend of inverse depth beside a pixel; more is an edge [1]
     min_pixels : fewest full-resolution pixels that carry a pose [1]
     min_inlier_share : least share of the pixels whose grey level must agree [1]
     min_correlation : least correlation of the aligned pictures [1]
-    noise_floor : smallest error of a grey level believed, that of rounding two of them [1]
+    noise_floor : smallest assumed error of a grey level, that of rounding two of them [1]
     block : side of the blocks whose errors count as independent [px]
     """
 
@@ -58,7 +58,7 @@ class PhotometricSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class _Level:
-    """One pyramid level: the picture, and the pixels of it that can be aligned to another."""
+    """One pyramid level: the picture, and its pixels that can be aligned to another picture."""
 
     grey: NDArray[np.float32]
     pixels: NDArray[np.float32]  # [P, 6]: x, y, 1/z, grey level, d/dx, d/dy
@@ -74,7 +74,7 @@ def recover_motion_photometric(
     route_rotations: Floats | None = None,
     settings: PhotometricSettings | None = None,
 ) -> RecoveredMotion:
-    """Ego motion by frame-to-frame alignment of grey levels with rendered depth.
+    """Recover ego motion by frame-to-frame alignment of grey levels with rendered depth.
 
     Inverse-compositional Gauss-Newton (Baker and Matthews 2004, DOI 10.1023/B:VISI.0000011205.11775.fd)
     from coarse to fine, with Tukey's weights on the grey levels.
@@ -97,32 +97,22 @@ def recover_motion_photometric(
     """
     check_clip(frames, K, T_rig_camera, depth, unusable, route_rotations)
     chosen = settings or PhotometricSettings()
-    prepared: dict[int, list[_Level]] = {}
-
-    def prepare(k: int) -> list[_Level]:
-        if k not in prepared:
-            for old in [i for i in prepared if i < k - 8]:
-                del prepared[old]
-            hidden = None if unusable is None else unusable[k]
-            prepared[k] = _pyramid(frames[k], depth[k], hidden, K, chosen)
-        return prepared[k]
-
-    def place(anchor: int, frame: int, predicted: Floats) -> FrameStep:
-        earlier, later = prepare(anchor), prepare(frame)
-        if anchor > 0:
-            step, _ = _align(earlier[: chosen.track_level + 1], later, predicted, chosen)
-            if not step.failure:
-                return step
-        guesses = [advance_pose(way, T_rig_camera) for way in chosen.search_advances]
-        step, _ = max(
-            (_align(earlier, later, guess, chosen) for guess in guesses), key=lambda found: found[1]
-        )
-        return step
-
-    return integrate_motion("photometric", place_frames(len(frames), place), T_rig_camera, route_rotations)
+    prepared = prepare_on_demand(
+        lambda k: _build_pyramid(frames[k], depth[k], None if unusable is None else unusable[k], K, chosen)
+    )
+    placements = place_frames_by_depth(
+        len(frames),
+        prepared,
+        track=lambda earlier, later, guess: _align_pictures(
+            earlier[: chosen.track_level + 1], later, guess, chosen
+        ),
+        search=lambda earlier, later, guess: _align_pictures(earlier, later, guess, chosen),
+        guesses=[advance_pose(way, T_rig_camera) for way in chosen.search_advances],
+    )
+    return integrate_motion("photometric", placements, T_rig_camera, route_rotations)
 
 
-def _pyramid(
+def _build_pyramid(
     rgb: NDArray[np.uint8],
     depth: NDArray[np.float32],
     hidden: NDArray[np.bool_] | None,
@@ -132,10 +122,7 @@ def _pyramid(
     grey = cv2.GaussianBlur(
         cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32), (0, 0), settings.smoothing
     )
-    seen = np.isfinite(depth) & (depth > 0)
-    if hidden is not None:
-        seen &= ~hidden
-    q = np.divide(1.0, depth, out=np.zeros_like(depth), where=seen)
+    q = invert_depth(depth, hidden)
     levels = []
     for level in range(settings.levels):
         if level and min(grey.shape) < 2 * settings.smallest_side:
@@ -159,63 +146,71 @@ def _informative_pixels(
         np.abs(q[2:, 1:-1] + q[:-2, 1:-1] - 2 * q[1:-1, 1:-1]),
     )
     useful = (gx * gx + gy * gy >= settings.least_gradient**2) & (bend <= settings.depth_kink * q) & (q > 0)
-    useful[::2, ::2] = useful[1::2, 1::2] = False  # neighbours say nearly the same: a chequerboard will do
+    useful[::2, ::2] = useful[1::2, 1::2] = False  # neighbours hold nearly the same: a chequerboard suffices
     y, x = np.nonzero(useful)
     return np.stack([x, y, q[y, x], grey[y, x], gx[y, x], gy[y, x]], axis=-1).astype(np.float32)
 
 
-def _align(
+def _align_pictures(
     earlier: list[_Level], later: list[_Level], T_earlier_later: Floats, settings: PhotometricSettings
-) -> tuple[FrameStep, float]:
-    """Align both ways at once, the later picture to the earlier and back: what resampling does to one
-    picture alone would pull the pose to its side, and so cancels."""
+) -> Attempt:
+    """Align the later picture to the earlier one and the earlier to the later one at once.
+
+    Resampling changes the picture that is resampled, which biases the pose; aligned both ways, the two biases cancel.
+    """
     T, scale = T_earlier_later, 20.0
     for level in range(len(earlier) - 1, -1, -1):
         a, b = earlier[level], later[level]
         fewest = min(len(a.pixels), len(b.pixels))
         if fewest < max(settings.min_pixels >> (2 * level), 12):
-            return failed_step(
+            return _failed_attempt(
                 f"{fewest} pixels with depth and contrast, at least {settings.min_pixels} are needed", 0
-            ), 0.0
+            )
         per_metre = float(np.median(b.pixels[:, 2]))
         for _ in range(settings.iterations):
             onto_a = _normal_equations(b.pixels, a.grey, b.K, T, scale, settings.block >> level)
             onto_b = _normal_equations(a.pixels, b.grey, a.K, invert_pose(T), scale, settings.block >> level)
-            back = -adjoint(T)
+            back = -adjoint_matrix(T)
             H = onto_a[0] + back.T @ onto_b[0] @ back
             gradient = onto_a[1] + onto_b[1] @ back
             sums, histogram = onto_a[2] + onto_b[2], onto_a[3] + onto_b[3]
             try:
                 twist = np.linalg.solve(H, gradient.sum(axis=0))
             except np.linalg.LinAlgError:
-                return failed_step("the picture does not fix the pose", 0), 0.0
+                return _failed_attempt("the picture does not fix the pose", 0)
             if not np.isfinite(twist).all():
-                return failed_step("the alignment diverged", 0), 0.0
+                return _failed_attempt("the alignment diverged", 0)
             T = T @ pose_from_twist(-twist)
-            scale = max(_median(histogram) * 1.4826, settings.noise_floor)
+            scale = max(_histogram_median(histogram) * 1.4826, settings.noise_floor)
             moved = b.K[0, 0] * (np.abs(twist[:3]).max() * per_metre + np.abs(twist[3:]).max())
             if moved < settings.converged:
                 break
-    agreeing, possible, correlation = int(sums[0]), len(a.pixels) + len(b.pixels), _correlation(sums)
+    agreeing, possible = int(sums[0]), len(a.pixels) + len(b.pixels)
+    correlation = _correlation_from_sums(sums)
     if agreeing < max(settings.min_pixels, settings.min_inlier_share * possible):
-        return failed_step(f"{agreeing} of {possible} pixels agree on a pose", agreeing), 0.0
+        return _failed_attempt(f"{agreeing} of {possible} pixels agree on a pose", agreeing)
     if correlation < settings.min_correlation:
-        return failed_step(f"the aligned pictures correlate by {correlation:.2f} only", agreeing), 0.0
-    # errors are alike within a block, so blocks, not pixels, are the independent witnesses
+        return _failed_attempt(f"the aligned pictures correlate by {correlation:.2f} only", agreeing)
+    # errors are correlated within a block, so the blocks count as independent, not the pixels
     spread = np.linalg.inv(H) @ (gradient.T @ gradient) @ np.linalg.inv(H)
-    carry = adjoint(T)
-    return FrameStep(T_earlier_later=T, covariance=carry @ spread @ carry.T, inliers=agreeing), correlation
+    carry = adjoint_matrix(T)
+    step = FrameStep(T_earlier_later=T, covariance=carry @ spread @ carry.T, inliers=agreeing)
+    return Attempt(step=step, quality=correlation)
+
+
+def _failed_attempt(reason: str, agreeing: int) -> Attempt:
+    return Attempt(step=failed_step(reason, agreeing), quality=0.0)
 
 
 BINS_PER_GREY_LEVEL = 4
 
 
-def _median(histogram: NDArray[np.int64]) -> float:
+def _histogram_median(histogram: NDArray[np.int64]) -> float:
     half = np.searchsorted(np.cumsum(histogram), max(histogram.sum(), 1) / 2)
     return (float(half) + 0.5) / BINS_PER_GREY_LEVEL
 
 
-def _correlation(sums: Floats) -> float:
+def _correlation_from_sums(sums: Floats) -> float:
     n, a, b, aa, bb, ab = sums
     if n == 0:
         return 0.0
@@ -226,7 +221,7 @@ def _correlation(sums: Floats) -> float:
 def _normal_equations(
     pixels: NDArray[np.float32], source: NDArray[np.float32], K: Floats, T: Floats, scale: float, block: int
 ) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
-    return _accumulate(
+    return _accumulate_normal_equations(
         pixels,
         source,
         K @ T[:3, :3] @ np.linalg.inv(K),
@@ -238,7 +233,7 @@ def _normal_equations(
 
 
 @numba.njit(cache=True, nogil=True)
-def _accumulate(pixels, source, warp, shift, intrinsics, scale, block):  # type: ignore[no-untyped-def]
+def _accumulate_normal_equations(pixels, source, warp, shift, intrinsics, scale, block):  # type: ignore[no-untyped-def]
     """Weighted JTJ [6, 6], weighted JTr of each block [B, 6], sums for the correlation of the inliers
     (n, a, b, aa, bb, ab) and a histogram of the absolute residuals [1]."""
     fx, fy, cx, cy = intrinsics

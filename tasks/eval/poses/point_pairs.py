@@ -1,4 +1,4 @@
-"""Points seen in two frames without depth: the corners of each, tracked into the other."""
+"""Points seen in two frames without depth: the corners of each frame, tracked into the other."""
 
 from dataclasses import dataclass
 
@@ -36,9 +36,9 @@ def track_pairs(
     earlier: Picture, later: Picture, inverse_depth: NDArray[np.float32], predicted: Floats, K: Floats,
     window: int, levels: int, forward_backward: float,
 ) -> PointPairs:  # fmt: skip
-    """Follow the corners of both frames, each into a view of the other picture from its own place.
+    """Track the corners of both frames, each into the other picture warped to its own camera.
 
-    A street looks alike from one frame to the next, so the earlier frame's depth serves for both views.
+    The depth hardly changes from one frame to the next, so the earlier frame's depth serves for both views.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rigid motions in the small: twists, poses and how a pixel moves with them."""
+"""Rigid motions: twists, poses and their effect on pixels."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ Floats = NDArray[np.float64]
 
 
 def pose_from_twist(twist: Floats) -> Floats:
-    """Exponential map of SE(3).
+    """Return the pose of a twist: the exponential map of SE(3).
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def pose_from_twist(twist: Floats) -> Floats:
     """
     rho, phi = twist[:3], twist[3:]
     angle = float(np.sqrt(phi @ phi))
-    W = skew(phi)
+    W = skew_matrix(phi)
     # below 1e-4 rad the next term of each series is under double precision
     if angle < 1e-4:
         a, b, c = 1.0 - angle**2 / 6, 0.5 - angle**2 / 24, 1 / 6 - angle**2 / 120
@@ -35,14 +35,14 @@ def pose_from_twist(twist: Floats) -> Floats:
     return pose
 
 
-def skew(vector: Floats) -> Floats:
-    """Cross-product matrix [3, 3] of a 3-vector, in the vector's unit."""
+def skew_matrix(vector: Floats) -> Floats:
+    """Return the cross-product matrix [3, 3] of a 3-vector, in the vector's unit."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def invert_pose(pose: Floats) -> Floats:
-    """Inverse of a rigid pose [..., 4, 4]; NaN stays NaN."""
+    """Return the inverse of a rigid pose [..., 4, 4]; NaN stays NaN."""
     rotation = np.swapaxes(pose[..., :3, :3], -1, -2)
     inverse = pose.copy()
     inverse[..., :3, :3] = rotation
@@ -51,34 +51,34 @@ def invert_pose(pose: Floats) -> Floats:
 
 
 def advance_pose(way: float, T_rig_camera: Floats) -> Floats:
-    """``T_earlier_later`` [4, 4] of a camera on a mount [m] whose rig goes `way` straight ahead [m]."""
+    """Return ``T_earlier_later`` [4, 4] of a camera on a mount [m] whose rig goes `way` straight ahead [m]."""
     ahead = np.eye(4)
     ahead[0, 3] = way
     return invert_pose(T_rig_camera) @ ahead @ T_rig_camera
 
 
-def adjoint(pose: Floats) -> Floats:
-    """[6, 6] matrix that takes twists written in frame b to frame a, for ``pose = T_a_b``."""
+def adjoint_matrix(pose: Floats) -> Floats:
+    """Return the [6, 6] matrix that takes twists in frame b to frame a, for ``pose = T_a_b``."""
     rotation = pose[:3, :3]
     matrix = np.zeros((6, 6))
     matrix[:3, :3] = matrix[3:, 3:] = rotation
-    matrix[:3, 3:] = skew(pose[:3, 3]) @ rotation
+    matrix[:3, 3:] = skew_matrix(pose[:3, 3]) @ rotation
     return matrix
 
 
 def viewing_rays(pixels: NDArray[np.number[Any]], K: Floats) -> Floats:
-    """Directions [N, 3] with z = 1 in the camera frame [1], through pixels [N, 2] [px]."""
+    """Return directions [N, 3] with z = 1 in the camera frame [1], through pixels [N, 2] [px]."""
     return np.column_stack([pixels.astype(np.float64), np.ones(len(pixels))]) @ np.linalg.inv(K).T
 
 
-def project(points: Floats, K: Floats) -> Floats:
-    """Pixels [N, 2] [px] of camera-frame points [N, 3] [m]."""
+def project_points(points: Floats, K: Floats) -> Floats:
+    """Return pixels [N, 2] [px] of camera-frame points [N, 3] [m]."""
     homogeneous = points @ K.T
     return homogeneous[:, :2] / homogeneous[:, 2:]
 
 
 def projection_jacobian(points: Floats, K: Floats) -> Floats:
-    """How pixels move when the camera frame's points are moved by a small left twist.
+    """Return the derivative of pixels with respect to a small left twist of the camera frame's points.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Pictures of a camera with a lens as a pinhole would see them: the judges' own, by OpenCV."""
+"""Undistortion of pictures to a pinhole, by OpenCV: the judges' own code."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,22 +14,22 @@ COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3")
 """Of Brown and Conrady, in the order in which OpenCV takes them."""
 
 
-def undistorted(
+def undistort_frames(
     buffers: Mapping[str, NDArray[Any]], K: Floats, distortion: Floats | None
 ) -> dict[str, NDArray[Any]]:
-    """Frames resampled to the pinhole of the same intrinsics and size.
+    """Resample frames to the pinhole of the same intrinsics and size.
 
     Parameters
     ----------
     buffers : ``rgb`` uint8 [F, H, W, 3], ``depth`` float32 [F, H, W] camera z [m] and ``class`` uint8 [F, H, W], any
-        of them. z stays z: a lens bends where a ray lands, not what it meets
+        of them. z is not changed: a lens changes the place of a ray in the picture, not the point that it meets
     K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
     distortion : float64 [5] `COEFFICIENTS` [1]; None for a pinhole
 
     Returns
     -------
     The same arrays for a pinhole; else colours bilinear, inverse depth bilinear (exact on planes), the class of the
-    nearest pixel. What the lens did not let in has no depth and class 0.
+    nearest pixel. Pixels outside the lens's picture have no depth and class 0.
     """
     if distortion is None:
         return dict(buffers)
@@ -42,7 +42,7 @@ def undistorted(
                 cv2.remap(f, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for f in frames
             ]
         elif name == "depth":
-            pictures = [_depth(f, across, down) for f in frames]
+            pictures = [_undistort_depth(f, across, down) for f in frames]
         elif name == "class":
             pictures = [cv2.remap(f, across, down, cv2.INTER_NEAREST) for f in frames]
         else:
@@ -51,7 +51,7 @@ def undistorted(
     return seen
 
 
-def _depth(
+def _undistort_depth(
     depth: NDArray[np.generic], across: NDArray[np.float32], down: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     there = np.isfinite(depth)

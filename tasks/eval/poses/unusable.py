@@ -1,4 +1,4 @@
-"""Pixels whose picture does not stand where their depth says."""
+"""Pixels whose image does not move as their depth says."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,8 +7,10 @@ from tasks.conventions import ROAD_CLASSES, SemanticClass
 
 
 def unusable_pixels(class_id: NDArray[np.uint8], film_depth_mm: float) -> NDArray[np.bool_]:
-    """The sky, which has no depth; crowns of trees, into which one sees, so that they have no single depth; and a
-    wet road, which mirrors the street: its image moves as the mirrored thing does, not as the road.
+    """Return the pixels that no check may read.
+
+    They are the sky, which has no depth; crowns of trees, which are partly transparent and have no single depth; and a
+    wet road, which mirrors the street, so that its image moves as the mirrored object does.
 
     Parameters
     ----------
@@ -24,9 +26,9 @@ def unusable_pixels(class_id: NDArray[np.uint8], film_depth_mm: float) -> NDArra
 
 
 def glossy_pixels(class_id: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Vehicles, whose paint and panes mirror the street in soft gradients, and which may move.
+    """Return the pixels of vehicles, whose paint and panes mirror the street in soft gradients, and which may move.
 
-    A check by every grey level reads such gradients as motion. A corner is sharp, and so of the body itself.
+    A check by every grey level takes such gradients for motion. Sharp corners belong to the body itself.
 
     Parameters
     ----------

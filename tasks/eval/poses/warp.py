@@ -1,7 +1,7 @@
-"""One picture seen from where another was taken, by a guess of depth and motion.
+"""One picture as seen from the camera of another, by a guess of depth and motion.
 
-Tracking between a picture and such a view meets small shifts and patches of one shape. What the guess
-gets wrong becomes shift that the tracker measures: it costs precision, never truth.
+Between a picture and such a view the tracker meets small shifts and patches of equal shape. An error of the guess
+becomes a shift that the tracker measures: it costs precision and causes no bias.
 """
 
 import cv2
@@ -12,7 +12,7 @@ from tasks.eval.poses.rigid import Floats
 
 
 def warp_map(inverse_depth: NDArray[np.float32], T_source_view: Floats, K: Floats) -> NDArray[np.float32]:
-    """Where in the source each pixel of the view lies.
+    """Return the place in the source of each pixel of the view.
 
     Parameters
     ----------
@@ -22,8 +22,8 @@ def warp_map(inverse_depth: NDArray[np.float32], T_source_view: Floats, K: Float
 
     Returns
     -------
-    float32 [H, W, 2] x, y in whole 1/32 px: `cv2.remap` samples no finer, and a map that claimed to
-    would make every smaller shift read as none [px]
+    float32 [H, W, 2] x, y in whole 1/32 px: `cv2.remap` samples no finer, and with a finer map every smaller shift
+    would be measured as 0 [px]
     """
     M = (K @ T_source_view[:3, :3] @ np.linalg.inv(K)).astype(np.float32)
     shift = (K @ T_source_view[:3, 3]).astype(np.float32)
@@ -35,14 +35,14 @@ def warp_map(inverse_depth: NDArray[np.float32], T_source_view: Floats, K: Float
 
 
 def view_from(source: NDArray[np.uint8], where: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """The source [H, W] sampled at a warp map [H, W, 2] [px], edges held [1]."""
+    """Return the source [H, W] sampled at a warp map [H, W, 2] [px], edges held [1]."""
     return cv2.remap(source, where, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
 
 
 def bilinear_taps(
     at: NDArray[np.float32], shape: tuple[int, ...]
 ) -> tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Floats, NDArray[np.bool_]]:
-    """Pixels and weights of bilinear sampling.
+    """Return pixels and weights of bilinear sampling.
 
     Parameters
     ----------

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.surface.road_profile import RoadHazard
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
 
@@ -25,7 +26,7 @@ class CalibrationCase:
     ----------
     name : of the case
     kind : flat, hump or depression
-    family : tyre family: dry, rain or snow
+    family : name of the kind of weather
     surface_friction : mu_c [1]
     controls : initial speed and brake
     hazard : road feature
@@ -85,9 +86,8 @@ def driven(vehicle: Vehicle, case: CalibrationCase, mode: Mode, margin_s: float)
     margin_s : time past the last sample [s]
     """
     duration = float(np.ceil((case.time[-1] + margin_s) * 1000) / 1000)
-    return rollout(
-        vehicle, case.family, case.surface_friction, case.controls, case.hazard, mode=mode, duration_s=duration
-    )  # fmt: skip
+    surface = SurfaceState(kind=case.family, friction=case.surface_friction)
+    return rollout(vehicle, surface, case.controls, case.hazard, mode=mode, duration_s=duration)
 
 
 def residuals(

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.campaign.planned_runs import EXPERIMENTS, planned_run
+from tasks.campaign.planned_runs import EXPERIMENTS, make_planned_run
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import run_evidence
 from tasks.identification.inference.fit import Fit
@@ -48,7 +48,7 @@ def next_experiment(
     for plan, drive in EXPERIMENTS:
         theta, slots = compose(first.parts, first.values, first.session)
         other, other_slots = compose(second.parts, second.values, second.session)
-        model = run_model(planned_run(drive, plan), vehicle, surface)
+        model = run_model(make_planned_run(drive, plan), vehicle, surface)
         ridden = predict(model, theta, slots=slots)
         # planned again with the speed it will have, so that the run ends where the car is slow
         model = run_model(replace(model.run, response=ridden), vehicle, surface)

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from tasks.campaign.campaign import CHANNELS, Run
-from tasks.campaign.gauge import at_rest
-from tasks.surface.friction import surface_friction
+from tasks.campaign.gauge import zero_pressure_at_rest
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
-from tasks.surface.state import SurfaceParameters, Weather, surface_state
+from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, named_values
@@ -62,7 +62,7 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     surface : pavement of the surface mapping
     """
     weather = Weather(
-        kind=run.weather,  # type: ignore[arg-type]
+        kind=run.weather,
         precipitation_mm_h=run.precipitation_mm_h,
         snow_accumulation_h=run.snow_accumulation_h,
     )
@@ -77,9 +77,9 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
     pressed = np.flatnonzero(run.pressure > 0.1)
     lead = min(100, int(pressed[0])) if pressed.size else 100
     return RunModel(
-        run=replace(run, pressure=at_rest(run.pressure)),
+        run=replace(run, pressure=zero_pressure_at_rest(run.pressure)),
         vehicle=vehicle,
-        surface_friction=surface_friction(weather, state, surface),
+        surface_friction=state.friction,
         conditions=Conditions(
             hazard=hazard, snow_depth_mm=state.snow_depth_mm, direction=run.direction, disc_rise=run.disc_rise
         ),

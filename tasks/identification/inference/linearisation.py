@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from tasks.campaign.campaign import Campaign, Tolerances
-from tasks.campaign.gauge import braking_pressure
+from tasks.campaign.gauge import denoise_pressure
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance, prior_precision
 from tasks.identification.inference.evidence import RunEvidence, run_evidence, with_disturbance
@@ -44,7 +44,7 @@ def prepare_evidence(
     rho, sigma = channel_noise(campaign)
     plain = np.zeros(len(EFFECT_TABLE))
     guess = Disturbance()
-    runs = [replace(run, pressure=braking_pressure(run.pressure)) for run in campaign.runs]
+    runs = [replace(run, pressure=denoise_pressure(run.pressure)) for run in campaign.runs]
     models = [run_model(run, vehicle, surface) for run in runs]
     used: list[str] = []
 

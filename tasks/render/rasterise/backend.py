@@ -1,4 +1,4 @@
-"""Which rasteriser draws: the CPU's own, or gsplat where a GPU is proven to give the same picture."""
+"""Choice of the rasteriser: this project's on the CPU, or gsplat where its picture on a GPU agrees with the CPU's."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,12 +19,12 @@ PROBE_TOLERANCE = 0.01
 """Largest difference in colour, opacity, normal or relative depth of two equal pictures of the probe [1]."""
 
 _GPU_DEVICES = (Path("/dev/nvidia0"), Path("/dev/dxg"))
-"""Exist where a CUDA driver is loaded: Linux, and Linux under Windows. Looking for them is the one glance
-at the file system in this package; asking torch instead costs more than a second."""
+"""Exist where a CUDA driver is loaded: Linux, and Linux under Windows. This is the only access to the file
+system in this package; asking torch instead takes more than a second."""
 
 
 class Backend(Protocol):
-    """A rasteriser: `prepare` a cloud once, then `rasterise` any number of views of it."""
+    """A rasteriser: prepare a cloud once, then rasterise any number of views of it."""
 
     @property
     def name(self) -> str:
@@ -43,12 +43,12 @@ class CpuBackend:
     """`tasks.render.rasterise.rasteriser` as a `Backend`."""
 
     name = "cpu"
-    prepare = staticmethod(rasteriser.prepare)
+    prepare = staticmethod(rasteriser.prepare_gaussians)
     rasterise = staticmethod(rasteriser.rasterise)
 
 
 def select_backend(name: str = "auto") -> Backend:
-    """The rasteriser to draw with.
+    """Return the rasteriser to draw with.
 
     ``"auto"`` takes gsplat if a GPU is there and gsplat draws the probe scene as the CPU does, and the
     CPU in every other case. torch is imported only if a GPU is there or gsplat is asked for.
@@ -70,13 +70,12 @@ def select_backend(name: str = "auto") -> Backend:
         raise InputError(f"backend: must be one of {', '.join(get_args(BackendName))}; it is {name!r}")
     if name == "cpu" or (name == "auto" and not any(device.exists() for device in _GPU_DEVICES)):
         return CpuBackend()
-    # Whatever goes wrong on the way to a GPU picture (no package, no compiler, no driver, no memory) is a
-    # reason to draw on the CPU, not to fail.
+    # Any error on the GPU (no package, no compiler, no driver, no memory) is a reason to draw on the CPU, not to fail.
     try:
         from tasks.render.rasterise.gsplat_backend import GsplatBackend
 
         gsplat: Backend = GsplatBackend()
-        problem = probe(gsplat)
+        problem = compare_with_cpu(gsplat)
     except Exception as error:
         problem = f"{type(error).__name__}: {error}"
     if not problem:
@@ -86,7 +85,7 @@ def select_backend(name: str = "auto") -> Backend:
     return CpuBackend()
 
 
-def probe(backend: Backend) -> str:
+def compare_with_cpu(backend: Backend) -> str:
     """Draw a small scene with this backend and with the CPU, and compare.
 
     Parameters
@@ -95,21 +94,21 @@ def probe(backend: Backend) -> str:
 
     Returns
     -------
-    What differs by more than `PROBE_TOLERANCE`; empty if nothing does
+    Sentence with the difference above `PROBE_TOLERANCE`; empty if there is none
     """
     gaussians, viewmat, K = probe_scene()
     covered = np.tile(np.array([2.0, 1.0], np.float32), (len(gaussians), 1))
-    return _difference(backend, gaussians, viewmat, K) or _difference(
+    return _describe_difference(backend, gaussians, viewmat, K) or _describe_difference(
         backend, replace(gaussians, antialiased=True, surroundings=covered), viewmat, K
     )
 
 
-def _difference(
+def _describe_difference(
     backend: Backend, gaussians: Gaussians, viewmat: NDArray[np.float64], K: NDArray[np.float64]
 ) -> str:
     width, height = 64, 48
     drawn = backend.rasterise(backend.prepare(gaussians), viewmat, K, width, height)
-    wanted = rasteriser.rasterise(rasteriser.prepare(gaussians), viewmat, K, width, height)
+    wanted = rasteriser.rasterise(rasteriser.prepare_gaussians(gaussians), viewmat, K, width, height)
     differences = {
         "rgb": drawn.rgb - wanted.rgb,
         "alpha": drawn.alpha - wanted.alpha,
@@ -125,7 +124,7 @@ def _difference(
 
 
 def probe_scene() -> tuple[Gaussians, NDArray[np.float64], NDArray[np.float64]]:
-    """A spiral of 200 Gaussians in front of a camera: ``gaussians, viewmat, K``."""
+    """Return a spiral of 200 Gaussians in front of a camera: ``gaussians, viewmat, K``."""
     n = 200
     i = np.arange(n, dtype=np.float64)
     means = np.column_stack((np.cos(i) * i / n * 2.5, np.sin(i) * i / n * 2.5, 3 + 4 * ((i * 0.618) % 1)))

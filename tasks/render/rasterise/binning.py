@@ -1,4 +1,4 @@
-"""Which splats touch which tile of the picture, nearest first."""
+"""Lists of the splats that touch each tile of the picture, nearest first."""
 
 import numba
 import numpy as np
@@ -26,11 +26,11 @@ _ZERO, _HALF, _ONE, _LOG_CUT = (np.float32(c) for c in (0, 0.5, 1, LOG_CUT))
 def tile_lists(
     records: NDArray[np.float32], width: int, height: int
 ) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Splats of every tile, nearest first; equal depths keep the order of the records.
+    """Return the splats of every tile, nearest first; equal depths keep the order of the records.
 
     Parameters
     ----------
-    records : float32 [V, 16] splat records of `tasks.render.rasterise.projection.project`
+    records : float32 [V, 16] splat records of `tasks.render.rasterise.projection.project_gaussians`
     width, height : picture size [px]
 
     Returns
@@ -47,7 +47,7 @@ def tile_lists(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def depth_order(keys: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Places of the keys in ascending order, equal keys in their order: a radix sort from the last digit.
+    """Return the places of the keys in ascending order: a stable radix sort from the last digit.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def depth_order(keys: NDArray[np.uint32]) -> NDArray[np.uint32]:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def touched_tiles(records, width, height):  # type: ignore[no-untyped-def]
-    """Tiles that each splat's ellipse touches.
+    """Return the tiles that each splat's ellipse touches.
 
     Within a row of tiles an ellipse reaches furthest right at its own rightmost point, moved into the row.
 

@@ -43,7 +43,7 @@ _BATCH = 64
 PIXELS = TILE_WIDTH * TILE_HEIGHT
 """Pixels of one tile [px]."""
 # Planes of a tile's state; the first is the transmittance in front of the next splat. One cache line more
-# than a power of two, lest they evict one another.
+# than a power of two, so that they do not evict one another.
 # Offsets are unsigned: a signed index may be negative, and the compiler would gather pixel by pixel.
 _PLANE = PIXELS + 16
 _FRONT, _ALPHA, _DEPTH, _RED, _GREEN, _BLUE, _NX, _NY, _NZ = (np.uint64(k * _PLANE) for k in range(1, 10))
@@ -65,19 +65,41 @@ _E1, _E2, _E3, _E4 = (
 _SIXTEENTH = np.float32(1 / 16)
 
 
+class Buffers(NamedTuple):
+    """The arrays of a `GBuffer`, as the kernel fills them."""
+
+    rgb: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    expected_depth: NDArray[np.float32]
+    alpha: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    class_id: NDArray[np.uint8]
+
+
 class _Strips(NamedTuple):
-    """Strips to blend: place of the splat in the tile's list, first pixel within the tile, where the splat's
-    middle crosses the row from that pixel [px], and the logarithm of its opacity there."""
+    """The strips of one batch of splats, and the scratch space to list them.
+
+    Parameters
+    ----------
+    entry : place of the splat in the tile's list
+    pixel : first pixel of the strip within the tile
+    middle : where the splat's middle crosses the row, from that pixel [px]
+    log_alpha : logarithm of the splat's opacity there
+    rows : first and last row of each splat of the batch
+    is_open : rows of the tile where light still passes
+    """
 
     entry: NDArray[np.int64]
     pixel: NDArray[np.int64]
     middle: NDArray[np.float32]
     log_alpha: NDArray[np.float32]
+    rows: NDArray[np.int64]
+    is_open: NDArray[np.bool_]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def absorb(p, before):  # type: ignore[no-untyped-def]
-    """Blend weight of a splat with logarithmic opacity p, and the transmittance behind it.
+def absorb_light(p, before):  # type: ignore[no-untyped-def]
+    """Return the blend weight of a splat with logarithmic opacity p, and the transmittance behind it.
 
     Once a pixel's transmittance is down at the stop it stays there, so no splat behind gets a weight.
     """
@@ -95,7 +117,7 @@ def absorb(p, before):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _open_tile(s, rows, columns):  # type: ignore[no-untyped-def]
-    """Fresh state: full transmittance inside the picture, none in what the tile has beyond it."""
+    """Reset the state: transmittance 1 inside the picture, 0 in the part of the tile beyond it."""
     s[:] = _ZERO
     for y in range(rows):
         for x in range(columns):
@@ -104,7 +126,7 @@ def _open_tile(s, rows, columns):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _find_open_rows(s, is_open):  # type: ignore[no-untyped-def]
-    """Mark the rows where light still passes; returns how many pixels let it."""
+    """Mark the rows where light still passes; return the number of pixels where it does."""
     total = 0
     for y in range(TILE_HEIGHT):
         count = 0
@@ -123,14 +145,17 @@ def _new_strips():  # type: ignore[no-untyped-def]
         np.empty(size, np.int64),
         np.empty(size, np.float32),
         np.empty(size, np.float32),
+        np.empty((_BATCH, 2), np.int64),
+        np.empty(TILE_HEIGHT, np.bool_),
     )
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, strips):  # type: ignore[no-untyped-def]
+def _list_strips(records, splats, start, end, x_tile, y_tile, strips):  # type: ignore[no-untyped-def]
     """List the open strips that the splats ``splats[start:end]`` reach, nearest splat first."""
     x_first, y_first = np.float32(x_tile) + _HALF, np.float32(y_tile) + _HALF
-    # A loop of its own, so that the cache misses of a whole batch overlap.
+    rows, is_open = strips.rows, strips.is_open
+    # A separate loop, so that the cache misses of a whole batch overlap.
     for i in range(end - start):
         splat = np.uint64(splats[start + i])
         y0, half_height = records[splat, Y] - y_first, records[splat, HALF_HEIGHT]
@@ -173,7 +198,7 @@ def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untype
             l = first + np.uint64(x)
             dx = np.float32(x) - middle
             before = s[l]
-            w, after = absorb(log_alpha - falloff * dx * dx, before)
+            w, after = absorb_light(log_alpha - falloff * dx * dx, before)
             s[l] = after
             s[_FRONT + l] += number if (before >= _HALF) & (after < _HALF) else _ZERO
             s[_ALPHA + l] += w
@@ -188,7 +213,7 @@ def _blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untype
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _plane_depth(record, rays, u, v):  # type: ignore[no-untyped-def]
-    """Camera z of a splat's plane at picture point (u, v); of its centre where the plane is nearly edge-on."""
+    """Return camera z of a splat's plane at picture point (u, v); of its centre if the plane is nearly edge-on."""
     slant = (
         record[NORMAL_X] * (rays[0, 0] * u + rays[1, 0] * v + rays[2, 0])
         + record[NORMAL_Y] * (rays[0, 1] * u + rays[1, 1] * v + rays[2, 1])
@@ -199,7 +224,7 @@ def _plane_depth(record, rays, u, v):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def blend(records, rays, starts, splats, rgb, depth, expected_depth, alpha, normal, class_id):  # type: ignore[no-untyped-def]
+def blend_tiles(records, rays, starts, splats, buffers):  # type: ignore[no-untyped-def]
     """Blend every tile and write the finished buffers of `GBuffer`.
 
     Parameters
@@ -207,20 +232,21 @@ def blend(records, rays, starts, splats, rgb, depth, expected_depth, alpha, norm
     records : float32 [V, 16] splat records
     rays : float32 [3, 3] world directions of the picture, see `View.rays` [1]
     starts, splats : tile lists, see `tasks.render.rasterise.binning.bin_splats`
-    rgb, depth, expected_depth, alpha, normal, class_id : the buffers, overwritten
+    buffers : overwritten
     """
+    rgb, depth, expected_depth, alpha, normal, class_id = buffers
     height, width = alpha.shape
     across = -(-width // TILE_WIDTH)
     s = np.empty(_STATE, dtype=np.float32)
-    is_open, rows, strips = np.empty(TILE_HEIGHT, np.bool_), np.empty((_BATCH, 2), np.int64), _new_strips()
+    strips = _new_strips()
     for tile in range(len(starts) - 1):
         x_tile, y_tile = (tile % across) * TILE_WIDTH, (tile // across) * TILE_HEIGHT
         row_count, column_count = min(TILE_HEIGHT, height - y_tile), min(TILE_WIDTH, width - x_tile)
         _open_tile(s, row_count, column_count)
         start, last = starts[tile], starts[tile + 1]
-        while start < last and _find_open_rows(s, is_open) > 0:
+        while start < last and _find_open_rows(s, strips.is_open) > 0:
             end = min(start + _BATCH, last)
-            listed = _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, strips)
+            listed = _list_strips(records, splats, start, end, x_tile, y_tile, strips)
             _blend_strips(s, records, splats, listed, strips)
             start = end
         for y in range(row_count):
@@ -258,7 +284,7 @@ def blend_transposed(records, starts, splats, residual, sums):  # type: ignore[n
     across = -(-width // TILE_WIDTH)
     s = np.empty((1 + channels) * _PLANE, dtype=np.float32)
     weights = np.empty(TILE_WIDTH, dtype=np.float32)
-    is_open, rows, strips = np.empty(TILE_HEIGHT, np.bool_), np.empty((_BATCH, 2), np.int64), _new_strips()
+    strips = _new_strips()
     for tile in range(len(starts) - 1):
         x_tile, y_tile = (tile % across) * TILE_WIDTH, (tile // across) * TILE_HEIGHT
         row_count, column_count = min(TILE_HEIGHT, height - y_tile), min(TILE_WIDTH, width - x_tile)
@@ -268,9 +294,9 @@ def blend_transposed(records, starts, splats, residual, sums):  # type: ignore[n
                 for x in range(column_count):
                     s[(1 + c) * _PLANE + y * TILE_WIDTH + x] = residual[y_tile + y, x_tile + x, c]
         start, last = starts[tile], starts[tile + 1]
-        while start < last and _find_open_rows(s, is_open) > 0:
+        while start < last and _find_open_rows(s, strips.is_open) > 0:
             end = min(start + _BATCH, last)
-            listed = _list_strips(records, splats, start, end, x_tile, y_tile, is_open, rows, strips)
+            listed = _list_strips(records, splats, start, end, x_tile, y_tile, strips)
             _gather_strips(s, records, splats, listed, strips, weights, sums)
             start = end
 
@@ -283,7 +309,7 @@ def _gather_strips(s, records, splats, listed, strips, weights, sums):  # type: 
         for x in range(TILE_WIDTH):
             l = first + np.uint64(x)
             dx = np.float32(x) - middle
-            weights[x], s[l] = absorb(log_alpha - falloff * dx * dx, s[l])
+            weights[x], s[l] = absorb_light(log_alpha - falloff * dx * dx, s[l])
         for c in range(sums.shape[1]):
             plane = np.uint64((1 + c) * _PLANE) + first
             # Four running sums, which do not wait for one another.

@@ -1,4 +1,4 @@
-"""What one rasterisation returns."""
+"""The result of one rasterisation."""
 
 from dataclasses import dataclass
 

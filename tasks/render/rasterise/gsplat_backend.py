@@ -1,8 +1,8 @@
 """The same views drawn by gsplat 1.5 (Apache-2.0) on a CUDA device.
 
 gsplat compiles its kernels with nvcc at first use. It blends colours that are evaluated before, here
-three of light and three of the normal, and expected depth; class and surface depth are found from the
-list of (Gaussian, pixel) pairs that it can return.
+three of light and three of the normal, and expected depth. Class and surface depth are computed from the
+list of (Gaussian, pixel) pairs that it returns.
 """
 
 from dataclasses import dataclass
@@ -63,14 +63,14 @@ class GsplatBackend:
         """
         check_gaussians(gaussians)
         return DeviceGaussians(
-            means=self._tensor(gaussians.means),
-            quats=self._tensor(gaussians.quats_wxyz),
-            scales=self._tensor(gaussians.scales),
-            opacities=self._tensor(gaussians.opacities),
-            sh=self._tensor(gaussians.sh),
-            normals=self._tensor(gaussians.normals),
-            class_id=self._tensor(gaussians.class_id),
-            surroundings=None if gaussians.surroundings is None else self._tensor(gaussians.surroundings),
+            means=self._to_tensor(gaussians.means),
+            quats=self._to_tensor(gaussians.quats_wxyz),
+            scales=self._to_tensor(gaussians.scales),
+            opacities=self._to_tensor(gaussians.opacities),
+            sh=self._to_tensor(gaussians.sh),
+            normals=self._to_tensor(gaussians.normals),
+            class_id=self._to_tensor(gaussians.class_id),
+            surroundings=None if gaussians.surroundings is None else self._to_tensor(gaussians.surroundings),
             antialiased=gaussians.antialiased,
         )
 
@@ -85,7 +85,7 @@ class GsplatBackend:
     ) -> GBuffer:
         """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise`."""
         view = view_of(viewmat, K, width, height)
-        direction = prepared.means - self._tensor(view.eye.astype(np.float32))
+        direction = prepared.means - self._to_tensor(view.eye.astype(np.float32))
         degree = int(prepared.sh.shape[1] ** 0.5) - 1
         colours = (gsplat.spherical_harmonics(degree, direction, prepared.sh) + 0.5).clamp_min(0)
         away = (prepared.normals * direction).sum(dim=1, keepdim=True) > 0
@@ -107,8 +107,8 @@ class GsplatBackend:
             scales=prepared.scales,
             opacities=prepared.opacities,
             colors=torch.cat((colours, facing), dim=1),
-            viewmats=self._tensor(view.viewmat.astype(np.float32))[None],
-            Ks=self._tensor(view.K.astype(np.float32))[None],
+            viewmats=self._to_tensor(view.viewmat.astype(np.float32))[None],
+            Ks=self._to_tensor(view.K.astype(np.float32))[None],
             width=width,
             height=height,
             near_plane=NEAR,
@@ -120,10 +120,10 @@ class GsplatBackend:
         alpha = alpha[0, ..., 0]
         normal = torch.nn.functional.normalize(blended[0, ..., 3:6], dim=-1)
         expected = torch.where(alpha > 0, blended[0, ..., 6], torch.nan)
-        front = self._front(splats, width, height)
+        front = self._find_front(splats, width, height)
         seen, splat = front >= 0, front.clamp_min(0)
         pixels = np.dstack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5, 1.0))
-        rays = self._tensor((pixels @ view.rays).astype(np.float32))
+        rays = self._to_tensor((pixels @ view.rays).astype(np.float32))
         plane = (facing * direction).sum(dim=1)[splat] / (facing[splat] * rays).sum(dim=-1)
         centre = splats["depths"][0, splat]
         tilted = (plane < centre * SURFACE_RATIO) & (centre < plane * SURFACE_RATIO)
@@ -138,8 +138,8 @@ class GsplatBackend:
             class_id=class_id.cpu().numpy(),
         )
 
-    def _front(self, splats: dict[str, Any], width: int, height: int) -> torch.Tensor:
-        """Gaussian at which each pixel's transmittance falls below one half, -1 where none does; [H, W]."""
+    def _find_front(self, splats: dict[str, Any], width: int, height: int) -> torch.Tensor:
+        """Return the Gaussian at which each pixel's transmittance falls below one half, -1 for none; [H, W]."""
         gaussian, pixel, _ = gsplat.rasterize_to_indices_in_range(
             0,
             _EVERY_BATCH,
@@ -163,12 +163,12 @@ class GsplatBackend:
         front[pixel[halves]] = gaussian[halves]
         return front.reshape(height, width)
 
-    def _tensor(self, array: NDArray[Any]) -> torch.Tensor:
+    def _to_tensor(self, array: NDArray[Any]) -> torch.Tensor:
         return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)
 
 
 def first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
-    """Which splats bring their pixel's transmittance from one half or more to less.
+    """Return the splats that bring their pixel's transmittance from one half or more to less.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
     front = behind - opaqueness
     starts = torch.ones_like(pixel, dtype=torch.bool)
     starts[1:] = pixel[1:] != pixel[:-1]
-    # What had gathered before the pixel's own first splat.
+    # The sum before the pixel's own first splat.
     before = front[starts][torch.cumsum(starts, dim=0) - 1]
     half = np.log(2.0)
     return (front - before <= half) & (behind - before > half)

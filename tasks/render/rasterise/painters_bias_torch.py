@@ -1,11 +1,11 @@
-"""Centres moved against the painter's bias, for a rasteriser that is given means and not splats.
+"""Correction of the painter's bias by moved centres, for a rasteriser that takes means instead of splats.
 
 The rules of `tasks.render.rasterise.projection`, on tensors.
 """
 
 import torch
 
-from tasks.render.rasterise.painters_bias import FURTHEST, INTERVALS, LEADS, OVERLAP_SCALE, STEEPEST
+from tasks.render.rasterise.painters_bias import INTERVALS, LARGEST_SHIFT, OVERLAP_SCALE, SHIFTS, STEEPEST
 from tasks.render.rasterise.projection import NEAR
 from tasks.render.rasterise.view import View
 
@@ -21,7 +21,7 @@ def means_nearer(
     view: View,
     low_pass: float,
 ) -> torch.Tensor:
-    """World centres whose projection is where the splats belong; camera z, and so the order, stays but for rounding.
+    """Return world centres that project to the corrected splats; camera z, and so the order, stays but for rounding.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def means_nearer(
 
     Returns
     -------
-    float32 [N, 3]; what is nearer than the near plane or behind it stays where it is [m]
+    float32 [N, 3]; centres nearer than the near plane or behind it are not moved [m]
     """
     R, t = means.new_tensor(view.viewmat[:3, :3]), means.new_tensor(view.viewmat[:3, 3])
     focal = means.new_tensor((view.K[0, 0], view.K[1, 1]))
@@ -41,7 +41,7 @@ def means_nearer(
     z = torch.where(drawn, in_camera[:, 2:], 1.0)
     ray = in_camera[:, :2] / z
     bounded = ray.clamp(limits[:, 0], limits[:, 1])
-    axes = (_rotations(quats_wxyz) * scales[:, None, :]).transpose(1, 2) @ R.T
+    axes = (_rotation_matrices(quats_wxyz) * scales[:, None, :]).transpose(1, 2) @ R.T
     rows = focal / z[:, None] * (axes[..., :2] - bounded[:, None] * axes[..., 2:])
     covariance = rows.transpose(1, 2) @ rows + low_pass * torch.eye(2, device=means.device)
 
@@ -55,28 +55,30 @@ def means_nearer(
     neighbours = (size**2 * (own - pixel) + pixel).clamp_min(_FACING)
     closeness = own.sqrt() / slant.abs().clamp_min(_FACING) * (1 - pixel / own)
     way = (
-        _lead(overlap, (own / neighbours).sqrt(), closeness) / own.sqrt() * torch.where(slant > 0, 1.0, -1.0)
+        _interpolate_shift(overlap, (own / neighbours).sqrt(), closeness)
+        / own.sqrt()
+        * torch.where(slant > 0, 1.0, -1.0)
     )
     shift = torch.cat((way[:, None] * along / focal * z, torch.zeros_like(z)), dim=1) @ R
     return means + torch.where(drawn, shift, 0.0)
 
 
-def _lead(overlap: torch.Tensor, ratio: torch.Tensor, closeness: torch.Tensor) -> torch.Tensor:
-    """`tasks.render.rasterise.painters_bias.lead`."""
+def _interpolate_shift(overlap: torch.Tensor, ratio: torch.Tensor, closeness: torch.Tensor) -> torch.Tensor:
+    """`tasks.render.rasterise.painters_bias.interpolate_shift`."""
     i, j = overlap / (overlap + OVERLAP_SCALE) * INTERVALS, ratio / (ratio + 1) * INTERVALS
     row, column = (place.long().clamp_max(INTERVALS - 1) for place in (i, j))
-    terms = overlap.new_tensor(LEADS)
+    terms = overlap.new_tensor(SHIFTS)
     down, across = i - row, j - column
     total = torch.zeros_like(overlap)
     for di, weight in ((0, 1 - down), (1, down)):
         for dj, share in ((0, 1 - across), (1, across)):
             corner = terms[row + di, column + dj]
             total += weight * share * (corner[:, 0] + closeness.clamp_max(STEEPEST) * corner[:, 1])
-    return total.clamp_max(FURTHEST)
+    return total.clamp_max(LARGEST_SHIFT)
 
 
-def _rotations(quats_wxyz: torch.Tensor) -> torch.Tensor:
-    """Rotation matrices of unit quaternions, [N, 3, 3]."""
+def _rotation_matrices(quats_wxyz: torch.Tensor) -> torch.Tensor:
+    """Return the rotation matrices of unit quaternions, [N, 3, 3]."""
     w, x, y, z = quats_wxyz.T
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),

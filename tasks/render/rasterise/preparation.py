@@ -1,4 +1,4 @@
-"""From a cloud of Gaussians to the packed blocks the rasteriser streams through."""
+"""Preparation of a cloud of Gaussians: the packed blocks that the rasteriser reads."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ OFFSET, AXES, LOG_OPACITY, NORMAL, SURROUNDINGS, SH = 0, 3, 12, 13, 16, 18
 _MORTON_BITS = 21
 _BLOCKS_AT_ONCE = 256
 _NEVER_VISIBLE = -1e30
-"""Logarithmic opacity of what fills up the last block [1]."""
+"""Logarithmic opacity of the padding in the last block [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +34,7 @@ class PreparedGaussians:
     reach : float64 [B] largest standard deviation within the block [m]
     class_id : uint8 [64 B] `SemanticClass`
     order : int64 [N] index in the original cloud of each Gaussian along the curve
-    level : the surroundings are known, and splats are drawn without the painter's bias
+    corrects_bias : the surroundings are known, and splats are drawn without the painter's bias
     antialiased, display_encoded : carried over from `Gaussians`
     """
 
@@ -44,7 +44,7 @@ class PreparedGaussians:
     reach: NDArray[np.float64]
     class_id: NDArray[np.uint8]
     order: NDArray[np.int64]
-    level: bool
+    corrects_bias: bool
     antialiased: bool
     display_encoded: bool
 
@@ -53,7 +53,7 @@ class PreparedGaussians:
 
 
 def rotation_matrices(quats_wxyz: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Rotation matrices of quaternions, which are normalised first.
+    """Return the rotation matrices of quaternions, which are normalised first.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def rotation_matrices(quats_wxyz: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def morton_order(means: NDArray[np.floating]) -> NDArray[np.int64]:
-    """Indices that walk the points along a Morton curve; points in one cell keep their order.
+    """Return the indices that sort the points along a Morton curve; points in one cell keep their order.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _spread_bits(v: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return v
 
 
-def prepare(gaussians: Gaussians) -> PreparedGaussians:
+def prepare_gaussians(gaussians: Gaussians) -> PreparedGaussians:
     """Check, order and pack a cloud once; every view of it is then rasterised from the result.
 
     Parameters
@@ -134,7 +134,7 @@ def prepare(gaussians: Gaussians) -> PreparedGaussians:
     origins, radii, reach = np.empty((block_count, 3)), np.empty(block_count), np.empty(block_count)
     for first in range(0, block_count, _BLOCKS_AT_ONCE):
         part = slice(first, first + _BLOCKS_AT_ONCE)
-        origins[part], radii[part], reach[part] = _pack(gaussians, members[part], blocks[part])
+        origins[part], radii[part], reach[part] = _pack_blocks(gaussians, members[part], blocks[part])
     if n % BLOCK:
         blocks[-1, LOG_OPACITY, n % BLOCK :] = _NEVER_VISIBLE
     return PreparedGaussians(
@@ -144,16 +144,16 @@ def prepare(gaussians: Gaussians) -> PreparedGaussians:
         reach=reach,
         class_id=gaussians.class_id[members].ravel(),
         order=order,
-        level=gaussians.surroundings is not None,
+        corrects_bias=gaussians.surroundings is not None,
         antialiased=gaussians.antialiased,
         display_encoded=gaussians.display_encoded,
     )
 
 
-def _pack(
+def _pack_blocks(
     gaussians: Gaussians, members: NDArray[np.int64], blocks: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Fill the blocks [B, P, 64] with the members [B, 64]; returns their origins, radii and reach."""
+    """Fill the blocks [B, P, 64] with the members [B, 64]; return their origins, radii and reach."""
     count = len(members)
     means = gaussians.means[members].astype(np.float64)
     scales = gaussians.scales[members].astype(np.float64)

@@ -2,8 +2,8 @@
 
 Zwicker et al. 2002 (doi:10.1109/TVCG.2002.1021576) with the rules of gsplat (arXiv:2409.06765): a pixel's
 variance added to the picture covariance, the Jacobian's ray clamped to 1.3 times the field of view, nothing
-below an opacity of 1/255. Clouds made for it (`Gaussians.antialiased`) lose in opacity what they gain in area;
-without that, discs smaller than a pixel grow, the near ones hide the far ones, and a road slides under the car.
+below an opacity of 1/255. Antialiased clouds (`Gaussians.antialiased`) lose as much opacity as they gain area;
+without that, discs smaller than a pixel grow, near ones hide far ones, and the road moves relative to the car.
 A splat is stored so that along a picture row y its opacity is
 
     alpha(x) = exp(log_opacity - row_falloff dy^2 - column_falloff (x - x0 - slope dy)^2),  dy = y - y0,
@@ -11,11 +11,13 @@ A splat is stored so that along a picture row y its opacity is
 a sum of squares, which unlike the usual conic cannot cancel for long thin splats.
 """
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.rasterise.painters_bias import FURTHEST, lead
+from tasks.render.rasterise.painters_bias import LARGEST_SHIFT, interpolate_shift
 from tasks.render.rasterise.preparation import (
     AXES,
     BLOCK,
@@ -55,20 +57,38 @@ _ZERO, _HALF, _ONE, _TWO = (np.float32(c) for c in (0, 0.5, 1, 2))
 _RECORD = SH * BLOCK
 
 
+class _Cloud(NamedTuple):
+    """Arrays and rules of a `PreparedGaussians`, as the kernel takes them."""
+
+    blocks: NDArray[np.float32]
+    class_id: NDArray[np.uint8]
+    antialiased: bool
+    corrects_bias: bool
+
+
+class _Camera(NamedTuple):
+    """A `View` as the kernel takes it: rotation [3, 3], focal lengths, principal point and ray limits [8], and size."""
+
+    rotation: NDArray[np.float32]
+    lens: NDArray[np.float32]
+    width: np.float32
+    height: np.float32
+
+
 def low_pass(antialiased: bool) -> float:
-    """Variance added to both picture axes [px^2]."""
+    """Return the variance added to both picture axes [px^2]."""
     return ANTIALIASED_LOW_PASS if antialiased else CLASSIC_LOW_PASS
 
 
 def visible_blocks(prepared: PreparedGaussians, view: View) -> NDArray[np.int64]:
-    """Blocks of which some Gaussian may touch the picture; never leaves out one that does.
+    """Return the blocks that may touch the picture, among them all that do.
 
     A splat's half width is at most 3.33 sqrt(variance), it is moved by at most 2.5, and its variance is at most
     (f sigma / z)^2 (1 + ray^2) plus the low pass, so "outside one edge" is a half-space of camera coordinates.
     """
     x, y, z = view.to_camera(prepared.origins).T
     keep = z + prepared.radii >= NEAR
-    extent = np.sqrt(-2 * LOG_CUT) + (FURTHEST if prepared.level else 0.0)
+    extent = np.sqrt(-2 * LOG_CUT) + (LARGEST_SHIFT if prepared.corrects_bias else 0.0)
     blur = extent * np.sqrt(low_pass(prepared.antialiased)) + 1.0
     limits = view.ray_limits
     for p, f, c, size, ray in ((x, 0, 0, view.width, limits[:2]), (y, 1, 1, view.height, limits[2:])):
@@ -80,8 +100,10 @@ def visible_blocks(prepared: PreparedGaussians, view: View) -> NDArray[np.int64]
     return np.flatnonzero(keep)
 
 
-def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Splat records of the Gaussians that touch the picture, along the Morton curve.
+def project_gaussians(
+    prepared: PreparedGaussians, view: View
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return the splat records of the Gaussians that touch the picture, along the Morton curve.
 
     Parameters
     ----------
@@ -98,35 +120,22 @@ def project(prepared: PreparedGaussians, view: View) -> tuple[NDArray[np.float32
     lens = np.array(
         (view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2], *view.ray_limits), dtype=np.float32
     )
+    cloud = _Cloud(prepared.blocks, prepared.class_id, prepared.antialiased, prepared.corrects_bias)
+    camera = _Camera(rotation, lens, np.float32(view.width), np.float32(view.height))
     from_eye = prepared.origins[wanted] - view.eye
     room = np.empty((len(wanted) * BLOCK + 1) * RECORD, dtype=np.float32)
     line = -room.ctypes.data // room.itemsize % RECORD
     records = room[line : line + len(wanted) * BLOCK * RECORD].reshape(-1, RECORD)
     slots = np.empty(len(records), dtype=np.int64)
-    count = _project_blocks(
-        prepared.blocks, prepared.class_id, prepared.antialiased, prepared.level, wanted,
-        view.to_camera(prepared.origins[wanted]).astype(np.float32),
-        from_eye.astype(np.float32), rotation, lens, np.float32(view.width), np.float32(view.height), records, slots
-    )  # fmt: skip
+    in_camera = view.to_camera(prepared.origins[wanted]).astype(np.float32)
+    count = _project_blocks(cloud, wanted, in_camera, from_eye.astype(np.float32), camera, records, slots)
     return records[:count], slots[:count]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _project_blocks(  # type: ignore[no-untyped-def]
-    blocks,
-    class_id,
-    antialiased,
-    level,
-    wanted,
-    in_camera,
-    from_eye,
-    rotation,
-    lens,
-    width,
-    height,
-    records,
-    slots,
-):
+def _project_blocks(cloud, wanted, in_camera, from_eye, camera, records, slots):  # type: ignore[no-untyped-def]
+    blocks, class_id, antialiased, corrects_bias = cloud
+    rotation, lens, width, height = camera
     s = np.empty((SH + RECORD) * BLOCK, dtype=np.float32)
     directions, colours = np.empty(3 * BLOCK, dtype=np.float32), s[_RECORD + RED * BLOCK :]
     visible = np.empty(BLOCK, dtype=np.bool_)
@@ -137,7 +146,7 @@ def _project_blocks(  # type: ignore[no-untyped-def]
             for l in range(BLOCK):
                 s[plane * BLOCK + l] = block[plane, l]
         _project_lanes(s, antialiased, in_camera[i], rotation, lens, visible)
-        if level:
+        if corrects_bias:
             _move_nearer(s, antialiased, rotation, lens)
         if not _find_visible(s, width, height, visible):
             continue
@@ -156,7 +165,7 @@ def _project_blocks(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _project_lanes(s, antialiased, origin, rotation, lens, drawable):  # type: ignore[no-untyped-def]
-    """Records but for planes and colours; whether the Gaussian is in front and single precision can hold its splat."""
+    """Fill the records but for planes and colours; mark the Gaussians in front whose splats single precision holds."""
     r00, r01, r02 = rotation[0]
     r10, r11, r12 = rotation[1]
     r20, r21, r22 = rotation[2]
@@ -211,7 +220,7 @@ def _project_lanes(s, antialiased, origin, rotation, lens, drawable):  # type: i
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def]
-    """Undo the painter's bias: every splat moves along its surface by its lead."""
+    """Undo the painter's bias: move every splat along its surface by its shift."""
     r00, r01, r02 = rotation[0]
     r10, r11, r12 = rotation[1]
     r20, r21, r22 = rotation[2]
@@ -236,7 +245,9 @@ def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def
         size = s[(SURROUNDINGS + 1) * BLOCK + l]
         neighbours = max(size * size * (own - pixel) + pixel, _FACING)
         closeness = np.sqrt(own) / max(abs(slant), _FACING) * (_ONE - pixel / own)
-        way = lead(s[SURROUNDINGS * BLOCK + l], np.sqrt(own / neighbours), closeness) / np.sqrt(own)
+        way = interpolate_shift(s[SURROUNDINGS * BLOCK + l], np.sqrt(own / neighbours), closeness) / np.sqrt(
+            own
+        )
         way = way if slant > _ZERO else -way
         s[_RECORD + X * BLOCK + l] = u + way * along_x
         s[_RECORD + Y * BLOCK + l] = v + way * along_y
@@ -244,7 +255,7 @@ def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _find_visible(s, width, height, visible):  # type: ignore[no-untyped-def]
-    """Leave of the drawable splats those whose box holds a pixel centre of the picture; returns whether any is left."""
+    """Keep the drawable splats whose box holds a pixel centre of the picture; return whether any is left."""
     for l in range(BLOCK):
         u, v = s[_RECORD + X * BLOCK + l], s[_RECORD + Y * BLOCK + l]
         slope, half_height = s[_RECORD + SLOPE * BLOCK + l], s[_RECORD + HALF_HEIGHT * BLOCK + l]
@@ -264,7 +275,7 @@ def _find_visible(s, width, height, visible):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _face_camera(s, from_eye, directions):  # type: ignore[no-untyped-def]
-    """Unit viewing directions, and the planes of the splats turned against them."""
+    """Compute unit viewing directions, and turn the planes of the splats against them."""
     ox, oy, oz = from_eye
     for l in range(BLOCK):
         x = s[OFFSET * BLOCK + l] + ox

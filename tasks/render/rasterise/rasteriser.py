@@ -4,14 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.rasterise.binning import tile_lists
-from tasks.render.rasterise.blending import blend
+from tasks.render.rasterise.blending import Buffers, blend_tiles
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.preparation import PreparedGaussians, prepare
-from tasks.render.rasterise.projection import project
+from tasks.render.rasterise.preparation import PreparedGaussians, prepare_gaussians
+from tasks.render.rasterise.projection import project_gaussians
 from tasks.render.rasterise.splat_back import splat_back
 from tasks.render.rasterise.view import view_of
 
-__all__ = ["PreparedGaussians", "prepare", "rasterise", "splat_back"]
+__all__ = ["PreparedGaussians", "prepare_gaussians", "rasterise", "splat_back"]
 
 
 def rasterise(
@@ -25,7 +25,7 @@ def rasterise(
 
     Parameters
     ----------
-    prepared : the cloud, from `prepare`
+    prepared : the cloud, from `prepare_gaussians`
     viewmat : [4, 4] world to camera; camera axes x right, y down, z forward [m]
     K : [3, 3] intrinsics; the top left pixel's centre is (0.5, 0.5) [px]
     width, height : picture size [px]
@@ -40,9 +40,9 @@ def rasterise(
         The camera is not finite, has no positive focal length or the picture has no pixels.
     """
     view = view_of(viewmat, K, width, height)
-    records, _ = project(prepared, view)
+    records, _ = project_gaussians(prepared, view)
     starts, splats = tile_lists(records, width, height)
-    buffers = GBuffer(
+    buffers = Buffers(
         rgb=np.empty((height, width, 3), dtype=np.float32),
         depth=np.empty((height, width), dtype=np.float32),
         expected_depth=np.empty((height, width), dtype=np.float32),
@@ -50,8 +50,5 @@ def rasterise(
         normal=np.empty((height, width, 3), dtype=np.float32),
         class_id=np.empty((height, width), dtype=np.uint8),
     )
-    blend(
-        records, view.rays.astype(np.float32), starts, splats,
-        buffers.rgb, buffers.depth, buffers.expected_depth, buffers.alpha, buffers.normal, buffers.class_id
-    )  # fmt: skip
-    return buffers
+    blend_tiles(records, view.rays.astype(np.float32), starts, splats, buffers)
+    return GBuffer(**buffers._asdict())

@@ -18,7 +18,7 @@ NEAR, RAY_MARGIN, MIN_ALPHA, MAX_ALPHA, STOP = 0.05, 0.3, 1 / 255, 0.999, 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Contribution:
-    """What one Gaussian adds to a window of the picture.
+    """Contribution of one Gaussian to a window of the picture.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def blend_steps(
             opacity *= np.sqrt(max(np.linalg.det(M @ M.T) / np.linalg.det(covariance), 1e-12))
         centre = f * ray + c
         if gaussians.surroundings is not None:
-            centre = centre + _way_nearer(gaussians, int(i), R, f, c, centre, covariance, low_pass)
+            centre = centre + _shift_nearer(gaussians, int(i), R, f, c, centre, covariance, low_pass)
         half = np.sqrt(2 * max(np.log(opacity / MIN_ALPHA), 0) * np.diag(covariance))
         first = np.clip(np.floor(centre - half), 0, size).astype(int)
         last = np.clip(np.ceil(centre + half), 0, size).astype(int)
@@ -101,7 +101,7 @@ def blend_steps(
         )
 
 
-def _way_nearer(
+def _shift_nearer(
     gaussians: Gaussians,
     i: int,
     R: NDArray[np.float64],
@@ -111,9 +111,9 @@ def _way_nearer(
     covariance: NDArray[np.float64],
     low_pass: float,
 ) -> NDArray[np.float64]:
-    """By how much a disc is drawn towards where its surface comes nearer, against the painter's bias [px].
+    """Return the shift of a disc towards the nearer side of its surface, against the painter's bias [px].
 
-    `painters_bias` in double precision: no table, the integrals themselves, by the trapezoidal rule.
+    It is `painters_bias` in double precision: without a table, by the trapezoidal rule.
     """
     normal = R @ gaussians.normals[i].astype(np.float64)
     gradient = normal[:2] / f
@@ -139,7 +139,7 @@ def _way_nearer(
 def rasterise_reference(
     gaussians: Gaussians, viewmat: NDArray[np.floating], K: NDArray[np.floating], width: int, height: int
 ) -> GBuffer:
-    """What `tasks.render.rasterise.rasteriser.rasterise` returns, slowly.
+    """Return the result of `tasks.render.rasterise.rasteriser.rasterise` by slow, readable code.
 
     Parameters
     ----------

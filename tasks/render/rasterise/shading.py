@@ -14,18 +14,18 @@ _HALF, _ZERO, _TWO, _THREE, _FOUR = (np.float32(c) for c in (0.5, 0, 2, 3, 4))
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _load(planes, l):  # type: ignore[no-untyped-def]
+def _load_vector(planes, l):  # type: ignore[no-untyped-def]
     return planes[l], planes[BLOCK + l], planes[2 * BLOCK + l]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _store(planes, l, values):  # type: ignore[no-untyped-def]
+def _store_vector(planes, l, values):  # type: ignore[no-untyped-def]
     planes[l], planes[BLOCK + l], planes[2 * BLOCK + l] = values
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _add(rgb, block, k, l, value):  # type: ignore[no-untyped-def]
-    """Add basis function k's share in lane l."""
+def _add_basis_share(rgb, block, k, l, value):  # type: ignore[no-untyped-def]
+    """Add the contribution of basis function k in lane l."""
     plane = SH + 3 * k
     red = rgb[0] + value * block[plane, l]
     green = rgb[1] + value * block[plane + 1, l]
@@ -35,7 +35,7 @@ def _add(rgb, block, k, l, value):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def shade_lanes(directions, block, colours):  # type: ignore[no-untyped-def]
-    """Colours max(SH + 1/2, 0) of one block of Gaussians: `sh_basis`, one vector lane each.
+    """Compute the colours max(SH + 1/2, 0) of one block of Gaussians as `sh_basis` does, one vector lane each.
 
     Parameters
     ----------
@@ -45,37 +45,37 @@ def shade_lanes(directions, block, colours):  # type: ignore[no-untyped-def]
     """
     count = (block.shape[0] - SH) // 3
     for l in range(BLOCK):
-        _store(colours, l, _add((_HALF, _HALF, _HALF), block, 0, l, _C0))
+        _store_vector(colours, l, _add_basis_share((_HALF, _HALF, _HALF), block, 0, l, _C0))
     if count > 1:
         for l in range(BLOCK):
-            x, y, z = _load(directions, l)
-            rgb = _load(colours, l)
-            rgb = _add(rgb, block, 1, l, -_C1 * y)
-            rgb = _add(rgb, block, 2, l, _C1 * z)
-            rgb = _add(rgb, block, 3, l, -_C1 * x)
-            _store(colours, l, rgb)
+            x, y, z = _load_vector(directions, l)
+            rgb = _load_vector(colours, l)
+            rgb = _add_basis_share(rgb, block, 1, l, -_C1 * y)
+            rgb = _add_basis_share(rgb, block, 2, l, _C1 * z)
+            rgb = _add_basis_share(rgb, block, 3, l, -_C1 * x)
+            _store_vector(colours, l, rgb)
     if count > 4:
         for l in range(BLOCK):
-            x, y, z = _load(directions, l)
-            rgb = _load(colours, l)
-            rgb = _add(rgb, block, 4, l, _C20 * x * y)
-            rgb = _add(rgb, block, 5, l, -_C20 * y * z)
-            rgb = _add(rgb, block, 6, l, _C21 * (_TWO * z * z - x * x - y * y))
-            rgb = _add(rgb, block, 7, l, -_C20 * x * z)
-            rgb = _add(rgb, block, 8, l, _C22 * (x * x - y * y))
-            _store(colours, l, rgb)
+            x, y, z = _load_vector(directions, l)
+            rgb = _load_vector(colours, l)
+            rgb = _add_basis_share(rgb, block, 4, l, _C20 * x * y)
+            rgb = _add_basis_share(rgb, block, 5, l, -_C20 * y * z)
+            rgb = _add_basis_share(rgb, block, 6, l, _C21 * (_TWO * z * z - x * x - y * y))
+            rgb = _add_basis_share(rgb, block, 7, l, -_C20 * x * z)
+            rgb = _add_basis_share(rgb, block, 8, l, _C22 * (x * x - y * y))
+            _store_vector(colours, l, rgb)
     if count > 9:
         for l in range(BLOCK):
-            x, y, z = _load(directions, l)
+            x, y, z = _load_vector(directions, l)
             xx, yy, zz = x * x, y * y, z * z
-            rgb = _load(colours, l)
-            rgb = _add(rgb, block, 9, l, -_C30 * y * (_THREE * xx - yy))
-            rgb = _add(rgb, block, 10, l, _C31 * x * y * z)
-            rgb = _add(rgb, block, 11, l, -_C32 * y * (_FOUR * zz - xx - yy))
-            rgb = _add(rgb, block, 12, l, _C33 * z * (_TWO * zz - _THREE * xx - _THREE * yy))
-            rgb = _add(rgb, block, 13, l, -_C32 * x * (_FOUR * zz - xx - yy))
-            rgb = _add(rgb, block, 14, l, _C34 * z * (xx - yy))
-            rgb = _add(rgb, block, 15, l, -_C30 * x * (xx - _THREE * yy))
-            _store(colours, l, rgb)
+            rgb = _load_vector(colours, l)
+            rgb = _add_basis_share(rgb, block, 9, l, -_C30 * y * (_THREE * xx - yy))
+            rgb = _add_basis_share(rgb, block, 10, l, _C31 * x * y * z)
+            rgb = _add_basis_share(rgb, block, 11, l, -_C32 * y * (_FOUR * zz - xx - yy))
+            rgb = _add_basis_share(rgb, block, 12, l, _C33 * z * (_TWO * zz - _THREE * xx - _THREE * yy))
+            rgb = _add_basis_share(rgb, block, 13, l, -_C32 * x * (_FOUR * zz - xx - yy))
+            rgb = _add_basis_share(rgb, block, 14, l, _C34 * z * (xx - yy))
+            rgb = _add_basis_share(rgb, block, 15, l, -_C30 * x * (xx - _THREE * yy))
+            _store_vector(colours, l, rgb)
     for l in range(3 * BLOCK):
         colours[l] = max(colours[l], _ZERO)

@@ -1,4 +1,4 @@
-"""The transpose of blending: what the pixels of one view say about each Gaussian."""
+"""The transpose of blending: sums over the pixels of one view for each Gaussian."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ from tasks.errors import InputError
 from tasks.render.rasterise.binning import tile_lists
 from tasks.render.rasterise.blending import blend_transposed
 from tasks.render.rasterise.preparation import PreparedGaussians
-from tasks.render.rasterise.projection import project
+from tasks.render.rasterise.projection import project_gaussians
 from tasks.render.rasterise.view import view_of
 
 
@@ -19,18 +19,18 @@ def splat_back(
     height: int,
     residual: NDArray[np.floating],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Sum over the pixels of blend weight times residual, for every Gaussian.
+    """Return the sum over the pixels of blend weight times residual, for every Gaussian.
 
     With w_i(p) the weight that `rasterise` gives Gaussian i at pixel p, the picture is
     ``sum_i w_i(p) colour_i``; this is its transpose, ``sum_p w_i(p) residual(p)``.
 
     Parameters
     ----------
-    prepared : the cloud, from `prepare`
+    prepared : the cloud, from `prepare_gaussians`
     viewmat : [4, 4] world to camera; camera axes x right, y down, z forward [m]
     K : [3, 3] intrinsics [px]
     width, height : picture size [px]
-    residual : [height, width, C] anything per pixel, finite [1]
+    residual : [height, width, C] finite values per pixel [1]
 
     Returns
     -------
@@ -48,7 +48,7 @@ def splat_back(
         raise InputError(
             f"splat_back: residual must have shape ({height}, {width}, channels); it has {residual.shape}"
         )
-    records, slots = project(prepared, view)
+    records, slots = project_gaussians(prepared, view)
     starts, splats = tile_lists(records, width, height)
     # A channel of ones carries the weight's own sum.
     channels = np.concatenate((residual, np.ones((height, width, 1), dtype=np.float32)), axis=2)

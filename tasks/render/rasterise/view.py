@@ -1,4 +1,4 @@
-"""A pinhole camera, checked and in the form that projection wants."""
+"""A checked pinhole camera in the form that projection takes."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ RAY_MARGIN = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """A pinhole camera as the kernels want it.
+    """A pinhole camera as the kernels take it.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class View:
 
 
 def view_of(viewmat: NDArray[np.floating], K: NDArray[np.floating], width: int, height: int) -> View:
-    """The camera, checked.
+    """Check a camera and return it as a `View`.
 
     Raises
     ------

@@ -50,13 +50,13 @@ def extinction_of_visual_range(visual_range_m: float) -> float:
 
 
 def precipitating_air(
-    population: Population, near: NearField, focal_px: float, haze_visual_range_m: float
+    population: Population | None, near: NearField, focal_px: float, haze_visual_range_m: float
 ) -> Air:
     """The air of one clip: the extinction of all precipitation less what is drawn particle by particle.
 
     Parameters
     ----------
-    population : the precipitation
+    population : the precipitation; None where nothing falls
     near : where its particles are drawn one by one
     focal_px : focal length of the camera [px]
     haze_visual_range_m : meteorological optical range of the air without precipitation [m]
@@ -66,8 +66,11 @@ def precipitating_air(
     Air
     """
     distance = np.linspace(0, near.farthest_m, TABLE_STEPS + 1)
+    haze = extinction_of_visual_range(haze_visual_range_m)
+    if population is None:
+        return Air(extinction=haze, table_m=near.farthest_m, drawn=np.zeros_like(distance))
     return Air(
-        extinction=population.extinction + extinction_of_visual_range(haze_visual_range_m),
+        extinction=population.extinction + haze,
         table_m=near.farthest_m,
         drawn=drawn_optical_depth(population, near, focal_px, distance),
     )

@@ -74,13 +74,14 @@ def snow_on(
     bool [H, W]
     """
     mask = np.zeros(gbuffer.depth.shape, dtype=bool)
-    if weather.falling is None or weather.falling.snow is None:
+    overcast = weather.overcast
+    if overcast is None or overcast.snow is None or overcast.look.snow_cover is None:
         return mask
     road = np.isin(gbuffer.class_id, ROAD_CLASSES)
-    bears = road | (gbuffer.normal[..., 2] > steepest_bearing(weather.parameters.snow_cover))
+    bears = road | (gbuffer.normal[..., 2] > steepest_bearing(overcast.look.snow_cover))
     ground = np.isin(gbuffer.class_id, list(classes)) & bears & (gbuffer.alpha > 0.5)
     place = shutter.T_world_camera[:3, 3] + gbuffer.depth[ground, None] * pixel_rays(shutter)[ground]
-    field, x, y = weather.falling.snow, place[:, 0], place[:, 1]
+    field, x, y = overcast.snow, place[:, 0], place[:, 1]
     tracks = np.where(road[ground], tracks_at(field, x, y), 0.0)
     mask[ground] = coverage_rank(field, x, y, tracks) <= weather.state.snow_coverage
     return mask

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.road_edit import RoadRelief, road_lift
+from tasks.render.road_edit import RoadRelief, measure_road_lift
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
 from tasks.render.weather.falling.particles import Shutter, visible_streaks
 from tasks.render.weather.falling.precipitation import Population, population
 from tasks.render.weather.falling.streaks import draw_streaks
 from tasks.render.weather.layer import Layer, recompose
-from tasks.render.weather.parameters import WeatherParameters, WeatherState
+from tasks.render.weather.parameters import KindLook, WeatherParameters
 from tasks.render.weather.relief import clear_light, overcast_light, relit
 from tasks.render.weather.scene_light import ground_light, without_sun
 from tasks.render.weather.sky import (
@@ -39,22 +39,26 @@ from tasks.render.weather.snow.layer import snow_layer, snowed_over, whitened
 from tasks.render.weather.wet.wet_road import wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
+from tasks.surface.state import SurfaceState
+from tasks.surface.weather import DRY
 
 
 @dataclass(frozen=True, kw_only=True)
-class Falling:
-    """What a clip with precipitation has beyond its state.
+class Overcast:
+    """What a clip under cloud has beyond its state.
 
     Parameters
     ----------
-    population : what falls
+    look : how its kind of weather looks
+    population : what falls; None where nothing does
     air : what it does to the light on its way
     sky : the light
     environment : float32 [h, w, 3] environment under cloud [1]
-    snow : coverage field of the scene; None when it rains
+    snow : coverage field of the scene; None where no snow lies
     """
 
-    population: Population
+    look: KindLook
+    population: Population | None
     air: Air
     sky: SkyLight
     environment: NDArray[np.float32]
@@ -67,18 +71,18 @@ class ClipWeather:
 
     Parameters
     ----------
-    state : the weather
+    state : what lies on the road
     parameters : the catalogue
     seed : visual seed of the clip [1]
     clear_environment : float32 [h, w, 3] environment in clear weather [1]
-    falling : None in dry weather
+    overcast : None under a clear sky
     """
 
-    state: WeatherState
+    state: SurfaceState
     parameters: WeatherParameters
     seed: int
     clear_environment: NDArray[np.float32]
-    falling: Falling | None
+    overcast: Overcast | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,26 +101,10 @@ class WeatherFrame:
     picture: NDArray[np.float32]
 
 
-def state_problems(state: WeatherState) -> list[str]:
-    """Every rule that a weather state breaks, each as one sentence; empty when it is sound."""
-    problems = []
-    if state.kind not in ("dry", "rain", "snow"):
-        problems.append(f"weather: kind must be dry, rain or snow; it is {state.kind!r}")
-    for name in ("precipitation_mm_h", "film_depth_mm", "snow_depth_mm", "snow_coverage"):
-        value = getattr(state, name)
-        if not (np.isfinite(value) and value >= 0):
-            problems.append(f"weather: {name} must be a number of 0 or more; it is {value:g}")
-    if state.snow_coverage > 1:
-        problems.append(f"weather: snow_coverage must not exceed 1; it is {state.snow_coverage:g}")
-    if state.kind != "dry" and state.precipitation_mm_h == 0:
-        problems.append(f"weather: {state.kind} needs precipitation_mm_h above 0; it is 0: use dry")
-    return problems
-
-
 def weather_scene(
     gaussians: Gaussians,
     environment: NDArray[np.float32],
-    state: WeatherState,
+    state: SurfaceState,
     parameters: WeatherParameters,
     focal_px: float,
     seed: int,
@@ -130,7 +118,7 @@ def weather_scene(
     ----------
     gaussians : the clear scene with the clip's road edit
     environment : float32 [h, w, 3] its clear environment, as in `Scene.environment` [1]
-    state : the weather
+    state : the weather, and what it leaves on the road
     parameters : the catalogue
     focal_px : focal length of the camera [px]
     seed : visual seed of the clip [1]
@@ -146,37 +134,38 @@ def weather_scene(
     Raises
     ------
     InputError
-        The state is unsound, or the scene has no road.
+        There is no such kind of weather, it has precipitation without a rate, or the scene has no road.
     """
-    problems = state_problems(state)
-    if problems:
-        raise InputError(problems)
-    if state.kind == "dry":
+    p, look = parameters, parameters.find_look(state.kind)
+    if look is None:
         dry = ClipWeather(
-            state=state, parameters=parameters, seed=seed, clear_environment=environment, falling=None
+            state=state, parameters=parameters, seed=seed, clear_environment=environment, overcast=None
         )
         if relief is None:
             return gaussians, dry
         return relit(gaussians, relief, clear_light(gaussians, environment, parameters.sky, to_sun)), dry
-    p = parameters
-    falls = population(p.rain if state.kind == "rain" else p.snowfall, state.precipitation_mm_h)
+    if look.particles is not None and state.precipitation_mm_h == 0:
+        raise InputError(f"weather: {state.kind} needs precipitation_mm_h above 0; it is 0: use {DRY}")
+    falls = None if look.particles is None else population(look.particles, state.precipitation_mm_h)
     air = precipitating_air(falls, p.air.near, focal_px, p.air.haze_visual_range_m)
     white = ground_light(gaussians, SemanticClass.ROAD).lit / p.sky.asphalt_albedo
-    covered = state.snow_coverage if state.kind == "snow" else 0.0
-    ground = (1 - covered) * p.sky.asphalt_albedo + covered * float(np.mean(p.snow_cover.albedo))
-    opened = p.sky.exposure_ev_snow if state.kind == "snow" else p.sky.exposure_ev_rain
-    level = cloud_transmittance(state.precipitation_mm_h, p.sky) * 2**opened
+    cover = look.snow_cover
+    covered = 0.0 if cover is None else state.snow_coverage
+    ground = p.sky.asphalt_albedo
+    if cover is not None:
+        ground = (1 - covered) * ground + covered * float(np.mean(cover.albedo))
+    level = cloud_transmittance(state.precipitation_mm_h, p.sky) * 2**look.exposure_ev
     sky = sky_light(white, level, air.extinction, ground, p.sky)
     scene = without_sun(gaussians, p.sky.shadow_kept)
     field = None
-    if state.kind == "snow":
-        c = p.snow_cover
-        field = snow_field(gaussians, c.patches, c.tracks, c.anchors, route, seed)
-        amount = (state.snow_coverage, state.snow_depth_mm, p.snow_cover)
-        lift = None if relief is None else road_lift(scene, relief)
+    if cover is not None:
+        field = snow_field(gaussians, cover.patches, cover.tracks, cover.anchors, route, seed)
+        amount = (state.snow_coverage, state.snow_depth_mm, cover)
+        lift = None if relief is None else measure_road_lift(scene, relief)
         snow = snow_layer(scene, field, white, *amount, lift)
         scene = snowed_over(whitened(scene, field, white, *amount), snow)
-    falling = Falling(
+    overcast = Overcast(
+        look=look,
         population=falls,
         air=air,
         sky=sky,
@@ -184,9 +173,9 @@ def weather_scene(
         snow=field,
     )
     if relief is not None:
-        scene = relit(scene, relief, overcast_light(falling.environment, sky))
+        scene = relit(scene, relief, overcast_light(overcast.environment, sky))
     return scene, ClipWeather(
-        state=state, parameters=p, seed=seed, clear_environment=environment, falling=falling
+        state=state, parameters=p, seed=seed, clear_environment=environment, overcast=overcast
     )
 
 
@@ -213,34 +202,35 @@ def apply_weather(
     -------
     WeatherFrame
     """
-    falling = weather.falling
-    if falling is None:
+    overcast = weather.overcast
+    if overcast is None:
         return WeatherFrame(base=picture, layers=(), picture=picture)
-    p, sky, air = weather.parameters, falling.sky, falling.air
+    sky, air, film = overcast.sky, overcast.air, overcast.look.film
     rays = pixel_rays(shutter)
-    layers = [light_layer(picture, gbuffer, weather.clear_environment, falling.environment, sky, rays)]
-    if weather.state.kind == "rain":
+    layers = [light_layer(picture, gbuffer, weather.clear_environment, overcast.environment, sky, rays)]
+    if film is not None:
         dry = recompose(picture, layers)
         layers.append(
             wet_layer(
-                dry, gbuffer, falling.environment, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
-                weather.state.film_depth_mm, p.wet_road, weather.seed,
+                dry, gbuffer, overcast.environment, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
+                weather.state.film_depth_mm, film, weather.seed,
             )
         )  # fmt: skip
-    layers.append(air_layer(gbuffer, falling.environment, air, sky, rays))
-    if particles:
-        layers.append(particle_layer(weather, falling, gbuffer.depth, shutter))
+    layers.append(air_layer(gbuffer, overcast.environment, air, sky, rays))
+    if particles and overcast.population is not None:
+        layers.append(particle_layer(weather, overcast.population, overcast.sky, gbuffer.depth, shutter))
     return WeatherFrame(base=picture, layers=tuple(layers), picture=recompose(picture, layers))
 
 
 def particle_layer(
-    weather: ClipWeather, falling: Falling, depth: NDArray[np.float32], shutter: Shutter
+    weather: ClipWeather, falling: Population, sky: SkyLight, depth: NDArray[np.float32], shutter: Shutter
 ) -> Layer:
     """The drops or flakes near the camera, lit by the sky and the ground about them.
 
     Parameters
     ----------
-    weather, falling : from `weather_scene`
+    weather : from `weather_scene`
+    falling, sky : its population and its light
     depth : float32 [H, W] camera z of the scene; NaN where there is none [m]
     shutter : pose, motion, time and exposure of the frame
 
@@ -249,11 +239,11 @@ def particle_layer(
     Layer
     """
     p = weather.parameters
-    kind = falling.population.parameters
+    kind = falling.parameters
     wind = np.array(p.air.wind_m_s)
-    streaks = visible_streaks(falling.population, p.air.near, shutter, wind, weather.seed)
+    streaks = visible_streaks(falling, p.air.near, shutter, wind, weather.seed)
     up = streaks["direction"][:, 2]
-    beyond, before = light_from(falling.sky, up, p.sky), light_from(falling.sky, -up, p.sky)
+    beyond, before = light_from(sky, up, p.sky), light_from(sky, -up, p.sky)
     light = kind.scattering * (kind.backlit_share * beyond + (1 - kind.backlit_share) * before)
     drawn = draw_streaks(streaks, light, depth, shutter.K, 1e-3 * p.air.near.aperture_mm)
     return Layer(name="particles", gain=(1 - drawn.alpha)[..., None], add=drawn.rgb)

@@ -1,12 +1,14 @@
-"""All that the weather's look is made from, and the weather of one clip."""
+"""All that the weather's look is made from."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
+from tasks.errors import InputError
 from tasks.render.weather.falling.precipitation import NearField, ParticleParameters
 from tasks.render.weather.sky import SkyParameters
 from tasks.render.weather.snow.layer import SnowCoverParameters
-from tasks.render.weather.wet.wet_road import WetRoadParameters
+from tasks.render.weather.wet.wet_road import RoadFilmParameters
+from tasks.surface.weather import find_weather
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,41 +28,54 @@ class AirParameters:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WeatherParameters:
-    """The catalogue's values, one member for each file.
+class KindLook:
+    """How one kind of weather looks; what it does not have is None.
 
     Parameters
     ----------
-    rain, snowfall : what falls
-    air : what it falls through
-    sky : the light
-    wet_road : water on the road
-    snow_cover : snow on the road
+    exposure_ev : how much further the camera opens than in clear weather, set once for the clip [EV]
+    particles : what falls, with its extinction
+    film : the film on the road, of water or of ice
+    snow_cover : snow on the ground
     """
 
-    rain: ParticleParameters
-    snowfall: ParticleParameters
-    air: AirParameters
-    sky: SkyParameters
-    wet_road: WetRoadParameters
-    snow_cover: SnowCoverParameters
+    exposure_ev: float
+    particles: ParticleParameters | None = None
+    film: RoadFilmParameters | None = None
+    snow_cover: SnowCoverParameters | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class WeatherState:
-    """The weather of one clip, as the surface model gives it.
+class WeatherParameters:
+    """The catalogue's values, one member for each file but for the kinds, which have a file each.
 
     Parameters
     ----------
-    kind : dry, rain or snow
-    precipitation_mm_h : rain rate, or water-equivalent snow rate; 0 when dry [mm/h]
-    film_depth_mm : water film h_t [mm]
-    snow_depth_mm : snow depth h_s [mm]
-    snow_coverage : c_s [1]
+    air : what precipitation falls through
+    sky : the light
+    kinds : how each kind of weather under cloud looks, by its name
     """
 
-    kind: Literal["dry", "rain", "snow"]
-    precipitation_mm_h: float = 0.0
-    film_depth_mm: float = 0.0
-    snow_depth_mm: float = 0.0
-    snow_coverage: float = 0.0
+    air: AirParameters
+    sky: SkyParameters
+    kinds: Mapping[str, KindLook]
+
+    def find_look(self, kind: str) -> KindLook | None:
+        """How a kind of weather looks; None under a clear sky, which changes nothing.
+
+        Parameters
+        ----------
+        kind : name of the kind
+
+        Raises
+        ------
+        InputError
+            If there is no such kind, or the catalogue has no entry of it.
+        """
+        if not find_weather(kind).overcast:
+            return None
+        if kind not in self.kinds:
+            raise InputError(
+                f"weather {kind}: the weather catalogue has no {kind}.yaml, which says how it looks"
+            )
+        return self.kinds[kind]

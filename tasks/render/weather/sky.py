@@ -27,8 +27,6 @@ class SkyParameters:
     cloud_transmittance : light under full cloud by light under clear sky, where hardly anything falls [1]
     rain_cloud_transmittance : the same under the thick cloud of heavy precipitation [1]
     thickening_mm_h : rate over which the cloud grows from the one to the other [mm/h]
-    exposure_ev_rain, exposure_ev_snow : how much further the camera opens than in clear weather, set once for
-        the clip; less over snow, which fills the picture with white [EV]
     tint : colour of daylight under cloud by that of clear daylight, linear red, green, blue [1]
     saturation : share of the clear picture's colour saturation that is left [1]
     zenith_gradient : zenith by horizon radiance of the overcast sky, less 1 [1]
@@ -45,8 +43,6 @@ class SkyParameters:
     cloud_transmittance: float
     rain_cloud_transmittance: float
     thickening_mm_h: float
-    exposure_ev_rain: float
-    exposure_ev_snow: float
     tint: tuple[float, float, float]
     saturation: float
     zenith_gradient: float

@@ -1,10 +1,10 @@
-"""How the road's surface looks: grain, tyre tracks, repairs, sealed cracks, iron covers, worn paint."""
+"""Reflectance of the road's surface: grain, tyre tracks, repairs, sealed cracks, iron covers, worn paint."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.scene.street.layout import StreetLayout
-from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.noise import fractal_noise, named_generator
 
 _ASPHALT = np.array([0.112, 0.108, 0.103])
 _PAINT = np.array([0.50, 0.50, 0.475])
@@ -18,22 +18,22 @@ Floats = NDArray[np.float64]
 def asphalt_albedo(
     layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, grain: Floats
 ) -> Floats:
-    """Reflectance of the asphalt at each cell.
+    """Return the reflectance of the asphalt at each cell.
 
     Parameters
     ----------
     layout : dimensions
     seed : the street's seed [1]
     s, d : station and lateral position [N] [m]
-    size : width of the cell [N], over which thin things are spread [m]
+    size : width of the cell [N], over which thin details are averaged [m]
     grain : [N, 2] independent normal numbers, the stones of the cell [1]
 
     Returns
     -------
     float64 [N, 3] linear reflectance [1]
     """
-    shade = 1 + 0.07 * fractal_noise(stream(seed, "asphalt age"), s, d, 9.0, 2)
-    shade += 0.06 * fractal_noise(stream(seed, "asphalt mix"), s, d, 0.9, 3)
+    shade = 1 + 0.07 * fractal_noise(named_generator(seed, "asphalt age"), s, d, 9.0, 2)
+    shade += 0.06 * fractal_noise(named_generator(seed, "asphalt mix"), s, d, 0.9, 3)
     shade *= np.exp(0.17 * grain[:, 0] * np.minimum(1.0, np.sqrt(0.05 / size)))
     for lane in (0.0, layout.lane_width):
         for wheel in (-0.74, 0.74):
@@ -42,22 +42,22 @@ def asphalt_albedo(
     to_kerb = np.minimum(layout.carriageway_left - d, d - layout.carriageway_right)
     shade *= 1 + 0.12 * np.exp(-(((to_kerb - 0.35) / 0.25) ** 2)) - 0.3 * np.exp(-to_kerb / 0.07)
     albedo = _ASPHALT * shade[:, None] * (1 + 0.015 * grain[:, 1:] * np.array([1, 0, -1]))
-    albedo = _with_repairs(layout, seed, s, d, size, albedo)
-    albedo = _with_cracks(layout, seed, s, d, size, albedo)
-    albedo = _with_covers(layout, seed, s, d, size, albedo)
-    return _with_leaves(seed, s, d, to_kerb, albedo)
+    albedo = _add_repairs(layout, seed, s, d, size, albedo)
+    albedo = _add_cracks(layout, seed, s, d, size, albedo)
+    albedo = _add_covers(layout, seed, s, d, size, albedo)
+    return _add_leaves(seed, s, d, to_kerb, albedo)
 
 
 def paint_albedo(seed: int, s: Floats, d: Floats, grain: Floats) -> Floats:
-    """Reflectance of worn road paint; parameters as `asphalt_albedo`, result float64 [N, 3] [1]."""
-    wear = 0.10 * fractal_noise(stream(seed, "paint wear"), s, d, 0.7, 3) + 0.05 * grain[:, 0]
+    """Return the reflectance of worn road paint, float64 [N, 3] [1]; parameters as `asphalt_albedo`."""
+    wear = 0.10 * fractal_noise(named_generator(seed, "paint wear"), s, d, 0.7, 3) + 0.05 * grain[:, 0]
     return _PAINT * np.clip(0.95 + np.minimum(wear, 0.06), 0.45, 1.0)[:, None]
 
 
-def _with_repairs(
+def _add_repairs(
     layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats
 ) -> Floats:
-    rng = stream(seed, "repairs")
+    rng = named_generator(seed, "repairs")
     shade = np.ones(len(s))
     seam = np.zeros(len(s))
     for slot in np.arange(14.0, layout.station_range[1], 15.0):
@@ -67,13 +67,13 @@ def _with_repairs(
         outside = np.maximum(np.abs(s - middle) - half_s, np.abs(d - lateral) - half_d)
         shade = np.where(outside < 0, tone, shade)
         seam = np.maximum(seam, np.clip(1 - (np.abs(outside) - 0.015) / size, 0, 0.7))
-    return _blend(albedo * shade[:, None], _BITUMEN, seam)
+    return _mix_colours(albedo * shade[:, None], _BITUMEN, seam)
 
 
-def _with_cracks(
+def _add_cracks(
     layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats
 ) -> Floats:
-    rng = stream(seed, "cracks")
+    rng = named_generator(seed, "cracks")
     cover = np.zeros(len(s))
     last = layout.station_range[1]
     for middle in rng.uniform(0, last, 26):
@@ -86,27 +86,27 @@ def _with_cracks(
         )
         thin = np.clip(1 - (np.abs(offset - bend) - 0.012) / size, 0, 0.8)
         cover = np.maximum(cover, np.where(np.abs(run) < half, thin, 0))
-    return _blend(albedo, _BITUMEN, cover)
+    return _mix_colours(albedo, _BITUMEN, cover)
 
 
-def _with_covers(
+def _add_covers(
     layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats, albedo: Floats
 ) -> Floats:
-    rng = stream(seed, "covers")
+    rng = named_generator(seed, "covers")
     for middle in np.arange(9.0, layout.station_range[1], 31.0):
         lateral = rng.choice([0.55, -0.4, layout.lane_width])
         radius = np.hypot(s - middle - rng.uniform(-3, 3), d - lateral)
-        albedo = _blend(albedo, _IRON, np.clip((0.31 - radius) / size + 0.5, 0, 1))
-        albedo = _blend(albedo, _BITUMEN, np.clip(1 - np.abs(radius - 0.34) / size, 0, 0.9))
+        albedo = _mix_colours(albedo, _IRON, np.clip((0.31 - radius) / size + 0.5, 0, 1))
+        albedo = _mix_colours(albedo, _BITUMEN, np.clip(1 - np.abs(radius - 0.34) / size, 0, 0.9))
     return albedo
 
 
-def _with_leaves(seed: int, s: Floats, d: Floats, to_kerb: Floats, albedo: Floats) -> Floats:
-    rng = stream(seed, "leaves on the road")
+def _add_leaves(seed: int, s: Floats, d: Floats, to_kerb: Floats, albedo: Floats) -> Floats:
+    rng = named_generator(seed, "leaves on the road")
     fallen = rng.random(len(s)) < 0.10 * np.exp(-to_kerb / 0.4) + 0.002
     colour = _LEAVES[rng.integers(0, len(_LEAVES), len(s))]
-    return _blend(albedo, colour, np.where(fallen, 0.75, 0.0))
+    return _mix_colours(albedo, colour, np.where(fallen, 0.75, 0.0))
 
 
-def _blend(albedo: Floats, colour: Floats, share: Floats) -> Floats:
+def _mix_colours(albedo: Floats, colour: Floats, share: Floats) -> Floats:
     return albedo + (colour - albedo) * share[:, None]

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from tasks.scene.route import Route
 from tasks.scene.street.layout import StreetLayout
+from tasks.scene.street.noise import smooth_step
 
 _STEP = 0.05
 _MARGIN = 150.0
@@ -31,45 +32,49 @@ class Course:
     heading: NDArray[np.float64]
 
     def heading_at(self, station: ArrayLike) -> NDArray[np.float64]:
-        """Direction of the road at a station [m], in [rad]."""
+        """Return the direction of the road at a station [m], in [rad]."""
         return np.interp(np.asarray(station, dtype=np.float64), self.station, self.heading)
 
     def to_world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """World position of points [N, 3] given as station, lateral, height [m]."""
+        """Return the world position of points [N, 3] given as station, lateral, height [m]."""
         s, d, z = points.T
         heading = self.heading_at(s)
         x = np.interp(s, self.station, self.x) - d * np.sin(heading)
         y = np.interp(s, self.station, self.y) + d * np.cos(heading)
         return np.stack([x, y, z], axis=1)
 
-    def quaternions(self, station: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """World quaternions wxyz [N, 4] [1] of local axes [N, 3, 3], rows in route coordinates, at stations [N] [m]."""
-        columns = [self.directions(station, axes[:, k]) for k in range(3)]
+    def to_world_quaternions(
+        self, station: NDArray[np.float64], axes: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return world quaternions wxyz [N, 4] of axes [N, 3, 3] (rows in route coordinates) at stations [N] [m]."""
+        columns = [self.to_world_directions(station, axes[:, k]) for k in range(3)]
         return Rotation.from_matrix(np.stack(columns, axis=2)).as_quat(scalar_first=True)
 
-    def directions(self, station: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """World directions [N, 3] of vectors [N, 3] in route coordinates at stations [N] [m]."""
+    def to_world_directions(
+        self, station: NDArray[np.float64], vectors: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return world directions [N, 3] of vectors [N, 3] in route coordinates at stations [N] [m]."""
         heading = self.heading_at(station)
         cos, sin = np.cos(heading), np.sin(heading)
         x, y, z = vectors.T
         return np.stack([x * cos - y * sin, x * sin + y * cos, z], axis=1)
 
 
-def course(layout: StreetLayout) -> Course:
-    """Integrate the curvature, which grows smoothly from nothing to that of the bend, and again beyond the route."""
+def integrate_course(layout: StreetLayout) -> Course:
+    """Integrate the curvature, which grows smoothly from 0 to that of the bend, and again beyond the route."""
     first, last = layout.station_range
     n = round((last - first + 2 * _MARGIN) / _STEP) + 1
     station = first - _MARGIN + _STEP * np.arange(n, dtype=np.float64)
-    curvature = _grown(station - layout.bend_start, layout.bend_transition) / layout.bend_radius
-    beyond = _grown(station - layout.route_length, layout.bend_transition)
+    curvature = smooth_step((station - layout.bend_start) / layout.bend_transition) / layout.bend_radius
+    beyond = smooth_step((station - layout.route_length) / layout.bend_transition)
     curvature += beyond * (1 / layout.end_radius - 1 / layout.bend_radius)
-    heading = _integral(curvature)
-    x, y = _integral(np.cos(heading)), _integral(np.sin(heading))
+    heading = _cumulative_integral(curvature)
+    x, y = _cumulative_integral(np.cos(heading)), _cumulative_integral(np.sin(heading))
     return Course(station=station, x=x - np.interp(0.0, station, x), y=y, heading=heading)
 
 
-def route(layout: StreetLayout, line: Course) -> Route:
-    """Rig poses every half metre along the lane's middle."""
+def lay_route(layout: StreetLayout, line: Course) -> Route:
+    """Return the route of rig poses every half metre along the lane's middle."""
     station = np.linspace(0.0, layout.route_length, round(layout.route_length / _ROUTE_STEP) + 1)
     heading = line.heading_at(station)
     pose = np.tile(np.eye(4), (len(station), 1, 1))
@@ -81,10 +86,5 @@ def route(layout: StreetLayout, line: Course) -> Route:
     return Route(station=station, T_world_rig=pose)
 
 
-def _grown(distance: NDArray[np.float64], length: float) -> NDArray[np.float64]:
-    t = np.clip(distance / length, 0.0, 1.0)
-    return t * t * (3 - 2 * t)
-
-
-def _integral(rate: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cumulative_integral(rate: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) * _STEP

@@ -4,21 +4,21 @@ import numpy as np
 
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene
-from tasks.scene.street.bend import course, route
-from tasks.scene.street.cars.parked import car_boxes, cars, footprints
-from tasks.scene.street.furniture import furniture, post_boxes
-from tasks.scene.street.houses.adornments import adornments, awning_boxes
-from tasks.scene.street.houses.facades import facades
-from tasks.scene.street.houses.roofs import house_boxes, roofs
+from tasks.scene.street.bend import integrate_course, lay_route
+from tasks.scene.street.cars.parked import build_cars, car_boxes, car_footprints
+from tasks.scene.street.furniture import build_furniture, post_boxes
+from tasks.scene.street.houses.adornments import awning_boxes, build_adornments
+from tasks.scene.street.houses.facades import build_facades
+from tasks.scene.street.houses.roofs import build_roofs, house_boxes
 from tasks.scene.street.layout import StreetLayout
 from tasks.scene.street.light import Casters, lit_radiance
-from tasks.scene.street.pavement import pavement
+from tasks.scene.street.pavement import build_pavement
 from tasks.scene.street.plan import CROWN_BALLS, plan_street
-from tasks.scene.street.road import road
-from tasks.scene.street.sky import panorama
-from tasks.scene.street.surfels import THICKNESS, join
-from tasks.scene.street.vegetation import LEAF_EXTINCTION, gardens, trees
-from tasks.scene.surroundings import with_surroundings
+from tasks.scene.street.road import build_road
+from tasks.scene.street.sky import draw_panorama
+from tasks.scene.street.surfels import THICKNESS, join_surfels
+from tasks.scene.street.vegetation import LEAF_EXTINCTION, build_gardens, build_trees
+from tasks.scene.surroundings import add_surroundings
 
 _SH_BAND_0 = 0.28209479177387814
 
@@ -40,19 +40,19 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
         its shadows baked in, the route in the right lane and a panorama of the sky.
     """
     layout = layout or StreetLayout()
-    line = course(layout)
+    line = integrate_course(layout)
     plan = plan_street(layout, seed)
-    surfels = join(
+    surfels = join_surfels(
         [
-            road(layout, seed),
-            pavement(layout, plan.trees, seed),
-            facades(layout, plan.buildings, seed),
-            roofs(layout, plan.buildings, seed),
-            adornments(layout, plan.buildings, seed),
-            gardens(layout, plan.buildings, seed),
-            trees(layout, plan.trees, seed),
-            cars(layout, plan.cars, seed),
-            furniture(layout, plan, seed),
+            build_road(layout, seed),
+            build_pavement(layout, plan.trees, seed),
+            build_facades(layout, plan.buildings, seed),
+            build_roofs(layout, plan.buildings, seed),
+            build_adornments(layout, plan.buildings, seed),
+            build_gardens(layout, plan.buildings, seed),
+            build_trees(layout, plan.trees, seed),
+            build_cars(layout, plan.cars, seed),
+            build_furniture(layout, plan, seed),
         ]
     )
     boxes = [
@@ -63,7 +63,7 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
     ]
     casters = Casters(
         boxes=np.concatenate(boxes),
-        footprints=footprints(plan.cars),
+        footprints=car_footprints(plan.cars),
         balls=np.array([tree.balls for tree in plan.trees]).reshape(-1, CROWN_BALLS, 4),
         leaf_extinction=LEAF_EXTINCTION,
     )
@@ -73,20 +73,20 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
     thickness = np.minimum(THICKNESS, 0.5 * surfels.scale.min(axis=1, keepdims=True))
     return Scene(
         name="street",
-        gaussians=with_surroundings(
+        gaussians=add_surroundings(
             Gaussians(
                 means=line.to_world(surfels.centre).astype(np.float32),
-                quats_wxyz=line.quaternions(station, surfels.axes).astype(np.float32),
+                quats_wxyz=line.to_world_quaternions(station, surfels.axes).astype(np.float32),
                 scales=np.concatenate([surfels.scale, thickness], axis=1).astype(np.float32),
                 opacities=surfels.opacity.astype(np.float32),
                 sh=((radiance - 0.5) / _SH_BAND_0).astype(np.float32)[:, None, :],
-                normals=line.directions(station, surfels.axes[:, 2]).astype(np.float32),
+                normals=line.to_world_directions(station, surfels.axes[:, 2]).astype(np.float32),
                 class_id=surfels.class_id,
                 antialiased=True,
             )
         ),
-        route=route(layout, line),
-        environment=panorama(layout, seed),
+        route=lay_route(layout, line),
+        environment=draw_panorama(layout, seed),
         carriageway_left=layout.carriageway_left,
         carriageway_right=layout.carriageway_right,
     )

@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
 from tasks.scene.street.layout import StreetLayout
-from tasks.scene.street.noise import stream
+from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Plan
-from tasks.scene.street.surfels import Surfels, box, join, tiles, tube
+from tasks.scene.street.surfels import Surfels, build_box, build_tube, join_surfels, tile_surface
 
 Floats = NDArray[np.float64]
 
@@ -16,26 +16,26 @@ _POST_INSET = 0.45
 """Of posts from the kerb's edge [m]."""
 
 
-def furniture(layout: StreetLayout, plan: Plan, seed: int) -> Surfels:
-    """Surfels of the street furniture, classes pole and other.
+def build_furniture(layout: StreetLayout, plan: Plan, seed: int) -> Surfels:
+    """Build the surfels of the street furniture, classes pole and other.
 
     Parameters
     ----------
     layout : dimensions
-    plan : what stands where
+    plan : positions of everything on the street
     seed : the street's seed [1]
     """
-    parts = [part for station, side in plan.lamps for part in _lamp(layout, station, side)]
-    parts += _crossing_signs(layout)
-    rng = stream(seed, "bins")
+    parts = [part for station, side in plan.lamps for part in _build_lamp(layout, station, side)]
+    parts += _build_crossing_signs(layout)
+    rng = named_generator(seed, "bins")
     for station, side in plan.lamps[::2]:
-        parts += _bin(layout, station + rng.uniform(1.2, 2.2), side)
-    parts.append(_letter_box(layout, layout.crossing_station - 12.0))
-    return join(parts)
+        parts += _build_bin(layout, station + rng.uniform(1.2, 2.2), side)
+    parts.append(_build_letter_box(layout, layout.crossing_station - 12.0))
+    return join_surfels(parts)
 
 
 def post_boxes(layout: StreetLayout, plan: Plan) -> Floats:
-    """Boxes [K, 2, 3] that cast the lamp posts' shadows [m]."""
+    """Return the boxes [K, 2, 3] that cast the lamp posts' shadows [m]."""
     half = np.array([0.06, 0.06, 0.0])
     boxes = []
     for station, side in plan.lamps:
@@ -45,10 +45,10 @@ def post_boxes(layout: StreetLayout, plan: Plan) -> Floats:
 
 
 def _post_line(layout: StreetLayout, side: int) -> float:
-    return layout.kerb(side) + side * (layout.kerb_width + _POST_INSET)
+    return layout.kerb_position(side) + side * (layout.kerb_width + _POST_INSET)
 
 
-def _lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
+def _build_lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
     foot = np.array([station, _post_line(layout, side), layout.kerb_height])
     top = layout.lamp_height
     t, up = np.linspace(0, 1, 25)[:, None], np.array([0, 0, 1])
@@ -60,11 +60,11 @@ def _lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
     out = arm[-1] + np.linspace(0, reach - 0.5, 5)[1:, None] * inward
     head, half = out[-1] + 0.3 * inward, np.array([0.13, 0.38, 0.03])
     return [
-        tube(foot + top * t[:4] * up, 0.10, 8, pole, steel),
-        tube(foot + top * t[3:] * up, 0.075 - 0.03 * t[3:, 0], 6, pole, steel),
-        tube(np.concatenate([arm, out]), 0.035, 6, pole, steel),
-        box(head - half, head + half + up * 0.05, 0.13, pole, steel),
-        tiles(
+        build_tube(foot + top * t[:4] * up, 0.10, 8, pole, steel),
+        build_tube(foot + top * t[3:] * up, 0.075 - 0.03 * t[3:, 0], 6, pole, steel),
+        build_tube(np.concatenate([arm, out]), 0.035, 6, pole, steel),
+        build_box(head - half, head + half + up * 0.05, 0.13, pole, steel),
+        tile_surface(
             head + np.array([[0, y, -0.035] for y in (-0.24, -0.08, 0.08, 0.24)]),
             [0, 0.16, 0],
             [0.2, 0, 0],
@@ -74,23 +74,27 @@ def _lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
     ]
 
 
-def _crossing_signs(layout: StreetLayout) -> list[Surfels]:
-    """A sign at either end of the crossing, facing the traffic that keeps right, and bollards beside it."""
+def _build_crossing_signs(layout: StreetLayout) -> list[Surfels]:
+    """Build a sign at either end of the crossing, facing the traffic that keeps right, and bollards beside it."""
     pole, up = SemanticClass.POLE, np.array([0.0, 0.0, 1.0])
     start, stop = layout.crossing_station, layout.crossing_station + layout.crossing_length
     parts = []
     for side, station, outward in ((-1, start - 0.5, -1.0), (1, stop + 0.5, 1.0)):
         foot = np.array([station, _post_line(layout, side), layout.kerb_height])
-        parts.append(tube(foot + np.linspace(0, 2.9, 16)[:, None] * up, 0.038, 6, pole, palette.METAL_GREY))
-        parts += _sign(foot + np.array([0.06 * outward, 0, 2.5]), outward)
+        parts.append(
+            build_tube(foot + np.linspace(0, 2.9, 16)[:, None] * up, 0.038, 6, pole, palette.METAL_GREY)
+        )
+        parts += _build_sign(foot + np.array([0.06 * outward, 0, 2.5]), outward)
         for s in (start - 1.6, start - 3.2, stop + 1.6, stop + 3.2):
-            base = np.array([s, layout.kerb(side) + side * 0.4, layout.kerb_height])
-            parts.append(tube(base + np.linspace(0, 0.9, 10)[:, None] * up, 0.05, 8, pole, _banded(10)))
+            base = np.array([s, layout.kerb_position(side) + side * 0.4, layout.kerb_height])
+            parts.append(
+                build_tube(base + np.linspace(0, 0.9, 10)[:, None] * up, 0.05, 8, pole, _banded_albedo(10))
+            )
     return parts
 
 
-def _sign(middle: Floats, outward: float) -> list[Surfels]:
-    """A pedestrian on a white triangle on blue (Vienna Convention, sign E,12), front and back."""
+def _build_sign(middle: Floats, outward: float) -> list[Surfels]:
+    """Build a pedestrian on a white triangle on blue (Vienna Convention, sign E,12), front and back."""
     n, edge = 15, 0.66
     grid = (np.arange(n) + 0.5) / n * 2 - 1
     a, b = np.meshgrid(grid, grid, indexing="ij")
@@ -105,30 +109,30 @@ def _sign(middle: Floats, outward: float) -> list[Surfels]:
     across, rise = np.array([0, outward * edge / n, 0]), np.array([0, 0, edge / n])
     back = middle - np.array([0.02 * outward, 0, 0])
     return [
-        tiles(middle + offset, across, rise, SemanticClass.POLE, picture),
-        tiles(back + offset, -across, rise, SemanticClass.POLE, palette.METAL_GREY),
+        tile_surface(middle + offset, across, rise, SemanticClass.POLE, picture),
+        tile_surface(back + offset, -across, rise, SemanticClass.POLE, palette.METAL_GREY),
     ]
 
 
-def _banded(n: int) -> Floats:
-    """Albedo [8, n - 1, 3] of a dark bollard with a light band near its top."""
+def _banded_albedo(n: int) -> Floats:
+    """Return the albedo [8, n - 1, 3] of a dark bollard with a light band near its top."""
     colour = np.tile(palette.METAL_DARK, (8, n - 1, 1))
     colour[:, -3:-1] = palette.WHITE_PAINT
     return colour
 
 
-def _bin(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
+def _build_bin(layout: StreetLayout, station: float, side: int) -> list[Surfels]:
     foot = np.array([station, _post_line(layout, side), layout.kerb_height])
     other, green = SemanticClass.OTHER, palette.BIN_GREEN
     up = np.linspace(0.1, 0.95, 10)[:, None] * [0, 0, 1]
     lid = np.linspace(0, 1, 4)[:, None] * [0, 0, 0.12] + [0, 0, 0.95]
     return [
-        tube(foot + up, 0.21, 12, other, green),
-        tube(foot + lid, np.array([0.23, 0.22, 0.15, 0.02]), 12, other, 0.6 * green),
+        build_tube(foot + up, 0.21, 12, other, green),
+        build_tube(foot + lid, np.array([0.23, 0.22, 0.15, 0.02]), 12, other, 0.6 * green),
     ]
 
 
-def _letter_box(layout: StreetLayout, station: float) -> Surfels:
+def _build_letter_box(layout: StreetLayout, station: float) -> Surfels:
     side = -1
-    low = np.array([station, layout.front(side) + 0.35, layout.kerb_height + 0.25])
-    return box(low, low + np.array([0.5, 0.4, 1.0]), 0.1, SemanticClass.OTHER, palette.POST_YELLOW)
+    low = np.array([station, layout.front_position(side) + 0.35, layout.kerb_height + 0.25])
+    return build_box(low, low + np.array([0.5, 0.4, 1.0]), 0.1, SemanticClass.OTHER, palette.POST_YELLOW)

@@ -1,4 +1,4 @@
-"""Dimensions and light of the built-in street, and the finest detail a camera on its route can see."""
+"""Dimensions and light of the built-in street, and the finest detail that a camera on its route resolves."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class StreetLayout:
     bend_start : station at which the road begins to turn left [m]
     bend_transition : length over which the curvature grows to its full value [m]
     bend_radius : radius of the bend [m]
-    end_radius : radius it tightens to beyond the route, so that houses close the view [m]
+    end_radius : radius of the bend beyond the route, so that houses close the view [m]
     lane_width : width of a traffic lane [m]
     parking_width : width of the parking strip on either side [m]
     marking_width : width of a longitudinal marking [m]
@@ -99,21 +99,21 @@ class StreetLayout:
         """First and last station that is built [m]."""
         return -self.behind, self.route_length + self.beyond
 
-    def kerb(self, side: int) -> float:
+    def kerb_position(self, side: int) -> float:
         """Lateral position of the kerb on the left (side 1) or the right (side -1) [m]."""
         return self.carriageway_left if side > 0 else self.carriageway_right
 
-    def front(self, side: int) -> float:
+    def front_position(self, side: int) -> float:
         """Lateral position of the facades on the left (side 1) or the right (side -1) [m]."""
-        return self.kerb(side) + side * (self.kerb_width + self.pavement_width)
+        return self.kerb_position(side) + side * (self.kerb_width + self.pavement_width)
 
 
 def nearest_depth(
     layout: StreetLayout, station: ArrayLike, lateral: ArrayLike, height: ArrayLike = 0.0
 ) -> NDArray[np.float64]:
-    """Depth at which a point first comes into the picture of a camera driving the route.
+    """Return the depth at which a point first enters the picture of a camera driving the route.
 
-    It bounds the detail that anybody can see there, and so sets the size of the Gaussians.
+    It bounds the visible detail there, and so determines the size of the Gaussians.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def nearest_depth(
     Returns
     -------
     float64, shape of the broadcast: depth [m]; points behind the start count as far away, since a
-        camera that looks ahead never sees them
+        camera that faces forward never shows them
     """
     s, d, z = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (station, lateral, height)))
     edge = np.maximum(np.abs(d) / VIEW_SLOPE[0], np.abs(z - EYE_HEIGHT) / VIEW_SLOPE[1])

@@ -1,7 +1,7 @@
-"""Sun, shade and skylight on the street: what is baked into the colours.
+"""Sun, shade and skylight on the street, which are baked into the colours.
 
-Shadows are cast by simple stand-ins, boxes and balls of leaves, along the sun's direction in route
-coordinates; over the length of a shadow the road is straight enough for that.
+Shadows are cast by simple proxies, boxes and balls of leaves, along the sun's direction in route
+coordinates; over the length of a shadow the road is nearly straight.
 """
 
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ _CANYON_HEIGHT = 12.0
 
 @dataclass(frozen=True, kw_only=True)
 class Casters:
-    """What throws shadows, in route coordinates.
+    """Objects that cast shadows, in route coordinates.
 
     Parameters
     ----------
     boxes : float64 [K, 2, 3] lowest and highest corner of each opaque box [m]
     balls : float64 [T, B, 4] centre and radius of the balls of leaves, one row per tree [m]
     leaf_extinction : extinction within a ball [m-1]
-    footprints : float64 [C, 2, 2] lowest and highest station and lateral position of what stands so low
-        over the road that it hides the sky around its foot [m]
+    footprints : float64 [C, 2, 2] lowest and highest station and lateral position of objects with so little
+        clearance that they hide the sky around their foot [m]
     """
 
     boxes: Floats
@@ -41,7 +41,7 @@ class Casters:
 
 
 def sun_direction(layout: StreetLayout) -> Floats:
-    """Unit vector to the sun [3], world frame [1]."""
+    """Return the unit vector to the sun [3], world frame [1]."""
     azimuth, elevation = np.radians(layout.sun_azimuth_deg), np.radians(layout.sun_elevation_deg)
     return np.array(
         [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
@@ -49,14 +49,14 @@ def sun_direction(layout: StreetLayout) -> Floats:
 
 
 def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: Casters) -> Floats:
-    """Outgoing radiance of every surfel: Lambert's law for sun, sky and surroundings, plus its own glow.
+    """Return the outgoing radiance of every surfel: Lambert's law for sun, sky and surroundings, plus its own glow.
 
     Parameters
     ----------
     surfels : the street
     layout : its light
     line : course of the road, against which the sun turns
-    casters : what throws shadows
+    casters : objects that cast shadows
 
     Returns
     -------
@@ -79,7 +79,7 @@ def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: 
     direct = np.zeros(len(point))
     lit = np.flatnonzero(facing > 0)
     direct[lit] = facing[lit] * _sun_share(point[lit], to_sun[lit], casters)
-    openness = surfels.openness[order] * _clearance(point, casters.footprints)
+    openness = surfels.openness[order] * _ambient_share(point, casters.footprints)
     sky = sky_share(point, normal, layout) * openness
     around = (1 - sky) * (0.25 + 0.75 * openness)
     light = (
@@ -93,7 +93,7 @@ def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: 
 
 
 def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
-    """View factor of the sky between two endless rows of houses, exact in the plane across the street.
+    """Return the view factor of the sky between two endless rows of houses, exact in the plane across the street.
 
     Parameters
     ----------
@@ -106,11 +106,11 @@ def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
     float64 [N] in 0..1 [1]
     """
     height = np.maximum(_CANYON_HEIGHT - point[:, 2], 0.0)
-    right = np.arctan2(height, np.maximum(point[:, 1] - layout.front(-1), 0.05))
-    left = np.pi - np.arctan2(height, np.maximum(layout.front(1) - point[:, 1], 0.05))
+    right = np.arctan2(height, np.maximum(point[:, 1] - layout.front_position(-1), 0.05))
+    left = np.pi - np.arctan2(height, np.maximum(layout.front_position(1) - point[:, 1], 0.05))
     tilt = np.arctan2(normal[:, 2], normal[:, 1])
     cross = np.hypot(normal[:, 1], normal[:, 2])
-    # angles run from the right horizon over the zenith to the left one; a surface sees a half turn about its normal
+    # angles run from the right horizon over the zenith to the left one; a surface sees half a turn about its normal
     low = np.maximum(right, tilt - np.pi / 2)
     high = np.minimum(left, tilt + np.pi / 2)
     low_behind = np.maximum(right, tilt + 2 * np.pi - np.pi / 2)
@@ -122,11 +122,11 @@ def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
     return cross * across + (1 - cross) * along
 
 
-def _clearance(point: Floats, footprints: Floats) -> Floats:
-    """Share of the ambient light that gets past parked cars to ground points sorted by station; float64 [N] [1]."""
+def _ambient_share(point: Floats, footprints: Floats) -> Floats:
+    """Return the share of ambient light that reaches ground points beside parked cars, sorted by station; [N] [1]."""
     clear = np.ones(len(point))
     for low, high in footprints:
-        near = _window(point[:, 0], low[0] - 1.5, high[0] + 1.5)
+        near = _station_slice(point[:, 0], low[0] - 1.5, high[0] + 1.5)
         p = point[near]
         outside = np.maximum(np.maximum(low - p[:, :2], p[:, :2] - high), 0.0)
         shade = 1 - 0.88 * np.exp(-np.hypot(outside[:, 0], outside[:, 1]) / 0.28)
@@ -135,12 +135,12 @@ def _clearance(point: Floats, footprints: Floats) -> Floats:
 
 
 def _sun_share(point: Floats, to_sun: Floats, casters: Casters) -> Floats:
-    """Share of the sun that reaches points sorted by station; float64 [N] [1]."""
+    """Return the share of the sun that reaches points sorted by station; float64 [N] [1]."""
     station = point[:, 0]
     lean = np.abs(to_sun[:, :2]).max(axis=0) / to_sun[0, 2]
     open_sun = np.ones(len(point))
     for low, high in casters.boxes:
-        near = _window(station, low[0] - lean[0] * high[2], high[0] + lean[0] * high[2])
+        near = _station_slice(station, low[0] - lean[0] * high[2], high[0] + lean[0] * high[2])
         p, l = point[near], to_sun[near]
         with np.errstate(divide="ignore"):
             a, b = (low - p) / l, (high - p) / l
@@ -150,7 +150,7 @@ def _sun_share(point: Floats, to_sun: Floats, casters: Casters) -> Floats:
     for balls in casters.balls:
         reach = balls[:, 3].max()
         low, high = balls[:, :3].min(axis=0) - reach, balls[:, :3].max(axis=0) + reach
-        near = _window(station, low[0] - lean[0] * high[2], high[0] + lean[0] * high[2])
+        near = _station_slice(station, low[0] - lean[0] * high[2], high[0] + lean[0] * high[2])
         p, l = point[near], to_sun[near]
         with np.errstate(divide="ignore"):
             a, b = (low - p) / l, (high - p) / l
@@ -168,6 +168,6 @@ def _sun_share(point: Floats, to_sun: Floats, casters: Casters) -> Floats:
     return open_sun
 
 
-def _window(station: Floats, low: float, high: float) -> slice:
+def _station_slice(station: Floats, low: float, high: float) -> slice:
     start, stop = np.searchsorted(station, [low, high])
     return slice(int(start), int(stop))

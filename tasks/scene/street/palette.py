@@ -1,16 +1,16 @@
-"""Colours of the street, as linear reflectance. They are taste, not data: muted, and never brighter than chalk."""
+"""Colours of the street, as linear reflectance. They are chosen, not measured, and never brighter than chalk."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
-def _linear(*colours: str) -> NDArray[np.float64]:
-    """Linear light of sRGB colours written #rrggbb (IEC 61966-2-1); float64 [len(colours), 3] [1]."""
+def _linear_light(*colours: str) -> NDArray[np.float64]:
+    """Return the linear light of sRGB colours written #rrggbb (IEC 61966-2-1); float64 [len(colours), 3] [1]."""
     code = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in colours]) / 255
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
 
 
-PLASTER = _linear(
+PLASTER = _linear_light(
     "#cabb9e",
     "#cfc8bb",
     "#b79a84",
@@ -22,26 +22,26 @@ PLASTER = _linear(
     "#c6a894",
     "#d9d5cb",
 )
-BRICK = _linear("#85584a", "#785046", "#93695a", "#6f5048", "#a07a62")
-PLINTH = _linear("#6f6a64")[0]
-TRIM = _linear("#d6cfc0", "#c7c0b4", "#ddd8cc", "#b9aa92")
-FRAMES = _linear("#e2e0da", "#dcd8ce", "#4a3a2e", "#2f3a40", "#e6e4de")
-DOORS = _linear("#5a2f22", "#24423a", "#2a3550", "#3c3a38", "#6b4a2c")
-SHOP_SIGNS = _linear("#7d3a34", "#2a4e4a", "#33486a", "#3a3a3c", "#8a6a3a", "#54394e")
-AWNINGS = _linear("#93443c", "#3c6355", "#47608a", "#b5894c")
-CURTAIN = _linear("#c9c4b8")[0]
-DARK_ROOM = _linear("#2b2d30")[0]
-ROOF_TILES = _linear("#7c5446", "#6d4d42", "#56545a", "#4d5056")
-METAL_DARK = _linear("#3b4043")[0]
-METAL_GREY = _linear("#7b8084")[0]
+BRICK = _linear_light("#85584a", "#785046", "#93695a", "#6f5048", "#a07a62")
+PLINTH = _linear_light("#6f6a64")[0]
+TRIM = _linear_light("#d6cfc0", "#c7c0b4", "#ddd8cc", "#b9aa92")
+FRAMES = _linear_light("#e2e0da", "#dcd8ce", "#4a3a2e", "#2f3a40", "#e6e4de")
+DOORS = _linear_light("#5a2f22", "#24423a", "#2a3550", "#3c3a38", "#6b4a2c")
+SHOP_SIGNS = _linear_light("#7d3a34", "#2a4e4a", "#33486a", "#3a3a3c", "#8a6a3a", "#54394e")
+AWNINGS = _linear_light("#93443c", "#3c6355", "#47608a", "#b5894c")
+CURTAIN = _linear_light("#c9c4b8")[0]
+DARK_ROOM = _linear_light("#2b2d30")[0]
+ROOF_TILES = _linear_light("#7c5446", "#6d4d42", "#56545a", "#4d5056")
+METAL_DARK = _linear_light("#3b4043")[0]
+METAL_GREY = _linear_light("#7b8084")[0]
 """Zinc, galvanised steel."""
-BARK = _linear("#5d5145")[0]
-FOLIAGE = _linear("#566e33", "#4d6a33", "#5f7438", "#476338", "#677a3c")
-FLOWERS = _linear("#a8324a", "#c46a8c", "#c9a23a", "#b8452e")
-HEDGE = _linear("#46632e")[0]
-EARTH = _linear("#5b4a3a")[0]
-GRASS = _linear("#6a7c40")[0]
-CAR_PAINT = _linear(
+BARK = _linear_light("#5d5145")[0]
+FOLIAGE = _linear_light("#566e33", "#4d6a33", "#5f7438", "#476338", "#677a3c")
+FLOWERS = _linear_light("#a8324a", "#c46a8c", "#c9a23a", "#b8452e")
+HEDGE = _linear_light("#46632e")[0]
+EARTH = _linear_light("#5b4a3a")[0]
+GRASS = _linear_light("#6a7c40")[0]
+CAR_PAINT = _linear_light(
     "#c2c2c0",
     "#979b9f",
     "#55595e",
@@ -53,15 +53,13 @@ CAR_PAINT = _linear(
     "#34493f",
     "#b4b7b8",
 )
-TYRE = _linear("#222223")[0]
-RIM = _linear("#a3a6a8")[0]
-PLASTIC = _linear("#2a2b2d")[0]
-TAIL_LIGHT = _linear("#7c1416")[0]
-HEAD_LIGHT = _linear("#d8dde0")[0]
-NUMBER_PLATE = _linear("#c4c0ae")[0]
-WHITE_PAINT = _linear("#dddcd6")[0]
-SIGN_BLUE = _linear("#1d4f9c")[0]
-SIGN_RED = _linear("#b3201f")[0]
-POST_YELLOW = _linear("#d9a514")[0]
-BIN_GREEN = _linear("#2f4b3c")[0]
-WOOD = _linear("#8a6240")[0]
+TYRE = _linear_light("#222223")[0]
+RIM = _linear_light("#a3a6a8")[0]
+PLASTIC = _linear_light("#2a2b2d")[0]
+TAIL_LIGHT = _linear_light("#7c1416")[0]
+HEAD_LIGHT = _linear_light("#d8dde0")[0]
+NUMBER_PLATE = _linear_light("#c4c0ae")[0]
+WHITE_PAINT = _linear_light("#dddcd6")[0]
+SIGN_BLUE = _linear_light("#1d4f9c")[0]
+POST_YELLOW = _linear_light("#d9a514")[0]
+BIN_GREEN = _linear_light("#2f4b3c")[0]

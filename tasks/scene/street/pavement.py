@@ -8,9 +8,9 @@ import numpy as np
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
-from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import Tree
-from tasks.scene.street.surfels import Surfels, join, tiles
+from tasks.scene.street.surfels import Surfels, join_surfels, tile_surface
 
 _CELL = 6.5
 """Width of a paving cell where it is seen closest [px]."""
@@ -21,8 +21,8 @@ _PIT = 0.58
 """Half the side of the open earth about a tree [m]."""
 
 
-def pavement(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
-    """Surfels of the kerbstones (class kerb), the slabs (sidewalk) and the earth about the trees (terrain).
+def build_pavement(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
+    """Build the surfels of the kerbstones (class kerb), the slabs (sidewalk) and the earth about the trees (terrain).
 
     Parameters
     ----------
@@ -32,17 +32,17 @@ def pavement(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surf
     """
     parts = []
     for side in (-1, 1):
-        parts += [_kerb(layout, seed, side), *_slabs(layout, seed, side)]
-    return _with_tree_pits(join(parts), planted, seed)
+        parts += [_build_kerb(layout, seed, side), *_build_slabs(layout, seed, side)]
+    return _add_tree_pits(join_surfels(parts), planted, seed)
 
 
-def _with_tree_pits(paving: Surfels, planted: tuple[Tree, ...], seed: int) -> Surfels:
+def _add_tree_pits(paving: Surfels, planted: tuple[Tree, ...], seed: int) -> Surfels:
     s, d = paving.centre[:, 0], paving.centre[:, 1]
     earth = np.zeros(len(paving), dtype=bool)
     for tree in planted:
         earth |= (np.abs(s - tree.station) < _PIT) & (np.abs(d - tree.lateral) < _PIT)
     earth &= paving.class_id == SemanticClass.SIDEWALK
-    tone = np.exp(0.25 * stream(seed, "earth").standard_normal((len(paving), 1)))
+    tone = np.exp(0.25 * named_generator(seed, "earth").standard_normal((len(paving), 1)))
     return replace(
         paving,
         albedo=np.where(earth[:, None], palette.EARTH * tone, paving.albedo),
@@ -50,10 +50,10 @@ def _with_tree_pits(paving: Surfels, planted: tuple[Tree, ...], seed: int) -> Su
     )
 
 
-def _kerb(layout: StreetLayout, seed: int, side: int) -> Surfels:
-    rng = stream(seed, f"kerb {side}")
+def _build_kerb(layout: StreetLayout, seed: int, side: int) -> Surfels:
+    rng = named_generator(seed, f"kerb {side}")
     first, last = layout.station_range
-    face, h = layout.kerb(side), layout.kerb_height
+    face, h = layout.kerb_position(side), layout.kerb_height
     per_stone = 3
     step = _KERBSTONE / per_stone
     s = np.arange(first + step / 2, last, step)
@@ -71,28 +71,28 @@ def _kerb(layout: StreetLayout, seed: int, side: int) -> Surfels:
         up = np.array([0.0, 0.0, high - low])
         edge_u = along if side > 0 else -along
         parts.append(
-            tiles(
+            tile_surface(
                 front, edge_u, up, SemanticClass.KERB, albedo * (0.75 + 0.25 * row), openness=0.5 + 0.3 * row
             )
         )
         d = face + side * layout.kerb_width * (row + 0.5) / rows
         top = np.stack([s, zero + d, zero + h], axis=1)
         across = np.array([0, layout.kerb_width / rows, 0])
-        parts.append(tiles(top, along, across, SemanticClass.KERB, albedo * (1.1 - 0.08 * row)))
-    return join(parts)
+        parts.append(tile_surface(top, along, across, SemanticClass.KERB, albedo * (1.1 - 0.08 * row)))
+    return join_surfels(parts)
 
 
-def _slabs(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
+def _build_slabs(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
     first, last = layout.station_range
-    inner = layout.kerb(side) + side * layout.kerb_width
+    inner = layout.kerb_position(side) + side * layout.kerb_width
     width = layout.pavement_width + 0.4  # under the fronts that stand back
     rows = round(width / layout.slab)
     slab = width / rows
     parts = []
-    # stretches of like distance share one number of cells per slab
+    # stretches of similar distance share one number of cells per slab
     end = layout.route_length
     for start, stop in pairwise(np.unique(np.clip([first, -2.0, end + 4.0, end + 20.0, last], first, last))):
-        rng = stream(seed, f"slabs {side} {start:.3f}")
+        rng = named_generator(seed, f"slabs {side} {start:.3f}")
         for row in range(rows):
             middle = inner + side * slab * (row + 0.5)
             depth = float(nearest_depth(layout, start if start >= 0 else min(stop, 0.0) - 1e-9, middle))
@@ -104,12 +104,12 @@ def _slabs(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
             s = start + (i + 0.5 * (row % 2) + (a + 0.5) / along) * length
             d = middle + slab * ((b + 0.5) / across - 0.5)
             tone = 1 + 0.09 * rng.standard_normal(n)[i] + 0.035 * rng.standard_normal(i.shape)
-            tone += 0.06 * fractal_noise(stream(seed, "pavement"), s, d, 3.0, 3)
+            tone += 0.06 * fractal_noise(named_generator(seed, "pavement"), s, d, 3.0, 3)
             at_joint = (a == 0) * (along > 1) | (b == 0) * (across > 2)
             tone *= np.where(at_joint, 0.80, 1.04)
             to_wall = layout.pavement_width - np.abs(d - inner)
             parts.append(
-                tiles(
+                tile_surface(
                     np.stack([s, d, np.full(s.shape, layout.kerb_height)], axis=-1),
                     np.array([length / along, 0, 0]),
                     np.array([0, slab / across, 0]),

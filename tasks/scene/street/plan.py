@@ -1,4 +1,4 @@
-"""Where things stand: buildings, trees, cars and lamps, drawn from the seed before anything is built."""
+"""Positions of buildings, trees, cars and lamps, drawn from the seed before anything is built."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.scene.street.layout import StreetLayout
-from tasks.scene.street.noise import stream
+from tasks.scene.street.noise import named_generator
 
 Roof = Literal["flat", "pitched", "mansard"]
 
@@ -26,7 +26,7 @@ class Building:
     storeys : including the ground floor [1]
     setback : of the front behind the building line [m]
     door : number of the bay with the door [1]
-    shop, awnings, balconies, flowers : what the front has
+    shop, awnings, balconies, flowers : whether the front has them
     roof : kind of roof
     beside : height of the houses that adjoin it before and after, 0 for a gap [m]
     """
@@ -56,7 +56,7 @@ class Building:
         """Length of the front [m]."""
         return self.bay * self.bays
 
-    def eaves(self, layout: StreetLayout) -> float:
+    def eaves_height(self, layout: StreetLayout) -> float:
         """Height of the wall above the road [m]."""
         return layout.kerb_height + layout.ground_storey_height + (self.storeys - 1) * layout.storey_height
 
@@ -101,7 +101,7 @@ class Car:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Everything that stands on the street."""
+    """Positions of everything on the street."""
 
     buildings: tuple[Building, ...]
     trees: tuple[Tree, ...]
@@ -116,7 +116,7 @@ MODELS = ("hatchback", "saloon", "estate", "van")
 
 
 def plan_street(layout: StreetLayout, seed: int) -> Plan:
-    """Draw the street from its seed.
+    """Draw the positions on the street from its seed.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def plan_street(layout: StreetLayout, seed: int) -> Plan:
     seed : the street's seed [1]
     """
     first, last = layout.station_range
-    # a lamp stands by the crossing; those of the other side stand between
+    # one lamp stands by the crossing; those of the other side stand between the lamps of this side
     beside = layout.crossing_station + layout.crossing_length + 1.5
     start = beside - layout.lamp_spacing * int((beside - first) / layout.lamp_spacing)
     lamps = tuple(
@@ -134,12 +134,12 @@ def plan_street(layout: StreetLayout, seed: int) -> Plan:
     )
     buildings = tuple(b for side in (-1, 1) for b in _row_of_houses(layout, seed, side))
     trees = tuple(t for side in (-1, 1) for t in _row_of_trees(layout, seed, side, lamps))
-    cars = tuple(c for side in (-1, 1) for c in _parked(layout, seed, side))
+    cars = tuple(c for side in (-1, 1) for c in _park_cars(layout, seed, side))
     return Plan(buildings=buildings, trees=trees, cars=cars, lamps=lamps)
 
 
 def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]:
-    rng = stream(seed, f"houses {side}")
+    rng = named_generator(seed, f"houses {side}")
     first, last = layout.station_range
     houses: list[Building] = []
     station, storeys = first - rng.uniform(0, 8), 4
@@ -165,8 +165,14 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
         )
         station += bay * bays + (rng.uniform(3.5, 6.5) if rng.random() < 0.16 else 0.0)
     touching = [0.0 if b.start - a.start - a.width > 0.5 else 1.0 for a, b in pairwise(houses)]
-    before = [0.0, *(joined * house.eaves(layout) for joined, house in zip(touching, houses, strict=False))]
-    after = [*(joined * house.eaves(layout) for joined, house in zip(touching, houses[1:], strict=True)), 0.0]
+    before = [
+        0.0,
+        *(joined * house.eaves_height(layout) for joined, house in zip(touching, houses, strict=False)),
+    ]
+    after = [
+        *(joined * house.eaves_height(layout) for joined, house in zip(touching, houses[1:], strict=True)),
+        0.0,
+    ]
     return [
         replace(house, beside=(low, high)) for house, low, high in zip(houses, before, after, strict=True)
     ]
@@ -175,14 +181,14 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
 def _row_of_trees(
     layout: StreetLayout, seed: int, side: int, lamps: tuple[tuple[float, int], ...]
 ) -> list[Tree]:
-    rng = stream(seed, f"trees {side}")
+    rng = named_generator(seed, f"trees {side}")
     first, last = layout.station_range
     posts = np.array([s for s, post_side in lamps if post_side == side])
-    lateral = layout.kerb(side) + side * (layout.kerb_width + 0.75)
+    lateral = layout.kerb_position(side) + side * (layout.kerb_width + 0.75)
     trees: list[Tree] = []
     for slot in np.arange(first + 4.0, last, layout.tree_spacing):
         station = float(slot + rng.uniform(-1.5, 1.5))
-        crown = _crown(rng, station, lateral, layout)
+        crown = _draw_crown(rng, station, lateral, layout)
         girth = float(rng.uniform(0.11, 0.17))
         near_crossing = -9.0 < station - layout.crossing_station < layout.crossing_length + 2.0
         if rng.random() < 0.12 or near_crossing or np.abs(posts - station).min(initial=np.inf) < 2.0:
@@ -192,10 +198,10 @@ def _row_of_trees(
     return trees
 
 
-def _crown(
+def _draw_crown(
     rng: np.random.Generator, station: float, lateral: float, layout: StreetLayout
 ) -> NDArray[np.float64]:
-    """Balls of leaves that fill an egg: the big ones within, smaller ones around."""
+    """Draw balls of leaves that fill an egg shape: large ones inside, smaller ones around them."""
     height, radius = rng.uniform(6.3, 8.3), rng.uniform(1.7, 2.2)
     base = 2.7 + layout.kerb_height
     middle = np.array([station, lateral, (base + height) / 2 + 0.2])
@@ -208,10 +214,10 @@ def _crown(
     return np.concatenate([centre, size[:, None] * radius / 1.5], axis=1)
 
 
-def _parked(layout: StreetLayout, seed: int, side: int) -> list[Car]:
-    rng = stream(seed, f"cars {side}")
+def _park_cars(layout: StreetLayout, seed: int, side: int) -> list[Car]:
+    rng = named_generator(seed, f"cars {side}")
     first, last = layout.station_range
-    lateral = layout.kerb(side) - side * (layout.parking_width / 2 - 0.12)
+    lateral = layout.kerb_position(side) - side * (layout.parking_width / 2 - 0.12)
     cars: list[Car] = []
     station = first + rng.uniform(2, 6)
     while station < last - 10:

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
 from tasks.scene.street.layout import EYE_HEIGHT, PIXEL, StreetLayout, nearest_depth
-from tasks.scene.street.noise import stream
-from tasks.scene.street.surfels import Surfels, graded_cells, join, tiles
+from tasks.scene.street.noise import named_generator
+from tasks.scene.street.surfels import Cover, Surfels, graded_cells, join_surfels, tile_surface
 
 CELL = 6.3
 """Width of an asphalt cell where it is seen closest [px]."""
-_OVERLAP, _OPACITY = 0.8, 0.94
-"""Standard deviation over cell size and peak opacity: wide and a little clear. Where cells are smaller than a
+_COVER = Cover(0.8, 0.94)
+"""Wide and slightly transparent cells. Where cells are smaller than a
 pixel, opaque ones hide all behind them and the road seems to slide under a moving camera."""
 _STONES = 32.0
 """Single light or dark stones where the road is seen closest [m-2]."""
@@ -24,8 +24,8 @@ _SLENDER = (2.0, 4.0)
 """Least and greatest length of a cell over its width: the road is seen foreshortened."""
 
 
-def road(layout: StreetLayout, seed: int) -> Surfels:
-    """Surfels of the carriageway, class road or marking, normals straight up.
+def build_road(layout: StreetLayout, seed: int) -> Surfels:
+    """Build the surfels of the carriageway, class road or marking, normals upward.
 
     Parameters
     ----------
@@ -38,13 +38,14 @@ def road(layout: StreetLayout, seed: int) -> Surfels:
     while stops[-1] < last:
         stops.append(min(stops[-1] + 0.6 * (stops[-1] - layout.route_length) + 2.0, last))
     stretches = [
-        _cells(layout, seed, start, stop, is_crossing=start == crossing[0]) for start, stop in pairwise(stops)
+        _lay_cells(layout, seed, start, stop, is_crossing=start == crossing[0])
+        for start, stop in pairwise(stops)
     ]
     s, d, length, width, mark = np.concatenate(stretches, axis=1)
     zero = np.zeros(len(s))
-    grain = stream(seed, "road grain").standard_normal((len(s), 2))
+    grain = named_generator(seed, "road grain").standard_normal((len(s), 2))
     marked = mark > 0.5
-    surface = tiles(
+    surface = tile_surface(
         np.stack([s, d, zero], axis=1),
         np.stack([length, zero, zero], axis=1),
         np.stack([zero, width, zero], axis=1),
@@ -52,40 +53,39 @@ def road(layout: StreetLayout, seed: int) -> Surfels:
         np.where(
             marked[:, None], paint_albedo(seed, s, d, grain), asphalt_albedo(layout, seed, s, d, width, grain)
         ),
-        overlap=_OVERLAP,
-        opacity=_OPACITY,
+        cover=_COVER,
     )
-    return join([surface, _stones(layout, seed)])
+    return join_surfels([surface, _build_stones(layout, seed)])
 
 
-def _stones(layout: StreetLayout, seed: int) -> Surfels:
-    """Stones of the surface that stand out: the sharp detail between the cells."""
-    rng = stream(seed, "stones")
+def _build_stones(layout: StreetLayout, seed: int) -> Surfels:
+    """Build single light or dark stones: the sharp detail between the cells."""
+    rng = named_generator(seed, "stones")
     half = 0.8 * layout.lane_width
     n = int(_STONES * 2 * half * layout.route_length)
     s = rng.uniform(0.0, layout.route_length + 6.0, n)
     d = half * np.sign(rng.uniform(-1, 1, n)) * rng.random(n) ** 1.15
-    kept = ~_marked(layout, s, d)
+    kept = ~_is_on_paint(layout, s, d)
     s, d = s[kept], d[kept]
     zero, grain = np.zeros(len(s)), rng.standard_normal((len(s), 2))
     albedo = asphalt_albedo(layout, seed, s, d, np.full(len(s), 0.05), grain * [0.2, 1.0])
     albedo = albedo * np.where(rng.random(len(s)) < 0.5, 0.42, 1.9)[:, None] * np.exp(0.2 * grain[:, :1])
     size = rng.uniform(0.7, 1.4, len(s))
-    return tiles(
+    return tile_surface(
         np.stack([s, d, zero], axis=1),
         np.stack([_STONE[0] * size, zero, zero], axis=1),
         np.stack([zero, _STONE[1] * size, zero], axis=1),
         SemanticClass.ROAD,
         albedo,
-        overlap=0.5,
+        cover=Cover(0.5),
     )
 
 
-def _cells(
+def _lay_cells(
     layout: StreetLayout, seed: int, start: float, stop: float, *, is_crossing: bool
 ) -> NDArray[np.float64]:
-    """Station, lateral, length, width [m] and 1 for paint of each cell of one stretch, as rows."""
-    rng = stream(seed, f"road {start:.3f}")
+    """Return station, lateral, length, width [m] and 1 for paint of each cell of one stretch, as rows."""
+    rng = named_generator(seed, f"road {start:.3f}")
     breaks, kind = _cross_section(layout, is_crossing)
     nearest = nearest_depth(
         layout, start if start >= 0 else min(stop, 0.0) - 1e-9, (breaks[1:] + breaks[:-1]) / 2
@@ -99,7 +99,7 @@ def _cells(
         n = max(round((stop - start) / length), 1)
         length = (stop - start) / n
         if kind[k] == "asphalt" and j % 2:
-            # laid in running bond: smaller gaps than a chequerboard leaves
+            # running bond leaves smaller gaps than a chequerboard
             s = start + np.clip(np.arange(n + 1) * length, 0.25 * length, stop - start - 0.25 * length)
         else:
             s = start + (np.arange(n) + 0.5) * length
@@ -116,7 +116,7 @@ def _on_dash(layout: StreetLayout, s: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _cross_section(layout: StreetLayout, is_crossing: bool) -> tuple[NDArray[np.float64], list[str]]:
-    """Edges across the road from right to left [m], and what lies between each two."""
+    """Return the edges across the road from right to left [m], and the surface between each two."""
     right, left, half = layout.carriageway_right, layout.carriageway_left, layout.marking_width / 2
     if is_crossing:
         bar = layout.crossing_bar
@@ -132,8 +132,8 @@ def _cross_section(layout: StreetLayout, is_crossing: bool) -> tuple[NDArray[np.
     return cuts, [kinds.get(edge, "asphalt") for edge in cuts[:-1]]
 
 
-def _marked(layout: StreetLayout, s: NDArray[np.float64], d: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which points lie on paint, or so close that they would blur its edge."""
+def _is_on_paint(layout: StreetLayout, s: NDArray[np.float64], d: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return whether points lie on paint, or so close to it that they would blur its edge."""
     margin = 0.04
     line = np.zeros(len(s), dtype=bool)
     for middle in (-layout.lane_width / 2, layout.lane_width / 2):

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tasks.scene.street.layout import StreetLayout
 from tasks.scene.street.light import sun_direction
-from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.noise import fractal_noise, named_generator
 
 Floats = NDArray[np.float64]
 
@@ -19,8 +19,8 @@ _CLOUD_BASE, _CLOUD_WAVE = 1.0, 0.8
 """Height of the cloud layer and length of its longest wave, in units of that height [1]."""
 
 
-def panorama(layout: StreetLayout, seed: int) -> NDArray[np.float32]:
-    """Equirectangular picture in linear light, as `Scene.environment` lays it out.
+def draw_panorama(layout: StreetLayout, seed: int) -> NDArray[np.float32]:
+    """Draw the equirectangular picture in linear light, as in `Scene.environment`.
 
     Parameters
     ----------
@@ -35,38 +35,40 @@ def panorama(layout: StreetLayout, seed: int) -> NDArray[np.float32]:
     azimuth = np.pi - (np.arange(2 * _ROWS) + 0.5) / _ROWS * np.pi
     upper = elevation > 0
     picture = np.empty((_ROWS, 2 * _ROWS, 3), dtype=np.float32)
-    picture[upper] = _sky(layout, seed, elevation[upper, None], azimuth[None, :])
+    picture[upper] = _sky_radiance(layout, seed, elevation[upper, None], azimuth[None, :])
     haze = np.exp(elevation[~upper] / 0.05)[:, None, None]
     picture[~upper] = _GROUND * (1 - haze) + 0.75 * _FAR_HOUSES * haze
     return picture
 
 
-def _sky(layout: StreetLayout, seed: int, elevation: Floats, azimuth: Floats) -> Floats:
+def _sky_radiance(layout: StreetLayout, seed: int, elevation: Floats, azimuth: Floats) -> Floats:
     up, flat = np.sin(elevation), np.cos(elevation)
     sun = sun_direction(layout)
     to_sun = flat * (sun[0] * np.cos(azimuth) + sun[1] * np.sin(azimuth)) + up * sun[2]
     clear = _HORIZON + (_ZENITH - _HORIZON) * (1 - np.exp(-3.2 * up))[..., None]
     off = np.degrees(np.arccos(np.clip(to_sun, -1, 1)))[..., None]
     clear = clear + _GLOW * (0.9 * np.exp(-off / 5) + 0.22 * np.exp(-off / 24))
-    light, cover = _clouds(layout, seed, up, flat, azimuth)
+    light, cover = _draw_clouds(layout, seed, up, flat, azimuth)
     cloud = _CLOUD_SHADE + (_CLOUD_LIGHT - _CLOUD_SHADE) * light[..., None] + 0.5 * _GLOW * np.exp(-off / 12)
     veiled = cover * np.clip((up - 0.02) / 0.10, 0, 1)
     sky = clear * (1 - veiled[..., None]) + cloud * veiled[..., None]
     disc = np.clip((_SUN_RADIUS_DEG - off) / 0.15 + 0.5, 0, 1)
     sky = sky * (1 - disc) + 30 * _GLOW * disc
-    return _with_skyline(seed, sky, elevation, azimuth)
+    return _add_skyline(seed, sky, elevation, azimuth)
 
 
-def _clouds(
+def _draw_clouds(
     layout: StreetLayout, seed: int, up: Floats, flat: Floats, azimuth: Floats
 ) -> tuple[Floats, Floats]:
-    """How bright the clouds are (0 shade, 1 sun) and how much sky they cover, in each direction."""
+    """Return the brightness of the clouds (0 shade, 1 sun) and the share of sky that they cover, per direction."""
     slant = _CLOUD_BASE / (up + 0.10)
     x, y = slant * flat * np.cos(azimuth), slant * flat * np.sin(azimuth)
     sun = sun_direction(layout)
-    field = fractal_noise(stream(seed, "clouds"), x, y, _CLOUD_WAVE, 5)
-    towards = fractal_noise(stream(seed, "clouds"), x + 0.10 * sun[0], y + 0.10 * sun[1], _CLOUD_WAVE, 5)
-    # the shadows in the street are sharp: no cloud stands before the sun
+    field = fractal_noise(named_generator(seed, "clouds"), x, y, _CLOUD_WAVE, 5)
+    towards = fractal_noise(
+        named_generator(seed, "clouds"), x + 0.10 * sun[0], y + 0.10 * sun[1], _CLOUD_WAVE, 5
+    )
+    # the shadows in the street are sharp: no cloud covers the sun
     away = np.hypot(x - sun[0] / (sun[2] + 0.10), y - sun[1] / (sun[2] + 0.10))
     field = field - 2.0 * np.exp(-((away / 0.6) ** 2))
     cover = np.clip((field - 0.75) / 0.8, 0, 1)
@@ -75,9 +77,9 @@ def _clouds(
     return light, 0.92 * cover
 
 
-def _with_skyline(seed: int, sky: Floats, elevation: Floats, azimuth: Floats) -> Floats:
-    """Rows of far houses and trees, paler the further they are."""
-    rng = stream(seed, "skyline")
+def _add_skyline(seed: int, sky: Floats, elevation: Floats, azimuth: Floats) -> Floats:
+    """Add rows of far houses and trees, paler with distance."""
+    rng = named_generator(seed, "skyline")
     turn = (azimuth[0] % (2 * np.pi)) / (2 * np.pi)
     for blocks, height, pale in ((90, 0.050, 0.72), (140, 0.036, 0.45)):
         step = np.floor(turn * blocks).astype(np.int64) % blocks

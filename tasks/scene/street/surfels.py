@@ -1,8 +1,8 @@
-"""Flat Gaussians that tile surfaces, in route coordinates and before the light falls on them."""
+"""Flat Gaussians that tile surfaces, in route coordinates, before lighting."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,11 +10,29 @@ from numpy.typing import ArrayLike, NDArray
 from tasks.conventions import SemanticClass
 
 OVERLAP = 0.74
-"""Standard deviation over cell size: below 0.7 the sky shows through, above 0.8 the picture turns soft."""
+"""Standard deviation over cell size: below 0.7 the sky shows through, above 0.8 the picture becomes blurred."""
 OPACITY = 0.985
-"""Peak opacity: where nearly opaque splats end a pixel early, they leave up to a tenth of it open."""
+"""Peak opacity: nearly opaque splats that close a pixel early leave up to a tenth of its light."""
 THICKNESS = 0.002
 """Standard deviation along the normal [m]."""
+
+
+class Cover(NamedTuple):
+    """Coverage of a surface by the Gaussians of its cells: standard deviation over cell size and peak opacity [1]."""
+
+    overlap: float = OVERLAP
+    opacity: float = OPACITY
+
+
+CLOSED = Cover()
+"""A surface through which nothing is seen."""
+
+
+class Grain(NamedTuple):
+    """Variation of a reflectance from cell to cell: the generator that draws it, and its relative deviation [1]."""
+
+    rng: np.random.Generator
+    deviation: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +45,7 @@ class Surfels:
     axes : float64 [N, 3, 3] unit axes as rows, the last one the normal [1]
     scale : float64 [N, 2] standard deviations along the first two axes [m]
     albedo : float64 [N, 3] diffuse reflectance, linear light [1]
-    glow : float64 [N, 3] radiance that does not depend on the light that falls here: mirror images, lamps [1]
+    glow : float64 [N, 3] radiance that does not depend on the incident light: reflections, lamps [1]
     openness : float64 [N] share of the ambient light that reaches the surfel past its own object [1]
     opacity : float64 [N] peak opacity [1]
     class_id : uint8 [N] `SemanticClass`
@@ -46,14 +64,14 @@ class Surfels:
         return len(self.centre)
 
 
-def join(parts: Sequence[Surfels]) -> Surfels:
-    """All surfels of the parts, in order; none where there are no parts."""
+def join_surfels(parts: Sequence[Surfels]) -> Surfels:
+    """Concatenate the surfels of the parts, in order; without parts there are none."""
     nothing = np.empty((0, 3))
-    parts = parts or [tiles(nothing, nothing, nothing, SemanticClass.OTHER, nothing)]
+    parts = parts or [tile_surface(nothing, nothing, nothing, SemanticClass.OTHER, nothing)]
     return Surfels(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Surfels)})
 
 
-def tiles(
+def tile_surface(
     centre: ArrayLike,
     edge_u: ArrayLike,
     edge_v: ArrayLike,
@@ -62,10 +80,9 @@ def tiles(
     *,
     glow: ArrayLike = 0.0,
     openness: ArrayLike = 1.0,
-    opacity: ArrayLike = OPACITY,
-    overlap: float = OVERLAP,
+    cover: Cover = CLOSED,
 ) -> Surfels:
-    """One surfel per cell of a surface; leading shapes broadcast and are flattened.
+    """Build one surfel per cell of a surface; leading shapes broadcast and are flattened.
 
     Parameters
     ----------
@@ -73,8 +90,8 @@ def tiles(
     edge_u, edge_v : [..., 3] the cell's edges; their cross product points outward [m]
     class_id : one class, or one per cell
     albedo, glow : [..., 3] see `Surfels` [1]
-    openness, opacity : [...] see `Surfels` [1]
-    overlap : standard deviation over cell size [1]
+    openness : [...] see `Surfels` [1]
+    cover : size and opacity of each cell's Gaussian
     """
     p, u, v = (np.asarray(x, dtype=np.float64) for x in (centre, edge_u, edge_v))
     shape = np.broadcast_shapes(p.shape, u.shape, v.shape, np.shape(albedo))
@@ -89,11 +106,11 @@ def tiles(
     return Surfels(
         centre=p,
         axes=np.stack([axis_u, axis_v, normal], axis=1),
-        scale=overlap * np.concatenate([length_u, length_v], axis=1),
+        scale=cover.overlap * np.concatenate([length_u, length_v], axis=1),
         albedo=np.broadcast_to(np.asarray(albedo, dtype=np.float64), shape).reshape(n, 3),
         glow=np.broadcast_to(np.asarray(glow, dtype=np.float64), shape).reshape(n, 3),
         openness=np.broadcast_to(np.asarray(openness, dtype=np.float64), shape[:-1]).reshape(n),
-        opacity=np.broadcast_to(np.asarray(opacity, dtype=np.float64), shape[:-1]).reshape(n),
+        opacity=np.broadcast_to(np.asarray(cover.opacity, dtype=np.float64), shape[:-1]).reshape(n),
         class_id=np.broadcast_to(np.asarray(class_id, dtype=np.uint8), shape[:-1]).reshape(n),
     )
 
@@ -101,7 +118,7 @@ def tiles(
 def sheet_cells(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Centres and edges of the cells of a curved sheet given by its corner points.
+    """Return centres and edges of the cells of a curved sheet given by its corner points.
 
     Parameters
     ----------
@@ -119,13 +136,13 @@ def sheet_cells(
 def graded_cells(
     breaks: ArrayLike, size: ArrayLike, fine: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Split a line at sharp edges, with cells that grow away from them, so that the edges stay crisp.
+    """Split a line at sharp edges into cells that grow away from them, so that the edges stay sharp.
 
     Parameters
     ----------
     breaks : [n + 1] increasing positions of the edges [m]
     size : [n] or scalar, largest cell of each interval, kept to within a quarter [m]
-    fine : [n] or scalar, largest cell next to an edge over ``size``; from 1 on all cells are alike [1]
+    fine : [n] or scalar, largest cell next to an edge over ``size``; from 1 on all cells have one size [1]
 
     Returns
     -------
@@ -143,15 +160,15 @@ def graded_cells(
             inner = np.arange(1, int(np.ceil(length / (1.25 * largest)))) * largest
             inner *= length / (largest * (len(inner) + 1))
         else:
-            inner = np.array(_graded(length, largest, share))
+            inner = np.array(_halve_interval(length, largest, share))
         cuts += [edges[k] + inner, edges[k + 1 : k + 2]]
         interval += [k] * (len(inner) + 1)
     cut = np.concatenate(cuts)
     return (cut[1:] + cut[:-1]) / 2, np.diff(cut), np.array(interval, dtype=np.int64)
 
 
-def _graded(length: float, largest: float, share: float) -> list[float]:
-    """Inner cuts of an interval [m]: halved until no cell is too large for its distance from the ends."""
+def _halve_interval(length: float, largest: float, share: float) -> list[float]:
+    """Return inner cuts of an interval [m], halved until no cell is too large for its distance from the ends."""
     cuts, pending = [], [(0.0, length)]
     while pending:
         a, b = pending.pop()
@@ -162,7 +179,7 @@ def _graded(length: float, largest: float, share: float) -> list[float]:
     return sorted(cuts)
 
 
-def tube(
+def build_tube(
     path: ArrayLike,
     radius: ArrayLike,
     around: int,
@@ -171,7 +188,7 @@ def tube(
     *,
     glow: ArrayLike = 0.0,
 ) -> Surfels:
-    """A round tube along a path, open at both ends.
+    """Build a round tube along a path, open at both ends.
 
     Parameters
     ----------
@@ -191,10 +208,10 @@ def tube(
     angle = 2 * np.pi * np.arange(around + 1)[:, None, None] / around
     thickness = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(axis))[:, None]
     corners = axis + thickness * (np.cos(angle) * side + np.sin(angle) * other)
-    return tiles(*sheet_cells(corners), class_id, albedo, glow=glow)
+    return tile_surface(*sheet_cells(corners), class_id, albedo, glow=glow)
 
 
-def panel(
+def build_panel(
     origin: ArrayLike,
     edge_u: ArrayLike,
     edge_v: ArrayLike,
@@ -202,11 +219,10 @@ def panel(
     class_id: SemanticClass,
     albedo: ArrayLike,
     *,
-    rng: np.random.Generator | None = None,
-    grain: float = 0.0,
+    grain: Grain | None = None,
     glow: ArrayLike = 0.0,
 ) -> Surfels:
-    """A plain rectangle in square cells.
+    """Build a plain rectangle of square cells.
 
     Parameters
     ----------
@@ -215,14 +231,15 @@ def panel(
     cell : largest cell [m]
     class_id : its class
     albedo, glow : [3] see `Surfels` [1]
-    rng : draws the grain; None for an even colour
-    grain : relative deviation of the reflectance from cell to cell [1]
+    grain : variation of the reflectance from cell to cell; None for an even colour
     """
     corner, u, v = (np.asarray(x, dtype=np.float64) for x in (origin, edge_u, edge_v))
     nu, nv = (max(int(np.ceil(np.linalg.norm(edge) / cell)), 1) for edge in (u, v))
     a, b = np.meshgrid((np.arange(nu) + 0.5) / nu, (np.arange(nv) + 0.5) / nv, indexing="ij")
-    tone = np.ones((nu, nv, 1)) if rng is None else 1 + grain * rng.standard_normal((nu, nv, 1))
-    return tiles(
+    tone = np.ones((nu, nv, 1))
+    if grain is not None:
+        tone += grain.deviation * grain.rng.standard_normal((nu, nv, 1))
+    return tile_surface(
         corner + a[..., None] * u + b[..., None] * v,
         u / nu,
         v / nv,
@@ -232,10 +249,15 @@ def panel(
     )
 
 
-def box(
-    low: ArrayLike, high: ArrayLike, cell: float, class_id: SemanticClass, albedo: ArrayLike, **grain: Any
+def build_box(
+    low: ArrayLike,
+    high: ArrayLike,
+    cell: float,
+    class_id: SemanticClass,
+    albedo: ArrayLike,
+    grain: Grain | None = None,
 ) -> Surfels:
-    """The four walls and the top of an upright box; parameters as `panel`, between two corners [3] [m]."""
+    """Build the four walls and the top of an upright box between two corners [3] [m]; parameters as `build_panel`."""
     a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     x, y, z = np.diag(b - a)
     sides = (
@@ -245,4 +267,6 @@ def box(
         (a + y, -y, z),
         (a + z, x, y),
     )
-    return join([panel(origin, u, v, cell, class_id, albedo, **grain) for origin, u, v in sides])
+    return join_surfels(
+        [build_panel(origin, u, v, cell, class_id, albedo, grain=grain) for origin, u, v in sides]
+    )

@@ -8,22 +8,30 @@ from numpy.typing import NDArray
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
-from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import Building, Tree
-from tasks.scene.street.surfels import Surfels, join, panel, tiles, tube
+from tasks.scene.street.surfels import (
+    Cover,
+    Grain,
+    Surfels,
+    build_panel,
+    build_tube,
+    join_surfels,
+    tile_surface,
+)
 
 Floats = NDArray[np.float64]
 
 LEAF_EXTINCTION = 0.9
-"""Of sunlight within a crown: about a quarter passes through 1.5 m of leaves [m-1]."""
+"""Extinction of sunlight in a crown: about a quarter passes through 1.5 m of leaves [m-1]."""
 _LEAF = 7.3
 """Length of a tuft of leaves where it is seen closest [px]."""
 _LAYERS = 1.7
 """Tufts over each other on the crown's surface [1]."""
 
 
-def trees(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
-    """Surfels of all trees, class vegetation.
+def build_trees(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
+    """Build the surfels of all trees, class vegetation.
 
     Parameters
     ----------
@@ -33,18 +41,18 @@ def trees(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels
     """
     parts = []
     for tree in planted:
-        rng = stream(seed, f"tree {tree.number}")
+        rng = named_generator(seed, f"tree {tree.number}")
         depth = float(nearest_depth(layout, tree.station, tree.lateral, 3.5))
         colour = palette.FOLIAGE[rng.integers(len(palette.FOLIAGE))]
         parts += [
-            leaves(tree.balls, colour, _LEAF * PIXEL * depth, rng),
-            *_wood(tree, layout.kerb_height, rng),
+            build_leaves(tree.balls, colour, _LEAF * PIXEL * depth, rng),
+            *_build_wood(tree, layout.kerb_height, rng),
         ]
-    return join(parts)
+    return join_surfels(parts)
 
 
-def leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Generator) -> Surfels:
-    """Tufts of leaves over the outer skin of a heap of balls.
+def build_leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Generator) -> Surfels:
+    """Build tufts of leaves over the outer surface of a group of balls.
 
     Parameters
     ----------
@@ -75,35 +83,36 @@ def leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Generator)
     spread = np.hypot(*(place[:, :2] - middle[:2]).T) / reach
     tone = np.exp(0.16 * rng.standard_normal((n, 1))) * (0.85 + 0.3 * rise[:, None])
     tint = 1 + rng.standard_normal((n, 1)) * [0.10, 0.03, 0.05]
-    return tiles(
+    return tile_surface(
         place,
         turn * length,
         np.cross(normal, turn) * length * 0.7,
         SemanticClass.VEGETATION,
         np.clip(colour * tone * tint, 0.004, 0.6),
         openness=np.clip(0.30 + 0.35 * (out[:, 2] + 0.5) + 0.3 * np.minimum(spread, 1.2) * rise, 0.18, 1.0),
-        opacity=0.93,
-        overlap=0.42,
+        cover=Cover(0.42, 0.93),
     )
 
 
-def _wood(tree: Tree, ground: float, rng: np.random.Generator) -> list[Surfels]:
+def _build_wood(tree: Tree, ground: float, rng: np.random.Generator) -> list[Surfels]:
     foot = np.array([tree.station, tree.lateral, ground])
     fork = foot + np.array([rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), 2.7])
     t = np.linspace(0, 1, 13)[:, None]
     grain = 1 + 0.22 * rng.standard_normal((8, 12, 1))
     girth = tree.girth * (1 + 0.35 * np.exp(-8 * t[:, 0]) - 0.2 * t[:, 0])
-    parts = [tube(foot + t * (fork - foot), girth, 8, SemanticClass.VEGETATION, palette.BARK * np.abs(grain))]
+    parts = [
+        build_tube(foot + t * (fork - foot), girth, 8, SemanticClass.VEGETATION, palette.BARK * np.abs(grain))
+    ]
     for ball in tree.balls[rng.choice(len(tree.balls), 6, replace=False)]:
         t = np.linspace(0, 1, 6)[:, None]
         path = fork + t * (ball[:3] - fork) - [0, 0, 0.3] * (t * (1 - t))
         thin = 0.55 * tree.girth * (1 - 0.75 * t[:, 0])
-        parts.append(tube(path - [0, 0, 0.15], thin, 5, SemanticClass.VEGETATION, 0.8 * palette.BARK))
+        parts.append(build_tube(path - [0, 0, 0.15], thin, 5, SemanticClass.VEGETATION, 0.8 * palette.BARK))
     return parts
 
 
-def gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
-    """Low walls, hedges, lawns and shrubs in the gaps between houses, classes other, vegetation and terrain.
+def build_gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
+    """Build low walls, hedges, lawns and shrubs in the gaps between houses, classes other, vegetation and terrain.
 
     Parameters
     ----------
@@ -115,31 +124,39 @@ def gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) ->
     for house, after in pairwise(buildings):
         start, stop = house.start + house.width, after.start
         if house.side == after.side and stop - start > 1.0:
-            parts += _garden(layout, seed, house.side, start, stop)
-    return join(parts)
+            parts += _build_garden(layout, seed, house.side, start, stop)
+    return join_surfels(parts)
 
 
-def _garden(layout: StreetLayout, seed: int, side: int, start: float, stop: float) -> list[Surfels]:
-    rng = stream(seed, f"garden {side} {start:.3f}")
-    front, ground, width = layout.front(side), layout.kerb_height, stop - start
+def _build_garden(layout: StreetLayout, seed: int, side: int, start: float, stop: float) -> list[Surfels]:
+    rng = named_generator(seed, f"garden {side} {start:.3f}")
+    front, ground, width = layout.front_position(side), layout.kerb_height, stop - start
     depth = float(nearest_depth(layout, start, front))
     size = 7.0 * PIXEL * depth
     brick = palette.BRICK[rng.integers(len(palette.BRICK))]
     begin = start if side > 0 else stop
     along = np.array([side * width, 0.0, 0.0])
 
-    def corner(back: float, z: float) -> Floats:
+    def corner_point(back: float, z: float) -> Floats:
         return np.array([begin, front + side * back, ground + z])
 
     other, green = SemanticClass.OTHER, SemanticClass.TERRAIN
     wall = [
-        panel(corner(0.1, 0), along, [0, 0, 1.0], size, other, brick, rng=rng, grain=0.12),
-        panel(
-            corner(0.05, 1.0), along, [0, side * 0.3, 0], 0.25, other, palette.TRIM[1], rng=rng, grain=0.04
+        build_panel(corner_point(0.1, 0), along, [0, 0, 1.0], size, other, brick, grain=Grain(rng, 0.12)),
+        build_panel(
+            corner_point(0.05, 1.0),
+            along,
+            [0, side * 0.3, 0],
+            0.25,
+            other,
+            palette.TRIM[1],
+            grain=Grain(rng, 0.04),
         ),
     ]
     lawn_u, lawn_v = (along, np.array([0, side * 12.0, 0]))
-    lawn = panel(corner(0.3, 0.05), lawn_u, lawn_v, 0.5, green, palette.GRASS, rng=rng, grain=0.15)
+    lawn = build_panel(
+        corner_point(0.3, 0.05), lawn_u, lawn_v, 0.5, green, palette.GRASS, grain=Grain(rng, 0.15)
+    )
     n = int(width / 0.45)
     hedge = np.column_stack(
         [
@@ -163,6 +180,6 @@ def _garden(layout: StreetLayout, seed: int, side: int, start: float, stop: floa
     return [
         *wall,
         lawn,
-        leaves(np.concatenate([hedge, low]), palette.HEDGE, size, rng),
-        leaves(shrubs, foliage, 1.4 * size, rng),
+        build_leaves(np.concatenate([hedge, low]), palette.HEDGE, size, rng),
+        build_leaves(shrubs, foliage, 1.4 * size, rng),
     ]

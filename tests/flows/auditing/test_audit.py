@@ -10,8 +10,8 @@ import pytest
 import flows.auditing.audit
 import manifests.explain
 from catalogs.scenes import load_scene, write_scene
-from flows.auditing.audit import audit, format_text
-from flows.making.generate import generate
+from flows.auditing.audit import audit_dataset, format_text
+from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street, write_toy_grid
@@ -27,11 +27,11 @@ def copy(toy_dataset, tmp_path) -> Layout:
 def own(tmp_path) -> Layout:
     """A dataset whose scene and camera are this test's own."""
     grid = write_toy_grid(tmp_path, frames=2)
-    return generate(grid, str(tmp_path / "data"), runner="threads", workers=1).layout
+    return generate_dataset(grid, str(tmp_path / "data"), runner="threads", workers=1).layout
 
 
 def audited(layout: Layout, **options) -> dict:
-    return audit(str(layout.root), **{"share": 0.25, "runner": "threads", "workers": 1} | options)
+    return audit_dataset(str(layout.root), **{"share": 0.25, "runner": "threads", "workers": 1} | options)
 
 
 def test_a_changed_catalogue_value_is_named_with_both_values_and_as_the_reason(copy, tmp_path):
@@ -105,7 +105,7 @@ def test_another_catalogue_or_code_does_not_go_into_the_same_folder_and_both_val
     (tmp_path / "camera.yaml").write_text(TOY_CAMERA.replace("{value: 80", "{value: 81"))
     monkeypatch.setattr("flows.making.plan.code_version", lambda: {"version": "9", "source_sha256": "0" * 64})
     with pytest.raises(InputError) as told:
-        generate(str(tmp_path / "grid.yaml"), str(own.root), runner="threads")
+        generate_dataset(str(tmp_path / "grid.yaml"), str(own.root), runner="threads")
     text = str(told.value)
     assert "camera.yaml focal_length.value is 80 there and 81 here" in text
     assert "code version is" in text and "and 9 here" in text and "clips" not in text

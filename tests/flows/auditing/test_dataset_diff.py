@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from catalogs.entries import find_entry
 from catalogs.scenes import write_scene
-from catalogs.vehicles import FOLDER
-from flows.auditing.dataset_diff import diff, format_text
-from flows.making.generate import generate
+from flows.auditing.dataset_diff import compare_datasets, format_text
+from flows.making.generate import generate_dataset
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
 
@@ -18,7 +18,7 @@ name: toy
 scene: {scene}
 camera: {camera}
 vehicle: {vehicle}
-frames: 31
+frames: {frames}
 frame_rate_hz: 10
 seed: {seed}
 axes:
@@ -36,16 +36,17 @@ def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("diff")
     write_scene(toy_street(), folder / "scene", {})
     (folder / "camera.yaml").write_text(TOY_CAMERA)
-    car = yaml.safe_load((FOLDER / "paper-reference.yaml").read_text())
+    car = yaml.safe_load(find_entry("vehicle", "paper-reference").read_text())
     (folder / "plain.yaml").write_text(yaml.safe_dump(car))
     car["brake_gain"]["value"] = 800
     (folder / "weak.yaml").write_text(yaml.safe_dump(car))
     made = {}
-    for name, vehicle, seed in (
-        ("a", "plain", 1),
-        ("again", "plain", 1),
-        ("weak", "weak", 1),
-        ("seed", "plain", 2),
+    for name, vehicle, seed, frames in (
+        ("a", "plain", 1, 31),
+        ("again", "plain", 1, 31),
+        ("weak", "weak", 1, 31),
+        ("seen", "plain", 1, 5),
+        ("other seed", "plain", 2, 5),
     ):
         (folder / f"{name}-grid.yaml").write_text(
             GRID.format(
@@ -53,22 +54,26 @@ def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
                 camera=folder / "camera.yaml",
                 vehicle=folder / f"{vehicle}.yaml",
                 seed=seed,
+                frames=frames,
             )
         )
-        generate(str(folder / f"{name}-grid.yaml"), str(folder / name), runner="threads", workers=1)
+        generate_dataset(
+            str(folder / f"{name}-grid.yaml"), str(folder / name), runner="threads", workers=1,
+            pictures="see" in name,
+        )  # fmt: skip
         made[name] = str(folder / name)
     return made
 
 
 def test_the_same_grid_made_twice_is_the_same(datasets: dict[str, str], tmp_path: Path) -> None:
-    result = diff(datasets["a"], datasets["again"], out=str(tmp_path))
+    result = compare_datasets(datasets["a"], datasets["again"], out=str(tmp_path))
     assert result["same"] and result["clips"] == [] and result["why"] == []
     assert result == json.loads((tmp_path / "diff.json").read_text())
     assert (tmp_path / "diff.txt").read_text().startswith("0 of 4 clips differ")
 
 
 def test_a_weaker_brake_moves_only_the_clips_that_brake_and_is_named(datasets: dict[str, str]) -> None:
-    result = diff(datasets["a"], datasets["weak"])
+    result = compare_datasets(datasets["a"], datasets["weak"])
     assert not result["same"]
     clips = {row["label"]: row for row in result["clips"]}
     assert "dry/brakes" in clips and "dry/coasts" not in clips
@@ -83,7 +88,10 @@ def test_a_weaker_brake_moves_only_the_clips_that_brake_and_is_named(datasets: d
 
 
 def test_swapping_the_datasets_turns_the_changes_round(datasets: dict[str, str]) -> None:
-    there, back = diff(datasets["a"], datasets["weak"]), diff(datasets["weak"], datasets["a"])
+    there, back = (
+        compare_datasets(datasets["a"], datasets["weak"]),
+        compare_datasets(datasets["weak"], datasets["a"]),
+    )
     for x, y in zip(there["clips"], back["clips"], strict=True):
         assert x["labels"]["speed_rms_m_s"] == y["labels"]["speed_rms_m_s"]
         change = x["labels"]["stopping_distance_change_m"]
@@ -92,7 +100,7 @@ def test_swapping_the_datasets_turns_the_changes_round(datasets: dict[str, str])
 
 
 def test_another_seed_changes_the_picture_and_no_label(datasets: dict[str, str]) -> None:
-    result = diff(datasets["a"], datasets["seed"])
+    result = compare_datasets(datasets["seen"], datasets["other seed"])
     assert result["clips"] and all("ticks" not in row["changed"] for row in result["clips"])
     snow = next(row for row in result["clips"] if row["label"].startswith("snow"))
     assert 0 < snow["picture"]["changed_pixels_share"] <= 1
@@ -101,11 +109,11 @@ def test_another_seed_changes_the_picture_and_no_label(datasets: dict[str, str])
 
 
 def test_the_text_says_which_label_moved_how_far_and_why(datasets: dict[str, str]) -> None:
-    text = format_text(diff(datasets["a"], datasets["weak"]))
+    text = format_text(compare_datasets(datasets["a"], datasets["weak"]))
     assert "vehicle.yaml brake_gain.value: 1000 -> 800" in text
     assert "can come from: vehicle.yaml" in text and "stopping_distance_change_m: +" in text
 
 
 def test_an_unfinished_or_foreign_folder_is_refused(datasets: dict[str, str], tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"manifest\.json: no such file"):
-        diff(datasets["a"], str(tmp_path))
+        compare_datasets(datasets["a"], str(tmp_path))

@@ -9,8 +9,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.vehicles import load_vehicle
-from flows.auditing.explain import explain, format_text
-from flows.making.generate import generate
+from flows.auditing.explain import explain_frame, format_text
+from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError
@@ -31,7 +31,9 @@ def coupled(toy_dataset, tmp_path_factory) -> Layout:
     folder = tmp_path_factory.mktemp("coupled")
     grid = (toy_dataset.root.parent / "grid.yaml").read_text()
     (folder / "grid.yaml").write_text(grid + "vehicle_mode: coupled\n")
-    return generate(str(folder / "grid.yaml"), str(folder / "data"), runner="threads", workers=1).layout
+    return generate_dataset(
+        str(folder / "grid.yaml"), str(folder / "data"), runner="threads", workers=1
+    ).layout
 
 
 @pytest.mark.parametrize("mode", ["paper", "coupled"])
@@ -39,7 +41,7 @@ def coupled(toy_dataset, tmp_path_factory) -> Layout:
 @pytest.mark.parametrize("frame", [0, 4, 10])
 def test_all_stored_numbers_follow(toy_dataset, coupled, mode, clip, frame):
     layout = toy_dataset if mode == "paper" else coupled
-    result = explain(str(layout.root), clip, frame)
+    result = explain_frame(str(layout.root), clip, frame)
     assert result["agrees"], [step for step in result["steps"] if not step["agrees"]]
     assert [s["quantity"] for s in result["steps"] if s["quantity"] in CHAIN] == CHAIN
     assert all(step["stored"] is not None for step in result["steps"] if step["quantity"] in CHAIN)
@@ -47,7 +49,7 @@ def test_all_stored_numbers_follow(toy_dataset, coupled, mode, clip, frame):
 
 def test_the_horizon_moves_by_the_focal_length_times_the_pitch(toy_dataset):
     """Pinhole camera: a far point turned by theta moves by f tan(theta); the toy camera has f = 80 px."""
-    steps = {s["quantity"]: s for s in explain(str(toy_dataset.root), "dry/flat", 8)["steps"]}
+    steps = {s["quantity"]: s for s in explain_frame(str(toy_dataset.root), "dry/flat", 8)["steps"]}
     pitch = steps["pitch"]["recomputed"]
     assert pitch > 0.005
     assert steps["shift of the horizon"]["recomputed"] == pytest.approx(-80 * np.tan(pitch), rel=1e-9)
@@ -64,13 +66,13 @@ def test_a_stored_number_that_does_not_follow_is_named(toy_dataset, tmp_path, co
     values = table[column].to_numpy() * (1 + 1e-6)
     position = table.column_names.index(column)
     write_parquet(table.set_column(position, table.schema.field(column), [values]), path)
-    result = explain(str(tmp_path / "copy"), "snow-3/flat", 9)
+    result = explain_frame(str(tmp_path / "copy"), "snow-3/flat", 9)
     assert not result["agrees"]
     assert quantity in [step["quantity"] for step in result["steps"] if not step["agrees"]]
 
 
 def test_the_report_is_json_and_text_with_equation_numbers(toy_dataset, tmp_path):
-    result = explain(str(toy_dataset.root), "snow-3/hump", 5, out=str(tmp_path))
+    result = explain_frame(str(toy_dataset.root), "snow-3/hump", 5, out=str(tmp_path))
     assert json.loads((tmp_path / "explain.json").read_text()) == result
     text = (tmp_path / "explain.txt").read_text()
     assert text == format_text(result)
@@ -79,7 +81,7 @@ def test_the_report_is_json_and_text_with_equation_numbers(toy_dataset, tmp_path
 
 def test_an_unknown_clip_and_frame_are_told_together(toy_dataset):
     with pytest.raises(InputError) as caught:
-        explain(str(toy_dataset.root), "moon", 11)
+        explain_frame(str(toy_dataset.root), "moon", 11)
     assert len(caught.value.problems) == 2 and "dry/flat" in caught.value.problems[0]
 
 
@@ -107,7 +109,7 @@ def test_equation_numbers_are_those_of_the_paper(outside_data):
 
 def test_the_brake_moment_is_the_papers_with_its_printed_mass_and_height(toy_dataset):
     """Eq. S16 with m_s = 1200 kg and h_cg = 0.55 m (Table frozen_physical_params), gamma of the dry family."""
-    steps = {s["symbol"]: s for s in explain(str(toy_dataset.root), "dry/flat", 8)["steps"]}
+    steps = {s["symbol"]: s for s in explain_frame(str(toy_dataset.root), "dry/flat", 8)["steps"]}
     (gamma,) = set(load_vehicle("paper-reference").families["dry"].pitch_scale)
     deceleration = -steps["dv/dt"]["stored"]
     assert deceleration > 4

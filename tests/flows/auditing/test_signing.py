@@ -8,12 +8,12 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from typer.testing import CliRunner
 
-from flows.auditing.repair import repair
-from flows.auditing.signing import sign, signature_findings
-from flows.auditing.verify import verify
+from flows.auditing.repair import repair_dataset
+from flows.auditing.signing import sign_dataset, signature_findings
+from flows.auditing.verify import verify_dataset
 from flows.cli import app
-from flows.making.generate import generate
-from flows.store.address import everything, working
+from flows.making.generate import generate_dataset
+from flows.store.address import open_for_writing, want_everything
 from flows.store.layout import Layout
 from flows.store.lock import sole_writer
 from flows.store.objects import Objects
@@ -49,7 +49,7 @@ def names(layout: Layout) -> set[str]:
 
 def test_a_signed_dataset_has_one_file_more_and_its_owners_key_holds(copy, keys):
     before = names(copy)
-    first = sign(str(copy.root), key=keys["owner"])
+    first = sign_dataset(str(copy.root), key=keys["owner"])
     assert first["written"] and first["signatures"] == 1
     assert names(copy) - before == {ENVELOPE} and before <= names(copy)
     assert signature_findings(copy, keys["owner.pub"])["signed"] is True
@@ -57,10 +57,10 @@ def test_a_signed_dataset_has_one_file_more_and_its_owners_key_holds(copy, keys)
 
 
 def test_a_second_key_adds_a_signature_and_the_same_key_writes_nothing(copy, keys):
-    sign(str(copy.root), key=keys["owner"])
-    assert sign(str(copy.root), key=keys["other"])["signatures"] == 2
+    sign_dataset(str(copy.root), key=keys["owner"])
+    assert sign_dataset(str(copy.root), key=keys["other"])["signatures"] == 2
     written = (copy.root / ENVELOPE).stat().st_mtime_ns
-    assert sign(str(copy.root), key=keys["owner"])["written"] is False
+    assert sign_dataset(str(copy.root), key=keys["owner"])["written"] is False
     assert (copy.root / ENVELOPE).stat().st_mtime_ns == written
     assert all(signature_findings(copy, keys[name])["signed"] for name in ("owner.pub", "other.pub"))
 
@@ -68,7 +68,7 @@ def test_a_second_key_adds_a_signature_and_the_same_key_writes_nothing(copy, key
 def test_without_a_key_it_is_said_that_the_seal_shows_damage_and_not_forgery(copy, keys):
     unsigned = signature_findings(copy, None)
     assert unsigned["signed"] is None and unsigned["signature"].startswith("there is none")
-    sign(str(copy.root), key=keys["owner"])
+    sign_dataset(str(copy.root), key=keys["owner"])
     assert signature_findings(copy, None)["signature"].startswith("1 not checked: give")
     (copy.root / ENVELOPE).write_text("{")
     assert signature_findings(copy, None)["signature"].startswith("not checked, and not readable")
@@ -76,31 +76,31 @@ def test_without_a_key_it_is_said_that_the_seal_shows_damage_and_not_forgery(cop
 
 
 def test_verify_with_a_key_asks_for_sound_files_and_the_signature(copy, keys):
-    assert verify(str(copy.root))["verified"] is True
-    assert verify(str(copy.root), key=keys["owner.pub"])["verified"] is False
-    sign(str(copy.root), key=keys["owner"])
-    sound = verify(str(copy.root), key=keys["owner.pub"])
+    assert verify_dataset(str(copy.root))["verified"] is True
+    assert verify_dataset(str(copy.root), key=keys["owner.pub"])["verified"] is False
+    sign_dataset(str(copy.root), key=keys["owner"])
+    sound = verify_dataset(str(copy.root), key=keys["owner.pub"])
     assert sound["verified"] and sound["signed"] and sound["unrecorded"] == [] and sound["damaged"] == []
-    assert verify(str(copy.root), key=keys["other.pub"])["verified"] is False
+    assert verify_dataset(str(copy.root), key=keys["other.pub"])["verified"] is False
     (copy.telemetry / "pairs.parquet").write_bytes(b"")
-    broken = verify(str(copy.root), key=keys["owner.pub"])
+    broken = verify_dataset(str(copy.root), key=keys["owner.pub"])
     assert broken["signed"] is True and broken["verified"] is False
-    assert repair(str(copy.root), runner="threads", workers=1)["repaired"]
-    assert verify(str(copy.root), key=keys["owner.pub"])["verified"] is True
+    assert repair_dataset(str(copy.root), runner="threads", workers=1)["repaired"]
+    assert verify_dataset(str(copy.root), key=keys["owner.pub"])["verified"] is True
 
 
 def test_a_manifest_that_a_stranger_seals_again_is_told_from_the_signed_one(copy, keys):
-    sign(str(copy.root), key=keys["owner"])
+    sign_dataset(str(copy.root), key=keys["owner"])
     forged = json.loads(copy.manifest.read_bytes())
     forged["clips"][0]["label"] = "mine"
     copy.manifest.write_bytes(canonical_bytes(forged | {"seal": seal_of(forged)}))
-    assert verify(str(copy.root))["verified"] is True
-    found = verify(str(copy.root), key=keys["owner.pub"])
+    assert verify_dataset(str(copy.root))["verified"] is True
+    found = verify_dataset(str(copy.root), key=keys["owner.pub"])
     assert found["verified"] is False and "another manifest.json" in found["signature"]
 
 
 def test_the_statement_says_which_run_and_commit(copy, keys):
-    sign(str(copy.root), key=keys["owner"])
+    sign_dataset(str(copy.root), key=keys["owner"])
     manifest = json.loads(copy.manifest.read_bytes())
     payload = json.loads((copy.root / ENVELOPE).read_bytes())["payload"]
     predicate = json.loads(base64.b64decode(payload))["predicate"]
@@ -120,13 +120,13 @@ def test_the_commands_exit_codes_tell_a_failed_check_from_a_wrong_input(copy, ke
 def test_a_key_that_is_none_is_a_wrong_input(copy, keys, tmp_path, words):
     command, name = words
     with pytest.raises(InputError, match=name):
-        {"verify": verify, "sign": sign}[command](str(copy.root), key=str(tmp_path / name))
+        {"verify": verify_dataset, "sign": sign_dataset}[command](str(copy.root), key=str(tmp_path / name))
 
 
 def test_a_folder_that_is_no_dataset_is_a_wrong_input(keys, tmp_path):
-    for call in (sign, verify):
+    for call in (sign_dataset, verify_dataset):
         with pytest.raises(InputError):
-            call(str(tmp_path / "nothing"), key=keys["owner" if call is sign else "owner.pub"])
+            call(str(tmp_path / "nothing"), key=keys["owner" if call is sign_dataset else "owner.pub"])
     assert not (tmp_path / "nothing").exists()
 
 
@@ -140,7 +140,7 @@ def test_no_envelope_and_none_that_can_be_read_are_no_signature(copy, keys):
 def test_a_damaged_manifest_is_not_signed(copy, keys):
     copy.manifest.write_bytes(copy.manifest.read_bytes().replace(b'"clips":[', b'"clips": [', 1))
     with pytest.raises(InputError, match="only a sound manifest can be signed"):
-        sign(str(copy.root), key=keys["owner"])
+        sign_dataset(str(copy.root), key=keys["owner"])
     assert not (copy.root / ENVELOPE).exists() and not copy.staging.exists()
 
 
@@ -148,13 +148,13 @@ def test_a_link_in_the_envelopes_place_is_not_written_through(copy, keys, tmp_pa
     victim = tmp_path / "victim"
     (copy.root / ENVELOPE).symlink_to(victim)
     with pytest.raises(InputError):
-        sign(str(copy.root), key=keys["owner"])
+        sign_dataset(str(copy.root), key=keys["owner"])
     assert not victim.exists()
 
 
 def test_a_dataset_that_is_being_written_is_not_signed(copy, keys):
     with sole_writer(copy), pytest.raises(InputError, match="another run is writing"):
-        sign(str(copy.root), key=keys["owner"])
+        sign_dataset(str(copy.root), key=keys["owner"])
 
 
 def test_a_dataset_in_an_object_store_is_signed_there(keys, toy_dataset, tmp_path, monkeypatch):
@@ -169,10 +169,10 @@ def test_a_dataset_in_an_object_store_is_signed_there(keys, toy_dataset, tmp_pat
                 if (toy_dataset.root / name).is_file()
             }
         )
-        assert sign("s3://data/signed", key=keys["owner"])["written"]
-        assert sign("s3://data/signed", key=keys["other"])["signatures"] == 2
+        assert sign_dataset("s3://data/signed", key=keys["owner"])["written"]
+        assert sign_dataset("s3://data/signed", key=keys["other"])["signatures"] == 2
         assert objects.sizes().keys() - names(toy_dataset) == {ENVELOPE}
-        with working("s3://data/signed", everything) as layout:
+        with open_for_writing("s3://data/signed", want_everything) as layout:
             assert signature_findings(layout, keys["owner.pub"])["signed"] is True
         grid = str(toy_dataset.root.parent / "grid.yaml")
-        assert generate(grid, "s3://data/signed").made == 0 and ENVELOPE in objects.sizes()
+        assert generate_dataset(grid, "s3://data/signed").made == 0 and ENVELOPE in objects.sizes()

@@ -6,8 +6,8 @@ import shutil
 
 import pytest
 
-from flows.auditing.repair import repair
-from flows.auditing.verify import gc, verify
+from flows.auditing.repair import repair_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
 from flows.store.layout import PARTIAL, Layout
 from flows.store.lock import sole_writer
 from manifests.canonical import canonical_bytes
@@ -34,7 +34,7 @@ def flip(layout: Layout, path: str, bit: int) -> None:
 
 
 def test_a_sound_dataset_verifies(toy_dataset):
-    result = verify(str(toy_dataset.root))
+    result = verify_dataset(str(toy_dataset.root))
     assert result["verified"] and result["damaged"] == [] and result["unrecorded"] == []
     assert result["files"] == len(files_of(toy_dataset))
 
@@ -49,7 +49,7 @@ def test_every_one_of_200_flipped_bits_is_found_and_its_file_named(copy):
         original = (copy.root / path).read_bytes()
         flip(copy, path, draw.randrange(8 * len(original)))
         try:
-            result = verify(str(copy.root))
+            result = verify_dataset(str(copy.root))
         finally:
             (copy.root / path).write_bytes(original)
         named += not result["verified"] and [row["path"] for row in result["damaged"]] == [path]
@@ -60,15 +60,15 @@ def test_a_manifest_that_was_written_anew_with_other_figures_does_not_verify(cop
     forged = json.loads(copy.manifest.read_bytes())
     forged["clips"][0]["figures"]["peak_pitch"] = 0.1
     copy.manifest.write_bytes(canonical_bytes(forged))
-    assert verify(str(copy.root))["damaged"][0]["path"] == "manifest.json"
+    assert verify_dataset(str(copy.root))["damaged"][0]["path"] == "manifest.json"
     with pytest.raises(InputError, match="put back a copy of the manifest"):
-        repair(str(copy.root))
+        repair_dataset(str(copy.root))
 
 
 def test_a_file_among_the_data_that_nobody_recorded_is_damage(copy):
     (copy.telemetry / "ticks" / "family=dry" / "part-0009.parquet").write_bytes(b"PAR1")
     (copy.root / "notes.txt").write_text("mine")
-    result = verify(str(copy.root))
+    result = verify_dataset(str(copy.root))
     assert [row["damage"] for row in result["damaged"]] == ["not recorded"]
     assert len(result["unrecorded"]) == 2
 
@@ -76,7 +76,7 @@ def test_a_file_among_the_data_that_nobody_recorded_is_damage(copy):
 def test_everything_but_the_manifest_is_made_again_with_equal_bytes(toy_dataset, copy):
     for path in recorded_files(json.loads(copy.manifest.read_bytes())):
         (copy.root / path).unlink()
-    result = repair(str(copy.root), runner="threads", workers=1)
+    result = repair_dataset(str(copy.root), runner="threads", workers=1)
     assert result["repaired"] and result["failed"] == []
     assert files_of(copy) == files_of(toy_dataset)
 
@@ -91,7 +91,7 @@ def test_everything_but_the_manifest_is_made_again_with_equal_bytes(toy_dataset,
 def test_one_broken_file_is_repaired_and_no_other_is_touched(toy_dataset, copy, path):
     before = {name: (copy.root / name).stat().st_mtime_ns for name in files_of(copy)}
     flip(copy, path, 4001)
-    assert repair(str(copy.root), runner="threads", workers=1)["restored"] == [path]
+    assert repair_dataset(str(copy.root), runner="threads", workers=1)["restored"] == [path]
     assert files_of(copy) == files_of(toy_dataset)
     changed = [name for name, when in before.items() if (copy.root / name).stat().st_mtime_ns != when]
     assert changed == [path]
@@ -105,7 +105,7 @@ def test_bytes_that_come_out_otherwise_are_not_put_in_place(copy):
     forged["artifacts"]["telemetry/clips.parquet"] = "0" * 64
     copy.manifest.write_bytes(canonical_bytes(forged | {"seal": seal_of(forged)}))
     before = (copy.telemetry / "clips.parquet").read_bytes()
-    result = repair(str(copy.root), runner="threads", workers=1)
+    result = repair_dataset(str(copy.root), runner="threads", workers=1)
     assert not result["repaired"] and result["failed"] == ["telemetry/clips.parquet"]
     assert (copy.telemetry / "clips.parquet").read_bytes() == before
 
@@ -123,9 +123,9 @@ def test_left_overs_of_killed_runs_go_and_nothing_else(toy_dataset, copy, tmp_pa
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     with sole_writer(Layout(copy.staging / "scratch-live")):
-        named = gc(str(copy.root), dry_run=True)["removed"]
+        named = collect_garbage(str(copy.root), dry_run=True)["removed"]
         assert (copy.staging / f"{'0' * 16}.json").exists()
-        assert gc(str(copy.root))["removed"] == named
+        assert collect_garbage(str(copy.root))["removed"] == named
         assert len(named) == 3
         assert (copy.staging / "scratch-live").exists()
     assert not (copy.staging / "scratch-dead").exists()
@@ -135,10 +135,10 @@ def test_left_overs_of_killed_runs_go_and_nothing_else(toy_dataset, copy, tmp_pa
 def test_of_a_collected_dataset_no_staging_folder_stays(toy_dataset, copy):
     copy.staging.mkdir()
     (copy.staging / f"{'0' * 16}.ticks.parquet").touch()
-    assert len(gc(str(copy.root))["removed"]) == 1
+    assert len(collect_garbage(str(copy.root))["removed"]) == 1
     assert files_of(copy) == files_of(toy_dataset) and not copy.staging.exists()
 
 
 def test_a_dataset_that_is_being_written_is_left_alone(copy):
     with sole_writer(copy), pytest.raises(InputError, match="another run is writing"):
-        gc(str(copy.root))
+        collect_garbage(str(copy.root))

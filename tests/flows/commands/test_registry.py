@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from flows import parser
 from flows.cli import app
-from flows.commands.command import REQUIRED, Command, argument, option
+from flows.commands.command import REQUIRED, Command, define_argument, define_option
 from flows.registry import COMMANDS, import_function
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
@@ -95,7 +95,7 @@ def test_only_what_may_lie_in_an_object_store_may_be_an_address():
         group="Datasets",
         sentence="",
         function="builtins:dict",
-        options=(argument("dataset", str, "", in_store=True), option("out", str, "")),
+        options=(define_argument("dataset", str, "", in_store=True), define_option("out", str, "")),
     )
     assert parser.run_function(command, {"dataset": "s3://a/b", "out": "folder"}, False)["out"] == "folder"
     with pytest.raises(InputError, match="--out s3://a/b: must be a folder"):

@@ -15,18 +15,18 @@ from flows.judging.controls import (
     BLIND_BY_DESIGN,
     CONTROLS,
     UNREAD,
-    controls,
     false_claims,
+    list_untried,
+    run_controls,
     score_controls,
-    summary,
+    summarise_controls,
     unread_rows,
-    untried,
 )
 from flows.judging.controls_figure import roc_figure
 from flows.judging.judged_clip import METHODS, JudgedClip
 from flows.judging.physics import clip_columns, clip_facts
 from flows.making.clip import catalogue_of
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
 from tasks.errors import InputError
 from tasks.eval.negative_controls import Claim
@@ -52,7 +52,9 @@ axes:
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("controls")
-    generate(write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    generate_dataset(
+        write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu"
+    )
     return folder / "made"
 
 
@@ -144,7 +146,7 @@ def test_metrics_that_no_claim_enters_are_blind_to_every_control(
     assert {(row["control"], row["metric"]) for row in rows} == {(c, m) for c in CONTROLS for m in UNREAD}
     assert {"localised_edit_rate", "severity_rank_correlation", "piqe"} <= set(UNREAD)
     assert all(row["verdict"] == "blind" and row["reason"] == BLIND_BY_DESIGN for row in rows)
-    told = summary(list(score_controls(clips, false)), untried(clips, false))
+    told = summarise_controls(list(score_controls(clips, false)), list_untried(clips, false))
     assert told["all_detected"] and told["undetected"] == []
     assert "piqe by no reference: every control, it never reads the claim" in told["blind"]
 
@@ -153,7 +155,7 @@ def test_a_control_that_could_not_be_tried_is_not_detected(
     clips: list[JudgedClip], false: list[dict[str, Claim]]
 ) -> None:
     without = [{name: claim for name, claim in f.items() if name != "fixed-mu"} for f in false]
-    told = summary(list(score_controls(clips, without)), untried(clips, without))
+    told = summarise_controls(list(score_controls(clips, without)), list_untried(clips, without))
     assert not told["all_detected"] and len(told["undetected"]) == 1
     assert told["undetected"][0].startswith("fixed-mu: not tried: in none of 3 clips does it change")
     by_name = {row["control"]: row for row in told["controls"]}
@@ -169,7 +171,7 @@ def test_a_dataset_without_a_single_track_says_so_of_every_control(
         )
         for c in clips
     ]
-    told = summary(list(score_controls(lost, false)), untried(lost, false))
+    told = summarise_controls(list(score_controls(lost, false)), list_untried(lost, false))
     assert not told["all_detected"] and len(told["undetected"]) == len(CONTROLS)
     assert all("every method misses the pose" in line for line in told["undetected"])
 
@@ -179,7 +181,7 @@ def test_the_command_fails_and_names_what_could_not_be_tried(
 ) -> None:
     made = {clip.facts["clip_id"]: clip for clip in clips}
     monkeypatch.setattr(judging_controls, "judge_clip", lambda view, facts: made[facts["clip_id"]])
-    monkeypatch.setattr(judging_controls, "stage", lambda work: work)
+    monkeypatch.setattr(judging_controls, "run_as_stage", lambda work: work)
     arguments = ["controls", str(dataset), "--out", str(tmp_path / "out")]
     assert CliRunner().invoke(app, arguments).exit_code == 0
     monkeypatch.setattr(judging_controls, "LEAST_PITCH", 9.0)
@@ -192,4 +194,4 @@ def test_the_command_fails_and_names_what_could_not_be_tried(
 
 def test_a_folder_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
-        controls(str(tmp_path))
+        run_controls(str(tmp_path))

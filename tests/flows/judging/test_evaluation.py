@@ -6,10 +6,10 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from flows.judging.evaluation import NOT_RUN, evaluate
+from flows.judging.evaluation import NOT_RUN, evaluate_dataset
 from flows.judging.physics import clip_columns, clip_facts
 from flows.making.clip import catalogue_of
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from tests.flows.judging.test_trajectories import tum_lines
 from tests.toy_street import write_toy_grid
 
@@ -33,9 +33,13 @@ axes:
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("judged")
-    generate(write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    generate_dataset(
+        write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu"
+    )
     write_true_trajectories(folder / "made", folder / "told" / "truth")
-    evaluate(str(folder / "made"), out=str(folder / "out"), trajectories=str(folder / "told"), metric=True)
+    evaluate_dataset(
+        str(folder / "made"), out=str(folder / "out"), trajectories=str(folder / "told"), metric=True
+    )
     return folder / "out"
 
 

@@ -13,7 +13,7 @@ from benchmarks.synthetic_street import Clip, drive_clip
 from catalogs.gates import load_foreign_gates
 from flows.judging import foreign_sources
 from flows.judging.claims import read_claim
-from flows.judging.foreign import judge, retention
+from flows.judging.foreign import judge_video, measure_retention
 from flows.judging.foreign_sources import (
     LEVEL,
     MOST_PIXELS,
@@ -23,9 +23,9 @@ from flows.judging.foreign_sources import (
     read_video,
 )
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim, claim_at, judge_motion
+from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.poses.undistort import undistorted
+from tasks.eval.poses.undistort import undistort_frames
 from tests.flows.judging.test_trajectories import tum_lines
 
 
@@ -63,7 +63,7 @@ def test_a_true_claim_passes_in_other_codecs_and_sizes(
         [cv2.resize(f, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for f in street.frames]
     )
     video = encode(tmp_path / f"v.{suffix}", frames, 16.0, codec)
-    result = judge(str(video), **write_inputs(tmp_path, street), out=str(tmp_path / "out"))
+    result = judge_video(str(video), **write_inputs(tmp_path, street), out=str(tmp_path / "out"))
     assert result["passed"], result["reasons"]
     assert result["failed_frames"] == 0 and result["frame_rate_hz"] == pytest.approx(16.0, rel=0.01)
     assert (
@@ -76,12 +76,12 @@ def test_a_true_claim_passes_in_other_codecs_and_sizes(
 def test_a_false_pitch_is_refused(street: Clip, tmp_path: Path, factor: float) -> None:
     video = encode(tmp_path / "v.mp4", street.frames, 16.0, "mp4v")
     false = street.pitch.copy() * factor if factor else np.roll(street.pitch, 6)
-    assert not judge(str(video), **write_inputs(tmp_path, street, false))["passed"]
+    assert not judge_video(str(video), **write_inputs(tmp_path, street, false))["passed"]
 
 
 def test_half_the_frames_at_half_the_rate_are_judged_by_their_own_times(street: Clip, tmp_path: Path) -> None:
     video = encode(tmp_path / "v.mp4", street.frames[::2], 8.0, "mp4v")
-    result = judge(str(video), **write_inputs(tmp_path, street))
+    result = judge_video(str(video), **write_inputs(tmp_path, street))
     assert result["frame_rate_hz"] == pytest.approx(8.0, rel=0.01)
     assert result["pitch_rmse_deg"] < 0.1
 
@@ -97,7 +97,7 @@ def test_large_frames_are_judged_reduced_and_held_once(street: Clip, tmp_path: P
     assert MOST_PIXELS > 881 * 587 and peak < 1.1 * frames.nbytes + 8 * large[0].nbytes
     reduced = cv2.resize(large[0], (881, 587), interpolation=cv2.INTER_AREA)
     assert np.abs(frames[0].astype(int) - reduced).mean() < 3.0
-    result = judge(str(video), **write_inputs(tmp_path, street))
+    result = judge_video(str(video), **write_inputs(tmp_path, street))
     assert result["passed"], result["reasons"]
     assert (result["width"], result["height"]) == (1440, 960)
     assert (result["judged_width"], result["judged_height"]) == (881, 587)
@@ -137,7 +137,7 @@ def test_undistortion_in_parts_is_that_of_the_whole(street: Clip, monkeypatch: p
     camera = ForeignCamera(K=street.K, width=width, height=height, mount=LEVEL, distortion=bent)
     film = foreign_sources.Footage(name="v", times=np.arange(24) / 16, frames=street.frames, poses=None)
     film.motion(camera, np.arange(2, 20))
-    whole = undistorted({"rgb": street.frames[2:20]}, street.K, bent)["rgb"]
+    whole = undistort_frames({"rgb": street.frames[2:20]}, street.K, bent)["rgb"]
     assert (seen[0] == whole).all()
 
 
@@ -157,7 +157,7 @@ def test_all_wrong_inputs_are_told_at_once(tmp_path: Path) -> None:
     (tmp_path / "K.yaml").write_text("width: 480\n")
     pq.write_table(pa.table({"time": [0.0, 1.0]}), tmp_path / "claim.parquet")
     with pytest.raises(InputError) as caught:
-        judge(
+        judge_video(
             str(tmp_path / "none.mp4"), claim=str(tmp_path / "claim.parquet"), camera=str(tmp_path / "K.yaml")
         )
     told = "\n".join(caught.value.problems)
@@ -185,10 +185,10 @@ def test_a_short_wrong_swing_is_not_hidden_by_a_long_quiet_clip() -> None:
     )  # fmt: skip
     for factor, good in ((1.0, True), (0.7, False), (-1.0, False)):
         claim = VideoClaim(time=times, pitch=factor * swing, station=10 * times)
-        verdict = judge_motion(drifting, claim_at(claim, times), load_foreign_gates())
+        verdict = judge_motion(drifting, sample_claim(claim, times), load_foreign_gates())
         assert verdict["pitch_judged"] and verdict["passed"] == good
     quiet = VideoClaim(time=times, pitch=nothing, station=10 * times)
-    assert not judge_motion(drifting, claim_at(quiet, times), load_foreign_gates())["pitch_judged"]
+    assert not judge_motion(drifting, sample_claim(quiet, times), load_foreign_gates())["pitch_judged"]
 
 
 def test_retention_sees_what_an_editor_kept_and_what_it_lost(tmp_path: Path) -> None:
@@ -212,14 +212,16 @@ def test_retention_sees_what_an_editor_kept_and_what_it_lost(tmp_path: Path) -> 
         track("lost", 0.5 * dive + 0.4 * np.roll(hump, 6)),
     )
     edited_braking = track("edited-braking", 0.5 * dive)
-    whole = retention(source, braking, kept, edited_braking, camera=str(tmp_path / "K.yaml"))
+    whole = measure_retention(source, braking, kept, edited_braking, camera=str(tmp_path / "K.yaml"))
     assert whole["motion_retention"] == pytest.approx(1.0, abs=0.01)
-    part = retention(
+    part = measure_retention(
         source, braking, lost, edited_braking, camera=str(tmp_path / "K.yaml"), out=str(tmp_path / "out")
     )
     assert part["motion_retention"] < 0.7 and (tmp_path / "out" / "retention.json").is_file()
     with pytest.raises(InputError, match="event must lie within"):
-        retention(source, braking, kept, edited_braking, camera=str(tmp_path / "K.yaml"), event=(16, 80))
+        measure_retention(
+            source, braking, kept, edited_braking, camera=str(tmp_path / "K.yaml"), event=(16, 80)
+        )
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flows.drawing import NO_SCRIPTS
-from flows.judging.evaluation_page import page
+from flows.judging.evaluation_page import render_page
 from flows.judging.evaluation_rows import figure_row
 from flows.measured import closing_report
 
@@ -59,7 +59,7 @@ def test_the_evaluation_takes_labels_as_text(hostile):
         figure_row("pitch_rmse", hostile, hostile, 1.0, "deg", note=hostile),
         figure_row("e_geometry_hump", hostile, hostile, 1.0, "1", floor=0.5, note=hostile),
     ]
-    found = assert_text_alone(page([clip], rows, hostile, hostile), hostile)
+    found = assert_text_alone(render_page([clip], rows, hostile, hostile), hostile)
     assert sum(text == hostile for text in found.text) > 5
 
 

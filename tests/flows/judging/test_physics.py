@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from flows.judging.physics import audit_physics, clip_columns, clip_facts, read_constants
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.physics.audit import audit_clip
@@ -20,8 +20,8 @@ GRID = """
 name: laws
 scene: {folder}/scene
 camera: {folder}/camera.yaml
-frames: 31
-frame_rate_hz: 10
+frames: 16
+frame_rate_hz: 5
 axes:
   weather:
     dry: {{weather: dry}}
@@ -32,13 +32,15 @@ axes:
     hump: {{initial_speed_km_h: 30, peak_pressure_mpa: 2.3, brake_onset_m: 6.0,
             hazard_center_m: 8.0, hazard_length_m: 3.7, hazard_height_m: 0.075}}
 """
-TRIALS = 300
+TRIALS = 100
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("laws")
-    generate(write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu")
+    generate_dataset(
+        write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu"
+    )
     return folder / "made"
 
 
@@ -137,3 +139,12 @@ def test_a_table_without_a_column_is_refused(dataset: Path, tmp_path: Path) -> N
         pq.write_table(table.drop_columns(["speed"]), path)
     with pytest.raises(InputError, match="lacks speed"):
         audit_physics(str(copy))
+
+
+def test_a_dataset_on_another_tyre_is_refused_by_its_name(dataset: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(dataset, copy, ignore=shutil.ignore_patterns("frames.zarr", "telemetry"))
+    with open(copy / "inputs" / "vehicle.yaml", "a") as file:
+        file.write("\ntyre: pacejka-205-60r15\n")
+    with pytest.raises(InputError, match=r"knows Burckhardt's tyre; .* drives on pacejka-205-60r15"):
+        read_constants(copy)

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.synthetic_street import drive_clip
-from flows.judging.foreign import judge
+from flows.judging.foreign import judge_video
 from flows.judging.trajectories import read_trajectory, trajectory_files
 from tasks.errors import InputError
 
@@ -71,7 +71,7 @@ def test_a_trajectory_is_judged_as_a_video_is(tmp_path: Path, factor: float, goo
     (tmp_path / "K.yaml").write_text(CAMERA)
     claim = pa.table({"time": times, "pitch": factor * clip.pitch, "station": clip.station})
     pq.write_table(claim, tmp_path / "claim.parquet")
-    result = judge(
+    result = judge_video(
         str(tmp_path / "vggt.txt"), claim=str(tmp_path / "claim.parquet"), camera=str(tmp_path / "K.yaml")
     )
     assert result["method"] == "vggt" and result["passed"] == good

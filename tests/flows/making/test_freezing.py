@@ -10,8 +10,8 @@ from catalogs.grids import load_grid
 from catalogs.studies import load_conditions
 from flows.cli import app
 from flows.judging.physics import audit_physics
-from flows.making.freezing import freeze, frozen_run, problems_of, reproduce
-from manifests.frozen_run import frozen_names, parameters_that_matter, read_frozen, sealed
+from flows.making.freezing import freeze_run, frozen_run, problems_of, reproduce_run
+from manifests.frozen_run import frozen_names, parameters_that_matter, read_frozen, seal_run
 from tasks.errors import InputError
 
 SMALL = "multibody-speed-check"
@@ -26,7 +26,7 @@ def written(run: dict, tmp_path) -> str:
     """A frozen run as a file, sealed anew."""
     path = tmp_path / "run.json"
     path.write_text(
-        json.dumps(sealed({key: value for key, value in run.items() if key not in {"format", "seal"}}))
+        json.dumps(seal_run({key: value for key, value in run.items() if key not in {"format", "seal"}}))
     )
     return str(path)
 
@@ -93,7 +93,7 @@ def test_another_state_of_the_code_does_not_matter_where_the_outcome_is_the_same
 def test_another_parameter_is_refused_with_its_value_and_what_to_do_and_nothing_is_written(small, tmp_path):
     small["parameters"]["vehicle.yaml"]["cg_height"]["value"] = 0.6
     with pytest.raises(InputError) as caught:
-        reproduce(written(small, tmp_path), str(tmp_path / "data"))
+        reproduce_run(written(small, tmp_path), str(tmp_path / "data"))
     first, last = caught.value.problems[0], caught.value.problems[-1]
     assert "vehicle.yaml.cg_height.value is 0.6 in the manifest and 0.55 here" in first
     assert "what to do" in last and "musync freeze" in last
@@ -124,7 +124,9 @@ def test_a_run_changed_by_hand_is_refused(small, tmp_path):
 def test_workers_that_compute_otherwise_are_found_after_the_run(small, tmp_path, monkeypatch):
     small["clips"][3]["ticks"] = "0" * 64
     monkeypatch.setattr(flows.making.freezing, "problems_of", lambda _: [])
-    _, differing = reproduce(written(small, tmp_path), str(tmp_path / "data"), runner="threads", workers=1)
+    _, differing = reproduce_run(
+        written(small, tmp_path), str(tmp_path / "data"), runner="threads", workers=1
+    )
     assert differing == ["depression-45kmh"]
 
 
@@ -146,9 +148,9 @@ def test_a_grid_of_one_s_own_is_frozen_into_a_file_and_made_again_from_it(tmp_pa
     grid.write_text("{name: mine, frames: 11, pictures: false, scenarios: {a: {initial_speed_km_h: 30}}}")
     file = tmp_path / "mine.json"
     with pytest.raises(InputError, match="say with --out FILE"):
-        freeze(str(grid))
-    assert freeze(str(grid), out=str(file))["frozen"][0]["clips"] == 1
-    report, differing = reproduce(str(file), str(tmp_path / "data"), runner="threads", workers=1)
+        freeze_run(str(grid))
+    assert freeze_run(str(grid), out=str(file))["frozen"][0]["clips"] == 1
+    report, differing = reproduce_run(str(file), str(tmp_path / "data"), runner="threads", workers=1)
     assert (report.made, differing) == (1, [])
 
 
@@ -181,7 +183,7 @@ def test_a_users_file_that_is_no_frozen_run_is_not_written_over(tmp_path):
         (tmp_path / "run.txt", "end in .json"),
     ):
         with pytest.raises(InputError, match=sentence):
-            freeze(SMALL, out=str(out))
+            freeze_run(SMALL, out=str(out))
     assert precious.read_text() == '{"mine": 1}'
-    assert freeze(SMALL, out=str(tmp_path / "run.json"))["frozen"][0]["changed"]
-    assert not freeze(SMALL, out=str(tmp_path / "run.json"))["frozen"][0]["changed"]
+    assert freeze_run(SMALL, out=str(tmp_path / "run.json"))["frozen"][0]["changed"]
+    assert not freeze_run(SMALL, out=str(tmp_path / "run.json"))["frozen"][0]["changed"]

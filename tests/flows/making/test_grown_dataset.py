@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from catalogs.effects import load_effects
-from flows.auditing.dataset_diff import diff
-from flows.making.generate import generate
+from flows.auditing.dataset_diff import compare_datasets
+from flows.making.generate import generate_dataset
 from tasks.identification.decision.answer import NamedEffect
 from tests.flows.measured.findings import found_effect, found_form, grown_file
 from tests.toy_street import write_toy_grid
@@ -52,7 +52,9 @@ def made_with(folder: Path, name: str, effect: NamedEffect) -> str:
     """The dataset of a vehicle grown by one effect."""
     car = grown_file(folder / f"{name}.yaml", effect, reached={"pressure": (0.0, 1.8)})
     out = str(folder / name)
-    generate(str(folder / "grid.yaml"), out, runner="threads", workers=1, vehicle=str(car), pictures=False)
+    generate_dataset(
+        str(folder / "grid.yaml"), out, runner="threads", workers=1, vehicle=str(car), pictures=False
+    )
     return out
 
 
@@ -69,7 +71,7 @@ def plain(folder: Path) -> str:
 
 
 def moved(plain: str, other: str) -> set[str]:
-    return {row["label"] for row in diff(plain, other)["clips"]}
+    return {row["label"] for row in compare_datasets(plain, other)["clips"]}
 
 
 @pytest.mark.parametrize("name", EXPLAINED)
@@ -79,7 +81,7 @@ def test_an_effect_moves_the_clips_that_it_explains_and_no_other(name: str, plai
 
 
 def test_a_form_moves_the_clips_that_it_explains_and_no_other(plain: str, folder: Path) -> None:
-    result = diff(plain, made_with(folder, "form", FORM))
+    result = compare_datasets(plain, made_with(folder, "form", FORM))
     rows = {row["label"]: row["labels"] for row in result["clips"]}
     assert set(rows) == BRAKED
     assert rows["dry/brakes"]["speed_rms_m_s"] > 0.1

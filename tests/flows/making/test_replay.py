@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from flows.making import replay
-from flows.making.clip import picture
-from flows.making.driving import drive
+from flows.making.clip import render_frames
+from flows.making.driving import simulate_drive
 from tasks.errors import InputError
 from tests.toy_street import write_toy_grid
 
@@ -29,19 +29,19 @@ def test_a_seed_that_reaches_the_motion_is_named_by_channel(grid, monkeypatch):
     calls = []
 
     def leaking(*args):
-        facts, ride = drive(*args)
+        state, ride = simulate_drive(*args)
         calls.append(1)
         columns = ride.columns | {"heave": ride.columns["heave"] + 1e-9 * len(calls)}
-        return facts, replace(ride, columns=columns)
+        return state, replace(ride, columns=columns)
 
-    monkeypatch.setattr(replay, "drive", leaking)
+    monkeypatch.setattr(replay, "simulate_drive", leaking)
     result = replay.replay_audit(grid, seeds=2)
     assert not result["verified"]
     assert any(problem.startswith("heave differs by up to") for problem in result["problems"])
 
 
 def test_snow_that_ignores_the_seed_is_named(grid, monkeypatch):
-    monkeypatch.setattr(replay, "picture", lambda *args: picture(*args[:5], 7, *args[6:]))
+    monkeypatch.setattr(replay, "render_frames", lambda *args: render_frames(*args[:5], 7, *args[6:]))
     result = replay.replay_audit(grid, seeds=2)
     assert "snow-3/flat: 2 seeds gave 1 different pictures" in result["problems"]
 

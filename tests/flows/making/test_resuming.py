@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import flows.making.generate
-from flows.auditing.repair import repair
-from flows.auditing.verify import gc
-from flows.making.generate import generate
+from flows.auditing.repair import repair_dataset
+from flows.auditing.verify import collect_garbage
+from flows.making.generate import generate_dataset
 from flows.making.places import noted_place, remember_place
 from flows.making.plan import make_plan
 from flows.store.layout import Layout
@@ -24,7 +24,7 @@ def grid(toy_dataset) -> str:
 
 
 def make(grid: str, folder: Path) -> Layout:
-    return generate(grid, str(folder), runner="threads", workers=1, pictures=False).layout
+    return generate_dataset(grid, str(folder), runner="threads", workers=1, pictures=False).layout
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
@@ -106,10 +106,10 @@ def test_what_a_run_began_without_a_plan_is_no_dataset_to_collect_in(tmp_path):
     (tmp_path / "data" / ".staging").mkdir(parents=True)
     (tmp_path / "data" / ".staging" / "begun").touch()
     with pytest.raises(InputError, match="goes on with the same musync generate"):
-        gc(str(tmp_path / "data"))
+        collect_garbage(str(tmp_path / "data"))
 
 
-@pytest.mark.parametrize("command", [gc, repair])
+@pytest.mark.parametrize("command", [collect_garbage, repair_dataset])
 def test_a_folder_that_is_no_dataset_is_not_touched_nor_made(tmp_path, command):
     (tmp_path / "mine").mkdir()
     for name in ("nowhere", "mine"):
@@ -187,7 +187,7 @@ def test_a_run_that_waited_while_another_ended_makes_nothing_and_leaves_nothing(
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(flows.making.generate, "sole_writer", late)
-        report = generate(grid, str(folder), runner="threads", workers=1, pictures=False)
+        report = generate_dataset(grid, str(folder), runner="threads", workers=1, pictures=False)
     assert report.made == 0 and files_of(folder) == whole
 
 

@@ -8,14 +8,14 @@ from catalogs.cameras import load_camera
 from catalogs.scenes import write_scene
 from flows.making.scenes import render_pose
 from tasks.errors import InputError
-from tasks.render.camera import viewmat
+from tasks.render.camera import world_to_camera
 from tests.toy_street import toy_street
 
 
 @pytest.fixture
 def pose(tmp_path):
     write_scene(toy_street(), tmp_path / "scene", {})
-    view = viewmat(load_camera("dashcam-480x320").T_rig_camera)
+    view = world_to_camera(load_camera("dashcam-480x320").T_rig_camera)
     content = {
         "viewmat": view.tolist(),
         "K": [[80, 0, 48], [0, 80, 32], [0, 0, 1]],

@@ -7,15 +7,15 @@ import pyarrow.parquet as pq
 import pytest
 
 import musync
-from flows.auditing.audit import audit
-from flows.auditing.explain import explain
-from flows.auditing.repair import repair
-from flows.auditing.verify import verify
+from flows.auditing.audit import audit_dataset
+from flows.auditing.explain import explain_frame
+from flows.auditing.repair import repair_dataset
+from flows.auditing.verify import verify_dataset
 from flows.judging.physics import audit_physics
-from flows.making.generate import generate
-from flows.reading.describe import describe
-from flows.reading.previews import preview
-from flows.reading.query import sql
+from flows.making.generate import generate_dataset
+from flows.reading.describe import describe_dataset
+from flows.reading.previews import make_films
+from flows.reading.query import query_dataset
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -24,7 +24,7 @@ from tasks.errors import InputError
 def bare(toy_dataset, tmp_path_factory) -> Layout:
     folder = tmp_path_factory.mktemp("bare")
     grid = str(toy_dataset.root.parent / "grid.yaml")
-    report = generate(grid, str(folder / "data"), runner="threads", workers=1, pictures=False)
+    report = generate_dataset(grid, str(folder / "data"), runner="threads", workers=1, pictures=False)
     assert report.quarantined == {}
     return report.layout
 
@@ -39,29 +39,31 @@ def test_telemetry_is_that_of_the_same_grid_with_frames(toy_dataset, bare):
 
 def test_there_is_no_picture_and_no_verdict(bare):
     assert not bare.frames.exists() and not bare.previews.exists()
-    rows = sql(str(bare.root), "SELECT count(*) n, count(check_passed) judged FROM verdicts")["rows"]
+    rows = query_dataset(str(bare.root), "SELECT count(*) n, count(check_passed) judged FROM verdicts")[
+        "rows"
+    ]
     assert rows == [{"n": 4, "judged": 0}]
     recovered = pq.read_table(bare.telemetry / "frames")["recovered_pitch"].to_numpy()
     assert np.isnan(recovered).all()
 
 
 def test_readers_and_auditors_take_it(bare, tmp_path):
-    assert verify(str(bare.root))["verified"]
-    assert audit(str(bare.root), share=1.0, runner="threads", workers=1)["mismatches"] == []
-    assert explain(str(bare.root), "snow-3/hump", 6)["agrees"]
-    assert describe(str(bare.root))["clips"][0]["passed"] is None
+    assert verify_dataset(str(bare.root))["verified"]
+    assert audit_dataset(str(bare.root), share=1.0, runner="threads", workers=1)["mismatches"] == []
+    assert explain_frame(str(bare.root), "snow-3/hump", 6)["agrees"]
+    assert describe_dataset(str(bare.root))["clips"][0]["passed"] is None
     assert audit_physics(str(bare.root))["verified"]
     data = musync.open(bare.root)
     assert data.torch(window=3, columns=["speed"], arrays=[])[1]["telemetry"].shape == (3, 1)
     with pytest.raises(InputError, match="without frames"):
         _ = data.frames
     with pytest.raises(InputError, match="--no-frames"):
-        preview(str(bare.root), str(tmp_path))
+        make_films(str(bare.root), str(tmp_path))
 
 
 def test_a_broken_table_is_repaired(bare):
     path = bare.telemetry / "ticks" / "family=snow" / "part-0000.parquet"
     before = path.read_bytes()
     path.write_bytes(before[:-9])
-    assert repair(str(bare.root), runner="threads", workers=1)["repaired"]
+    assert repair_dataset(str(bare.root), runner="threads", workers=1)["repaired"]
     assert path.read_bytes() == before

@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 import yaml
 
-from catalogs.channel_maps import FOLDER
 from flows.measured.bump_study import bump_study
 from flows.measured.importing import import_measurements
 from tasks.errors import InputError
@@ -41,9 +40,7 @@ def small_campaign(folder: Path) -> str:
         "pose_pitch_deg": np.degrees(wave), "steer_deg": np.sin(t),
     }  # fmt: skip
     pd.DataFrame(log).to_csv(folder / "log.csv", index=False)
-    import_measurements(
-        str(folder / "log.csv"), map=str(FOLDER / "comma2k19.yaml"), out=str(folder / "campaign")
-    )
+    import_measurements(str(folder / "log.csv"), map="comma2k19", out=str(folder / "campaign"))
     return str(folder / "campaign")
 
 

@@ -20,14 +20,14 @@ from flows.measured.closing import close_loop, verdict_json
 from flows.measured.closing_ledger import record_reading
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
-from tasks.campaign.planned_runs import Drive
+from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import TOLERANCES, synthetic_campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 SHORT = tuple(
-    Drive(speed=speed, peak=peak, duration=2.6, disc_rise=rise)
+    RunPlan(speed=speed, peak=peak, duration=2.6, disc_rise=rise)
     for speed, peak, rise in ((16.0, 1.2, 20.0), (20.0, -1.8, 60.0), (12.0, 0.8, 20.0), (18.0, 1.5, 100.0))
 )
 

@@ -17,9 +17,8 @@ from tasks.campaign.campaign import Run
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.forms import PORT_STEP, RANGE, form_in_range
 from tasks.identification.inference.forward import run_model, simulate_run
-from tasks.surface.friction import surface_friction
 from tasks.surface.road_profile import RoadHazard
-from tasks.surface.state import Weather, surface_state
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand, brake_pressure
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
@@ -73,10 +72,9 @@ def difference(manoeuvre, car, theta, slots=()):
     weather, speed, peak, height = MANOEUVRES[manoeuvre]
     state = surface_state(weather, SURFACE)
     made = rollout(
-        car, weather.kind, surface_friction(weather, state, SURFACE),
+        car, state,
         Controls(initial_speed=speed, brake=brake_of(peak), hold_speed_until_brake=False),
         RoadHazard(center_m=12.0, length_m=3.7, height_m=height), mode="coupled", duration_s=3.0,
-        snow_depth_mm=state.snow_depth_mm,
     ).columns  # fmt: skip
     _, fitted = fitted_run(manoeuvre, theta, slots)
     return np.array([np.abs(made[name][:3000:10] - fitted.column(name)).max() for name in CHANNELS])

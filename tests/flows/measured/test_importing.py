@@ -11,11 +11,12 @@ import pytest
 import yaml
 
 from catalogs.campaigns import read_campaign
-from catalogs.channel_maps import FOLDER, load_channel_map
+from catalogs.channel_maps import load_channel_map
+from catalogs.entries import entry_names
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
 from tasks.errors import InputError
-from tests.campaign.recorded import MAP, braking_columns, logged
+from tests.campaign.recorded import MAP, braking_columns, log_signal
 
 Columns = dict[str, np.ndarray]
 
@@ -64,13 +65,13 @@ def assert_same_motion(found: Columns, start: int) -> None:
 
 
 def test_a_csv_becomes_the_motion_in_campaign_units(tmp_path: Path) -> None:
-    found = imported(tmp_path, write_csv(tmp_path / "log.csv", logged(braking_columns())))
+    found = imported(tmp_path, write_csv(tmp_path / "log.csv", log_signal(braking_columns())))
     assert_same_motion(found, 0)
 
 
 def test_parquet_and_mdf4_give_what_the_csv_gives(tmp_path: Path) -> None:
     asammdf = pytest.importorskip("asammdf", reason="reading MDF4 needs asammdf")
-    log = logged(braking_columns())
+    log = log_signal(braking_columns())
     t = log["t_ms"] / 1e3
     with asammdf.MDF(version="4.10") as recording:
         for name, values in log.items():
@@ -89,7 +90,7 @@ def test_parquet_and_mdf4_give_what_the_csv_gives(tmp_path: Path) -> None:
 
 def test_a_unit_that_the_mdf4_file_states_must_be_the_maps(tmp_path: Path) -> None:
     asammdf = pytest.importorskip("asammdf", reason="reading MDF4 needs asammdf")
-    log = logged(braking_columns())
+    log = log_signal(braking_columns())
     with asammdf.MDF(version="4.10") as recording:
         for name, values in log.items():
             unit = "m/s" if name == "v_kmh" else ""
@@ -109,7 +110,7 @@ def test_without_asammdf_the_reader_says_what_to_install(
 
 
 def test_the_campaign_is_the_one_that_closing_the_loop_reads(tmp_path: Path) -> None:
-    write_csv(tmp_path / "log.csv", logged(braking_columns(seconds=14.0)))
+    write_csv(tmp_path / "log.csv", log_signal(braking_columns(seconds=14.0)))
     runs = [
         {"name": f"r{i}", "file": "log.csv", "from_s": 0.2 * i, "to_s": 0.2 * i + 3.0,
          "part": "held_out" if i % 2 else "train", "conditions": {"disc_temperature_above_ambient_c": 10.0 * i}}
@@ -128,7 +129,7 @@ def test_the_campaign_is_the_one_that_closing_the_loop_reads(tmp_path: Path) -> 
 def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
     for day, seconds in (("monday", 3.0), ("tuesday", 4.0)):
         (tmp_path / "logs" / day).mkdir(parents=True)
-        write_csv(tmp_path / "logs" / day / "log.csv", logged(braking_columns(seconds)))
+        write_csv(tmp_path / "logs" / day / "log.csv", log_signal(braking_columns(seconds)))
     runs = [{"name": day, "file": f"{day}/log.csv"} for day in ("monday", "tuesday")]
     report = import_measurements(
         str(tmp_path / "logs"), map=write_map(tmp_path, runs=runs), out=str(tmp_path / "campaign")
@@ -154,7 +155,7 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
         "above_mpa": 0.12, "merge_gap_s": 0.08, "minimum_s": 0.5, "before_s": 1.0, "after_s": 0.8, "held_out_every": 3,
     }  # fmt: skip
     report = import_measurements(
-        write_csv(tmp_path / "log.csv", logged(columns)),
+        write_csv(tmp_path / "log.csv", log_signal(columns)),
         map=write_map(tmp_path, segment=segment), out=str(tmp_path / "campaign"),
     )  # fmt: skip
     assert [(run["run"], run["part"]) for run in report["runs"]] == [
@@ -164,7 +165,7 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
 
 
 def test_the_same_recording_gives_the_same_bytes(tmp_path: Path) -> None:
-    source = write_csv(tmp_path / "log.csv", logged(braking_columns()))
+    source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
     for name in ("a", "b"):
         import_measurements(source, map=write_map(tmp_path), out=str(tmp_path / name))
     for file in sorted((tmp_path / "a").rglob("*.*")):
@@ -203,7 +204,7 @@ def _held(x: np.ndarray) -> np.ndarray:
 def test_what_is_wrong_is_named_with_run_and_channel(
     tmp_path: Path, signal: str, damage: Callable[[np.ndarray], np.ndarray], words: str
 ) -> None:
-    log = logged(braking_columns())
+    log = log_signal(braking_columns())
     log[signal] = damage(log[signal])
     text = problems_of(tmp_path, log)
     assert words in text
@@ -211,7 +212,7 @@ def test_what_is_wrong_is_named_with_run_and_channel(
 
 
 def test_all_problems_come_at_once(tmp_path: Path) -> None:
-    log = logged(braking_columns())
+    log = log_signal(braking_columns())
     log["pitch_up"] = -log["pitch_up"]
     log["az"][90] = np.inf
     log["p_bar"] *= 100
@@ -220,7 +221,7 @@ def test_all_problems_come_at_once(tmp_path: Path) -> None:
 
 
 def test_a_missing_signal_is_named_with_those_that_come_near(tmp_path: Path) -> None:
-    log = logged(braking_columns())
+    log = log_signal(braking_columns())
     log["v_kmph"] = log.pop("v_kmh")
     assert "signal v_kmh is missing; there are: v_kmph" in problems_of(tmp_path, log)
 
@@ -230,7 +231,7 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
     for name in columns:
         columns[name][:120] = columns[name][:120] if name == "time" else 0.0
     assert "is frozen" not in problems_of(
-        tmp_path, logged(columns) | {"az": np.full(len(columns["time"]), 99.0)}
+        tmp_path, log_signal(columns) | {"az": np.full(len(columns["time"]), 99.0)}
     )
 
 
@@ -251,12 +252,12 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
     ],
 )
 def test_a_faulty_map_is_named_by_its_key(tmp_path: Path, changes: dict[str, object], words: str) -> None:
-    assert words in problems_of(tmp_path, logged(braking_columns()), **changes)
+    assert words in problems_of(tmp_path, log_signal(braking_columns()), **changes)
 
 
 @pytest.mark.parametrize("file", ["../log.csv", "/etc/passwd", "..", "a\x00b", ""])
 def test_a_run_stays_in_the_folder_of_the_measurements(tmp_path: Path, file: str) -> None:
-    text = problems_of(tmp_path, logged(braking_columns()), runs=[{"name": "a", "file": file}])
+    text = problems_of(tmp_path, log_signal(braking_columns()), runs=[{"name": "a", "file": file}])
     assert "runs.0.file: must be a file in the folder" in text or "runs.0.file: String should have" in text
 
 
@@ -266,7 +267,7 @@ def test_missing_tolerances_hide_neither_a_wrong_unit_nor_a_missing_signal(tmp_p
     content["channels"]["speed"] |= {"unit": "bar"}
     content["channels"]["pitch"] |= {"source": "nick"}
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
-    source = write_csv(tmp_path / "log.csv", logged(braking_columns()))
+    source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
     with pytest.raises(InputError) as caught:
         import_measurements(source, map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign"))
     text = str(caught.value)
@@ -276,26 +277,26 @@ def test_missing_tolerances_hide_neither_a_wrong_unit_nor_a_missing_signal(tmp_p
 
 
 def test_files_that_give_runs_of_one_name_are_told(tmp_path: Path) -> None:
-    write_csv(tmp_path / "log.csv", logged(braking_columns()))
-    pd.DataFrame(logged(braking_columns())).to_parquet(tmp_path / "log.parquet")
+    write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
+    pd.DataFrame(log_signal(braking_columns())).to_parquet(tmp_path / "log.parquet")
     with pytest.raises(InputError, match="run log stands twice"):
         import_measurements(str(tmp_path), map=map_beside(tmp_path), out=str(tmp_path / "campaign"))
 
 
 def test_a_clock_that_would_fill_the_memory_is_refused(tmp_path: Path) -> None:
-    log = logged(braking_columns())
+    log = log_signal(braking_columns())
     log["t_ms"] = log["t_ms"] * 1e12
     assert "run log must have at most 20000000 samples; at" in problems_of(tmp_path, log)
 
 
 def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
-    source = write_csv(tmp_path / "log.csv", logged(braking_columns()))
+    source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
     with pytest.raises(InputError, match="new or empty folder"):
         import_measurements(source, map=write_map(tmp_path), out=str(tmp_path))
 
 
 def test_every_map_that_ships_can_be_read() -> None:
-    names = sorted(path.stem for path in FOLDER.glob("*.yaml"))
+    names = entry_names("channel map")
     assert names and all(load_channel_map(name)[0].channels for name in names)
 
 
@@ -328,7 +329,7 @@ def test_a_damaged_or_foreign_file_is_one_sentence(tmp_path: Path, name: str, wo
 
 
 def test_text_in_a_number_column_is_named(tmp_path: Path) -> None:
-    log: dict[str, object] = dict(logged(braking_columns()))
+    log: dict[str, object] = dict(log_signal(braking_columns()))
     log["v_kmh"] = ["fast"] * len(braking_columns()["time"])
     pd.DataFrame(log).to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(InputError, match="signal v_kmh must be of numbers"):

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import musync
-from flows.reading.query import sql
+from flows.reading.query import query_dataset
 from flows.store.layout import Layout
 from tasks.errors import InputError
 from tests.flows.reseal import reseal
@@ -97,7 +97,7 @@ def test_an_odd_table_is_shown_or_refused_with_a_sentence_by_every_library(copy,
     data = musync.open(copy.root)
     for table in ("clips", "frames", "verdicts"):
         for reader in (
-            lambda table: sql(str(copy.root), f"SELECT * FROM {table}"),
+            lambda table: query_dataset(str(copy.root), f"SELECT * FROM {table}"),
             data.pandas,
             data.polars,
             lambda table: data.telemetry("clips" if table == "verdicts" else table).head(2),
@@ -114,7 +114,7 @@ def test_a_file_that_is_no_parquet_is_one_sentence(copy, content):
     (copy.telemetry / "frames" / "family=dry" / "part-0000.parquet").write_bytes(content)
     data = musync.open(copy.root)
     for reader in (
-        lambda: sql(str(copy.root), "SELECT 1"),
+        lambda: query_dataset(str(copy.root), "SELECT 1"),
         lambda: data.pandas("clips"),
         lambda: data.telemetry("clips"),
         lambda: data.telemetry("frames"),

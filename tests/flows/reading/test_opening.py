@@ -15,7 +15,7 @@ import pytest
 from torch.utils.data import DataLoader
 
 import musync
-from flows.reading.query import VIEWS, schema, sql
+from flows.reading.query import VIEWS, list_columns, query_dataset
 from flows.store.frames import read_clip
 from manifests.provenance import SOURCE_ROOT
 from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
@@ -36,7 +36,7 @@ def test_views_have_the_columns_that_the_schema_lists(data):
 
 
 def test_the_schema_is_that_of_the_parquet_files(data, toy_dataset):
-    assert schema()["ticks"][3] == {
+    assert list_columns()["ticks"][3] == {
         "name": "t_ns", "unit": "ns", "symbol": "t", "standard_name": "time",
         "description": "time since the start of the clip",
     }  # fmt: skip
@@ -80,7 +80,7 @@ def test_xarray_reads_frames_lazily_with_named_dimensions(data, toy_dataset):
 
 
 def test_the_schema_of_the_arrays_is_that_of_the_zarr_store(data):
-    listed = {row["name"]: row for row in schema()["arrays"]}
+    listed = {row["name"]: row for row in list_columns()["arrays"]}
     for name, array in data.frames.arrays():
         assert array.attrs["units"] == listed[name]["unit"]
         assert array.attrs["description"] == listed[name]["description"]
@@ -105,7 +105,9 @@ def test_the_python_of_the_analysts_page_runs_as_it_stands(data, toy_dataset):
 def test_what_is_not_represented_is_null_and_left_out_of_an_average(data, toy_dataset):
     """Clips that coast over a hump have no stopping distance; in Parquet that is NaN."""
     stored = pq.read_table(toy_dataset.telemetry / "clips.parquet")["stopping_distance"].to_numpy()
-    answer = sql(str(toy_dataset.root), "SELECT count(stopping_distance) n, avg(peak_pitch) p FROM clips")
+    answer = query_dataset(
+        str(toy_dataset.root), "SELECT count(stopping_distance) n, avg(peak_pitch) p FROM clips"
+    )
     assert np.isnan(stored).sum() >= 2
     assert answer["rows"][0]["n"] == np.isfinite(stored).sum()
     assert 0 < answer["rows"][0]["p"] < 0.2
@@ -122,14 +124,14 @@ def test_pairs_are_those_of_the_grid_and_join_with_clips(data):
 
 def test_a_query_that_is_no_sql_is_one_sentence_with_the_views(toy_dataset):
     with pytest.raises(InputError, match="views are clips, ticks, frames, verdicts, pairs"):
-        sql(str(toy_dataset.root), "SELECT nothing FROM nowhere")
+        query_dataset(str(toy_dataset.root), "SELECT nothing FROM nowhere")
 
 
 def test_a_missing_table_is_told_with_what_to_do(toy_dataset, tmp_path):
     shutil.copytree(toy_dataset.root, tmp_path / "copy")
     (tmp_path / "copy" / "telemetry" / "pairs.parquet").unlink()
     with pytest.raises(InputError, match="files of pairs are missing: musync repair"):
-        sql(str(tmp_path / "copy"), "SELECT 1")
+        query_dataset(str(tmp_path / "copy"), "SELECT 1")
 
 
 def test_a_question_needs_neither_torch_nor_what_makes_clips(toy_dataset):
@@ -150,7 +152,7 @@ def test_an_unknown_table_names_those_that_exist(data):
 
 def test_answers_are_json(toy_dataset):
     query = "SELECT *, [1.5, 'nan'::DOUBLE] AS l, DATE '2025-01-01' AS d FROM clips"
-    row = json.loads(json.dumps(sql(str(toy_dataset.root), query), allow_nan=False))["rows"][0]
+    row = json.loads(json.dumps(query_dataset(str(toy_dataset.root), query), allow_nan=False))["rows"][0]
     assert (row["d"], row["l"]) == ("2025-01-01", [1.5, None])
 
 

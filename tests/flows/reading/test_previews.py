@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from flows.reading.film import through_film, write_film
-from flows.reading.previews import film_names, preview
+from flows.reading.previews import film_names, make_films
 from flows.store.frames import read_clip
 from flows.store.layout import read_json
 from flows.store.outputs import name_problem
@@ -19,7 +19,7 @@ def frames_of(path: str) -> np.ndarray:
 
 
 def test_a_film_shows_every_frame_of_its_clip_over_the_traces(toy_dataset, tmp_path):
-    films = preview(str(toy_dataset.root), str(tmp_path / "films"), clips=["snow-3/hump"])["films"]
+    films = make_films(str(toy_dataset.root), str(tmp_path / "films"), clips=["snow-3/hump"])["films"]
     assert [film.rsplit("/", 1)[1] for film in films] == ["snow-3_hump.mp4"]
     row = next(r for r in read_json(toy_dataset.manifest)["clips"] if r["label"] == "snow-3/hump")
     wanted = read_clip(toy_dataset.frames, row["index"], "rgb").astype(float)
@@ -30,7 +30,7 @@ def test_a_film_shows_every_frame_of_its_clip_over_the_traces(toy_dataset, tmp_p
 
 
 def test_a_film_without_traces_has_the_size_of_the_picture(toy_dataset, tmp_path):
-    films = preview(str(toy_dataset.root), str(tmp_path), clips=["dry/flat"], traces=False)["films"]
+    films = make_films(str(toy_dataset.root), str(tmp_path), clips=["dry/flat"], traces=False)["films"]
     assert frames_of(films[0]).shape[1:] == read_clip(toy_dataset.frames, 0, "rgb").shape[1:]
 
 
@@ -58,15 +58,15 @@ def test_labels_that_differ_have_films_of_their_own_with_names_that_stay_in_the_
 def test_a_film_of_one_s_own_is_not_overwritten(toy_dataset, tmp_path):
     (tmp_path / "dry_flat.mp4").write_text("mine")
     with pytest.raises(InputError, match=r"dry_flat\.mp4 is not a file that musync preview wrote"):
-        preview(str(toy_dataset.root), str(tmp_path))
+        make_films(str(toy_dataset.root), str(tmp_path))
     assert [path.name for path in tmp_path.iterdir()] == ["dry_flat.mp4"]
 
 
 def test_clips_and_datasets_that_are_not_there_are_named(toy_dataset, tmp_path):
     with pytest.raises(InputError, match="no clip 'fog'"):
-        preview(str(toy_dataset.root), str(tmp_path), clips=["fog", "dry/flat"])
+        make_films(str(toy_dataset.root), str(tmp_path), clips=["fog", "dry/flat"])
     with pytest.raises(InputError, match="must be a finished dataset"):
-        preview(str(tmp_path), str(tmp_path))
+        make_films(str(tmp_path), str(tmp_path))
 
 
 def test_a_film_gives_back_what_its_rate_factor_leaves() -> None:

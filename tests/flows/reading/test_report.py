@@ -10,8 +10,8 @@ from base64 import b64decode
 import numpy as np
 import pytest
 
-from flows.making.generate import generate
-from flows.reading.report import packed, report
+from flows.making.generate import generate_dataset
+from flows.reading.report import make_report, pack_columns
 from flows.store.telemetry import read_columns
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
@@ -20,7 +20,7 @@ from tasks.errors import InputError
 @pytest.fixture(scope="module")
 def page_folder(toy_dataset, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report") / "page"
-    result = report(str(toy_dataset.root), out=str(folder))
+    result = make_report(str(toy_dataset.root), out=str(folder))
     assert (result["clips"], result["traced"], result["films_made"]) == (4, 4, 4)
     return folder
 
@@ -169,8 +169,8 @@ def test_the_manifest_s_facts_stand_on_the_page(page, toy_dataset):
 
 def test_telemetry_alone_gets_the_page_without_films(browser, toy_dataset, tmp_path):
     grid = str(toy_dataset.root.parent / "grid.yaml")
-    bare = generate(grid, str(tmp_path / "bare"), runner="threads", workers=1, pictures=False).layout
-    result = report(str(bare.root), clips=["dry/hump"])
+    bare = generate_dataset(grid, str(tmp_path / "bare"), runner="threads", workers=1, pictures=False).layout
+    result = make_report(str(bare.root), clips=["dry/hump"])
     assert result["page"] == str(tmp_path / "bare-report" / "index.html")
     assert (result["traced"], result["films_made"]) == (1, 0)
     for page in opened(browser, tmp_path / "bare-report"):
@@ -184,17 +184,17 @@ def test_telemetry_alone_gets_the_page_without_films(browser, toy_dataset, tmp_p
 
 
 def test_a_second_report_keeps_the_films(toy_dataset, page_folder):
-    assert report(str(toy_dataset.root), out=str(page_folder))["films_made"] == 0
+    assert make_report(str(toy_dataset.root), out=str(page_folder))["films_made"] == 0
 
 
 def test_files_that_no_report_wrote_stay_and_those_of_clips_that_went_go(toy_dataset, tmp_path):
     page = tmp_path / "page"
-    report(str(toy_dataset.root), out=str(page), clips=["dry/flat", "dry/hump"])
+    make_report(str(toy_dataset.root), out=str(page), clips=["dry/flat", "dry/hump"])
     ours = {path.name for folder in ("clips", "media") for path in (page / folder).iterdir()}
     for name in ("clips/holiday.mp4", "media/wedding.mp4", "letter.txt"):
         (page / name).write_text("mine")
     (page / "media" / f"{'0' * 16}.mp4").write_text("mine, with a name like a film's")
-    assert report(str(toy_dataset.root), out=str(page), clips=["dry/hump"])["films_made"] == 0
+    assert make_report(str(toy_dataset.root), out=str(page), clips=["dry/hump"])["films_made"] == 0
     left = {path.name for folder in ("clips", "media") for path in (page / folder).iterdir()}
     assert len(ours & left) == 2 and len(ours - left) == 2
     assert left - ours == {"holiday.mp4", "wedding.mp4", f"{'0' * 16}.mp4"}
@@ -207,27 +207,27 @@ def test_a_folder_that_only_looks_like_a_report_is_left_alone(toy_dataset, tmp_p
     (tmp_path / theirs).write_text('{"format": "musync-written/1", "files": {"clips/holiday.mp4": "audit"}}')
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     with pytest.raises(InputError, match="must be new, empty or an earlier report"):
-        report(str(toy_dataset.root), out=str(tmp_path))
+        make_report(str(toy_dataset.root), out=str(tmp_path))
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 def test_a_page_is_not_written_through_links(toy_dataset, tmp_path):
     victim, page = tmp_path / "victim", tmp_path / "page"
     victim.mkdir()
-    report(str(toy_dataset.root), out=str(page), clips=["dry/hump"])
+    make_report(str(toy_dataset.root), out=str(page), clips=["dry/hump"])
     shutil.rmtree(page / "media")
     (page / "media").symlink_to(victim)
     (page / "data.js").unlink()
     (page / "data.js").symlink_to(victim / "data.js")
     with pytest.raises(InputError) as told:
-        report(str(toy_dataset.root), out=str(page))
+        make_report(str(toy_dataset.root), out=str(page))
     assert len(told.value.problems) == 2
     beside = tmp_path / "data"
     beside.symlink_to(toy_dataset.root)
     (toy_dataset.root.parent / f"{toy_dataset.root.name}-report").symlink_to(victim)
     try:
         with pytest.raises(InputError, match="is a link; name the page's folder"):
-            report(str(toy_dataset.root))
+            make_report(str(toy_dataset.root))
     finally:
         (toy_dataset.root.parent / f"{toy_dataset.root.name}-report").unlink()
     assert list(victim.iterdir()) == []
@@ -248,7 +248,7 @@ def test_labels_are_text_in_the_page_whatever_they_hold(browser, toy_dataset, tm
         clip["verdict"]["reasons"] = [label]
     manifest["grid"]["name"] = HOSTILE[0]
     path.write_text(json.dumps(manifest))
-    report(str(tmp_path / "data"), out=str(tmp_path / "page"))
+    make_report(str(tmp_path / "data"), out=str(tmp_path / "page"))
     assert "</script>" not in (tmp_path / "page" / "data.js").read_text()
     for page in opened(browser, tmp_path / "page"):
         shown = page.locator("#clips tbody tr td:first-child").all_text_contents()
@@ -268,7 +268,7 @@ def test_labels_are_text_in_the_page_whatever_they_hold(browser, toy_dataset, tm
 
 def test_packed_columns_read_back_bit_for_bit():
     columns = {"x": np.array([0.1, -0.0, np.nan]), "on": np.array([True, False, True])}
-    content = packed(columns, ["x", "on"])
+    content = pack_columns(columns, ["x", "on"])
     planes = zlib.decompress(b64decode(content["packed"]))
     read = [struct.unpack("<d", planes[i : 8 * 3 : 3])[0] for i in range(3)]
     np.testing.assert_array_equal(np.array(read).view(np.uint64), columns["x"].view(np.uint64))
@@ -278,8 +278,8 @@ def test_packed_columns_read_back_bit_for_bit():
 def test_the_page_does_not_go_among_other_files_nor_into_the_dataset(toy_dataset, tmp_path):
     (tmp_path / "letter.txt").write_text("mine")
     with pytest.raises(InputError, match="holds other files"):
-        report(str(toy_dataset.root), out=str(tmp_path))
+        make_report(str(toy_dataset.root), out=str(tmp_path))
     with pytest.raises(InputError, match="outside the dataset"):
-        report(str(toy_dataset.root), out=str(toy_dataset.root / "report"))
+        make_report(str(toy_dataset.root), out=str(toy_dataset.root / "report"))
     with pytest.raises(InputError, match="no clip 'moon'"):
-        report(str(toy_dataset.root), clips=["moon"])
+        make_report(str(toy_dataset.root), clips=["moon"])

@@ -3,13 +3,13 @@
 import cv2
 import pytest
 
-from flows.reading.sheets import is_flat_twin, sheets
+from flows.reading.sheets import draw_sheets, is_flat_twin
 from tasks.errors import InputError
 from tasks.render.contact_sheet import CAPTION, MARGIN, TILE_WIDTH
 
 
 def test_sheets_have_a_row_a_drive_and_a_row_a_feature(toy_dataset, tmp_path):
-    written = sheets(str(toy_dataset.root), str(tmp_path))
+    written = draw_sheets(str(toy_dataset.root), str(tmp_path))
     weather, hazards = (cv2.imread(written[name]) for name in ("weather", "hazards"))
     tile = round(TILE_WIDTH * 2 / 3)
     row, column = tile + MARGIN + CAPTION, TILE_WIDTH + MARGIN
@@ -33,4 +33,4 @@ def test_a_flat_twin_is_the_same_drive_weather_and_seed_without_the_feature():
 
 def test_a_folder_that_is_no_dataset_is_named(tmp_path):
     with pytest.raises(InputError, match="must be a finished dataset"):
-        sheets(str(tmp_path), str(tmp_path))
+        draw_sheets(str(tmp_path), str(tmp_path))

@@ -15,8 +15,8 @@ import pytest
 
 import flows.reading.query
 import musync
-from flows.reading.connection import connect
-from flows.reading.query import sql
+from flows.reading.connection import connect_views
+from flows.reading.query import query_dataset
 from flows.reading.table_files import TableFiles
 from flows.store.layout import Layout
 from manifests.provenance import SOURCE_ROOT
@@ -67,7 +67,7 @@ def hashes(folder: Path) -> dict[str, str]:
 def test_a_query_reaches_no_file_of_the_machine_and_says_what_would_let_it(toy_dataset, tmp_path, query):
     asked = query.format(dataset=toy_dataset.root, outside=tmp_path)
     with pytest.raises(InputError, match="--allow-files lets SQL read and write files of this machine"):
-        sql(str(toy_dataset.root), asked)
+        query_dataset(str(toy_dataset.root), asked)
     assert not list(tmp_path.iterdir())
 
 
@@ -86,14 +86,14 @@ def test_a_query_reaches_no_file_of_the_machine_and_says_what_would_let_it(toy_d
 def test_no_query_writes_to_the_dataset_through_the_views_files(copy, query, allowed):
     before = hashes(copy.root)
     with pytest.raises(InputError) as caught:
-        sql(str(copy.root), query, allow_files=allowed)
+        query_dataset(str(copy.root), query, allow_files=allowed)
     assert "Traceback" not in str(caught.value)
     assert hashes(copy.root) == before
 
 
 def test_files_are_read_and_written_where_they_are_allowed(toy_dataset, tmp_path):
     (tmp_path / "notes.txt").write_text("speed bump at 4 m")
-    answer = sql(
+    answer = query_dataset(
         str(toy_dataset.root), f"SELECT content FROM read_text('{tmp_path}/notes.txt')", allow_files=True
     )
     assert answer["rows"] == [{"content": "speed bump at 4 m"}]
@@ -119,7 +119,7 @@ def test_sql_hidden_in_a_column_name_is_a_name(copy, tmp_path):
         stored = pq.read_table(path, partitioning=None)
         pq.write_table(stored.append_column(name, [[0.5] * stored.num_rows]), path)
     reseal(copy)
-    rows = sql(str(copy.root), "SELECT * FROM clips")["rows"]
+    rows = query_dataset(str(copy.root), "SELECT * FROM clips")["rows"]
     data = musync.open(copy.root)
     assert rows[0][name] == 0.5 == data.pandas("clips", [name])[name][0]
     assert data.pandas("frames").shape[0] == 44
@@ -131,7 +131,7 @@ def test_sql_hidden_in_a_column_name_is_a_name(copy, tmp_path):
 def test_a_folder_s_name_means_nothing_to_sql(toy_dataset, tmp_path):
     for name in ("a[b]c", "a*c", "it's {1,2}?", 'say "x"; --'):
         folder = shutil.copytree(toy_dataset.root, tmp_path / name / "data")
-        assert sql(str(folder), "SELECT count(*) n FROM ticks")["rows"] == [{"n": 4004}]
+        assert query_dataset(str(folder), "SELECT count(*) n FROM ticks")["rows"] == [{"n": 4004}]
         assert musync.open(folder).telemetry("ticks").count_rows() == 4004
 
 
@@ -139,14 +139,17 @@ def test_a_file_that_the_manifest_does_not_record_is_not_read(copy):
     for table in ("ticks", "frames"):
         part = copy.telemetry / table / "family=dry" / "part-0000.parquet"
         shutil.copyfile(part, part.with_name("part-0001.parquet"))
-    assert sql(str(copy.root), "SELECT count(*) n FROM ticks")["rows"] == [{"n": 4004}]
+    assert query_dataset(str(copy.root), "SELECT count(*) n FROM ticks")["rows"] == [{"n": 4004}]
     data = musync.open(copy.root)
     assert data.telemetry("ticks").count_rows() == 4004
     assert len(data.torch(window=11, arrays=[], quarantined=True)) == 4
 
 
 def test_a_query_uses_half_of_the_memory_and_no_disk(toy_dataset):
-    with connect(toy_dataset.root) as closed, connect(toy_dataset.root, allow_files=True) as opened:
+    with (
+        connect_views(toy_dataset.root) as closed,
+        connect_views(toy_dataset.root, allow_files=True) as opened,
+    ):
         asked = "SELECT current_setting('temp_directory'), current_setting('memory_limit')"
         [(aside, memory)] = closed.execute(asked).fetchall()
         assert aside == "" and opened.execute(asked).fetchall()[0][0] != ""
@@ -157,9 +160,9 @@ def test_a_query_uses_half_of_the_memory_and_no_disk(toy_dataset):
 
 def test_an_answer_too_large_to_return_is_refused(toy_dataset, monkeypatch):
     monkeypatch.setattr(flows.reading.query, "MOST_VALUES", 8)
-    assert len(sql(str(toy_dataset.root), "SELECT clip_id, label FROM clips")["rows"]) == 4
+    assert len(query_dataset(str(toy_dataset.root), "SELECT clip_id, label FROM clips")["rows"]) == 4
     with pytest.raises(InputError, match="at most 8 values"):
-        sql(str(toy_dataset.root), "SELECT clip_id, label, weather FROM clips")
+        query_dataset(str(toy_dataset.root), "SELECT clip_id, label, weather FROM clips")
 
 
 @pytest.mark.parametrize(

@@ -7,16 +7,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Thread
 
 import pytest
-from distributed import Client
+from distributed import Client, LocalCluster
 
 from flows.making.clip import warm_up
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from flows.running.cluster import check_cluster, facts_here, gpu_for, version_problems, warm_cluster
 from flows.running.runner import open_executor
 from flows.store.layout import Layout
@@ -96,12 +96,6 @@ def cluster(
             process.wait(timeout=20)
 
 
-@pytest.fixture(scope="module")
-def scheduler(tmp_path_factory):
-    with cluster(tmp_path_factory.mktemp("cluster"), 1) as (address, _):
-        yield address
-
-
 def address_in(file: Path) -> str:
     for _ in range(400):
         if file.is_file() and file.stat().st_size:
@@ -109,15 +103,6 @@ def address_in(file: Path) -> str:
             return address
         time.sleep(0.1)
     raise TimeoutError("no scheduler came up in 40 s")
-
-
-def test_the_bytes_made_on_a_cluster_are_those_made_here(toy_dataset, scheduler, tmp_path):
-    with Client(scheduler) as client:
-        client.wait_for_workers(1, timeout=30)
-    grid = str(toy_dataset.root.parent / "grid.yaml")
-    made = generate(grid, str(tmp_path / "data"), scheduler=scheduler)
-    assert made.made == 4
-    assert made.layout.manifest.read_bytes() == toy_dataset.manifest.read_bytes()
 
 
 def test_a_worker_killed_in_the_middle_changes_no_byte(toy_dataset, tmp_path):
@@ -135,10 +120,26 @@ def test_a_worker_killed_in_the_middle_changes_no_byte(toy_dataset, tmp_path):
             client.wait_for_workers(2, timeout=60)
         watcher = Thread(target=kill_one_when_a_clip_is_there, args=workers[:1], daemon=True)
         watcher.start()
-        made = generate(str(toy_dataset.root.parent / "grid.yaml"), str(layout.root), scheduler=address)
+        made = generate_dataset(
+            str(toy_dataset.root.parent / "grid.yaml"), str(layout.root), scheduler=address
+        )
         assert workers[0].wait(5) == -signal.SIGKILL and workers[1].poll() is None
     assert told["clips"] < made.made == 4
     assert layout.manifest.read_bytes() == toy_dataset.manifest.read_bytes()
+
+
+def test_a_worker_that_dies_while_it_compiles_is_passed_over(tmp_path):
+    mark = tmp_path / "ended"
+
+    def end_the_first() -> None:
+        with suppress(FileExistsError):
+            mark.mkdir()
+            os._exit(1)
+
+    with cluster(tmp_path / "cluster", 2) as (address, workers), Client(address) as client:
+        client.wait_for_workers(2, timeout=60)
+        warm_cluster(client, end_the_first, address)
+        assert mark.is_dir() and [worker.poll() for worker in workers].count(None) == 1
 
 
 def test_a_cluster_behind_certificates_is_used_with_those_that_dask_is_configured_with(tmp_path):
@@ -171,19 +172,23 @@ def test_a_cluster_behind_certificates_is_used_with_those_that_dask_is_configure
                 assert executor.submit(abs, -7).result() == 7
 
 
-def test_a_worker_that_does_not_see_the_folder_is_told(scheduler):
-    with Client(scheduler) as client:
+@pytest.fixture
+def local():
+    """A scheduler in this process."""
+    with LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as cluster:
+        yield cluster
+
+
+def test_a_worker_that_does_not_see_the_folder_is_told(local):
+    local.scale(1)
+    with Client(local) as client:
         client.wait_for_workers(1, timeout=30)
         with pytest.raises(InputError, match="must be visible on every worker under the same path"):
-            warm_cluster(client, partial(warm_up, Layout(Path("/nowhere/at/all")), "street"), scheduler)
+            warm_cluster(
+                client, partial(warm_up, Layout(Path("/nowhere/at/all")), "street"), local.scheduler_address
+            )
 
 
-def test_a_cluster_without_workers_is_refused(tmp_path):
-    from distributed import Client, LocalCluster
-
-    with (
-        LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as cluster,
-        Client(cluster) as client,
-        pytest.raises(InputError, match="has no workers"),
-    ):
-        check_cluster(client, cluster.scheduler_address)
+def test_a_cluster_without_workers_is_refused(local):
+    with Client(local) as client, pytest.raises(InputError, match="has no workers"):
+        check_cluster(client, local.scheduler_address)

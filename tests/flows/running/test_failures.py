@@ -30,7 +30,7 @@ def end_of(monkeypatch, capsys, error: BaseException) -> tuple[int, str]:
     def describe(dataset: str) -> dict[str, str]:
         raise error
 
-    monkeypatch.setattr("flows.reading.describe.describe", describe)
+    monkeypatch.setattr("flows.reading.describe.describe_dataset", describe)
     code = run_command(monkeypatch, "describe", "data")
     printed = capsys.readouterr()
     assert "Traceback" not in printed.err and printed.out == ""

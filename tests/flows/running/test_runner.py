@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from flows.running.orchestration import stage
+from flows.running.orchestration import run_as_stage
 from flows.running.runner import open_executor, run_unordered
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
@@ -78,10 +78,10 @@ def test_a_scheduler_that_does_not_answer_is_an_input_error(monkeypatch):
 
 
 def test_outside_a_flow_a_stage_is_its_function():
-    assert stage(square_or_fail)(4) == 16
+    assert run_as_stage(square_or_fail)(4) == 16
     with pytest.raises(ValueError, match="three"):
-        stage(square_or_fail)(3)
-    assert stage(square_or_fail).__name__ == "square_or_fail"
+        run_as_stage(square_or_fail)(3)
+    assert run_as_stage(square_or_fail).__name__ == "square_or_fail"
 
 
 KILLED = """

@@ -6,7 +6,7 @@ import pytest
 
 from flows.printing import print_json, print_result
 from flows.running.progress import progress_bar
-from flows.running.terminal import open_console, visible, visible_lines
+from flows.running.terminal import escape_controls, escape_lines, open_console
 
 HOSTILE = [
     "[/red]", "[bold]x[/bold]", "a[b]c", ":smile:", "\x1b[2J\x1b]0;title\x07", "x\rforged", "\u202egnp.exe", "\x9b31m",
@@ -20,9 +20,9 @@ def test_a_label_is_printed_as_it_is_with_its_control_characters_written_out(cap
     printed = capsys.readouterr().out
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202e\ud800]", printed)
     lines = printed.splitlines()
-    assert f"first: {visible(label)}" in lines and f"all: {visible(label)}" in lines
+    assert f"first: {escape_controls(label)}" in lines and f"all: {escape_controls(label)}" in lines
     assert "verified: True" not in lines
-    if visible(label) == label:
+    if escape_controls(label) == label:
         assert label in printed.split("first:")[0]
 
 
@@ -34,7 +34,7 @@ def test_a_label_in_the_progress_is_text(capsys, monkeypatch, label, on_terminal
     with progress_bar("clips", 1) as advance:
         advance(label)
     printed = capsys.readouterr().err
-    assert visible(label) in printed
+    assert escape_controls(label) in printed
     assert "\x1b[2J" not in printed and "\x07" not in printed and "\u202e" not in printed
 
 
@@ -44,12 +44,12 @@ def test_json_is_plain_ascii(capsys):
 
 
 def test_only_the_line_feeds_of_several_lines_stay():
-    assert visible("a\n\x1b") == r"a\n\x1b"
-    assert visible_lines("a\n\x1b\tb") == "a\n" + r"\x1b\tb"
-    assert visible("Schnee, 雪, é") == "Schnee, 雪, é"
+    assert escape_controls("a\n\x1b") == r"a\n\x1b"
+    assert escape_lines("a\n\x1b\tb") == "a\n" + r"\x1b\tb"
+    assert escape_controls("Schnee, 雪, é") == "Schnee, 雪, é"
 
 
 def test_a_reader_that_leaves_ends_no_run(monkeypatch):
     console = open_console()
-    monkeypatch.setattr("flows.running.terminal._silence", lambda stream: None)
+    monkeypatch.setattr("flows.running.terminal._silence_stream", lambda stream: None)
     console.on_broken_pipe()

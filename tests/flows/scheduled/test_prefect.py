@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from benchmarks import scheduled_runs
-from flows.making.generate import generate
+from flows.making.generate import generate_dataset
 from flows.scheduled.scheduling import checked_parameters
 from manifests.provenance import SOURCE_ROOT
 from tests.toy_street import write_toy_grid
@@ -111,9 +111,9 @@ def scheduled(runs) -> dict:
 
 def test_as_a_prefect_flow_the_stages_are_tasks_and_the_bytes_are_the_same(runs):
     folder, facts = runs["folder"], runs["plain"]
-    assert (facts["made"], facts["tasks"]) == (4, ["fan_out", "prepare", "seal"])
+    assert (facts["made"], facts["tasks"]) == (4, ["fan_out", "prepare_dataset", "seal_dataset"])
     assert (folder / ".musync" / "prefect").is_dir(), "Prefect keeps to the project's folder"
-    plain = generate(str(folder / "grid.yaml"), str(folder / "plain"), runner="threads").layout
+    plain = generate_dataset(str(folder / "grid.yaml"), str(folder / "plain"), runner="threads").layout
     assert (folder / "flow" / "manifest.json").read_bytes() == plain.manifest.read_bytes()
 
 

@@ -10,21 +10,21 @@ import pytest
 
 import flows.making.generate
 import musync
-from flows.auditing.audit import audit
-from flows.auditing.explain import explain
-from flows.auditing.repair import repair
-from flows.auditing.verify import gc, verify
+from flows.auditing.audit import audit_dataset
+from flows.auditing.explain import explain_frame
+from flows.auditing.repair import repair_dataset
+from flows.auditing.verify import collect_garbage, verify_dataset
 from flows.making.clip import make_clip
-from flows.making.generate import generate, prepare
+from flows.making.generate import generate_dataset, prepare_dataset
 from flows.making.plan import make_plan
-from flows.reading.describe import describe
-from flows.reading.query import sql
+from flows.reading.describe import describe_dataset
+from flows.reading.query import query_dataset
 from flows.scheduled.failure_report import report_failure
 from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
-from flows.store.address import reading, resumable, working
+from flows.store.address import open_for_reading, open_for_writing, want_progress
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
-from flows.store.lease import LOCK, leased
+from flows.store.lease import LOCK, hold_lease
 from flows.store.objects import Objects
 from tasks.errors import InputError
 from tests.flows.objects_server import ask, environment, kill, s3_server, start
@@ -56,7 +56,7 @@ def stored(server, grid, tmp_path_factory) -> str:
     with pytest.MonkeyPatch.context() as patch:
         for name, value in environment(server, tmp_path_factory.mktemp("cache")).items():
             patch.setenv(name, value)
-        assert generate(grid, "s3://data/sets/toy", runner="threads", workers=1).made == 4
+        assert generate_dataset(grid, "s3://data/sets/toy", runner="threads", workers=1).made == 4
     return "s3://data/sets/toy"
 
 
@@ -74,20 +74,20 @@ def test_the_objects_are_the_files_of_the_same_run_in_a_folder(stored, machine, 
 
 
 def test_no_folder_of_the_run_is_left(stored, machine, grid, tmp_path):
-    assert generate(grid, stored).made == 0
+    assert generate_dataset(grid, stored).made == 0
     assert list((tmp_path / "cache" / "stores").glob("work-*")) == []
 
 
 def test_it_is_audited_and_questions_bring_no_frames(stored, machine, toy_dataset, tmp_path):
     query = "SELECT label, max(pitch) AS pitch FROM ticks GROUP BY label ORDER BY label"
-    assert sql(stored, query) == sql(str(toy_dataset.root), query)
-    assert describe(stored) == describe(str(toy_dataset.root))
-    assert explain(stored, "dry/hump", 4)["agrees"]
+    assert query_dataset(stored, query) == query_dataset(str(toy_dataset.root), query)
+    assert describe_dataset(stored) == describe_dataset(str(toy_dataset.root))
+    assert explain_frame(stored, "dry/hump", 4)["agrees"]
     here = [
         path for path in (tmp_path / "cache").rglob("*") if path.is_file() and "frames.zarr" in path.parts
     ]
     assert here and {path.name for path in here} == {"zarr.json"}
-    result = audit(stored, share=0.25, runner="threads", workers=1)
+    result = audit_dataset(stored, share=0.25, runner="threads", workers=1)
     assert result["verified"] and len(result["rerun"]) == 1
 
 
@@ -108,16 +108,16 @@ def test_one_flipped_bit_is_named_and_repaired_and_no_reader_gets_it(stored, mac
     name = "telemetry/ticks/family=snow/part-0000.parquet"
     whole = objects.read(name)
     objects.write(name, whole[:999] + bytes([whole[999] ^ 4]) + whole[1000:])
-    found = verify(stored)
+    found = verify_dataset(stored)
     assert [(row["path"], row["damage"]) for row in found["damaged"]] == [(name, "changed")]
     with pytest.raises(InputError, match=r"part-0000.parquet: not the recorded bytes: musync repair"):
-        sql(stored, "SELECT count(*) FROM ticks")
-    assert repair(stored, runner="threads", workers=1)["restored"] == [name]
-    assert objects.read(name) == whole and verify(stored)["verified"]
+        query_dataset(stored, "SELECT count(*) FROM ticks")
+    assert repair_dataset(stored, runner="threads", workers=1)["restored"] == [name]
+    assert objects.read(name) == whole and verify_dataset(stored)["verified"]
 
 
 def test_a_killed_run_goes_on_from_what_the_store_holds_on_another_machine(
-    server, machine, grid, toy_dataset, tmp_path
+    machine, grid, toy_dataset, tmp_path, monkeypatch
 ):
     address = "s3://data/sets/killed"
     command = ["generate", grid, "--out", address, "--runner", "threads", "--workers", "1"]
@@ -133,12 +133,9 @@ def test_a_killed_run_goes_on_from_what_the_store_holds_on_another_machine(
     kill(run)
     assert 1 <= len(receipts) < 4
     with pytest.raises(InputError, match="must be finished"):
-        sql(address, "SELECT 1")
-    resumed = start(command, environment(server, tmp_path / "other machine"))
-    out, errors = resumed.communicate(timeout=120)
-    assert resumed.returncode == 0, errors
-    made = int(out.split("made: ")[1].split()[0])
-    assert 0 < made < 4
+        query_dataset(address, "SELECT 1")
+    monkeypatch.setenv("MUSYNC_CACHE", str(tmp_path / "other machine"))
+    assert 0 < generate_dataset(grid, address, runner="threads", workers=1).made < 4
     assert objects_of(address) == files_of(toy_dataset)
 
 
@@ -149,35 +146,37 @@ def test_workers_on_other_machines_share_no_folder_with_the_run(machine, grid, t
 
     monkeypatch.setattr(flows.making.generate, "make_clip", make_elsewhere)
     address = "s3://data/sets/apart"
-    assert generate(grid, address, runner="threads", workers=1).made == 4
+    assert generate_dataset(grid, address, runner="threads", workers=1).made == 4
     assert objects_of(address) == files_of(toy_dataset)
 
 
-def test_a_second_run_on_another_machine_is_told_while_the_first_goes_on(server, machine, grid, tmp_path):
+def test_a_second_run_on_another_machine_is_told_while_the_first_goes_on(
+    machine, grid, tmp_path, monkeypatch
+):
     address = "s3://data/sets/busy"
-    with working(address, resumable) as layout:
-        prepare(layout, *make_plan(grid, "cpu"))
-    with leased(Objects(address)):
-        run = start(
-            ["generate", grid, "--out", address, "--runner", "threads"], environment(server, tmp_path / "b")
-        )
-        _, errors = run.communicate(timeout=120)
-    assert run.returncode == 2 and f"{address}: another run is writing this dataset (on " in errors
+    with open_for_writing(address, want_progress) as layout:
+        prepare_dataset(layout, *make_plan(grid, "cpu"))
+    monkeypatch.setenv("MUSYNC_CACHE", str(tmp_path / "other machine"))
+    with (
+        hold_lease(Objects(address)),
+        pytest.raises(InputError, match=rf"{address}: another run is writing this dataset \(on "),
+    ):
+        generate_dataset(grid, address, runner="threads")
 
 
 def test_the_second_writer_is_told_and_the_lock_of_a_dead_one_is_taken(stored, machine, monkeypatch):
     monkeypatch.setattr("flows.store.lease.RENEW_S", 0.2)
     objects = Objects(stored)
     with (
-        leased(objects),
+        hold_lease(objects),
         pytest.raises(InputError, match="another run is writing this dataset"),
-        leased(objects),
+        hold_lease(objects),
     ):
         pass
     assert objects.tag(LOCK) is None
     objects.write(LOCK, b'{"host": "gone", "pid": 1}')
     monkeypatch.setattr("flows.store.lease.LEASE_S", 1.0)
-    with leased(objects):
+    with hold_lease(objects):
         assert b"gone" not in objects.read(LOCK)
     assert objects.tag(LOCK) is None
 
@@ -187,13 +186,13 @@ def test_another_grid_does_not_go_into_the_same_dataset(stored, machine, grid, t
     with open(grid) as source:
         other.write_text(source.read().replace("frames: 11", "frames: 10"))
     with pytest.raises(InputError, match=r"s3://data/sets/toy: holds the dataset of another run: .*frames"):
-        generate(str(other), stored)
+        generate_dataset(str(other), stored)
 
 
 def test_what_a_killed_run_left_in_the_store_is_collected(stored, machine):
     objects = Objects(stored)
     objects.write(f".staging/{'0' * 16}.json", b"{}")
-    assert len(gc(stored)["removed"]) == 1
+    assert len(collect_garbage(stored)["removed"]) == 1
     assert not [name for name in objects.sizes() if name.startswith(".staging/")]
 
 
@@ -205,8 +204,8 @@ def test_a_schedule_writes_dated_datasets_to_a_store_resumes_there_and_reports_t
     assert checked_parameters(grid, "0 3 * * *", f"{root}/", "threads", 1, None)["root"] == root
     with pytest.raises(InputError, match="--out s3://nowhere/nightly: the bucket does not exist"):
         checked_parameters(grid, "0 3 * * *", "s3://nowhere/nightly", "threads", 1, None)
-    with working(f"{root}/toy-20260301T030000Z", resumable) as layout:
-        prepare(layout, *make_plan(grid, "cpu"))
+    with open_for_writing(f"{root}/toy-20260301T030000Z", want_progress) as layout:
+        prepare_dataset(layout, *make_plan(grid, "cpu"))
     run = scheduled_run(grid, root, at=at + timedelta(days=1), runner="threads", workers=1)
     assert (run["dataset"], run["made"]) == (f"{root}/toy-20260301T030000Z", 4)
     assert dataset_place(grid, root, "cpu", at + timedelta(days=2)) == f"{root}/toy-20260303T030000Z"
@@ -219,7 +218,7 @@ def test_a_schedule_writes_dated_datasets_to_a_store_resumes_there_and_reports_t
 def test_faults_of_the_store_are_one_sentence_each(server, machine, grid, monkeypatch):
     def told(address: str) -> str:
         with pytest.raises(InputError) as raised:
-            reading(address)
+            open_for_reading(address)
         (sentence,) = raised.value.problems
         return sentence
 
@@ -230,7 +229,7 @@ def test_faults_of_the_store_are_one_sentence_each(server, machine, grid, monkey
     Objects("s3://data/other").write("letter.txt", b"Dear Sir")
     with (
         pytest.raises(InputError, match="it holds other objects"),
-        working("s3://data/other", lambda _: True),
+        open_for_writing("s3://data/other", lambda _: True),
     ):
         pass
     ask(f"{server}/moto-api/reset-auth", "POST", b"0")

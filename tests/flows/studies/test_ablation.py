@@ -8,15 +8,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.scenario import Scenario
-from catalogs.studies.ablation import VARIANTS, cut
-from flows.studies.ablation import ablation
+from catalogs.studies.ablation import VARIANTS, cut_coupling
+from flows.studies.ablation import run_ablation
 from tasks.errors import InputError
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
     out = tmp_path_factory.mktemp("ablation")
-    return ablation(out=str(out)), out
+    return run_ablation(out=str(out)), out
 
 
 def stops(result: dict[str, Any], variant: str, weather: str) -> dict[float, float]:
@@ -86,7 +86,7 @@ def test_the_full_model_follows_the_reference_and_no_cut_one_does(outside_data: 
     traces = outside_data / "reference" / "multibody"
     if not traces.is_dir():
         pytest.skip(f"no reference traces at {traces}")
-    figures = ablation(out=str(tmp_path), traces=str(traces))["reference"]
+    figures = run_ablation(out=str(tmp_path), traces=str(traces))["reference"]
     assert figures["full_pitch_rmse_deg"] < 0.05
     assert all(figures[f"{name}_pitch_rmse_deg"] > 0.4 for name in VARIANTS if name != "full")
 
@@ -101,7 +101,7 @@ def test_traces_without_the_condition_are_refused(outside_data: Path, tmp_path: 
         '[{"case": "flat-dry", "weather": "dry", "surface_coefficient": 0.82, "initial_speed_km_h": 60}]'
     )
     with pytest.raises(InputError, match="compares the pitch of hump-rain50"):
-        ablation(out=str(tmp_path / "out"), traces=str(tmp_path))
+        run_ablation(out=str(tmp_path / "out"), traces=str(tmp_path))
 
 
 def test_a_cut_changes_weather_or_brake_and_nothing_else() -> None:
@@ -109,10 +109,12 @@ def test_a_cut_changes_weather_or_brake_and_nothing_else() -> None:
         weather="snow", precipitation_mm_h=3.0, snow_accumulation_h=2.0, peak_pressure_mpa=2.0,
         brake_onset_s=1.0, hazard_height_m=0.1, hazard_length_m=3.0,
     )  # fmt: skip
-    assert cut(seen, "full") == seen
-    assert cut(seen, "appearance-only").weather == "dry"
-    assert cut(seen, "appearance-only").peak_pressure_mpa == 2.0
-    assert cut(seen, "vertical-only").peak_pressure_mpa == 0.0
-    assert cut(seen, "vertical-only").hazard_height_m == 0.1
-    assert cut(seen, "fixed-mu").precipitation_mm_h == 1.0
-    assert cut(cut(seen, "appearance-only"), "fixed-mu") == cut(seen, "appearance-only")
+    assert cut_coupling(seen, "full") == seen
+    assert cut_coupling(seen, "appearance-only").weather == "dry"
+    assert cut_coupling(seen, "appearance-only").peak_pressure_mpa == 2.0
+    assert cut_coupling(seen, "vertical-only").peak_pressure_mpa == 0.0
+    assert cut_coupling(seen, "vertical-only").hazard_height_m == 0.1
+    assert cut_coupling(seen, "fixed-mu").precipitation_mm_h == 1.0
+    assert cut_coupling(cut_coupling(seen, "appearance-only"), "fixed-mu") == cut_coupling(
+        seen, "appearance-only"
+    )

@@ -12,6 +12,7 @@ import pytest
 
 from catalogs.references import ReferenceCase
 from catalogs.vehicles import load_vehicle
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, rollout
 
@@ -56,8 +57,8 @@ def make_traces(tmp_path: Path) -> Make:
 
 
 def _trace(car: Vehicle, case: ReferenceCase, mode: Mode, number: int, noise: float) -> pa.Table:
-    ride = rollout(car, case.weather, case.surface_coefficient, case.controls(), case.hazard(), mode=mode,
-                   duration_s=8.0)  # fmt: skip
+    surface = SurfaceState(kind=case.weather, friction=case.surface_coefficient)
+    ride = rollout(car, surface, case.controls(), case.hazard(), mode=mode, duration_s=8.0)
     model = ride.columns
     end = int(np.argmax(model["speed"] <= 0.0)) or len(model["speed"])
     rng = np.random.Generator(np.random.Philox(key=[7, number]))

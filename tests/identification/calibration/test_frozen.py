@@ -8,12 +8,13 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from catalogs.calibration import FOLDER, load_procedure
+from catalogs.calibration import load_procedure
 from catalogs.effects import load_effects
-from catalogs.vehicles import load_vehicle, vehicle_names, vehicle_provenance, vehicle_source
+from catalogs.entries import entry_names, find_entry
+from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
 from flows.measured.calibration import calibrate
-from flows.studies.vehicle_model import agreement
+from flows.studies.vehicle_model import measure_agreement
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
 from tests.flows.measured.findings import found_effect, found_form, grown_file
@@ -22,7 +23,7 @@ from tests.flows.measured.findings import found_effect, found_form, grown_file
 @pytest.fixture
 def frozen(vehicle, make_traces, tmp_path):
     traces = make_traces(vehicle, "coupled", ("wet",))
-    entry = yaml.safe_load((FOLDER / "coupled-grown.yaml").read_text())
+    entry = yaml.safe_load(find_entry("calibration procedure", "coupled-grown").read_text())
     entry["stages"] = [
         {"name": "air", "groups": ["drag_area", "cg_to_front_axle", "static_pitch", "efficiency"],
          "responses": ["speed"], "kinds": ["flat"], "phase": "braking"}
@@ -43,7 +44,7 @@ def test_a_frozen_file_says_where_its_numbers_come_from(frozen):
         "paper-reference",
         "development",
     )
-    assert provenance.base_sha256 == sha256_of_file(vehicle_source("paper-reference"))
+    assert provenance.base_sha256 == sha256_of_file(find_entry("vehicle", "paper-reference"))
     assert provenance.data_sha256 == {"wet": sha256_of_file(traces / "development" / "wet.parquet")}
     assert provenance.bounds["drag_area"].upper == 2
     assert [s.name for s in provenance.stages] == ["air"]
@@ -70,14 +71,14 @@ def test_an_edited_frozen_file_is_refused(frozen, edit):
 
 def test_agreement_drives_a_frozen_vehicle_in_the_mode_it_was_fitted_in(frozen):
     traces, path = frozen
-    assert agreement(str(traces), vehicle=str(path))["mode"] == "coupled"
-    assert agreement(str(traces), vehicle=str(path), mode="paper")["mode"] == "paper"
-    assert agreement(str(traces))["mode"] == "paper"
+    assert measure_agreement(str(traces), vehicle=str(path))["mode"] == "coupled"
+    assert measure_agreement(str(traces), vehicle=str(path), mode="paper")["mode"] == "paper"
+    assert measure_agreement(str(traces))["mode"] == "paper"
 
 
 def test_every_vehicle_of_the_catalogue_loads_with_its_seal():
-    assert "paper-reference" in vehicle_names()
-    for name in vehicle_names():
+    assert "paper-reference" in entry_names("vehicle")
+    for name in entry_names("vehicle"):
         load_vehicle(name)
 
 
@@ -127,24 +128,26 @@ def test_a_split_that_is_none_lists_those_that_exist(vehicle, make_traces, tmp_p
 
 def test_conditions_may_hold_nulls_and_leave_the_onset_to_the_trace(vehicle, make_traces):
     folder = make_traces(vehicle, "paper", ("wet",))
-    told = agreement(str(folder))["cases"]
+    told = measure_agreement(str(folder))["cases"]
     rows = json.loads((folder / "cases.json").read_text())
     rows[0] |= {"brake_onset_s": None, "hazard_center_m": None, "hazard_height_m": None, "note": "unseen"}
     (folder / "cases.json").write_text(json.dumps(rows))
     with pytest.raises(InputError, match="add one of them"):
-        agreement(str(folder))
+        measure_agreement(str(folder))
     path = folder / "development" / "wet.parquet"
     table = pq.read_table(path)
     pressure = np.clip(np.round(table["time"].to_numpy() - 0.3, 6) / 0.5, 0, 1) * 2.3
     pq.write_table(table.append_column("brake_pressure", [pressure]), path)
-    read = agreement(str(folder))["cases"]
+    read = measure_agreement(str(folder))["cases"]
     assert read[0]["window"] == pytest.approx(told[0]["window"], abs=1e-9)
     assert read[0]["speed_rmse_m_s"] == pytest.approx(told[0]["speed_rmse_m_s"], rel=0.01)
 
 
 @pytest.mark.parametrize("mode", ["paper", "coupled"])
 def test_cases_that_coast_and_cases_that_brake_at_a_place_are_driven_as_they_were(vehicle, make_traces, mode):
-    cases = agreement(str(make_traces(vehicle, mode, ("roll", "trigger"), noise=0.0)), mode=mode)["cases"]
+    cases = measure_agreement(str(make_traces(vehicle, mode, ("roll", "trigger"), noise=0.0)), mode=mode)[
+        "cases"
+    ]
     assert [case["event_unit"] for case in cases] == ["km/h", "m"]
     for case in cases:
         assert case["speed_rmse_m_s"] < 1e-9
@@ -154,9 +157,9 @@ def test_cases_that_coast_and_cases_that_brake_at_a_place_are_driven_as_they_wer
 
 def test_traces_may_lie_beside_their_conditions(vehicle, make_traces):
     folder = make_traces(vehicle, "paper", ("wet",))
-    nested = agreement(str(folder))["cases"]
+    nested = measure_agreement(str(folder))["cases"]
     shutil.move(folder / "development" / "wet.parquet", folder / "wet.parquet")
-    assert agreement(str(folder))["cases"] == nested
+    assert measure_agreement(str(folder))["cases"] == nested
 
 
 @pytest.mark.parametrize(
@@ -172,7 +175,7 @@ def test_traces_may_lie_beside_their_conditions(vehicle, make_traces):
     ],
 )
 def test_a_faulty_procedure_is_told_by_place_and_rule(tmp_path, harm, sentence):
-    entry = yaml.safe_load((FOLDER / "paper-staged.yaml").read_text())
+    entry = yaml.safe_load(find_entry("calibration procedure", "paper-staged").read_text())
     harm(entry)
     path = tmp_path / "faulty.yaml"
     path.write_text(yaml.safe_dump(entry))
@@ -188,7 +191,7 @@ def test_a_vehicle_that_close_loop_grew_is_calibrated_further_and_keeps_what_it_
         tmp_path / "grown.yaml", found, found_effect(lag, {"lag": 0.08}), reached={"pressure": (0.0, 3.6)}
     )
     truth = replace(load_vehicle(grown), effects={"lag": 0.08, "drag_area": 0.6})
-    entry = yaml.safe_load((FOLDER / "coupled-grown.yaml").read_text())
+    entry = yaml.safe_load(find_entry("calibration procedure", "coupled-grown").read_text())
     entry["stages"] = [
         {"name": "air", "groups": ["drag_area"], "responses": ["speed"], "kinds": ["flat"], "phase": "event"}
     ]

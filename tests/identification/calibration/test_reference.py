@@ -6,7 +6,7 @@ import pytest
 
 from catalogs.references import trace_file
 from catalogs.vehicles import vehicle_provenance
-from flows.studies.vehicle_model import agreement
+from flows.studies.vehicle_model import measure_agreement
 from manifests.canonical import sha256_of_file
 
 # docs/calibration.md, "Before and after"; speed [m/s], pitch [deg], slip [1], wheel load [N]
@@ -21,7 +21,7 @@ FIGURES = ("speed_rmse_m_s", "pitch_rmse_deg", "slip_rmse", "wheel_load_rmse_n")
 
 @pytest.mark.parametrize("name", PRINTED)
 def test_the_shipped_vehicle_has_the_documented_figures(outside_data, name):
-    result = agreement(str(outside_data / "reference" / "multibody"), vehicle=name)
+    result = measure_agreement(str(outside_data / "reference" / "multibody"), vehicle=name)
     for split, expected in PRINTED[name].items():
         (found,) = (g for g in result["groups"] if (g["split"], g["group"]) == (split, "all"))
         assert [found[figure] for figure in FIGURES] == pytest.approx(expected, rel=0.02)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.calibration import FOLDER, load_procedure
+from catalogs.calibration import load_procedure
+from catalogs.entries import find_entry
 from catalogs.references import read_reference
 from flows.measured.calibration import calibrate, calibration_case
 from flows.studies.vehicle_model import agreement_of
@@ -16,7 +17,7 @@ from tasks.identification.calibration.staged import run_stage, smoothness, stage
 
 
 def procedure_file(folder: Path, base: str, stages: list[dict], passes: int = 2) -> str:
-    entry = yaml.safe_load((FOLDER / f"{base}.yaml").read_text())
+    entry = yaml.safe_load(find_entry("calibration procedure", base).read_text())
     entry["stages"] = stages
     entry["passes"]["value"] = passes
     path = folder / "procedure.yaml"
@@ -83,6 +84,17 @@ def test_effects_of_the_coupled_mode_come_back_from_noisy_traces(vehicle, make_t
     assert fitted.effects["rolling_coefficient"] == pytest.approx(0.02, abs=0.002)
     assert fitted.effects["slope_moment"] == pytest.approx(1.5, abs=0.1)
     assert fitted.effects["anti_dive"] == pytest.approx(0.3, abs=0.03)
+
+
+@pytest.mark.parametrize(("upper_deg", "named"), [(0.2, ("static_pitch",)), (2.0, ())])
+def test_a_scalar_that_rests_on_a_bound_is_named(vehicle, make_traces, tmp_path, upper_deg, named):
+    folder = make_traces(dataclasses.replace(vehicle, static_pitch=np.deg2rad(0.3)), "paper")
+    name = procedure_file(tmp_path, "paper-staged", [stage(["static_pitch"], ["pitch"])])
+    procedure, interval = load_procedure(name)
+    bound = dataclasses.replace(procedure.bounds["static_pitch"], upper=np.deg2rad(upper_deg))
+    bounded = dataclasses.replace(procedure, bounds=procedure.bounds | {"static_pitch": bound})
+    _, record = run_stage(vehicle, cases_of(folder, vehicle, bounded, interval), bounded.stages[0], bounded)
+    assert record.at_bounds == named
 
 
 def test_a_scalar_to_which_no_run_answers_stays_where_it_was(vehicle, make_traces):

@@ -8,6 +8,7 @@ import yaml
 
 from catalogs.weather import FOLDER, load_weather
 from tasks.errors import InputError
+from tasks.surface.weather import WEATHERS
 
 
 def leaves(entries, place=""):
@@ -28,25 +29,29 @@ def copy(tmp_path) -> Path:
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_value_has_unit_and_source(path):
     for name, entry in leaves(yaml.safe_load(path.read_text())):
-        assert set(entry) == {"value", "unit", "source"}, name
+        assert set(entry) - {"bounds"} == {"value", "unit", "source"}, name
         assert len(str(entry["source"])) > 5, name
         assert isinstance(entry["unit"], str), name
 
 
 def test_published_numbers_stand_as_published(parameters):
-    assert (parameters.rain.intercept, parameters.rain.slope, parameters.rain.slope_exponent) == (
+    assert (
+        parameters.kinds["rain"].particles.intercept,
+        parameters.kinds["rain"].particles.slope,
+        parameters.kinds["rain"].particles.slope_exponent,
+    ) == (
         8000,
         4.1,
         -0.21,
     )
-    snow = parameters.snowfall
+    snow = parameters.kinds["snow"].particles
     assert (snow.intercept, snow.intercept_exponent, snow.slope, snow.slope_exponent) == (
         2500,
         -0.94,
         2.29,
         -0.45,
     )
-    assert parameters.rain.fall_speed == (9.65, 10.3, 0.6)
+    assert parameters.kinds["rain"].particles.fall_speed == (9.65, 10.3, 0.6)
     # mass [mg] = 0.012 (area [mm2])^1.5, the melted flake a sphere of 1 mg/mm3
     area = (3.141592653589793 / 6 / 0.012) ** (2 / 3)
     assert snow.visible_diameter_ratio == pytest.approx((4 * area / 3.141592653589793) ** 0.5, abs=0.005)
@@ -54,10 +59,11 @@ def test_published_numbers_stand_as_published(parameters):
 
 def test_all_mistakes_are_told_at_once(copy):
     rain = yaml.safe_load((copy / "rain.yaml").read_text())
-    rain["slope"]["value"] = "steep"
-    rain["classes"]["value"] = 2.5
-    rain["colour"] = {"value": 1, "unit": "1", "source": "none"}
-    del rain["flutter_m"]
+    particles = rain["particles"]
+    particles["slope"]["value"] = "steep"
+    particles["classes"]["value"] = 2.5
+    particles["colour"] = {"value": 1, "unit": "1", "source": "none"}
+    del particles["flutter_m"]
     (copy / "rain.yaml").write_text(yaml.safe_dump(rain))
     air = yaml.safe_load((copy / "air.yaml").read_text())
     air["wind_m_s"]["value"] = 3.0
@@ -65,20 +71,20 @@ def test_all_mistakes_are_told_at_once(copy):
     air["haze_visual_range_m"]["value"] = float("inf")
     (copy / "air.yaml").write_text(yaml.safe_dump(air))
     (copy / "sky.yaml").write_text("a: [")
-    (copy / "snowfall.yaml").unlink()
+    (copy / "snow.yaml").rename(copy / "hail.yaml")
     with pytest.raises(InputError) as caught:
         load_weather(copy)
     text = "\n".join(caught.value.problems)
     for part in (
-        "rain.yaml: slope must be a finite number; it is 'steep'",
-        "rain.yaml: classes must be a whole number from 1 to 100; it is 2.5",
-        "rain.yaml: colour is not a known value; known are kind, intercept",
-        "rain.yaml: flutter_m is missing",
+        "rain.yaml: particles: slope must be a finite number; it is 'steep'",
+        "rain.yaml: particles: classes must be a whole number from 1 to 100; it is 2.5",
+        "rain.yaml: particles: colour is not a known value; known are kind, intercept",
+        "rain.yaml: particles: flutter_m is missing",
         "air.yaml: wind_m_s must be a list of finite numbers; it is 3.0",
         "air.yaml: near: nearest_m must have value, unit and source",
         "air.yaml: haze_visual_range_m must be a finite number; it is inf",
         "sky.yaml: a weather catalogue's file must be valid YAML",
-        "snowfall.yaml: the weather catalogue needs this file",
+        "hail.yaml: must be of a kind of weather, which are rain, snow",
     ):
         assert part in text
     assert len(caught.value.problems) == 9
@@ -86,3 +92,14 @@ def test_all_mistakes_are_told_at_once(copy):
 
 def test_an_unedited_copy_is_the_same_catalogue(copy, parameters):
     assert load_weather(copy) == parameters
+
+
+@pytest.mark.parametrize("kind", [kind for kind, row in WEATHERS.items() if row.overcast])
+def test_every_kind_under_cloud_has_an_entry(kind, parameters):
+    assert parameters.find_look(kind) is not None
+
+
+def test_a_kind_without_an_entry_is_named(copy):
+    (copy / "snow.yaml").unlink()
+    with pytest.raises(InputError, match=r"weather snow: the weather catalogue has no snow\.yaml"):
+        load_weather(copy).find_look("snow")

@@ -8,27 +8,28 @@ import pytest
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.render.composition import encode_8bit, to_linear
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.attribution import LAYER_BITS, attribution, paper_picture, snow_on
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import apply_weather, weather_scene
-from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.scene_light import appended, to_display_unclipped
 from tasks.render.weather.snow.layer import GROUND_CLASSES
+from tasks.surface.state import SurfaceState
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import clear_sky, road, surfels
 
 SKY = clear_sky()
 RAIN = {
-    rate: WeatherState(kind="rain", precipitation_mm_h=rate, film_depth_mm=film)
+    rate: SurfaceState(kind="rain", precipitation_mm_h=rate, film_depth_mm=film)
     for rate, film in ((2, 0.189), (10, 0.489), (25, 0.839), (50, 1.263))
 }
 SNOW = {
-    rate: WeatherState(
+    rate: SurfaceState(
         kind="snow", precipitation_mm_h=rate, snow_depth_mm=10 * rate, snow_coverage=min(1, rate / 2)
     )
     for rate in (0.5, 1, 2, 3)
 }
+ICE = SurfaceState(kind="ice", film_depth_mm=0.4)
 SIZE = {"width": 144, "height": 96, "focal": 120.0}
 
 
@@ -48,28 +49,29 @@ def street():
 def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005):
     view = shutter(time_s=time_s, exposure_s=exposure_s, speed=speed, **SIZE)
     scene, weather = weather_scene(street, SKY, state, parameters, SIZE["focal"], seed)
-    gbuffer = rasterise(prepare(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height)
+    gbuffer = rasterise(
+        prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height
+    )
     picture = gbuffer.rgb + (1 - gbuffer.alpha[..., None]) * np.float32((0.2, 0.4, 0.8))
     return weather, apply_weather(weather, picture, gbuffer, view), gbuffer, view
 
 
 def test_dry_weather_changes_no_bit(street, parameters):
-    scene, weather = weather_scene(street, SKY, WeatherState(kind="dry"), parameters, 120.0, 1)
+    scene, weather = weather_scene(street, SKY, SurfaceState(kind="dry"), parameters, 120.0, 1)
     assert scene is street
-    _, drawn, gbuffer, view = frame(street, WeatherState(kind="dry"), parameters)
+    _, drawn, gbuffer, view = frame(street, SurfaceState(kind="dry"), parameters)
     assert drawn.picture is drawn.base
     assert drawn.layers == ()
     assert attribution(weather, drawn, gbuffer, view).max() == 0
 
 
-@pytest.mark.parametrize("state", [RAIN[25], SNOW[1]], ids=["rain", "snow"])
+@pytest.mark.parametrize("state", [RAIN[25], SNOW[1], ICE], ids=["rain", "snow", "ice"])
 def test_layers_recompose_to_the_picture_bit_for_bit(street, parameters, state):
     _, drawn, _, _ = frame(street, state, parameters)
     assert recompose(drawn.base, drawn.layers).tobytes() == drawn.picture.tobytes()
     names = [layer.name for layer in drawn.layers]
-    assert names == (
-        ["light", "wet", "air", "particles"] if state.kind == "rain" else ["light", "air", "particles"]
-    )
+    layers = {"rain": ["light", "wet", "air", "particles"], "snow": ["light", "air", "particles"]}
+    assert names == layers.get(state.kind, ["light", "wet", "air"])
     assert np.isfinite(drawn.picture).all()
     assert drawn.picture.min() >= 0
     assert drawn.picture.dtype == np.float32
@@ -164,14 +166,24 @@ def test_display_values_go_on_beyond_white():
     assert to_display_unclipped(to_linear(display)) == pytest.approx(display, abs=1e-6)
 
 
-def test_every_rule_that_a_state_breaks_is_told_at_once(street, parameters):
-    broken = WeatherState(kind="snow", precipitation_mm_h=0.0, snow_coverage=1.2, snow_depth_mm=float("nan"))
+def test_every_rule_that_a_state_breaks_is_told_at_once():
     with pytest.raises(InputError) as caught:
-        weather_scene(street, SKY, broken, parameters, 120.0, 1)
+        SurfaceState(kind="snow", precipitation_mm_h=-1.0, snow_coverage=1.2, snow_depth_mm=float("nan"))
     text = "\n".join(caught.value.problems)
-    for part in ("snow_coverage must not exceed 1; it is 1.2", "snow_depth_mm", "precipitation_mm_h above 0"):
+    for part in (
+        "snow_coverage must not exceed 1; it is 1.2",
+        "snow_depth_mm",
+        "precipitation_mm_h must be a number",
+    ):
         assert part in text
     assert len(caught.value.problems) == 3
+
+
+def test_weather_that_falls_needs_a_rate_and_an_unknown_kind_is_refused(street, parameters):
+    with pytest.raises(InputError, match="snow needs precipitation_mm_h above 0"):
+        weather_scene(street, SKY, SurfaceState(kind="snow"), parameters, 120.0, 1)
+    with pytest.raises(InputError, match=r"must be dry, rain.*it is 'hail'"):
+        weather_scene(street, SKY, SurfaceState(kind="hail"), parameters, 120.0, 1)
 
 
 def test_a_scene_without_road_is_refused(street, parameters):

@@ -7,24 +7,24 @@ import numpy as np
 import pytest
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
-from tasks.render.composition import compose, encode_8bit
+from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.labels import forward_flow
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.atmosphere import air_layer, light_layer, precipitating_air
 from tasks.render.weather.attribution import snow_on
 from tasks.render.weather.falling.precipitation import population
 from tasks.render.weather.layer import recompose
 from tasks.render.weather.layers import apply_weather, pixel_rays, weather_scene
-from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.scene_light import appended
 from tasks.render.weather.sky import sky_light
+from tasks.surface.state import SurfaceState
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import flat_gbuffer, road, surfels
 
 SIZE = {"width": 144, "height": 96, "focal": 120.0}
-RAIN = WeatherState(kind="rain", precipitation_mm_h=25, film_depth_mm=0.839)
-SNOW = WeatherState(kind="snow", precipitation_mm_h=1, snow_depth_mm=10, snow_coverage=0.5)
+RAIN = SurfaceState(kind="rain", precipitation_mm_h=25, film_depth_mm=0.839)
+SNOW = SurfaceState(kind="snow", precipitation_mm_h=1, snow_depth_mm=10, snow_coverage=0.5)
 
 
 def even_sky():
@@ -56,9 +56,9 @@ def rendered(street, state, parameters, time_s=2.0, x=0.0, speed=10.0):
     view = shutter(time_s=time_s, x=x, speed=speed, exposure_s=0.005, **SIZE)
     scene, weather = weather_scene(street, even_sky(), state, parameters, SIZE["focal"], 1)
     viewmat = np.linalg.inv(view.T_world_camera)
-    gbuffer = rasterise(prepare(scene), viewmat, view.K, view.width, view.height)
+    gbuffer = rasterise(prepare_gaussians(scene), viewmat, view.K, view.width, view.height)
     sky = environment_view(even_sky(), viewmat, view.K, view.width, view.height)
-    picture = compose(gbuffer, sky, street.display_encoded)
+    picture = compose_over_sky(gbuffer, sky, street.display_encoded)
     return weather, apply_weather(weather, picture, gbuffer, view), gbuffer, view
 
 
@@ -99,7 +99,7 @@ def test_a_deeper_film_mirrors_more_and_a_longer_exposure_leaves_the_street_as_i
     assert lost[1] == pytest.approx(lost[0], rel=0.1)
 
 
-@pytest.mark.parametrize("state", [WeatherState(kind="dry"), SNOW], ids=["dry", "snow"])
+@pytest.mark.parametrize("state", [SurfaceState(kind="dry"), SNOW], ids=["dry", "snow"])
 def test_the_next_frame_warped_back_by_the_flow_is_this_one(street, parameters, state):
     """Median difference of what stays in sight: at most two grey levels."""
     (_, now, here, view), (_, later, there, next_view) = (
@@ -132,11 +132,13 @@ def test_a_mirrored_street_makes_the_mirrored_frame(street, parameters):
     mirrored = replace(
         uneven, means=uneven.means * np.float32((1, -1, 1)), normals=uneven.normals * np.float32((1, -1, 1))
     )
-    air = precipitating_air(population(parameters.rain, 25.0), parameters.air.near, 120.0, 12000.0)
+    air = precipitating_air(
+        population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 120.0, 12000.0
+    )
     sky = sky_light(np.full(3, 1.7), 0.5, air.extinction, 0.1, parameters.sky)
     pictures = []
     for side in (uneven, mirrored):
-        _, drawn, gbuffer, view = rendered(side, WeatherState(kind="dry"), parameters)
+        _, drawn, gbuffer, view = rendered(side, SurfaceState(kind="dry"), parameters)
         layers = [
             light_layer(drawn.base, gbuffer, even_sky(), even_sky(), sky, pixel_rays(view)),
             air_layer(gbuffer, even_sky(), air, sky, pixel_rays(view)),
@@ -153,7 +155,7 @@ def test_koschmieder_at_the_visual_range_leaves_five_percent_of_a_black_target(p
     view = shutter(**SIZE)
     picture, gbuffer = flat_gbuffer(view, shade=0.0)
     air = replace(
-        precipitating_air(population(parameters.rain, 25.0), parameters.air.near, 120.0, 12000.0),
+        precipitating_air(population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 120.0, 12000.0),
         extinction=2.995732 / 50.0, drawn=np.zeros(65),
     )  # fmt: skip
     sky = sky_light(np.full(3, 1.7), 0.5, air.extinction, 0.1, parameters.sky)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.render.lens import Lens, distorted
+from tasks.render.lens import Lens, distort_rays
 from tasks.render.weather.falling.particles import visible_streaks
 from tasks.render.weather.falling.precipitation import drawn_optical_depth, drawn_reach, population
 from tasks.render.weather.falling.streaks import draw_streaks
@@ -16,12 +16,12 @@ CALM = np.zeros(3)
 
 @pytest.fixture
 def rain(parameters):
-    return population(parameters.rain, 50.0)
+    return population(parameters.kinds["rain"].particles, 50.0)
 
 
 @pytest.fixture
 def snow(parameters):
-    return population(parameters.snowfall, 2.0)
+    return population(parameters.kinds["snow"].particles, 2.0)
 
 
 def test_one_class_has_as_many_drops_in_view_as_density_times_volume(parameters, rain):
@@ -68,7 +68,9 @@ def test_heavier_rain_keeps_the_drops_of_lighter_rain(parameters):
     light, heavy = (
         {
             tuple(streak["direction"])
-            for streak in visible_streaks(population(parameters.rain, rate), near, shutter(), CALM, 3)
+            for streak in visible_streaks(
+                population(parameters.kinds["rain"].particles, rate), near, shutter(), CALM, 3
+            )
         }
         for rate in (10.0, 25.0)
     )
@@ -188,7 +190,7 @@ def test_a_lens_bends_the_way_of_every_particle(parameters, rain):
         other = bent[by_size[round(float(streak["diameter"]), 12)]]
         for end in ("begin", "end"):
             x, y = (streak[end] - (240, 160)) / 400
-            expected = np.array(distorted(x, y, lens.coefficients)) * 400 + (240, 160)
+            expected = np.array(distort_rays(x, y, lens.coefficients)) * 400 + (240, 160)
             if np.abs(streak[end] - (240, 160)).max() < 240:
                 np.testing.assert_allclose(other[end], expected, atol=1e-6)
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.render.road_edit import RoadRelief, apply_road_profile, road_lift
+from tasks.render.road_edit import RoadRelief, apply_road_profile, measure_road_lift
 from tasks.render.weather.layers import weather_scene
-from tasks.render.weather.parameters import WeatherState
 from tasks.render.weather.relief import ReliefLight, clear_light, relief_ratios, relit, sun_in
 from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
+from tasks.surface.state import SurfaceState
 from tests.render.weather.scenes import clear_sky, road
 from tests.toy_street import toy_street
 
@@ -159,7 +159,7 @@ def test_only_the_road_on_the_feature_and_in_its_shadow_changes_colour(parameter
 
 
 def test_a_flat_road_keeps_every_byte(parameters):
-    dry = WeatherState(kind="dry")
+    dry = SurfaceState(kind="dry")
     scene, _ = weather_scene(SCENE.gaussians, clear_sky(), dry, parameters, 80.0, 1, SCENE.route, None)
     assert scene is SCENE.gaussians
 
@@ -167,7 +167,7 @@ def test_a_flat_road_keeps_every_byte(parameters):
 @pytest.mark.parametrize("kind", ["rain", "snow"])
 def test_under_cloud_a_feature_has_no_sunny_side(parameters, kind):
     """The overcast sky is the same all around, so both flanks of a hump get the same light."""
-    state = WeatherState(
+    state = SurfaceState(
         kind=kind, precipitation_mm_h=1, film_depth_mm=0.1, snow_coverage=1.0, snow_depth_mm=9
     )
     if kind == "rain":
@@ -191,7 +191,7 @@ def test_the_crest_of_a_short_hump_carries_snow_like_the_road_about_it(parameter
     """A hump of 0.6 m rises further above its neighbours' plane than an outlier may; it is road all the same."""
     relief = relief_of(0.1, 0.6, 8.0)
     shaped, _ = apply_road_profile(road(), relief, 4.0, -4.0)
-    limits = parameters.snow_cover.anchors
+    limits = parameters.kinds["snow"].snow_cover.anchors
     crest = np.flatnonzero(np.abs(shaped.means[:, 0] - 8.0) < 0.1)
     assert not np.isin(crest, road_anchors(shaped, limits).index).any()
-    assert np.isin(crest, road_anchors(shaped, limits, road_lift(shaped, relief)).index).all()
+    assert np.isin(crest, road_anchors(shaped, limits, measure_road_lift(shaped, relief)).index).all()

@@ -31,7 +31,9 @@ WHITE = np.array((1.8, 1.7, 1.5))
 
 @pytest.fixture
 def air(parameters):
-    return precipitating_air(population(parameters.rain, 25.0), parameters.air.near, 400.0, 12000.0)
+    return precipitating_air(
+        population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 400.0, 12000.0
+    )
 
 
 @pytest.fixture
@@ -161,7 +163,7 @@ def test_contrast_falls_with_distance_as_koschmieder_says(parameters, sky, air):
 
 
 def test_veil_and_drawn_particles_together_take_the_light_once(parameters, air):
-    falling = population(parameters.rain, 25.0)
+    falling = population(parameters.kinds["rain"].particles, 25.0)
     whole = (falling.extinction + extinction_of_visual_range(12000.0)) * 30.0
     assert optical_depth(air, np.array(30.0)) + air.drawn[-1] == pytest.approx(whole)
     distance = np.linspace(0, 30, 200)
@@ -169,11 +171,11 @@ def test_veil_and_drawn_particles_together_take_the_light_once(parameters, air):
 
 
 def test_heavier_weather_veils_more(parameters):
-    for kind, rates in (("rain", (2, 10, 25, 50)), ("snowfall", (0.5, 1, 2, 3))):
+    for kind, rates in (("rain", (2, 10, 25, 50)), ("snow", (0.5, 1, 2, 3))):
         depths = [
             optical_depth(
                 precipitating_air(
-                    population(getattr(parameters, kind), rate), parameters.air.near, 400.0, 12000.0
+                    population(parameters.kinds[kind].particles, rate), parameters.air.near, 400.0, 12000.0
                 ),
                 np.array(60.0),
             )

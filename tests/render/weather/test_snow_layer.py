@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
-from tasks.render.rasterise.rasteriser import prepare, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.scene_light import appended, mean_colours, without
@@ -16,7 +16,7 @@ from tasks.render.weather.snow.field import coverage_rank, local_depth_mm, snow_
 from tasks.render.weather.snow.layer import hidden_share, snow_layer, snowed_over, whitened
 from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.scene.route import Route
-from tasks.scene.surroundings import with_surroundings
+from tasks.scene.surroundings import add_surroundings
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import ASPHALT, road, surfels
 
@@ -30,7 +30,7 @@ def street():
 
 
 def field_of(scene, parameters, seed=5, route=None):
-    p = parameters.snow_cover
+    p = parameters.kinds["snow"].snow_cover
     return snow_field(scene, p.patches, p.tracks, p.anchors, route, seed)
 
 
@@ -41,7 +41,7 @@ def rank_at(field, x, y):
 def layer_at(street, parameters, coverage, depth_mm=None, seed=5):
     field = field_of(street, parameters, seed)
     depth_mm = 20.0 * coverage if depth_mm is None else depth_mm
-    return snow_layer(street, field, WHITE, coverage, depth_mm, parameters.snow_cover)
+    return snow_layer(street, field, WHITE, coverage, depth_mm, parameters.kinds["snow"].snow_cover)
 
 
 def test_ranks_by_weight_are_uniform_and_keep_the_order():
@@ -126,7 +126,7 @@ def test_what_stands_up_or_floats_is_no_anchor(street, parameters):
     floating = surfels(np.array([[6.0, 0.0, 0.3]]), (0, 0, 1), 0.04, 0.2, SemanticClass.ROAD)
     grass = surfels(np.array([[7.0, 0.0, 0.0]]), (0, 0, 1), 0.04, 0.2, SemanticClass.TERRAIN)
     scene = appended(appended(appended(street, kerb), floating), grass)
-    anchors = road_anchors(scene, parameters.snow_cover.anchors)
+    anchors = road_anchors(scene, parameters.kinds["snow"].snow_cover.anchors)
     assert set(range(len(street), len(scene))).isdisjoint(anchors.index.tolist())
     assert len(anchors.index) == len(street)
     assert anchors.flat.all()
@@ -135,7 +135,7 @@ def test_what_stands_up_or_floats_is_no_anchor(street, parameters):
 
 def test_round_gaussians_take_the_normal_of_their_neighbours(street, parameters):
     round_road = replace(street, scales=np.full_like(street.scales, 0.05))
-    anchors = road_anchors(round_road, parameters.snow_cover.anchors)
+    anchors = road_anchors(round_road, parameters.kinds["snow"].snow_cover.anchors)
     assert len(anchors.index) == len(street)
     assert not anchors.flat.any()
     assert anchors.normal[:, 2].min() > 0.99
@@ -146,14 +146,14 @@ def test_round_gaussians_take_the_normal_of_their_neighbours(street, parameters)
 def test_the_picture_shows_the_coverage_asked(street, parameters):
     """Share of road pixels nearer to snow than to asphalt, from the car, by the field's share of the same pixels."""
     view = shutter(width=240, height=160, focal=200.0)
-    middle = (ASPHALT * parameters.snow_cover.damp_albedo_ratio + 0.87 * WHITE[0]) / 2
+    middle = (ASPHALT * parameters.kinds["snow"].snow_cover.damp_albedo_ratio + 0.87 * WHITE[0]) / 2
     seen, expected = [], []
     for coverage in COVERAGES:
         field = field_of(street, parameters)
-        amount = (coverage, 20.0 * coverage, parameters.snow_cover)
+        amount = (coverage, 20.0 * coverage, parameters.kinds["snow"].snow_cover)
         snow = snow_layer(street, field, WHITE, *amount)
         scene = appended(without(whitened(street, field, WHITE, *amount), snow.buried), snow.gaussians)
-        gbuffer = rasterise(prepare(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
+        gbuffer = rasterise(prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
         inside = gbuffer.alpha > 0.9
         place = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
         expected.append(float((rank_at(field, place[inside, 0], place[inside, 1]) <= coverage).mean()))
@@ -165,9 +165,9 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
 def test_snow_is_as_bright_as_its_albedo_in_the_light(street, parameters):
     layer = layer_at(street, parameters, 1.0, 30.0).gaussians
     assert mean_colours(layer).mean(axis=0) == pytest.approx(
-        np.array(parameters.snow_cover.albedo) * WHITE, rel=0.02
+        np.array(parameters.kinds["snow"].snow_cover.albedo) * WHITE, rel=0.02
     )
-    assert hidden_share(np.array(10.0), parameters.snow_cover) > 0.99
+    assert hidden_share(np.array(10.0), parameters.kinds["snow"].snow_cover) > 0.99
 
 
 def test_snow_settles_on_what_faces_up_and_leaves_walls_bare(street, parameters):
@@ -175,7 +175,7 @@ def test_snow_settles_on_what_faces_up_and_leaves_walls_bare(street, parameters)
     wall = surfels(np.array([[5.0, 6.0, 1.0]]), (0, 1, 0), 0.1, 0.1, SemanticClass.BUILDING)
     scene = appended(appended(street, flat), wall)
     field = field_of(scene, parameters)
-    colours = mean_colours(whitened(scene, field, WHITE, 1.0, 30.0, parameters.snow_cover))
+    colours = mean_colours(whitened(scene, field, WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover))
     assert colours[-2].mean() > 1.0
     assert colours[-1] == pytest.approx(mean_colours(scene)[-1], rel=1e-5)
 
@@ -189,7 +189,7 @@ def test_under_a_roof_the_ground_is_white_and_what_stands_on_it_is_bare(street, 
     )
     scene = appended(appended(appended(street, roof), table), ground)
     colours = mean_colours(
-        whitened(scene, field_of(scene, parameters), WHITE, 1.0, 30.0, parameters.snow_cover)
+        whitened(scene, field_of(scene, parameters), WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover)
     )
     assert colours[-1].mean() > 1.0 and colours[len(street)].mean() > 1.0
     assert colours[-2].mean() < 0.2
@@ -205,9 +205,9 @@ def test_wheel_tracks_are_covered_last_and_leave_the_share_as_it_is(street, para
     assert np.mean(xi <= 0.5) == pytest.approx(0.5, abs=0.005)
     track = tracks_at(field, x, y) > 0.8
     assert 0.02 < track.mean() < 0.12
-    assert np.abs(np.abs(y[track]) - parameters.snow_cover.tracks.gauge_m / 2).max() < 0.5
+    assert np.abs(np.abs(y[track]) - parameters.kinds["snow"].snow_cover.tracks.gauge_m / 2).max() < 0.5
     assert np.mean(xi[track] <= 0.5) < 0.25
-    snow = snow_layer(street, field, WHITE, 1.0, 30.0, parameters.snow_cover)
+    snow = snow_layer(street, field, WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover)
     layer, pressed = snow.gaussians, track[snow.anchors]
     assert mean_colours(layer)[pressed].mean() < 0.95 * mean_colours(layer)[~pressed].mean()
     assert tracks_at(field_of(street, parameters), x, y).max() == 0
@@ -229,11 +229,11 @@ def test_scenes_that_blend_display_colours_get_the_same_snow(street, parameters)
 @pytest.mark.parametrize(("coverage", "depth_mm"), [(1.0, 30.0), (1.0, 1.0), (0.6, 12.0)])
 def test_snow_and_ground_know_how_densely_both_together_cover(street, parameters, coverage, depth_mm):
     """Against a count of the joined cloud: thick snow alone, thin snow among the discs of the ground."""
-    ground = with_surroundings(replace(street, antialiased=True))
+    ground = add_surroundings(replace(street, antialiased=True))
     snow = layer_at(ground, parameters, coverage, depth_mm)
     joined = snowed_over(ground, snow)
     assert len(joined.surroundings) == len(joined) == len(ground) - len(snow.buried) + len(snow.anchors)
-    counted = with_surroundings(joined).surroundings
+    counted = add_surroundings(joined).surroundings
     ratio = joined.surroundings / counted
     layer = np.arange(len(joined)) >= len(joined) - len(snow.anchors)
     assert np.median(ratio[layer, 0]) == pytest.approx(1, abs=0.15)

@@ -27,7 +27,7 @@ def sky(parameters):
 
 def wet(parameters, sky, film, wall_x=12.0, seed=1):
     picture, gbuffer = flat_gbuffer(VIEW, wall_x)
-    cloudy, pose, p = np.full((8, 16, 3), 0.9, np.float32), VIEW.T_world_camera, parameters.wet_road
+    cloudy, pose, p = np.full((8, 16, 3), 0.9, np.float32), VIEW.T_world_camera, parameters.kinds["rain"].film
     return picture, gbuffer, wet_layer(
         picture, gbuffer, cloudy, sky, 0.0, pixel_rays(VIEW), pose, VIEW.K, film, p, seed
     )  # fmt: skip
@@ -45,7 +45,7 @@ def test_water_reflects_two_percent_straight_down_and_all_at_grazing():
 def test_diffuse_reflectance_of_water_is_the_mean_over_the_hemisphere(parameters):
     cosine = (np.arange(20000) + 0.5) / 20000
     mean = np.mean(2 * cosine * fresnel_reflectance(cosine, 1.333))
-    assert parameters.wet_road.diffuse_reflectance == pytest.approx(mean, abs=0.001)
+    assert parameters.kinds["rain"].film.diffuse_reflectance == pytest.approx(mean, abs=0.001)
 
 
 def test_wet_asphalt_keeps_half_its_albedo_and_white_paint_more():
@@ -61,7 +61,7 @@ def test_the_film_drowns_more_of_the_road_everywhere_as_it_rises(parameters):
     shares = [
         water_surface(
             gbuffer.depth, pixel_rays(VIEW), gbuffer.normal, road, VIEW.T_world_camera[:3, 3], 133.0, film,
-            parameters.wet_road.water, 3,
+            parameters.kinds["rain"].film.water, 3,
         ).smooth
         for film in FILMS
     ]  # fmt: skip
@@ -70,7 +70,7 @@ def test_the_film_drowns_more_of_the_road_everywhere_as_it_rises(parameters):
     assert np.all(np.diff([share[road].mean() for share in shares]) > 0)
     assert shares[-1][road].min() > 0.99
     assert all(share[~road].max() == 0 for share in shares)
-    assert np.all(np.diff([wetness(film, parameters.wet_road.water) for film in FILMS]) > 0)
+    assert np.all(np.diff([wetness(film, parameters.kinds["rain"].film.water) for film in FILMS]) > 0)
 
 
 def test_reflection_grows_and_the_road_darkens_with_the_film(parameters, sky):
@@ -108,7 +108,7 @@ def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):
         cloudy = np.full((8, 16, 3), 0.9, np.float32)
         layer = wet_layer(
             picture, ground, cloudy, sky, 0.0, pixel_rays(VIEW), VIEW.T_world_camera, VIEW.K, 4.0,
-            parameters.wet_road, 1,
+            parameters.kinds["rain"].film, 1,
         )  # fmt: skip
         expected = wet_albedo_ratio(ASPHALT / (LUMINANCE @ sky.white), 1.333, 0.066) if soaks else 1.0
         assert layer.gain[beside] == pytest.approx(expected, rel=1e-3)
@@ -117,7 +117,7 @@ def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):
     standing.normal[beside] = (1, 0, 0)
     upright = wet_layer(
         picture, standing, cloudy, sky, 0.0, pixel_rays(VIEW), VIEW.T_world_camera, VIEW.K, 4.0,
-        parameters.wet_road, 1,
+        parameters.kinds["rain"].film, 1,
     )  # fmt: skip
     assert np.all(upright.gain[beside] == 1)
 
@@ -187,7 +187,7 @@ def test_mirrored_pictures_have_mirrored_reflections():
 
 def test_puddles_stay_where_they_are_as_the_car_drives(parameters):
     """Two cameras a pixel's footprint apart see the same water at the same place in the world."""
-    p = replace(parameters.wet_road.water, ripple_slope=0.0)
+    p = replace(parameters.kinds["rain"].film.water, ripple_slope=0.0)
     shares = []
     for x in (0.0, 1.0):
         view = shutter(width=160, height=108, focal=133.0, x=x)

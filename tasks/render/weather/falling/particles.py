@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.lens import Lens, distorted, undistorted
+from tasks.render.lens import Lens, distort_rays, undistort_points
 from tasks.render.weather.falling.precipitation import NearField, Population, drawn_reach
 from tasks.render.weather.random_streams import philox, stream_key, unit
 
@@ -120,7 +120,7 @@ def _corner_rays(shutter: Shutter, K: NDArray[np.float64]) -> NDArray[np.float64
     if shutter.lens is not None:
         around = np.vstack((corners, ((0.5, 0.0), (0.5, 1.0), (0.0, 0.5), (1.0, 0.5))))
         x, y = ((around * (shutter.width, shutter.height) - K[:2, 2]) / K[[0, 1], [0, 1]]).T
-        edge = np.stack(undistorted(x, y, shutter.lens), axis=-1)
+        edge = np.stack(undistort_points(x, y, shutter.lens), axis=-1)
         low, high = edge.min(axis=0), edge.max(axis=0)
         return np.column_stack((low + corners * (high - low), np.ones(4)))
     corners = corners * (shutter.width, shutter.height)
@@ -190,7 +190,7 @@ def _seen_at(place, motion, time, K, coefficients):  # type: ignore[no-untyped-d
     """Where the lens shows a particle at a time from the middle of the frame [px]."""
     z = max(place[2] + time * motion[2], NEAREST_Z_SHARE * place[2])
     x, y = (place[0] + time * motion[0]) / z, (place[1] + time * motion[1]) / z
-    x, y = distorted(x, y, coefficients)
+    x, y = distort_rays(x, y, coefficients)
     return K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
 
 

@@ -20,7 +20,7 @@ class ParticleParameters:
 
     Parameters
     ----------
-    kind : rain or snow; picks the form of the fall speed
+    kind : rain for drops, snow for flakes; picks the form of the fall speed, and names the random stream
     intercept : N_0 at 1 mm/h, by diameter of the melted particle [mm-1 m-3]
     intercept_exponent : a [1]
     slope : Lambda at 1 mm/h [mm-1]

@@ -14,7 +14,7 @@ from tasks.render.weather.snow.shelter import open_share
 from tasks.render.weather.snow.wheel_tracks import TrackParameters
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
-from tasks.scene.surroundings import in_surface
+from tasks.scene.surroundings import surface_scales
 
 EDGE_WIDTHS = 1.4
 """Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
@@ -151,7 +151,7 @@ def snow_layer(
     share = hidden_share(depth, p)
     buried = (kept == 1) & (share >= BURIED)
     # Where the ground is not buried, its discs lie among those of the snow.
-    area = in_surface(scales).prod(axis=1) / in_surface(gaussians.scales[index]).prod(axis=1)
+    area = surface_scales(scales).prod(axis=1) / surface_scales(gaussians.scales[index]).prod(axis=1)
     layer = replace(
         gaussians,
         means=(place + rise[:, None] * normal).astype(np.float32),

@@ -23,15 +23,15 @@ from tasks.render.weather.wet.reflection import mirrored_scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class WetRoadParameters:
-    """Optics of the wet road.
+class RoadFilmParameters:
+    """Optics of a road under a film of water or of ice.
 
     Parameters
     ----------
     water : how the film lies
-    refractive_index : of water [1]
-    diffuse_reflectance : mean reflectance of the water surface for diffuse light from above [1]
-    rough_slope : standard deviation of the slopes of wet texture that stands out of the film [1]
+    refractive_index : of water or ice [1]
+    diffuse_reflectance : mean reflectance of the film's surface for diffuse light from above [1]
+    rough_slope : standard deviation of the slopes of coated texture that stands out of the film [1]
     normal_window : width of the window over which road normals are averaged, by picture height [1]
     """
 
@@ -94,7 +94,7 @@ def wet_layer(
     T_world_camera: NDArray[np.floating],
     K: NDArray[np.floating],
     film_depth_mm: float,
-    parameters: WetRoadParameters,
+    parameters: RoadFilmParameters,
     seed: int,
 ) -> Layer:
     """The water on the road and on the ground beside it.

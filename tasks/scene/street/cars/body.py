@@ -1,12 +1,12 @@
-"""The bodywork of a car: a skin lofted over its outline, with glass, lamps, plates and what the lacquer mirrors."""
+"""The bodywork of a car: a skin lofted over its outline, with glass, lamps, plates and reflections in the lacquer."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
-from tasks.scene.street.cars.shapes import Shape, section
-from tasks.scene.street.surfels import Surfels, graded_cells, sheet_cells, tiles
+from tasks.scene.street.cars.shapes import Shape, cross_section
+from tasks.scene.street.surfels import Surfels, graded_cells, sheet_cells, tile_surface
 
 Floats = NDArray[np.float64]
 
@@ -28,8 +28,8 @@ _SKY, _HOUSES, _ROAD = (
 )
 
 
-def body(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> Surfels:
-    """The skin from sill to sill over the roof, class vehicle, in the car's axes: x from the tail, y left, z up.
+def build_bodywork(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> Surfels:
+    """Build the skin from sill to sill over the roof, class vehicle, in the car's axes: x from the tail, y left, z up.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def body(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> Surfels:
     )
     _, width, _ = graded_cells(np.unique(place) * shape.length, cell[0], 1.0)
     x = np.concatenate([[0.0], np.cumsum(width)])
-    keys = section(shape, x / shape.length)
+    keys = cross_section(shape, x / shape.length)
     counts = np.maximum(np.ceil(_SECTION_LENGTHS / (1.25 * cell[1])), 1).astype(int)
     half = np.concatenate([k + np.arange(n) / n for k, n in enumerate(counts)] + [[float(len(counts))]])
     right = np.stack([[np.interp(half, np.arange(len(counts) + 1), row) for row in key.T] for key in keys])
@@ -77,15 +77,15 @@ def body(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> Surfels:
         albedo = np.where(chosen[..., None], colour, albedo)
     gloss = np.where(arch | lower, 0.0, np.where(pane, _GLASS, _LACQUER))
     openness = np.where(arch, 0.15, np.clip(0.25 + 1.1 * z, 0.0, 1.0))
-    glow = _mirrored(centre, edge_u, edge_v, gloss, eye)
-    return tiles(centre, edge_u, edge_v, SemanticClass.VEHICLE, albedo, glow=glow, openness=openness)
+    glow = _mirrored_radiance(centre, edge_u, edge_v, gloss, eye)
+    return tile_surface(centre, edge_u, edge_v, SemanticClass.VEHICLE, albedo, glow=glow, openness=openness)
 
 
-def ends(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> list[Surfels]:
-    """Tail and nose, with lamps, number plates, bumpers and grille; parameters as `body`."""
+def build_car_ends(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> list[Surfels]:
+    """Build tail and nose, with lamps, number plates, bumpers and grille; parameters as `build_bodywork`."""
     parts = []
     for along, outward in ((0.0, -1.0), (1.0, 1.0)):
-        half_width, height = section(shape, np.array([along]))[0, :6].T
+        half_width, height = cross_section(shape, np.array([along]))[0, :6].T
         belt, roof = height[4], height[5]
         plate = (0.54, 0.66) if outward < 0 else (0.40, 0.51)
         lamp = (belt - 0.22, belt - 0.05)
@@ -110,16 +110,16 @@ def ends(shape: Shape, cell: Floats, paint: Floats, eye: Floats) -> list[Surfels
         ):  # fmt: skip
             albedo = np.where(chosen[..., None], colour, albedo)
         gloss = np.where(z < _BUMPER, 0.0, np.where(pane, _GLASS, _LACQUER))
-        glow = _mirrored(centre, edge_u, edge_v, gloss, eye)
+        glow = _mirrored_radiance(centre, edge_u, edge_v, gloss, eye)
         openness = np.clip(0.2 + 1.1 * z, 0.0, 1.0)
         parts.append(
-            tiles(centre, edge_u, edge_v, SemanticClass.VEHICLE, albedo, glow=glow, openness=openness)
+            tile_surface(centre, edge_u, edge_v, SemanticClass.VEHICLE, albedo, glow=glow, openness=openness)
         )
     return parts
 
 
-def _mirrored(centre: Floats, edge_u: Floats, edge_v: Floats, gloss: Floats, eye: Floats) -> Floats:
-    """Radiance [..., 3] mirrored towards the eye, after Schlick (1994), doi:10.1111/1467-8659.1330233."""
+def _mirrored_radiance(centre: Floats, edge_u: Floats, edge_v: Floats, gloss: Floats, eye: Floats) -> Floats:
+    """Return the radiance [..., 3] mirrored towards the eye, after Schlick (1994), doi:10.1111/1467-8659.1330233."""
     normal = np.cross(edge_u, edge_v)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     view = eye - centre

@@ -1,4 +1,4 @@
-"""Parked cars: where their parts go, their wheels, and the shade they cast."""
+"""Parked cars: their parts in the street, their wheels, and the shade they cast."""
 
 from dataclasses import replace
 
@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
-from tasks.scene.street.cars.body import WHEEL, body, ends
+from tasks.scene.street.cars.body import WHEEL, build_bodywork, build_car_ends
 from tasks.scene.street.cars.shapes import SHAPES, SILL, Shape
 from tasks.scene.street.layout import EYE_HEIGHT, PIXEL, StreetLayout, nearest_depth
-from tasks.scene.street.noise import stream
+from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Car
-from tasks.scene.street.surfels import Surfels, join, panel, tiles
+from tasks.scene.street.surfels import Surfels, build_panel, join_surfels, tile_surface
 
 Floats = NDArray[np.float64]
 
@@ -23,8 +23,8 @@ _SEEN_FROM = 9.0
 """Distance before the car from which its mirror images are right [m]."""
 
 
-def cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> Surfels:
-    """Surfels of all parked cars, class vehicle.
+def build_cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> Surfels:
+    """Build the surfels of all parked cars, class vehicle.
 
     Parameters
     ----------
@@ -32,11 +32,11 @@ def cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> Surfels:
     parked : the cars
     seed : the street's seed [1]
     """
-    return join([_placed(layout, car, seed) for car in parked])
+    return join_surfels([_build_car(layout, car, seed) for car in parked])
 
 
 def car_boxes(parked: tuple[Car, ...]) -> Floats:
-    """Boxes [K, 2, 3] that cast the cars' shadows, body and cabin, a little within the surface [m]."""
+    """Return the boxes [K, 2, 3] that cast the cars' shadows: body and cabin, slightly inside the surface [m]."""
     boxes = []
     for car in parked:
         shape = SHAPES[car.model]
@@ -50,8 +50,8 @@ def car_boxes(parked: tuple[Car, ...]) -> Floats:
     return np.array(boxes).reshape(-1, 2, 3)
 
 
-def footprints(parked: tuple[Car, ...]) -> Floats:
-    """Ground under the cars [K, 2, 2]: lowest and highest station and lateral position [m]."""
+def car_footprints(parked: tuple[Car, ...]) -> Floats:
+    """Return the ground under the cars [K, 2, 2]: lowest and highest station and lateral position [m]."""
     rectangles = []
     for car in parked:
         length, width = 0.46 * SHAPES[car.model].length, 0.42 * SHAPES[car.model].width
@@ -59,9 +59,9 @@ def footprints(parked: tuple[Car, ...]) -> Floats:
     return np.array(rectangles).reshape(-1, 2, 2)
 
 
-def _placed(layout: StreetLayout, car: Car, seed: int) -> Surfels:
+def _build_car(layout: StreetLayout, car: Car, seed: int) -> Surfels:
     shape = SHAPES[car.model]
-    rng = stream(seed, f"car {car.number}")
+    rng = named_generator(seed, f"car {car.number}")
     paint = palette.CAR_PAINT[rng.integers(len(palette.CAR_PAINT))]
     flank = np.sign(car.lateral) * (abs(car.lateral) - shape.width / 2)
     tail = car.station - shape.length / 2
@@ -69,19 +69,19 @@ def _placed(layout: StreetLayout, car: Car, seed: int) -> Surfels:
     cell = np.minimum(np.array(_CELL) * PIXEL * depth, [0.4, 0.25])
     eye = np.array([shape.length / 2 - car.facing * _SEEN_FROM, -car.facing * car.lateral, EYE_HEIGHT])
     parts = [
-        body(shape, cell, paint, eye),
-        *ends(shape, cell, paint, eye),
-        *_wheels(shape, cell),
-        *_underside(shape),
+        build_bodywork(shape, cell, paint, eye),
+        *build_car_ends(shape, cell, paint, eye),
+        *_build_wheels(shape, cell),
+        *_build_underside(shape),
     ]
-    local = join(parts)
+    local = join_surfels(parts)
     turn = np.array([car.facing, car.facing, 1.0])
     origin = np.array([car.station, car.lateral, 0.0])
     middle = np.array([shape.length / 2, 0.0, 0.0])
     return replace(local, centre=(local.centre - middle) * turn + origin, axes=local.axes * turn)
 
 
-def _wheels(shape: Shape, cell: Floats) -> list[Surfels]:
+def _build_wheels(shape: Shape, cell: Floats) -> list[Surfels]:
     n = int(np.clip(np.ceil(2 * WHEEL / cell[1]), 5, 11))
     grid = (np.arange(n) + 0.5) / n * 2 - 1
     a, b = np.meshgrid(grid, grid, indexing="ij")
@@ -97,24 +97,24 @@ def _wheels(shape: Shape, cell: Floats) -> list[Surfels]:
             y = np.full(x.shape, side * 0.99 * shape.width / 2)
             centre = np.stack([x, y, (b[kept] + 1) * WHEEL], axis=-1)
             edge_u, edge_v = [-side * step, 0, 0], [0, 0, step]
-            parts.append(tiles(centre, edge_u, edge_v, SemanticClass.VEHICLE, albedo, openness=0.6))
+            parts.append(tile_surface(centre, edge_u, edge_v, SemanticClass.VEHICLE, albedo, openness=0.6))
     return parts
 
 
-def _underside(shape: Shape) -> list[Surfels]:
-    """Dark sheets that close the space under the car, with the tyres' treads."""
+def _build_underside(shape: Shape) -> list[Surfels]:
+    """Build dark sheets that close the space under the car, with the tyres' treads."""
     low, high, cell, kind = 0.02, SILL + 0.12, 0.15, SemanticClass.VEHICLE
     rear, front = (axle * shape.length for axle in shape.axles)
     width, up = 0.92 * shape.width, np.array([0, 0, high - low])
     parts = []
     for x, outward in ((rear - WHEEL, -1.0), (front + WHEEL, 1.0)):
         across = np.array([0, outward * width, 0])
-        parts.append(panel([x, -across[1] / 2, low], across, up, cell, kind, _SHADE))
+        parts.append(build_panel([x, -across[1] / 2, low], across, up, cell, kind, _SHADE))
         for tyre in (-0.43, 0.43):
             tread = np.array([x + 0.02 * outward, tyre * shape.width - outward * 0.09, low])
-            parts.append(panel(tread, [0, outward * 0.18, 0], up, cell, kind, palette.TYRE))
+            parts.append(build_panel(tread, [0, outward * 0.18, 0], up, cell, kind, palette.TYRE))
     for side in (-1.0, 1.0):
         along = np.array([-side * (front - rear), 0, 0])
         begin = [front if side > 0 else rear, side * 0.40 * shape.width, low]
-        parts.append(panel(begin, along, up, 2 * cell, kind, _SHADE))
+        parts.append(build_panel(begin, along, up, 2 * cell, kind, _SHADE))
     return parts

@@ -34,7 +34,7 @@ class Shape:
     axles: tuple[float, float] = (0.19, 0.80)
 
 
-def _line(*points: tuple[float, float]) -> Floats:
+def _outline(*points: tuple[float, float]) -> Floats:
     return np.array(points)
 
 
@@ -45,22 +45,22 @@ SHAPES = {
     "hatchback": Shape(
         length=4.1,
         width=1.76,
-        roof=_line(
+        roof=_outline(
             (0, 0.84), (0.015, 0.95), (0.10, 1.36), (0.16, 1.44), (0.40, 1.47), (0.55, 1.42), (0.74, 0.97),
             (0.78, 0.93), *_NOSE,
         ),
-        belt=_line((0, 0.84), (0.015, 0.94), (0.15, 0.99), (0.60, 0.94), (0.78, 0.90), *_NOSE_BELT),
+        belt=_outline((0, 0.84), (0.015, 0.94), (0.15, 0.99), (0.60, 0.94), (0.78, 0.90), *_NOSE_BELT),
         glass=(0.12, 0.70),
         pillar=0.42,
     ),
     "saloon": Shape(
         length=4.6,
         width=1.81,
-        roof=_line(
+        roof=_outline(
             (0, 0.86), (0.01, 0.98), (0.14, 1.03), (0.27, 1.38), (0.36, 1.44), (0.52, 1.42), (0.69, 0.98),
             (0.73, 0.94), *_NOSE,
         ),
-        belt=_line((0, 0.86), (0.01, 0.95), (0.14, 0.99), (0.60, 0.94), (0.73, 0.91), *_NOSE_BELT),
+        belt=_outline((0, 0.86), (0.01, 0.95), (0.14, 0.99), (0.60, 0.94), (0.73, 0.91), *_NOSE_BELT),
         glass=(0.22, 0.66),
         pillar=0.44,
         axles=(0.205, 0.80),
@@ -68,11 +68,11 @@ SHAPES = {
     "estate": Shape(
         length=4.6,
         width=1.81,
-        roof=_line(
+        roof=_outline(
             (0, 0.86), (0.012, 0.98), (0.075, 1.38), (0.12, 1.45), (0.42, 1.48), (0.53, 1.44), (0.69, 0.98),
             (0.73, 0.94), *_NOSE,
         ),
-        belt=_line((0, 0.86), (0.012, 0.96), (0.15, 1.0), (0.60, 0.95), (0.73, 0.91), *_NOSE_BELT),
+        belt=_outline((0, 0.86), (0.012, 0.96), (0.15, 1.0), (0.60, 0.95), (0.73, 0.91), *_NOSE_BELT),
         glass=(0.09, 0.66),
         pillar=0.43,
         axles=(0.205, 0.80),
@@ -80,11 +80,11 @@ SHAPES = {
     "van": Shape(
         length=4.9,
         width=1.92,
-        roof=_line(
+        roof=_outline(
             (0, 1.80), (0.03, 1.90), (0.55, 1.93), (0.66, 1.86), (0.80, 1.18), (0.84, 1.11), (0.95, 0.93),
             (0.985, 0.78), (1, 0.66),
         ),
-        belt=_line((0, 1.06), (0.66, 1.08), (0.84, 1.05), (0.95, 0.90), (0.985, 0.76), (1, 0.66)),
+        belt=_outline((0, 1.06), (0.66, 1.08), (0.84, 1.05), (0.95, 0.90), (0.985, 0.76), (1, 0.66)),
         glass=(0.58, 0.76),
         pillar=0.60,
         axles=(0.19, 0.82),
@@ -92,8 +92,8 @@ SHAPES = {
 }  # fmt: skip
 
 
-def section(shape: Shape, along: Floats) -> Floats:
-    """Corner points of half a cross-section, from the sill to the middle of the roof.
+def cross_section(shape: Shape, along: Floats) -> Floats:
+    """Return the corner points of half a cross-section, from the sill to the middle of the roof.
 
     Parameters
     ----------

@@ -1,17 +1,17 @@
-"""What people fix to house fronts: awnings, balconies, flower boxes and downpipes."""
+"""Fixtures of house fronts: awnings, balconies, flower boxes and downpipes."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
-from tasks.scene.street.houses.facade_paint import look_of
+from tasks.scene.street.houses.facade_paint import draw_look
 from tasks.scene.street.houses.openings import SIGN_BOTTOM, Part
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
-from tasks.scene.street.noise import stream
+from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Building
-from tasks.scene.street.surfels import Surfels, box, join, tiles, tube
-from tasks.scene.street.vegetation import leaves
+from tasks.scene.street.surfels import Surfels, build_box, build_tube, join_surfels, tile_surface
+from tasks.scene.street.vegetation import build_leaves
 
 Floats = NDArray[np.float64]
 
@@ -22,8 +22,8 @@ _SILL = 0.95
 _KIND = SemanticClass.BUILDING
 
 
-def adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
-    """Surfels of what is fixed to the fronts, classes building and vegetation.
+def build_adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
+    """Build the surfels of the fixtures, classes building and vegetation.
 
     Parameters
     ----------
@@ -33,14 +33,14 @@ def adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed: int)
     """
     parts = []
     for house in buildings:
-        front = layout.front(house.side) + house.side * house.setback
+        front = layout.front_position(house.side) + house.side * house.setback
         depth = float(nearest_depth(layout, house.nearest_station, front, 4.0))
         if depth > 40:
             continue
-        rng = stream(seed, f"adornments {house.number}")
-        parts.append(_downpipe(layout, house, front))
+        rng = named_generator(seed, f"adornments {house.number}")
+        parts.append(_build_downpipe(layout, house, front))
         if house.shop and house.awnings:
-            parts += _awnings(layout, house, front, depth, rng)
+            parts += _build_awnings(layout, house, front, depth, rng)
         upper = [
             (
                 storey,
@@ -50,23 +50,23 @@ def adornments(layout: StreetLayout, buildings: tuple[Building, ...], seed: int)
             for storey in range(1, house.storeys)
             for bay in range(house.bays)
         ]
-        window = look_of(house, seed).window[0]
-        slab = look_of(house, seed).colours[Part.TRIM]
+        window = draw_look(house, seed).window[0]
+        slab = draw_look(house, seed).colours[Part.TRIM]
         for storey, bay, floor in upper:
             middle = house.start + (bay + 0.5) * house.bay
             if house.balconies and bay % 2 == house.bays % 2 and storey < house.storeys - 1:
-                parts += _balcony(house, middle, front, floor, window + 0.7, slab)
+                parts += _build_balcony(house, middle, front, floor, window + 0.7, slab)
             elif house.flowers and storey < 3 and rng.random() < 0.6:
-                parts += _flower_box(house, middle, front, floor + _SILL, window, PIXEL * depth, rng)
-    return join(parts)
+                parts += _build_flower_box(house, middle, front, floor + _SILL, window, PIXEL * depth, rng)
+    return join_surfels(parts)
 
 
 def awning_boxes(layout: StreetLayout, buildings: tuple[Building, ...]) -> Floats:
-    """Boxes [K, 2, 3] that cast the awnings' shadows [m]."""
+    """Return the boxes [K, 2, 3] that cast the awnings' shadows [m]."""
     boxes = []
     for house in buildings:
         if house.shop and house.awnings:
-            front = layout.front(house.side) + house.side * house.setback
+            front = layout.front_position(house.side) + house.side * house.setback
             d = sorted((front, front - house.side * _AWNING_REACH))
             top = layout.kerb_height + SIGN_BOTTOM
             boxes += [[[a, d[0], top - 0.3], [b, d[1], top - 0.2]] for a, b in _shop_bays(house)]
@@ -78,7 +78,7 @@ def _shop_bays(house: Building) -> list[tuple[float, float]]:
     return [(edges[k] + 0.08, edges[k + 1] - 0.08) for k in range(house.bays) if k != house.door]
 
 
-def _awnings(
+def _build_awnings(
     layout: StreetLayout, house: Building, front: float, depth: float, rng: np.random.Generator
 ) -> list[Surfels]:
     cloth = palette.AWNINGS[rng.integers(len(palette.AWNINGS))]
@@ -97,15 +97,15 @@ def _awnings(
         centre = np.stack([along, front + across * out[1], top + across * out[2]], axis=-1)
         # the cloth lies face up: along the street to the left of the outward slope
         edge_u = np.array([house.side * step, 0, 0])
-        parts.append(tiles(centre, edge_u, -out / rows, _KIND, colour * np.ones((1, rows, 1))))
+        parts.append(tile_surface(centre, edge_u, -out / rows, _KIND, colour * np.ones((1, rows, 1))))
         hem = np.stack(
             [s, np.full(len(s), front + out[1]), np.full(len(s), top + out[2] - _VALANCE / 2)], axis=-1
         )
-        parts.append(tiles(hem, edge_u, [0, 0, _VALANCE], _KIND, colour[:, 0] * 0.95))
+        parts.append(tile_surface(hem, edge_u, [0, 0, _VALANCE], _KIND, colour[:, 0] * 0.95))
     return parts
 
 
-def _balcony(
+def _build_balcony(
     house: Building, middle: float, front: float, floor: float, width: float, slab: Floats
 ) -> list[Surfels]:
     out = -house.side * _BALCONY_REACH
@@ -115,21 +115,23 @@ def _balcony(
     height = (np.arange(4) + 0.5) / 4 * _RAIL_HEIGHT
     s, z = np.meshgrid(middle + bars, floor + height, indexing="ij")
     centre = np.stack([s, np.full(s.shape, front + out), z], axis=-1)
-    rail = tiles(centre, [house.side * 0.028, 0, 0], [0, 0, _RAIL_HEIGHT / 4], _KIND, palette.METAL_DARK)
+    rail = tile_surface(
+        centre, [house.side * 0.028, 0, 0], [0, 0, _RAIL_HEIGHT / 4], _KIND, palette.METAL_DARK
+    )
     ends = np.array([-half, half])[:, None] + np.zeros(5)
     depth = front + out * (np.arange(5) + 0.5) / 5 + 0 * ends
     sides = np.stack([middle + ends, depth, np.full(ends.shape, floor + _RAIL_HEIGHT / 2)], axis=-1)
-    side_bars = tiles(sides, [0, 0.03, 0], [0, 0, 0.6 * _RAIL_HEIGHT], _KIND, palette.METAL_DARK)
+    side_bars = tile_surface(sides, [0, 0.03, 0], [0, 0, 0.6 * _RAIL_HEIGHT], _KIND, palette.METAL_DARK)
     path = np.linspace(-half, half, 5)[:, None] * [1, 0, 0] + [middle, front + out, floor + _RAIL_HEIGHT]
     return [
-        box([middle - half, d[0], floor - 0.16], [middle + half, d[1], floor], 0.35, _KIND, slab),
+        build_box([middle - half, d[0], floor - 0.16], [middle + half, d[1], floor], 0.35, _KIND, slab),
         rail,
         side_bars,
-        tube(path, 0.028, 4, _KIND, palette.METAL_DARK),
+        build_tube(path, 0.028, 4, _KIND, palette.METAL_DARK),
     ]
 
 
-def _flower_box(
+def _build_flower_box(
     house: Building,
     middle: float,
     front: float,
@@ -144,12 +146,12 @@ def _flower_box(
     balls = np.column_stack([s, np.full(n, d), sill + rng.uniform(0.08, 0.14, n), np.full(n, 0.14)])
     bloom = palette.FLOWERS[rng.integers(len(palette.FLOWERS))]
     return [
-        leaves(balls, palette.HEDGE, 4.0 * pixel, rng),
-        leaves(balls + np.array([0, 0, 0.06, -0.02]), bloom, 2.6 * pixel, rng),
+        build_leaves(balls, palette.HEDGE, 4.0 * pixel, rng),
+        build_leaves(balls + np.array([0, 0, 0.06, -0.02]), bloom, 2.6 * pixel, rng),
     ]
 
 
-def _downpipe(layout: StreetLayout, house: Building, front: float) -> Surfels:
+def _build_downpipe(layout: StreetLayout, house: Building, front: float) -> Surfels:
     foot = np.array([house.start, front - house.side * 0.09, layout.kerb_height])
-    path = foot + np.linspace(0, 1, 16)[:, None] * [0, 0, house.eaves(layout) - layout.kerb_height]
-    return tube(path, 0.055, 5, _KIND, palette.METAL_GREY)
+    path = foot + np.linspace(0, 1, 16)[:, None] * [0, 0, house.eaves_height(layout) - layout.kerb_height]
+    return build_tube(path, 0.055, 5, _KIND, palette.METAL_GREY)

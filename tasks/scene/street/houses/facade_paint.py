@@ -1,4 +1,4 @@
-"""How house fronts look: plaster and brick, woodwork, curtains, and what the panes mirror."""
+"""Colours of house fronts: plaster and brick, woodwork, curtains, and reflections in the panes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tasks.scene.street import palette
 from tasks.scene.street.houses.openings import BAYS, DOOR_HEIGHT, Part
 from tasks.scene.street.layout import StreetLayout
-from tasks.scene.street.noise import fractal_noise, stream
+from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import Building
 
 Floats = NDArray[np.float64]
@@ -48,14 +48,14 @@ class FrontCells:
 
     @staticmethod
     def join(parts: Sequence["FrontCells"]) -> "FrontCells":
-        """All cells, in order."""
+        """Concatenate the cells, in order."""
         names = [f.name for f in fields(FrontCells)]
         return FrontCells(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """Colours and habits of one house.
+    """Colours and windows of one house.
 
     Parameters
     ----------
@@ -73,15 +73,15 @@ class Look:
     banded: bool
 
 
-def look_of(house: Building, seed: int) -> Look:
-    """The house's colours and window size, from a stream of its own.
+def draw_look(house: Building, seed: int) -> Look:
+    """Draw the house's colours and window size from its own random stream.
 
     Parameters
     ----------
     house : the house
     seed : the street's seed [1]
     """
-    rng = stream(seed, f"look {house.number}")
+    rng = named_generator(seed, f"look {house.number}")
     brick = rng.random() < 0.25
     walls = palette.BRICK if brick else palette.PLASTER
     wall = walls[rng.integers(len(walls))]
@@ -98,10 +98,10 @@ def look_of(house: Building, seed: int) -> Look:
     )
 
 
-def painted(
+def paint_fronts(
     layout: StreetLayout, cells: FrontCells, looks: Sequence[Look], seed: int
 ) -> tuple[Floats, Floats]:
-    """Albedo and glow of the cells.
+    """Return albedo and glow of the cells.
 
     Parameters
     ----------
@@ -114,11 +114,11 @@ def painted(
     -------
     albedo, glow : float64 [N, 3] see `Surfels` [1]
     """
-    rng = stream(seed, "fronts")
+    rng = named_generator(seed, "fronts")
     s, z, part = cells.station, cells.height, cells.part
-    tone = 1 + 0.05 * fractal_noise(stream(seed, "stains"), s + 400.0 * (cells.house % 7), z, 2.5, 3)
+    tone = 1 + 0.05 * fractal_noise(named_generator(seed, "stains"), s + 400.0 * (cells.house % 7), z, 2.5, 3)
     grain = np.array([look.grain for look in looks])[cells.house]
-    # a cell averages what lies within it: the thin ones beside the openings must not stand out as streaks
+    # a cell averages its content: the thin cells beside the openings must not appear as streaks
     grain = grain * np.clip(cells.size.min(axis=1) / 0.3, 0.15, 1.0)
     tone += grain * rng.standard_normal(len(s)) * (part == Part.WALL)
     tone *= np.clip(0.84 + 0.06 * z, 0.0, 1.0)
@@ -133,7 +133,7 @@ def painted(
     albedo = np.where(doors[:, None], leaf, albedo)
 
     shop = pane & (kind == "shop")
-    goods = np.maximum(0.55 + 0.6 * fractal_noise(stream(seed, "goods"), s, z, 0.7, 3), 0.05)
+    goods = np.maximum(0.55 + 0.6 * fractal_noise(named_generator(seed, "goods"), s, z, 0.7, 3), 0.05)
     inside = _SHOP_LIGHT * (goods * np.clip(1.2 - 0.6 * cells.up, 0.0, 1.0))[:, None] + _MIRRORED_STREET
     glow = np.where(shop[:, None], inside, glow)
 
@@ -142,8 +142,8 @@ def painted(
     window = pane & ~shop & ~doors
     drawn = (drape < 0.4) & (np.abs(cells.across) > 0.2) | (drape > 0.75) & (cells.up > 2.2 - 1.8 * drape)
     albedo = np.where((window & drawn)[:, None], 0.55 * palette.CURTAIN, albedo)
-    # from the road a pane mirrors the houses opposite up to where their roofs end, and the sky above
-    ridge = 5.2 + 0.8 * fractal_noise(stream(seed, "opposite"), s, 0.0 * s, 4.0, 2)
+    # from the road a pane mirrors the houses opposite up to their roofs, and the sky above
+    ridge = 5.2 + 0.8 * fractal_noise(named_generator(seed, "opposite"), s, 0.0 * s, 4.0, 2)
     sky = np.clip((z - ridge) / 0.5 + 0.5, 0.0, 1.0) * (0.65 + 0.7 * glint) * (0.75 + 0.35 * cells.up)
     mirrored = _MIRRORED_STREET + (_MIRRORED_SKY - _MIRRORED_STREET) * sky[:, None]
     return albedo, np.where(window[:, None], mirrored * np.where(drawn, 0.8, 1.0)[:, None], glow)

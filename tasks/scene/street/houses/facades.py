@@ -4,22 +4,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
-from tasks.scene.street.houses.facade_paint import FrontCells, Look, look_of, painted
-from tasks.scene.street.houses.openings import BAYS, Part, Pattern, bay_patterns, simplified, storey_pattern
+from tasks.scene.street.houses.facade_paint import FrontCells, Look, draw_look, paint_fronts
+from tasks.scene.street.houses.openings import (
+    BAYS,
+    Part,
+    Pattern,
+    bay_patterns,
+    drop_thin_parts,
+    storey_pattern,
+)
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.plan import Building
-from tasks.scene.street.surfels import Surfels, graded_cells, tiles
+from tasks.scene.street.surfels import Surfels, graded_cells, tile_surface
 
 Floats = NDArray[np.float64]
 
 _CELL = (19.0, 12.0)
 """Largest width and height of a wall cell where it is seen closest [px]."""
 _RECESS = np.array([0.0, -0.03, 0.10, 0.14, -0.06, -0.08, -0.04])
-"""How far each part stands back from the wall [m]."""
+"""Distance of each part behind the wall's surface [m]."""
 
 
-def facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
-    """Surfels of all fronts, class building.
+def build_facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
+    """Build the surfels of all fronts, class building.
 
     Parameters
     ----------
@@ -27,21 +34,21 @@ def facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) ->
     buildings : the houses
     seed : the street's seed [1]
     """
-    looks = [look_of(house, seed) for house in buildings]
+    looks = [draw_look(house, seed) for house in buildings]
     grids = [
         grid
         for index, (house, look) in enumerate(zip(buildings, looks, strict=True))
-        for grid in _front(layout, house, look, index)
+        for grid in _cut_front(layout, house, look, index)
     ]
     cells = FrontCells.join(grids)
     side = np.array([house.side for house in buildings], dtype=np.float64)[cells.house]
-    front = np.array([layout.front(house.side) + house.side * house.setback for house in buildings])[
+    front = np.array([layout.front_position(house.side) + house.side * house.setback for house in buildings])[
         cells.house
     ]
     zero = np.zeros(len(side))
-    albedo, glow = painted(layout, cells, looks, seed)
+    albedo, glow = paint_fronts(layout, cells, looks, seed)
     glazed = (cells.part == Part.GLASS) | (cells.part == Part.FRAME)
-    return tiles(
+    return tile_surface(
         np.stack([cells.station, front + side * _RECESS[cells.part], cells.height], axis=1),
         np.stack([side * cells.size[:, 0], zero, zero], axis=1),
         np.stack([zero, zero, cells.size[:, 1]], axis=1),
@@ -52,21 +59,21 @@ def facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) ->
     )
 
 
-def _front(layout: StreetLayout, house: Building, look: Look, index: int) -> list[FrontCells]:
+def _cut_front(layout: StreetLayout, house: Building, look: Look, index: int) -> list[FrontCells]:
     ground = bay_patterns(layout.ground_storey_height, house.bay, look.window)
     grids = []
     for k in range(house.bays):
         kind = "door" if k == house.door else "shop" if house.shop else "window"
-        grids.append(_grid(layout, house, index, (k, 1), 0, *ground[kind], kind))
+        grids.append(_cut_bays(layout, house, index, (k, 1), 0, *ground[kind], kind))
     for storey in range(1, house.storeys):
         pattern = storey_pattern(
             layout.storey_height, house.bay, look.window, banded=look.banded or storey == 1
         )
-        grids.append(_grid(layout, house, index, (0, house.bays), storey, *pattern, "window"))
+        grids.append(_cut_bays(layout, house, index, (0, house.bays), storey, *pattern, "window"))
     return grids
 
 
-def _grid(
+def _cut_bays(
     layout: StreetLayout,
     house: Building,
     index: int,
@@ -76,18 +83,18 @@ def _grid(
     rows: Pattern,
     kind: str,
 ) -> FrontCells:
-    """The cells of some bays (first, count) of one storey."""
+    """Cut the cells of some bays (first, count) of one storey."""
     bottom = layout.kerb_height + (layout.ground_storey_height + (storey - 1) * layout.storey_height) * (
         storey > 0
     )
     cell = (
         np.array(_CELL)
         * PIXEL
-        * nearest_depth(layout, house.nearest_station, layout.front(house.side), bottom)
+        * nearest_depth(layout, house.nearest_station, layout.front_position(house.side), bottom)
     )
-    columns, rows = simplified(columns, 0.08 * cell[0]), simplified(rows, 0.11 * cell[1])
-    x, width, column = _cut(columns, cell[0])
-    y, height, row = _cut(rows, cell[1])
+    columns, rows = drop_thin_parts(columns, 0.08 * cell[0]), drop_thin_parts(rows, 0.11 * cell[1])
+    x, width, column = _cut_pattern(columns, cell[0])
+    y, height, row = _cut_pattern(rows, cell[1])
     across, up = np.array([p for _, p in columns])[column], np.array([p for _, p in rows])[row]
     bay = bays[0] + np.arange(bays[1])
     b, i, j = np.meshgrid(bay, np.arange(len(x)), np.arange(len(y)), indexing="ij")
@@ -105,7 +112,7 @@ def _grid(
     )
 
 
-def _cut(pattern: Pattern, cell: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Cells along one side of a grid: walls fine at their ends, panes and boards alike throughout."""
+def _cut_pattern(pattern: Pattern, cell: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Cut cells along one side of a grid: walls finely at their ends, panes and boards evenly."""
     alike = np.array([part in (Part.GLASS, Part.SIGN, Part.PLINTH) for _, part in pattern])
     return graded_cells(np.cumsum([0.0, *(size for size, _ in pattern)]), cell, np.where(alike, 1.0, 0.45))

@@ -4,10 +4,10 @@ from enum import IntEnum
 
 
 class Part(IntEnum):
-    """What a row or a column of a bay shows.
+    """Part of a house front that a row or a column of a bay shows.
 
-    Where a row and a column cross one sees the lesser of the two, so that glass lies within its frame,
-    the frame within its surround and the surround within the wall; a band or a sign runs right across.
+    A cell shows the lesser of its row and its column, so that glass lies within its frame, the frame within
+    its surround and the surround within the wall; a band or a sign runs over the whole width.
     """
 
     WALL = 0
@@ -32,7 +32,7 @@ _PLINTH = 0.55
 
 
 def window_columns(bay: float, width: float) -> Pattern:
-    """A two-casement window [m] in the middle of a bay [m]."""
+    """Return the columns of a two-casement window [m] in the middle of a bay [m]."""
     pane = (width - 0.18) / 2
     pier = ((bay - width) / 2 - 0.13, Part.WALL)
     surround, frame = (0.13, Part.TRIM), (0.065, Part.FRAME)
@@ -50,41 +50,41 @@ def window_columns(bay: float, width: float) -> Pattern:
 
 
 def window_rows(storey_height: float, sill: float, height: float, *, banded: bool) -> Pattern:
-    """The window [m] over its sill [m], below a wall up to the next floor [m]."""
+    """Return the rows of a window [m] over its sill [m], below a wall up to the next floor [m]."""
     low, high = 0.66 * (height - 0.17), 0.34 * (height - 0.17)
     foot = (BAND_HEIGHT, Part.BAND if banded else Part.WALL)
     rows = [
         foot,
         (sill - BAND_HEIGHT - 0.1, Part.WALL),
         (0.1, Part.TRIM),
-        *_glazing(low, high),
+        *_glaze_opening(low, high),
         (0.17, Part.TRIM),
     ]
-    return _filled(rows, storey_height)
+    return _fill_with_wall(rows, storey_height)
 
 
 def ground_window_rows(storey_height: float, height: float) -> Pattern:
-    """A ground-floor window [m] over a plinth, below a wall up to the next floor [m]."""
+    """Return the rows of a ground-floor window [m] over a plinth, below a wall up to the next floor [m]."""
     low, high = 0.66 * (height - 0.17), 0.34 * (height - 0.17)
     rows = [
         (_PLINTH, Part.PLINTH),
         (0.5, Part.WALL),
         (0.1, Part.TRIM),
-        *_glazing(low, high),
+        *_glaze_opening(low, high),
         (0.2, Part.TRIM),
     ]
-    return _filled(rows, storey_height)
+    return _fill_with_wall(rows, storey_height)
 
 
 def shop_columns(bay: float) -> Pattern:
-    """Shop windows from pier to pier of a bay [m]."""
+    """Return the columns of shop windows from pier to pier of a bay [m]."""
     pane = (bay - 0.6) / 2
     pier, frame = (0.2, Part.WALL), (0.075, Part.FRAME)
     return [pier, frame, (pane, Part.GLASS), (0.05, Part.FRAME), (pane, Part.GLASS), frame, pier]
 
 
 def shop_rows(storey_height: float) -> Pattern:
-    """A shop window over a low stall riser, a name board and wall up to the next floor [m]."""
+    """Return the rows of a shop window over a low stall riser, a name board and wall up to the next floor [m]."""
     rows = [
         (0.4, Part.PLINTH),
         (0.07, Part.FRAME),
@@ -92,18 +92,18 @@ def shop_rows(storey_height: float) -> Pattern:
         (0.08, Part.FRAME),
         (SIGN_HEIGHT, Part.SIGN),
     ]
-    return _filled(rows, storey_height)
+    return _fill_with_wall(rows, storey_height)
 
 
 def door_columns(bay: float) -> Pattern:
-    """A double door in the middle of a bay [m]."""
+    """Return the columns of a double door in the middle of a bay [m]."""
     pier = ((bay - 1.66) / 2, Part.WALL)
     surround, frame, leaf = (0.16, Part.TRIM), (0.08, Part.FRAME), (0.57, Part.GLASS)
     return [pier, surround, frame, leaf, (0.04, Part.FRAME), leaf, frame, surround, pier]
 
 
 def door_rows(storey_height: float) -> Pattern:
-    """Door leaves, the light above them and wall up to the next floor [m]."""
+    """Return the rows of door leaves, the light above them and wall up to the next floor [m]."""
     rows = [
         (DOOR_HEIGHT, Part.GLASS),
         (0.07, Part.FRAME),
@@ -111,26 +111,26 @@ def door_rows(storey_height: float) -> Pattern:
         (0.07, Part.FRAME),
         (0.22, Part.TRIM),
     ]
-    return _filled(rows, storey_height)
+    return _fill_with_wall(rows, storey_height)
 
 
 DOOR_HEIGHT = 2.2
-"""Of the door leaves, which are wood where the pattern says glass [m]."""
+"""Height of the door leaves, which are wood where the pattern has glass [m]."""
 
 
-def _glazing(low: float, high: float) -> Pattern:
+def _glaze_opening(low: float, high: float) -> Pattern:
     frame = (0.06, Part.FRAME)
     return [frame, (low, Part.GLASS), (0.05, Part.FRAME), (high, Part.GLASS), frame]
 
 
-def _filled(rows: Pattern, total: float) -> Pattern:
+def _fill_with_wall(rows: Pattern, total: float) -> Pattern:
     return [*rows, (total - sum(height for height, _ in rows), Part.WALL)]
 
 
 def bay_patterns(
     height: float, bay: float, window: tuple[float, float]
 ) -> dict[str, tuple[Pattern, Pattern]]:
-    """Columns and rows of every kind of ground-floor bay.
+    """Return columns and rows of every kind of ground-floor bay.
 
     Parameters
     ----------
@@ -148,12 +148,12 @@ def bay_patterns(
 def storey_pattern(
     height: float, bay: float, window: tuple[float, float], *, banded: bool
 ) -> tuple[Pattern, Pattern]:
-    """Columns and rows of a bay of an upper storey, as `bay_patterns`; ``banded``: a string course marks the floor."""
+    """Return columns and rows of an upper storey's bay, as `bay_patterns`; ``banded``: with a string course."""
     return window_columns(bay, window[0]), window_rows(height, 0.95, window[1], banded=banded)
 
 
-def simplified(pattern: Pattern, least: float) -> Pattern:
-    """The pattern without parts too thin to be seen [m]; their neighbours share their place."""
+def drop_thin_parts(pattern: Pattern, least: float) -> Pattern:
+    """Return the pattern without parts thinner than ``least`` [m]; their neighbours share their width."""
     kept = [(size, part) for size, part in pattern if size >= least]
     stretch = sum(size for size, _ in pattern) / sum(size for size, _ in kept)
     return [(size * stretch, part) for size, part in kept]

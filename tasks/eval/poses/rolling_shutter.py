@@ -1,4 +1,4 @@
-"""Frames of a rolling shutter as one shutter for all rows would have seen them, by depth and a motion already found."""
+"""Correction of a rolling shutter: frames as one shutter for all rows would have taken them, by depth and motion."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,10 +13,10 @@ from tasks.eval.poses.rigid import Floats, invert_pose
 from tasks.eval.poses.unusable import unusable_pixels
 
 STEPS = 3
-"""By which each pixel's source is found; a row is off by less than a hundredth of its way after them."""
+"""Iterations that find each pixel's source; after them a row's error is below a hundredth of its motion [1]."""
 
 
-def one_shutter(
+def recover_and_correct_rolling_shutter(
     buffers: Mapping[str, NDArray[Any]],
     K: Floats,
     T_rig_camera: Floats,
@@ -27,12 +27,14 @@ def one_shutter(
     film_depth_mm: float,
     route_rotations: Floats | None,
 ) -> dict[str, NDArray[Any]]:
-    """`unrolled` by the motion that the check by points finds in the frames as they are; it moves rows by little.
+    """Correct the rolling shutter by the motion that `recover_motion_pnp` finds in the frames as they were read out.
+
+    The motion of one row's delay is small, so the error of that motion is negligible.
 
     Parameters
     ----------
-    buffers : undistorted ``rgb``, ``depth`` and ``class``, as `unrolled` takes them
-    K, T_rig_camera, frame_interval_s : as `unrolled` takes them
+    buffers : undistorted ``rgb``, ``depth`` and ``class``, as `correct_rolling_shutter` takes them
+    K, T_rig_camera, frame_interval_s : as `correct_rolling_shutter` takes them
     distortion, line_delay_s : as `row_times` takes them; the buffers come back as they are where the delay is 0
     film_depth_mm : water on the road, as `unusable_pixels` takes it [mm]
     route_rotations : as `recover_motion_pnp` takes them
@@ -43,17 +45,19 @@ def one_shutter(
     motion = recover_motion_pnp(buffers["rgb"], buffers["depth"], K, T_rig_camera, hidden, route_rotations)
     height, width = buffers["depth"].shape[1:]
     times = row_times(K, (height, width), distortion, line_delay_s)
-    return unrolled(buffers, K, times, motion, T_rig_camera, frame_interval_s)
+    return correct_rolling_shutter(buffers, K, times, motion, T_rig_camera, frame_interval_s)
 
 
 def row_times(K: Floats, shape: tuple[int, int], distortion: Floats | None, line_delay_s: float) -> Floats:
-    """When the rows that an undistorted picture's pixels came from were exposed, from the middle one, [H, W] [s].
+    """Return the exposure time of the row that each pixel of an undistorted picture came from, [H, W] [s].
+
+    Times count from the middle row.
 
     Parameters
     ----------
     K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
     shape : height and width [px]
-    distortion : as `tasks.eval.poses.undistort.undistorted` takes it
+    distortion : as `tasks.eval.poses.undistort.undistort_frames` takes it
     line_delay_s : from one row's exposure to the next one's [s]
     """
     height, width = shape
@@ -62,7 +66,7 @@ def row_times(K: Floats, shape: tuple[int, int], distortion: Floats | None, line
     return (row.astype(np.float64) - (height - 1) / 2) * line_delay_s
 
 
-def unrolled(
+def correct_rolling_shutter(
     buffers: Mapping[str, NDArray[Any]],
     K: Floats,
     times: Floats,
@@ -70,7 +74,7 @@ def unrolled(
     T_rig_camera: Floats,
     frame_interval_s: float,
 ) -> dict[str, NDArray[Any]]:
-    """``rgb``, ``depth`` and ``class`` of every frame at its middle row's pose; a frame without a motion stays.
+    """Return ``rgb``, ``depth`` and ``class`` of every frame at its middle row's pose; a frame without motion stays.
 
     Parameters
     ----------
@@ -90,13 +94,13 @@ def unrolled(
         rate = (step[:3, :4] - np.eye(4)[:3]) / ((after - before) * frame_interval_s)
         picture = {name: values[k] for name, values in buffers.items()}
         if np.isfinite(rate).all():
-            picture = _unrolled_frame(picture, K, times, rate)
+            picture = _correct_frame(picture, K, times, rate)
         for name, values in picture.items():
             frames[name].append(values)
     return {name: np.stack(values) for name, values in frames.items()}
 
 
-def _unrolled_frame(
+def _correct_frame(
     picture: Mapping[str, NDArray[Any]], K: Floats, times: Floats, rate: Floats
 ) -> dict[str, NDArray[Any]]:
     height, width = times.shape

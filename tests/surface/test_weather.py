@@ -1,0 +1,91 @@
+"""The table of weathers: one row a kind, the judge's own table beside it, and no kind beyond them anywhere."""
+
+from dataclasses import fields
+
+import pytest
+
+from catalogs.physical_limits import PhysicalLimits, load_physical_limits
+from catalogs.scenario import Scenario, scenario_problems
+from catalogs.surfaces import load_surface
+from flows.making.driving import weather_of
+from tasks.campaign.planned_runs import Drive, planned_run
+from tasks.errors import InputError
+from tasks.eval.physics.constants import SURFACE_FORMS, surface_of
+from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.surface.weather import DRY, WEATHERS, Weather, find_weather, surface_state
+
+ASPHALT = load_surface("dense-asphalt")
+
+
+def sound(kind: str) -> Scenario:
+    """A scenario of the kind with what its row asks for."""
+    row = WEATHERS[kind]
+    return Scenario(
+        weather=kind,
+        precipitation_mm_h=1.5 if row.rate_limit else 0.0,
+        snow_accumulation_h=0.7 if row.accumulates else 0.0,
+    )
+
+
+@pytest.mark.parametrize("kind", WEATHERS)
+def test_a_row_says_what_its_scenarios_give(kind):
+    row, limits = WEATHERS[kind], load_physical_limits()
+    assert row.name == kind and scenario_problems(sound(kind)) == []
+    wrong = Scenario(
+        weather=kind,
+        precipitation_mm_h=0.0 if row.rate_limit else 1.5,
+        snow_accumulation_h=0.0 if row.accumulates else 0.7,
+    )
+    assert len(scenario_problems(wrong)) == 2
+    assert row.rate_limit is None or row.rate_limit in PhysicalLimits.model_fields
+    if row.rate_limit:
+        beyond = getattr(limits, row.rate_limit).value + 1
+        (found,) = scenario_problems(Scenario(**sound(kind).as_row() | {"precipitation_mm_h": beyond}))
+        assert found.startswith("precipitation_mm_h must be at most")
+
+
+def test_the_judge_has_a_closed_form_for_each_row():
+    assert set(SURFACE_FORMS) == set(WEATHERS)
+
+
+@pytest.mark.parametrize("kind", WEATHERS)
+def test_the_judge_finds_the_same_surface_and_the_derivation_names_what_moved(kind):
+    scenario = sound(kind)
+    weather = weather_of(scenario)
+    state = surface_state(weather, ASPHALT)
+    numbers = {name: value for name, value in vars(ASPHALT).items() if isinstance(value, float)}
+    found = surface_of(kind, scenario.precipitation_mm_h, scenario.snow_accumulation_h, numbers)
+    assert found == pytest.approx(
+        {name: getattr(state, name) for name in ("film_depth_mm", "snow_depth_mm", "snow_coverage")}
+        | {"surface_friction": state.friction}
+    )
+    derived = [one.field for one in WEATHERS[kind].derive(weather, state, ASPHALT)]
+    names = {field.name for field in fields(SurfaceState)} - {"kind", "precipitation_mm_h"}
+    assert derived[-1] == "friction"
+    assert set(derived[:-1]) == {name for name in names - {"friction"} if getattr(state, name) > 0}
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda: Weather(kind="hail"),
+        lambda: find_weather("hail"),
+        lambda: surface_state(Weather(kind="hail"), ASPHALT),
+        lambda: planned_run(Drive(weather="hail", speed=10.0, peak=2.0), "a"),
+        lambda: scenario_problems(Scenario(weather="hail")),
+    ],
+)
+def test_an_unknown_kind_is_refused_and_the_known_are_listed(use):
+    known = ", ".join(list(WEATHERS)[:-1]) + f" or {list(WEATHERS)[-1]}"
+    with pytest.raises(InputError, match=f"weather must be {known}; it is 'hail'"):
+        use()
+
+
+def test_dry_is_the_kind_that_changes_no_picture():
+    assert [name for name, row in WEATHERS.items() if not row.overcast] == [DRY]
+
+
+def test_no_number_of_the_pavement_is_left_out():
+    """What kinds of weather bring are the fields that a pavement's file does not have."""
+    assert all(value == value for name, value in vars(ASPHALT).items() if name != "bounds")
+    assert set(ASPHALT.bounds) <= {field.name for field in fields(SurfaceParameters)}
