@@ -18,7 +18,7 @@ def drag(value: float, name: str = "aerodynamic_drag") -> NamedEffect:
         ci_high=value + 0.1,
         lower=0.0,
         upper=3.0,
-        unit="m^2",
+        unit="m2",
     )
     return NamedEffect(
         name=name, effect_class="effect", port="longitudinal_force", variable="speed", parameters=(parameter,),
