@@ -177,8 +177,8 @@ def _frozen(
             in_entry = degrees(value) if entry[group]["unit"] == "deg" else value
             entry[group] |= {"value": float(f"{in_entry:.{DIGITS}g}"), "source": note}
             continue
-        for family, table in fitted.families.items():
-            entry["families"][family][group] |= {"value": list(getattr(table, group)), "source": note}
+        for family, tables in entry["families"].items():
+            tables[group] |= {"value": list(getattr(fitted.families[family], group)), "source": note}
     provenance = {
         "mode": procedure.mode,
         "base": source.stem,

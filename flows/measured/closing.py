@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.campaigns import read_campaign
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.entries import find_entry
 from catalogs.surfaces import load_surface
@@ -20,8 +21,8 @@ from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
-from tasks.identification.decision.excitation import reached
-from tasks.identification.decision.verdict import attribute
+from tasks.identification.decision.excitation import find_reached_range
+from tasks.identification.decision.verdict import find_missing_effects
 
 
 def close_loop(
@@ -50,7 +51,7 @@ def close_loop(
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown)
     results.write_json("split.json", split_of(measured))
     earlier = record_reading(measured, sha256_of_file(find_entry("vehicle", name)))
-    trace = attribute(measured, model, road, load_effects())
+    trace = find_missing_effects(measured, model, road, load_effects(), load_decision_rules())
     result = verdict_json(trace.verdict)
     result["residual_rmse"] = residual_rmse(trace)
     result["held_out_readings_before"] = earlier
@@ -60,7 +61,9 @@ def close_loop(
         )
     verdict, runs = trace.verdict, [run.model for run in trace.end.evidence.train]
     forms = {effect.variable for effect in verdict.effects if effect.effect_class == "form"}
-    ranges = {variable: reached(runs, verdict.theta, verdict.slots, variable) for variable in forms}
+    ranges = {
+        variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms
+    }
     text, missing = grown_vehicle(name, verdict, ranges)
     result["vehicle_file"] = None
     if text is not None:
@@ -120,7 +123,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         },
         "noise": {name: {"ar1": r, "sigma": s} for name, (r, s) in verdict.noise.items()},
         "disturbance": asdict(verdict.disturbance),
-        "runs_left_out": list(verdict.torn),
+        "runs_left_out": list(verdict.forked),
         # JSON has no infinity: an effect that this campaign cannot show at any size is null
         "minimum_detectable": {
             name: value if np.isfinite(value) else None for name, value in verdict.detectable.items()

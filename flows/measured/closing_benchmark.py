@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import Truth, load_sizes, load_truths
 from catalogs.studies.closing import load_closing_study
@@ -17,9 +18,9 @@ from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
 from tasks.campaign.planned_runs import RICH, RunPlan
-from tasks.identification.benchmark import covered, outcome, synthetic_campaign
+from tasks.identification.benchmark import classify_outcome, interval_holds_truth, synthetic_campaign
 from tasks.identification.decision.answer import Verdict
-from tasks.identification.decision.verdict import attribute
+from tasks.identification.decision.verdict import find_missing_effects
 
 FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
 RATES = "closing_error_rates.json"
@@ -34,6 +35,7 @@ JUDGES = (
     "tasks/vehicle/",
     "tasks/surface/",
     "catalogs/effects/",
+    "catalogs/decision_rules",
     "catalogs/studies/closing.yaml",
     "catalogs/surfaces/",
     "catalogs/vehicles/paper",
@@ -90,7 +92,7 @@ def close_loop_benchmark(
     rows = [row for row in read_lines(log, {"engine", "truth", "seed"}) if row["engine"] == engine]
     done = {(row["truth"], row["seed"]) for row in rows}
     model, surface, effects = load_vehicle(vehicle), load_surface("dense-asphalt"), load_effects()
-    started = time.monotonic()
+    rules, started = load_decision_rules(), time.monotonic()
     for planned in _plan(seeds, nulls, harder):
         if (planned.name, planned.seed) in done:
             continue
@@ -103,8 +105,8 @@ def close_loop_benchmark(
             slots=tuple(slot for truth in planned.truths for slot in truth.slots), design=planned.design,
         )  # fmt: skip
         made = time.process_time()
-        verdict = attribute(
-            campaign, model, surface, tuple(e for e in effects if e.name not in left_out)
+        verdict = find_missing_effects(
+            campaign, model, surface, tuple(e for e in effects if e.name not in left_out), rules
         ).verdict
         row = {
             "kind": planned.kind,
@@ -117,7 +119,7 @@ def close_loop_benchmark(
             "rivals": [rival.name for _, rival in verdict.rivals],
             "ports": [[effect.port, effect.variable] for effect in verdict.effects],
             "tried": [[effect.name, effect.score, effect.held_out_gain] for effect in verdict.tried[:3]],
-            "covered": covered(verdict, planned.name, planned.values) if planned.name else None,
+            "covered": interval_holds_truth(verdict, planned.name, planned.values) if planned.name else None,
             "reasons": list(verdict.reasons),
             "cpu_s": time.process_time() - made,
             "made_cpu_s": made - before,
@@ -140,7 +142,9 @@ def engine_hash() -> str:
 
 def _outcome(verdict: Verdict, truths: tuple[Truth, ...]) -> str:
     if len(truths) < 2:
-        return outcome(verdict, truths[0].name if truths else None, truths[0].form if truths else None)
+        return classify_outcome(
+            verdict, truths[0].name if truths else None, truths[0].form if truths else None
+        )
     named, rivals = [e.name for e in verdict.effects], [rival.name for _, rival in verdict.rivals]
     return pair_outcome(verdict.verdict, named, rivals, [truth.name for truth in truths])
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flows.drawing import escape_formulas
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.identification.decision.forms import Leftover, curve, form_hypotheses, scan
+from tasks.identification.decision.forms import Leftover, curve, form_hypotheses, scan_leftovers
 from tasks.identification.decision.search import Found
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
@@ -81,7 +81,7 @@ def _force_points(
 
 def spline(trace: Trace) -> str:
     """Shape of what the frozen model leaves over at the port of what is named, with its band and best form."""
-    found = scan(trace.start.evidence, trace.start.base)
+    found = scan_leftovers(trace.start.evidence, trace.start.base)
     ports = [effect.port for effect in trace.verdict.effects]
     left = next((x for x in found if x.port in ports), found[0])
     figure = Figure(figsize=(5.2, 3.4))
@@ -101,8 +101,8 @@ def spline(trace: Trace) -> str:
 
 def leftovers(trace: Trace) -> str:
     """What a spline at every scanned port and variable would gain, before and after."""
-    before = scan(trace.start.evidence, trace.start.base)
-    after = scan(trace.end.evidence, trace.end.base)
+    before = scan_leftovers(trace.start.evidence, trace.start.base)
+    after = scan_leftovers(trace.end.evidence, trace.end.base)
     keys = [(x.port, x.variable) for x in sorted(before, key=lambda x: (x.port, x.variable))]
 
     def gains(found: list[Leftover]) -> list[float]:

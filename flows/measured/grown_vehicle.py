@@ -134,10 +134,11 @@ def _write(entry: dict[str, Any], grown: Vehicle, row: EffectParameter, field: s
         return
     if field.startswith(FAMILY):
         table = field.removeprefix(FAMILY)
-        for weather, family in grown.families.items():
-            old = entry["families"][weather][table]
-            entry["families"][weather][table] = {
-                **old, "value": list(getattr(family, table)), "source": f"{old['source']}; {source}",
+        # families that the weather lends a vehicle are no part of its file
+        for weather, tables in entry["families"].items():
+            old = tables[table]
+            tables[table] = {
+                **old, "value": list(getattr(grown.families[weather], table)), "source": f"{old['source']}; {source}",
             }  # fmt: skip
         return
     entry[field] |= {"value": getattr(grown, field), "source": f"{entry[field]['source']}; {source}"}

@@ -65,7 +65,7 @@ def synthetic_campaign(
     theta[list(SESSION_INDEX)] += rng.standard_normal(len(SESSION_INDEX)) * TOLERANCES.session
     theta[PARAMETER_INDEX["wheel_inertia"]] += 0.05 * rng.random()
     runs = tuple(
-        _measure(drive, i, 1 if rng.random() < 0.5 else -1, vehicle, surface, theta, slots, rng)
+        _measure_run(drive, i, 1 if rng.random() < 0.5 else -1, vehicle, surface, theta, slots, rng)
         for i, drive in enumerate(design)
     )  # fmt: skip
     return Campaign(
@@ -78,7 +78,7 @@ def synthetic_campaign(
     )
 
 
-def _measure(
+def _measure_run(
     drive: RunPlan,
     number: int,
     direction: int,
@@ -122,7 +122,7 @@ def _autoregressive(rho: float, count: int, rng: np.random.Generator) -> NDArray
     return x
 
 
-def outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] | None = None) -> str:
+def classify_outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] | None = None) -> str:
     """How a verdict stands to the truth: right, wrong, set (with or without the truth), form or refused.
 
     Parameters
@@ -147,7 +147,7 @@ def outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] | None = 
     return "right" if names == [truth] else "wrong"
 
 
-def covered(verdict: Verdict, truth: str, values: Mapping[str, float]) -> bool | None:
+def interval_holds_truth(verdict: Verdict, truth: str, values: Mapping[str, float]) -> bool | None:
     """Whether the 95 % interval of the first parameter holds the truth; None unless the truth alone is named.
 
     Parameters

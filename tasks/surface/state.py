@@ -88,3 +88,23 @@ class SurfaceState:
             problems.append(f"weather: snow_coverage must not exceed 1; it is {self.snow_coverage:g}")
         if problems:
             raise InputError(problems)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Derivation:
+    """How one number of the surface state follows, with the values put in.
+
+    Parameters
+    ----------
+    field : of ``SurfaceState``
+    quantity : what it is
+    symbol : the paper's
+    equation : the paper's number; S counts the supplement's
+    formula : for people
+    """
+
+    field: str
+    quantity: str
+    symbol: str
+    equation: str
+    formula: str

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import exp
 
 from tasks.errors import InputError
-from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.surface.state import Derivation, SurfaceParameters, SurfaceState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,32 +38,7 @@ class Weather:
         find_weather(self.kind)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Derivation:
-    """How one number of the surface state follows, with the values put in.
-
-    Parameters
-    ----------
-    field : of ``SurfaceState``
-    quantity : what it is
-    symbol : the paper's
-    equation : the paper's number; S counts the supplement's
-    formula : for people
-    """
-
-    field: str
-    quantity: str
-    symbol: str
-    equation: str
-    formula: str
-
-
 Law = Callable[[Weather, SurfaceParameters], float]
-
-
-def nothing_lies(weather: Weather, parameters: SurfaceParameters) -> float:
-    """Depth on a road that carries no film, or no snow [mm]."""
-    return 0.0
 
 
 def film_depth(weather: Weather, parameters: SurfaceParameters) -> float:
@@ -112,13 +87,7 @@ def glaze_depth(weather: Weather, parameters: SurfaceParameters) -> float:
 
 
 def dry_friction(film_mm: float, coverage: float, parameters: SurfaceParameters) -> float:
-    """Friction of the dry pavement, mu_dry [1] (paper, Eq. surface_friction_mapping).
-
-    Parameters
-    ----------
-    film_mm, coverage : not used
-    parameters : the friction anchors
-    """
+    """Friction of the dry pavement, mu_dry [1] (paper, Eq. surface_friction_mapping)."""
     return parameters.dry_friction
 
 
@@ -232,8 +201,8 @@ class WeatherKind:
     Parameters
     ----------
     name : what scenarios, telemetry, tyre families and the entry in ``catalogs/weather/`` call it
-    film : depth of the film on the road [mm]
-    snow : depth of the snow on it [mm]
+    film : depth of the film on the road; None where it leaves none [mm]
+    snow : depth of the snow on it; None where it leaves none [mm]
     friction : film depth [mm], snow coverage [1] and pavement to mu_c [1]
     derive : how those follow, for people
     rate_limit : name of the physical limit of its precipitation rate; None where nothing falls
@@ -243,8 +212,8 @@ class WeatherKind:
     """
 
     name: str
-    film: Law = nothing_lies
-    snow: Law = nothing_lies
+    film: Law | None = None
+    snow: Law | None = None
     friction: Callable[[float, float, SurfaceParameters], float]
     derive: Callable[[Weather, SurfaceState, SurfaceParameters], tuple[Derivation, ...]]
     rate_limit: str | None = None
@@ -316,7 +285,7 @@ def surface_state(weather: Weather, parameters: SurfaceParameters) -> SurfaceSta
     Paper, Eqs. surface_state, surface_evolution and surface_friction_mapping.
     """
     kind = find_weather(weather.kind)
-    film, snow = kind.film(weather, parameters), kind.snow(weather, parameters)
+    film, snow = (law(weather, parameters) if law else 0.0 for law in (kind.film, kind.snow))
     coverage = min(1.0, snow / parameters.full_cover_depth_mm)
     return SurfaceState(
         kind=kind.name,

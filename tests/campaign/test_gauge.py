@@ -5,13 +5,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.gauge import denoise_pressure, estimate_gauge_noise
 from tasks.identification.benchmark import synthetic_campaign
-from tasks.identification.decision.verdict import attribute
+from tasks.identification.decision.verdict import find_missing_effects
 
 TIME = np.arange(600) * 0.01
 STOP = 2.0 * np.clip((TIME - 1.0) / 0.3, 0.0, 1.0)
@@ -67,4 +68,7 @@ def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery() -> None:
     model, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     campaign = synthetic_campaign(model, surface, {}, 700_100, design=load_closing_study().drives())
     lag = tuple(effect for effect in load_effects() if effect.name in {"brake_lag", "pressure_nonlinearity"})
-    assert attribute(campaign, model, surface, lag).verdict.verdict == "NOTHING"
+    assert (
+        find_missing_effects(campaign, model, surface, lag, load_decision_rules()).verdict.verdict
+        == "NOTHING"
+    )

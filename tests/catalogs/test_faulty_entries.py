@@ -11,6 +11,7 @@ import yaml
 from catalogs.buses import load_bus
 from catalogs.calibration import load_procedure
 from catalogs.channel_maps import load_channel_map
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_sizes, load_truths
 from catalogs.hazard_markings import load_marking
@@ -39,6 +40,9 @@ Change = Callable[[Any], None]
             "0.parameters: the table of effects has no parameter turbo; there are: pressure_gain",
         ),
         ("effects/library.yaml", load_effects, lambda c: c.insert(0, None), "0: must be a table"),
+        ("decision_rules.yaml", load_decision_rules, lambda c: c.pop("rival_span"), "rival_span is missing"),
+        ("decision_rules.yaml", load_decision_rules, lambda c: c["win_share"].update(value=2), "win_share"),
+        ("decision_rules.yaml", load_decision_rules, lambda c: c["longest_lag"].update(unit="ms"), "longest_lag"),
         ("effects/truths.yaml", load_truths, lambda c: c.pop("outside"), "outside is missing"),
         ("effects/truths.yaml", load_truths, lambda c: c["library"].update(magic={"a": 1}), "magic: the library"),
         ("effects/truths.yaml", load_sizes, lambda c: c["sizes"].update(idle_creep=[1]), "sizes.idle_creep: must be"),

@@ -9,8 +9,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.attribution import ladder
+from tasks.identification.decision.attribution import refine_candidates
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance, prior_precision
 from tasks.identification.inference.evidence import run_evidence
@@ -51,7 +52,12 @@ def evidence_of(theta: np.ndarray) -> Evidence:
         for i, (v, p, d, t) in enumerate(runs)
     )
     return Evidence(
-        train=derived, held_out=derived[-2:], effects=LIBRARY, tolerances=TOLERANCES, disturbance=QUIET
+        train=derived,
+        held_out=derived[-2:],
+        effects=LIBRARY,
+        tolerances=TOLERANCES,
+        disturbance=QUIET,
+        rules=load_decision_rules(),
     )
 
 
@@ -68,7 +74,7 @@ def test_the_effect_in_the_data_tops_the_ladder_with_its_value(
 ) -> None:
     evidence = evidence_of(parameter_vector({parameter: value}))
     null = fit(evidence.train, (), evidence.session_sigma)
-    best = ladder(evidence, null, count=3)[0]
+    best = refine_candidates(evidence, null, count=3)[0]
     assert best.hypothesis.name == effect and best.score > 25.0
     sigma = np.sqrt(best.fitted.covariance[-1, -1] * best.inflation)
     assert abs(best.fitted.values[0] - value) < 4.0 * sigma + 0.02 * value
@@ -77,7 +83,7 @@ def test_the_effect_in_the_data_tops_the_ladder_with_its_value(
 def test_nothing_passes_where_nothing_is_missing() -> None:
     evidence = evidence_of(np.zeros(len(EFFECT_TABLE)))
     null = fit(evidence.train, (), evidence.session_sigma)
-    assert not any(c.passes for c in ladder(evidence, null, count=3))
+    assert not any(c.passes for c in refine_candidates(evidence, null, count=3))
 
 
 def test_the_marginal_misfit_is_that_of_the_dense_covariance() -> None:

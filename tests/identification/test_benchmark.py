@@ -65,8 +65,8 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
     monkeypatch.setattr(
         closing_benchmark, "synthetic_campaign", lambda model, road, truth, seed, slots, design: seed
     )
-    monkeypatch.setattr(closing_benchmark, "attribute", judge)
-    monkeypatch.setattr(closing_benchmark, "covered", lambda *_: None)
+    monkeypatch.setattr(closing_benchmark, "find_missing_effects", judge)
+    monkeypatch.setattr(closing_benchmark, "interval_holds_truth", lambda *_: None)
     with pytest.raises(KeyboardInterrupt):
         closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
     result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)

@@ -10,8 +10,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.forms import RIDGE, form_hypotheses, scan, spline_slopes
+from tasks.identification.decision.forms import RIDGE, form_hypotheses, scan_leftovers, spline_slopes
 from tasks.identification.decision.screening import screen
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
@@ -31,7 +32,10 @@ PLAIN = np.zeros(len(EFFECT_TABLE))
 
 def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence:
     runs = tuple(run_evidence(m, np.zeros(7), NOISE, PLAIN, effects, TOLERANCES, QUIET) for m in models)
-    return Evidence(train=runs, held_out=runs[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET)
+    return Evidence(
+        train=runs, held_out=runs[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET,
+        rules=load_decision_rules(),
+    )  # fmt: skip
 
 
 def over_a_hump(speed_offset: float) -> RunModel:
@@ -151,6 +155,6 @@ def test_a_form_outside_the_library_does_not_pass_for_a_disturbance() -> None:
 def test_a_bump_is_in_the_grammar() -> None:
     evidence = hump_in_the_brake()
     null = fit(evidence.train, (), evidence.session_sigma)
-    best = scan(evidence, null)[0]
+    best = scan_leftovers(evidence, null)[0]
     assert (best.port, best.variable) == ("brake_torque", "speed")
     assert "a exp(-(4x - 2)^2)" in form_hypotheses(best, evidence.samples)[0].name

@@ -10,17 +10,23 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.identification.benchmark import synthetic_campaign
-from tasks.identification.decision.attribution import Candidate, judge
-from tasks.identification.decision.intervals import curvature_interval, profile_interval, quantile, refitted
+from tasks.identification.decision.attribution import Candidate, judge_hypothesis
+from tasks.identification.decision.intervals import (
+    curvature_interval,
+    profile_interval,
+    refit_named,
+    student_quantile,
+)
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import run_evidence
 from tasks.identification.inference.fit import fit, misfit_by_run
 from tasks.identification.inference.forward import predict, run_model
 from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import prepare
+from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
 
 LIBRARY = tuple(
@@ -40,11 +46,15 @@ def rain_stops(speeds: tuple[float, ...], truth: dict[str, float], disturbance: 
         derived.append(run_evidence(model, np.zeros(7), NOISE, zero, LIBRARY, TOLERANCES, disturbance))
     evidence = Evidence(
         train=tuple(derived), held_out=tuple(derived[-2:]), effects=LIBRARY, tolerances=TOLERANCES,
-        disturbance=disturbance,
+        disturbance=disturbance, rules=load_decision_rules(),
     )  # fmt: skip
     base = fit(evidence.train, (), evidence.session_sigma)
     held_out = misfit_by_run(evidence.held_out, base)
-    return evidence, judge(evidence, base, held_out, library_hypothesis(WET, 0.004)), base.objective
+    return (
+        evidence,
+        judge_hypothesis(evidence, base, held_out, library_hypothesis(WET, 0.004)),
+        base.objective,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +76,7 @@ def test_an_effect_whose_score_excludes_zero_has_an_interval_that_does(
 ) -> None:
     evidence, candidate, none = valley
     root = np.sqrt((none - candidate.fitted.objective) / candidate.inflation)
-    assert candidate.passes and root > quantile(candidate)
+    assert candidate.passes and root > student_quantile(candidate)
     low, high = profile_interval(candidate, evidence)
     assert low[0] > 0.0
     assert low[0] < 0.01 < high[0] and low[1] < 8.0 < high[1]
@@ -89,7 +99,7 @@ def test_at_an_end_of_the_interval_the_best_fit_is_worse_by_the_quantile(
                 held = replace(h, lower=pair, upper=pair, start=pair)
                 rises.append(fit(evidence.train, (held,), evidence.session_sigma, iterations=1).objective)
             root = np.sqrt((min(rises) - best) / candidate.inflation)
-            assert root == pytest.approx(quantile(candidate), rel=0.15), (j, ends[j])
+            assert root == pytest.approx(student_quantile(candidate), rel=0.15), (j, ends[j])
 
 
 def test_intervals_stay_within_the_bounds_of_their_parameters(
@@ -106,12 +116,12 @@ def test_intervals_stay_within_the_bounds_of_their_parameters(
 def test_with_derivatives_taken_at_it_an_estimate_forgets_where_it_started() -> None:
     rolling = next(e for e in LIBRARY if e.name == "rolling_resistance")
     campaign = synthetic_campaign(VEHICLE, SURFACE, {"rolling_coefficient": 0.012}, 56)
-    evidence = prepare(campaign, VEHICLE, SURFACE, (rolling,))
+    evidence = prepare_evidence(campaign, VEHICLE, SURFACE, (rolling,), load_decision_rules())
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
     part = library_hypothesis(rolling)
     far = fit(evidence.train, (part,), evidence.session_sigma, session=null.session, iterations=8)
     true = np.array([0.012])
-    here, settled, _ = refitted(evidence, far, [])
+    here, settled, _ = refit_named(evidence, far, [])
     near = fit(here.train, (part,), here.session_sigma, values=true, session=far.session, iterations=8)
     sigma = np.sqrt(settled.covariance[0, 0])
     assert abs(settled.values[0] - near.values[0]) < 0.3 * sigma < abs(far.values[0] - near.values[0])

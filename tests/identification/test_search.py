@@ -10,20 +10,21 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, make_planned_run
-from tasks.identification.decision.attribution import ladder
+from tasks.identification.decision.attribution import refine_candidates
 from tasks.identification.decision.experiment import next_experiment
-from tasks.identification.decision.rivals import detectable
+from tasks.identification.decision.rivals import find_detectable_sizes
 from tasks.identification.decision.screening import inflation, look_alikes
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import run_evidence
-from tasks.identification.inference.fit import fall, fit
+from tasks.identification.inference.fit import fit, sum_misfit_falls
 from tasks.identification.inference.forward import run_model
 from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import TORN, step_change
+from tasks.identification.inference.linearisation import step_change
 from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
@@ -41,22 +42,28 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
         for i, (v, p, d, t) in enumerate(runs)
     )  # fmt: skip
     return Evidence(
-        train=derived, held_out=derived[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET
+        train=derived,
+        held_out=derived[-2:],
+        effects=effects,
+        tolerances=TOLERANCES,
+        disturbance=QUIET,
+        rules=load_decision_rules(),
     )
 
 
 def test_a_run_that_forks_at_the_abs_threshold_is_told_from_sound_ones() -> None:
+    forked = load_decision_rules().forked_misfit
     changes = [
         step_change(run_model(make_planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
-        for drive in (RICH[0], RICH[2], RICH[11], RICH[19], replace(RICH[19], peak=3.0))
+        for drive in (RICH[0], RICH[2], RICH[11], RICH[19], replace(RICH[19], speed=12.0, peak=3.0))
     ]
-    assert max(changes[:4]) < 0.5 * TORN < 10.0 * TORN < changes[4]
+    assert max(changes[:4]) < 0.5 * forked < 10.0 * forked < changes[4]
 
 
 def test_a_fall_counts_only_beyond_the_doubt() -> None:
     before = (np.array([100.0, 100.0, 50.0]), np.array([0.0, 30.0, 0.0]))
     after = (np.array([90.0, 60.0, 55.0]), np.array([2.0, 20.0, 1.0]))
-    assert fall(before, after) == pytest.approx(8.0 + 0.0 - 4.0)
+    assert sum_misfit_falls(before, after) == pytest.approx(8.0 + 0.0 - 4.0)
 
 
 def test_a_free_parameter_takes_its_session_nuisance_over() -> None:
@@ -105,7 +112,7 @@ def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> 
     evidence = evidence_of(parameter_vector({"fade": 0.06}), "brake_fade", "rolling_resistance")
     null = fit(evidence.train, (), evidence.session_sigma)
     plain, asked = (
-        {c.hypothesis.name for c in ladder(evidence, null, gated=False, also=also)}
+        {c.hypothesis.name for c in refine_candidates(evidence, null, gated=False, also=also)}
         for also in (frozenset[str](), frozenset({"rolling_resistance"}))
     )
     assert plain == {"brake_fade"} and asked == {"brake_fade", "rolling_resistance"}
@@ -114,7 +121,7 @@ def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> 
 def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bounds() -> None:
     evidence = evidence_of(np.zeros(len(EFFECT_TABLE)), "rolling_resistance", "wet_friction_speed")
     null = fit(evidence.train, (), evidence.session_sigma)
-    sizes = detectable(evidence, null)
+    sizes = find_detectable_sizes(evidence, null)
     assert 0.0 < sizes["rolling_resistance"] < 0.05
     rolling = LIBRARY["rolling_resistance"]
     found = fit(evidence.train, (library_hypothesis(rolling),), evidence.session_sigma)
@@ -123,6 +130,6 @@ def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bo
     (first,) = rolling.parameters
     tight = replace(rolling, parameters=(replace(first, bounds=(0.0, 0.9 * sizes["rolling_resistance"])),))
     bounded = replace(evidence, effects=(tight, *evidence.effects[1:]))
-    assert detectable(bounded, null)["rolling_resistance"] == np.inf
+    assert find_detectable_sizes(bounded, null)["rolling_resistance"] == np.inf
     # stops on a dry road say nothing of wet friction
     assert sizes["wet_friction_speed"] == np.inf

@@ -7,7 +7,7 @@ import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.render.labels import HAZARD, clip_flow, forward_flow, hazard_mark, road_coordinates
-from tasks.render.sight import as_drawn
+from tasks.render.sight import take_drawn_frame
 from tasks.scene.route import Route
 from tests.render.weather.scenes import flat_gbuffer
 from tests.render.weather.test_wet_road import VIEW
@@ -83,7 +83,7 @@ def test_road_pixels_know_their_station_and_side(monkeypatch):
     poses[:, 0, 3] = station
     route = Route(station=station + 50, T_world_rig=poses)
     monkeypatch.setattr("tasks.render.sight.attribution", lambda *drawn: None)
-    points = as_drawn(None, SimpleNamespace(picture=None), gbuffer, view, True).points
+    points = take_drawn_frame(None, SimpleNamespace(picture=None), gbuffer, view, True).points
     place = road_coordinates(gbuffer.class_id, points, route)
     road = gbuffer.class_id == SemanticClass.ROAD
     assert np.isfinite(place[road]).all() and np.isnan(place[~road]).all()

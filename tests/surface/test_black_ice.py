@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from catalogs.entries import entry_names
 from catalogs.grids import load_grid
 from catalogs.scenario import Scenario, scenario_problems
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_names
+from catalogs.vehicles import load_vehicle
 from flows.making.plan import make_plan
 from manifests.canonical import sha256_of
 from manifests.frozen_run import parameters_that_matter
@@ -61,7 +62,7 @@ def test_the_tyre_on_ice_is_burckhardts_with_a_top():
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", vehicle_names())
+@pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_car_takes_several_times_the_way_on_ice_with_its_abs_at_work(name, mode):
     dry = SurfaceState(kind="dry", friction=0.82)
     vehicle = load_vehicle(name)

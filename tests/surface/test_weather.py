@@ -8,9 +8,9 @@ from catalogs.physical_limits import PhysicalLimits, load_physical_limits
 from catalogs.scenario import Scenario, scenario_problems
 from catalogs.surfaces import load_surface
 from flows.making.driving import weather_of
-from tasks.campaign.planned_runs import Drive, planned_run
+from tasks.campaign.planned_runs import RunPlan, make_planned_run
 from tasks.errors import InputError
-from tasks.eval.physics.constants import SURFACE_FORMS, surface_of
+from tasks.eval.physics.constants import SURFACE_FORMS, derive_surface
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import DRY, WEATHERS, Weather, find_weather, surface_state
 
@@ -54,7 +54,7 @@ def test_the_judge_finds_the_same_surface_and_the_derivation_names_what_moved(ki
     weather = weather_of(scenario)
     state = surface_state(weather, ASPHALT)
     numbers = {name: value for name, value in vars(ASPHALT).items() if isinstance(value, float)}
-    found = surface_of(kind, scenario.precipitation_mm_h, scenario.snow_accumulation_h, numbers)
+    found = derive_surface(kind, scenario.precipitation_mm_h, scenario.snow_accumulation_h, numbers)
     assert found == pytest.approx(
         {name: getattr(state, name) for name in ("film_depth_mm", "snow_depth_mm", "snow_coverage")}
         | {"surface_friction": state.friction}
@@ -71,7 +71,7 @@ def test_the_judge_finds_the_same_surface_and_the_derivation_names_what_moved(ki
         lambda: Weather(kind="hail"),
         lambda: find_weather("hail"),
         lambda: surface_state(Weather(kind="hail"), ASPHALT),
-        lambda: planned_run(Drive(weather="hail", speed=10.0, peak=2.0), "a"),
+        lambda: make_planned_run(RunPlan(weather="hail", speed=10.0, peak=2.0), "a"),
         lambda: scenario_problems(Scenario(weather="hail")),
     ],
 )

@@ -1,4 +1,4 @@
-"""What a calibration holds against what: model less reference, response by response, in sizes that compare."""
+"""Residuals of a calibration: model less reference, response by response, in sizes that compare."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ class CalibrationCase:
 
 @dataclass(frozen=True, kw_only=True)
 class Yardstick:
-    """What makes residuals comparable.
+    """Scales that make residuals comparable.
 
     Parameters
     ----------

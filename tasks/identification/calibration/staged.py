@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """What one group may take.
+    """Limits of one group.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Procedure:
 
 @dataclass(frozen=True, kw_only=True)
 class StageRecord:
-    """What one stage did.
+    """Result of one stage.
 
     Parameters
     ----------

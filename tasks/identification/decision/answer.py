@@ -80,7 +80,7 @@ class ChannelError:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """What `attribute` concludes.
+    """Conclusion of `find_missing_effects`.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Verdict:
     theta : float64 full parameter vector of the effects, without session nuisances
     slots : tables of the forms found
     experiment : the planned run that would tell the first effect from its closest alternative best
-    torn : runs left out because they fork when the integration step is halved
+    forked : runs left out because they fork when the integration step is halved
     reasons : sentences that say why the answer is what it is
     """
 
@@ -120,7 +120,7 @@ class Verdict:
     theta: NDArray[np.float64]
     slots: tuple[Slot, ...]
     experiment: Experiment | None
-    torn: tuple[str, ...]
+    forked: tuple[str, ...]
     reasons: tuple[str, ...]
 
 

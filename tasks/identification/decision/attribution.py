@@ -8,23 +8,9 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.screening import inflation, look_alikes, screen
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fall, fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, fit, misfit_by_run, sum_misfit_falls
 from tasks.identification.inference.hypothesis import Hypothesis, library_hypothesis
-
-ACCEPT_SCORE = 25.0
-RIVAL_SPAN = 10.0
-HELD_OUT_GAIN = 4.0
-WIN_SHARE = 0.6
-REFINED = 5
-"""Candidates of each screening that are refined through the simulation."""
-BOOTSTRAP = 400
-ALIKE_REFINED = 4
-DECIDED = 0.1
-"""Share of the best gain over inflation so far below which the linear screen is taken at its word."""
-LARGE_GAIN = 300.0
-"""Gain from which derivatives taken without an effect no longer hold with it."""
-REACHED = 0.8
-"""Share of the linear gain that a refined one reaches where the start did not matter."""
+from tasks.identification.rules import DecisionRules
 
 Misfits = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -42,6 +28,7 @@ class Candidate:
     score : gain / inflation - parameters x log N
     held_out_gain : fall of the held-out marginal misfit, divided by the inflation; 0 where the score fails
     informed : number of training runs that inform its first parameter
+    rules : by which it is judged
     """
 
     hypothesis: Hypothesis
@@ -51,14 +38,16 @@ class Candidate:
     score: float
     held_out_gain: float
     informed: int
+    rules: DecisionRules
 
     @property
     def passes(self) -> bool:
         """Whether score, held-out test and bounds all hold."""
-        return self.score > ACCEPT_SCORE and self.held_out_gain > HELD_OUT_GAIN and not self.fitted.at_bound
+        enough = self.score > self.rules.accept_score and self.held_out_gain > self.rules.held_out_gain
+        return enough and not self.fitted.at_bound
 
 
-def judge(
+def judge_hypothesis(
     evidence: Evidence,
     base: Fit,
     base_held_out: Misfits | None,
@@ -75,6 +64,7 @@ def judge(
     hypothesis : what may be added
     foreseen : gain by the linear screen: a first fit that reaches it needs no other start
     """
+    rules = evidence.rules
     first = np.arange(len(hypothesis.names)) == 0
     if hypothesis.names[0] in SESSION:
         # the session already carries the same number under a prior: hand it over to the free parameter
@@ -100,14 +90,15 @@ def judge(
         )
         gain = 0.5 * (base.objective - trials[-1].objective)
         # a large one is only ranked here: derivatives are taken anew at it
-        enough = REACHED * foreseen if len(hypothesis.names) == 1 else np.inf
-        if gain > min(enough, LARGE_GAIN) or max(gain, foreseen) < 0.3 * ACCEPT_SCORE:
+        enough = rules.reached_share * foreseen if len(hypothesis.names) == 1 else np.inf
+        hopeless = max(gain, foreseen) < 0.3 * rules.accept_score
+        if gain > min(enough, rules.relinearisation_gain) or hopeless:
             break
     fitted = min(trials, key=lambda trial: trial.objective)
-    return assess(evidence, base, base_held_out, hypothesis, fitted)
+    return assess_fit(evidence, base, base_held_out, hypothesis, fitted)
 
 
-def assess(
+def assess_fit(
     evidence: Evidence,
     base: Fit,
     base_held_out: Misfits | None,
@@ -128,20 +119,20 @@ def assess(
     own = _own_scores(evidence, fitted, hypothesis)
     factor = inflation(evidence, fitted, own)
     penalty = float(len(hypothesis.names) * np.log(evidence.samples))
-    if gain / factor - penalty > ACCEPT_SCORE and base_held_out is not None:
+    if gain / factor - penalty > evidence.rules.accept_score and base_held_out is not None:
         # what the base reaches from here as well is no merit of the hypothesis
-        gain = min(gain, 0.5 * (_back(evidence, base, hypothesis, fitted).objective - fitted.objective))
+        gain = min(gain, 0.5 * (_refit_base(evidence, base, hypothesis, fitted).objective - fitted.objective))
     score = gain / factor - penalty
     held_out = 0.0
-    if score > ACCEPT_SCORE and base_held_out is not None:
-        held_out = fall(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
+    if score > evidence.rules.accept_score and base_held_out is not None:
+        held_out = sum_misfit_falls(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
     return Candidate(
         hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
-        informed=len(own) or len(evidence.train),
+        informed=len(own) or len(evidence.train), rules=evidence.rules,
     )  # fmt: skip
 
 
-def _back(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
+def _refit_base(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
     """The base fitted again from where a fit that extends it ended."""
     session = fitted.session.copy()
     k = len(hypothesis.names)
@@ -168,10 +159,10 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
     return np.array(scores)
 
 
-def ladder(
+def refine_candidates(
     evidence: Evidence,
     base: Fit,
-    count: int = REFINED,
+    count: int | None = None,
     *,
     gated: bool = True,
     also: frozenset[str] = frozenset(),
@@ -182,22 +173,25 @@ def ladder(
     ----------
     evidence : the runs
     base : fit of what is accepted so far
-    count : how many of the screening are refined
+    count : how many of the screening are refined; None takes as many as the rules say
     gated : judge them on held-out runs as well, and refine what looks like the best of them too
     also : names of effects that are refined whatever the screen says of them
     """
+    rules = evidence.rules
     gains, estimates, seconds = screen(evidence, base)
     held_out = misfit_by_run(evidence.held_out, base) if gated else None
-    order = [int(j) for j in np.argsort(-gains, kind="stable") if gains[j] > 0.3 * ACCEPT_SCORE][:count]
+    hopeful = [int(j) for j in np.argsort(-gains, kind="stable") if gains[j] > 0.3 * rules.accept_score]
+    order = hopeful[: rules.refined_candidates if count is None else count]
 
     def judged(j: int) -> Candidate:
         hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
-        return judge(evidence, base, held_out, hypothesis, float(gains[j]))
+        return judge_hypothesis(evidence, base, held_out, hypothesis, float(gains[j]))
 
     candidates: list[Candidate] = []
     refined: list[int] = []
     for j in order:
-        if gains[j] > DECIDED * max((c.gain / c.inflation for c in candidates), default=0.0):
+        best_so_far = max((c.gain / c.inflation for c in candidates), default=0.0)
+        if gains[j] > rules.trusted_screen_share * best_so_far:
             candidates.append(judged(j))
             refined.append(j)
     known = {p.name for p in base.parts}
@@ -207,13 +201,13 @@ def ladder(
             refined.append(j)
     if candidates and gated:
         best = max(range(len(candidates)), key=lambda i: candidates[i].score)
-        if candidates[best].score > ACCEPT_SCORE:
+        if candidates[best].score > rules.accept_score:
             near = [j for j in look_alikes(evidence, refined[best]) if j not in refined and gains[j] > 0.0]
-            candidates += [judged(j) for j in near[:ALIKE_REFINED]]
+            candidates += [judged(j) for j in near[: rules.refined_look_alikes]]
     return sorted(candidates, key=lambda c: -c.score)
 
 
-def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
+def bootstrap_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     """Share of bootstrap resamples of the runs in which the first candidate keeps the best score.
 
     Parameters
@@ -222,8 +216,9 @@ def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     base : the fit they were added to
     seed : of the resampling
     """
+    runs = len(base.by_run)
     draws = np.random.Generator(np.random.Philox(seed)).integers(
-        0, len(base.by_run), (BOOTSTRAP, len(base.by_run))
+        0, runs, (candidates[0].rules.bootstrap_resamples, runs)
     )
     scores = []
     for c in candidates:
@@ -234,12 +229,12 @@ def win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     return float(np.mean((winner == 0) & (scores[0] > 0.0)))
 
 
-def nested(small: Hypothesis, large: Hypothesis) -> bool:
+def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
     """Whether every parameter of ``small`` is also one of ``large``."""
     return set(small.names) < set(large.names)
 
 
-def without(base: Fit, index: int, evidence: Evidence) -> Fit:
+def refit_without(base: Fit, index: int, evidence: Evidence) -> Fit:
     """Refit with one accepted part left out.
 
     Parameters

@@ -15,8 +15,6 @@ from tasks.identification.inference.forward import predict
 from tasks.identification.inference.noise import whiten
 from tasks.vehicle.effects.slots import Slot
 
-MOST_LAG = 1.0
-"""Lags up to this are looked at [s]."""
 CORRELATED = ("longitudinal_acceleration", "pitch")
 
 
@@ -38,7 +36,7 @@ class Correlation:
 
 
 def residual_input_correlation(
-    runs: tuple[RunEvidence, ...], theta: NDArray[np.float64], slots: tuple[Slot, ...]
+    runs: tuple[RunEvidence, ...], theta: NDArray[np.float64], slots: tuple[Slot, ...], longest_lag: float
 ) -> dict[str, Correlation]:
     """Correlation over the held-out runs, residual and pressure whitened by the channel's noise.
 
@@ -46,20 +44,24 @@ def residual_input_correlation(
     ----------
     runs : held-out
     theta, slots : full parameters of the grown model
+    longest_lag : [s]
     """
     plain = np.zeros(len(theta))
     residuals = [
         [(run.model.measured - predict(run.model, p, slots=s)) for run in runs]
         for p, s in ((plain, ()), (theta, slots))
     ]
-    return {name: _channel(runs, residuals, CHANNELS.index(name)) for name in CORRELATED}
+    return {name: _channel(runs, residuals, CHANNELS.index(name), longest_lag) for name in CORRELATED}
 
 
 def _channel(
-    runs: tuple[RunEvidence, ...], residuals: list[list[NDArray[np.float64]]], channel: int
+    runs: tuple[RunEvidence, ...],
+    residuals: list[list[NDArray[np.float64]]],
+    channel: int,
+    longest_lag: float,
 ) -> Correlation:
     interval = runs[0].model.run.interval
-    most = round(MOST_LAG / interval)
+    most = round(longest_lag / interval)
     sums = np.zeros((2, 2 * most + 1))
     powers, pressed, count = np.zeros(2), 0.0, 0
     for i, run in enumerate(runs):

@@ -5,31 +5,23 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.identification.decision.attribution import ACCEPT_SCORE, RIVAL_SPAN, Candidate, judge
-from tasks.identification.decision.forms import form_hypotheses, is_constant, scan, spline_slopes
+from tasks.identification.decision.attribution import Candidate, judge_hypothesis
+from tasks.identification.decision.forms import form_hypotheses, is_constant, scan_leftovers, spline_slopes
 from tasks.identification.decision.screening import inflation
 from tasks.identification.decision.search import (
-    MAX_EFFECTS,
     Found,
     Round,
-    retuned,
+    find_retune,
+    relinearise_candidate,
     scale_disturbances,
-    search,
-    settle,
+    search_library,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit, misfit_by_run
-from tasks.identification.inference.linearisation import rederived, rescaled
-
-FAR_PULL = 2.5
-"""Pull, in prior sigmas, from which the model without effects has its derivatives taken anew at its session."""
-AT_ODDS = 2.0
-"""Inflation of a named effect from which its runs are at odds about it, and a form alone is held against it."""
-WORTHY = 0.3
-"""Share of the gain of what is named that a form alone must have, linearly, to be held against it."""
+from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
 
 
-def forms(
+def search_forms(
     start: Found,
     null: Found,
     reasons: list[str],
@@ -48,12 +40,13 @@ def forms(
     -------
     The state, and a form alone that cannot be told from the first effect.
     """
-    state, near = start, None
+    state, near, rules = start, None, start.evidence.rules
     left = best_form(state.evidence, state.base, splines=splines)
     over = left is not None and left.passes
-    torn = any(r.accepted.inflation > AT_ODDS for r in state.rounds)
-    if state.rounds and (over or torn):
-        alone = best_form(null.evidence, null.base, WORTHY * sum(r.accepted.gain for r in state.rounds))
+    disagreeing = any(r.accepted.inflation > rules.disagreement for r in state.rounds)
+    if state.rounds and (over or disagreeing):
+        least = rules.lone_form_share * sum(r.accepted.gain for r in state.rounds)
+        alone = best_form(null.evidence, null.base, least)
         ahead = -np.inf
         if alone is not None and alone.passes:
             # a form has no direction of its own to be judged by, so both sides take the larger inflation
@@ -71,17 +64,17 @@ def forms(
                 or (first.variable == "constant" and is_constant(alone.hypothesis))
             )
         )
-        if alone is not None and ahead > RIVAL_SPAN and not dressed:
+        if alone is not None and ahead > rules.rival_span and not dressed:
             reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
             state = Found(
                 evidence=null.evidence,
                 base=alone.fitted,
                 rounds=(Round(base=null.base, tried=(), accepted=alone, evidence=null.evidence),),
             )
-        elif alone is not None and ahead > -RIVAL_SPAN:
+        elif alone is not None and ahead > -rules.rival_span:
             elsewhere = alone.hypothesis.port != first.port
-            near = alone if (ahead > RIVAL_SPAN if dressed else elsewhere or torn) else None
-    if left is not None and over and state is start and len(state.rounds) < MAX_EFFECTS:
+            near = alone if (ahead > rules.rival_span if dressed else elsewhere or disagreeing) else None
+    if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
         reasons.append(f"something is left over: {left.hypothesis.name}")
         state = replace(
             state,
@@ -107,15 +100,17 @@ def best_form(
     splines : `spline_slopes` where they are known
     """
     level = inflation(evidence, base, None)
-    enough = max(ACCEPT_SCORE + float(np.log(evidence.samples)), least / level)
-    leftovers = [x for x in scan(evidence, base, splines)[:2] if x.gain > enough]
+    enough = max(evidence.rules.accept_score + float(np.log(evidence.samples)), least / level)
+    leftovers = [x for x in scan_leftovers(evidence, base, splines)[:2] if x.gain > enough]
     if not leftovers:
         return None
     held_out = misfit_by_run(evidence.held_out, base)
     judged = [
-        judge(evidence, base, held_out, h) for x in leftovers for h in form_hypotheses(x, evidence.samples)
+        judge_hypothesis(evidence, base, held_out, h)
+        for x in leftovers
+        for h in form_hypotheses(x, evidence.samples)
     ]
-    return settle(evidence, base, max(judged, key=lambda c: c.score))[1]
+    return relinearise_candidate(evidence, base, max(judged, key=lambda c: c.score))[1]
 
 
 def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found, Found, Candidate | None]:
@@ -131,20 +126,21 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
     -------
     The start without effects, what was found, and a form alone that cannot be told from the first effect.
     """
-    if np.any(np.abs(null.session) > FAR_PULL * evidence.session_sigma):
-        evidence = rederived(evidence, null, library=True)
+    if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
+        evidence = differentiate_at(evidence, null, library=True)
         null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
-    explored = search(Found(evidence=evidence, base=null), gated=False)
+    explored = search_library(Found(evidence=evidence, base=null), gated=False)
     splines = spline_slopes(explored.evidence, explored.base)
     scales = scale_disturbances(explored, splines)
-    evidence = rescaled(evidence, scales)
+    evidence = rescale_disturbances(evidence, scales)
     explored = replace(
-        explored, rounds=tuple(replace(r, evidence=rescaled(r.evidence, scales)) for r in explored.rounds)
+        explored,
+        rounds=tuple(replace(r, evidence=rescale_disturbances(r.evidence, scales)) for r in explored.rounds),
     )
     null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     start = Found(evidence=evidence, base=null)
-    found = search(start, gated=True, explored=explored)
+    found = search_library(start, gated=True, explored=explored)
     if not found.rounds:
-        found = replace(retuned(start, reasons), tried=found.tried)
-    found, near = forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
+        found = replace(find_retune(start, reasons), tried=found.tried)
+    found, near = search_forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
     return start, found, near

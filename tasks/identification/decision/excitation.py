@@ -1,4 +1,4 @@
-"""What the runs of a campaign reach: the range of each variable that a form can depend on."""
+"""Ranges that the runs of a campaign reach of each variable that a form can depend on."""
 
 from collections.abc import Iterable
 
@@ -9,10 +9,10 @@ from tasks.identification.inference.forward import RunModel, simulate_run
 from tasks.vehicle.effects.slots import Slot
 
 
-def reached(
+def find_reached_range(
     models: Iterable[RunModel], theta: NDArray[np.float64], slots: tuple[Slot, ...], variable: str
 ) -> tuple[float, float]:
-    """Lowest and highest value of a variable over runs, by the model with what was found [unit of the variable].
+    """Return the lowest and highest value of a variable over runs, by the grown model [unit of the variable].
 
     Parameters
     ----------

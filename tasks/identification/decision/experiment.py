@@ -14,9 +14,6 @@ from tasks.identification.inference.noise import whiten
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
 
-TELLING = 1.0
-"""Expected D2 below which a run says nothing."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
@@ -68,7 +65,7 @@ def next_experiment(
         distance = float(change @ change - q @ q - shared @ np.linalg.solve(session, shared))
         if distance > best[1]:
             best = (plan, distance)
-    if best[1] < TELLING:
+    if best[1] < evidence.rules.least_expected_d2:
         return None
     names = (first.parts[-1].name, second.parts[-1].name if second.parts else "the model as it stands")
     return Experiment(between=names, plan=best[0], expected_d2=best[1])

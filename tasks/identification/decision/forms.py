@@ -1,4 +1,4 @@
-"""What is left over: port by variable splines, and the simple shape that a spline has."""
+"""Residual left over, as splines over pairs of port and variable, and the simple shape that a spline has."""
 
 from dataclasses import dataclass
 
@@ -70,7 +70,7 @@ RIDGE = np.repeat([(20.0 * PORT_STEP[port]) ** -2 for port, _ in KEYS], KNOTS)
 """Precision of the broad priors of all knots, in the order of `KEYS`."""
 
 
-def scan(
+def scan_leftovers(
     evidence: Evidence, at: Fit, splines: tuple[NDArray[np.float64], ...] | None = None
 ) -> list[Leftover]:
     """Fit a spline at every scanned port and variable to the residuals of ``at``; best first.

@@ -14,10 +14,6 @@ from tasks.identification.inference.forward import predict
 from tasks.identification.inference.hypothesis import compose
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
-RETUNE_WIDENING = 10.0
-"""Factor on the session's tolerances when a model is re-tuned without any new effect."""
-ERROR_DRAWS = 1000
-
 
 def held_out_error(
     evidence: Evidence, null: Fit, base: Fit
@@ -34,8 +30,9 @@ def held_out_error(
     -------
     Errors by channel; and of stopping distance and peak pitch, over the runs that brake.
     """
+    rules = evidence.rules
     retuned = fit(
-        evidence.train, (), RETUNE_WIDENING * evidence.session_sigma, session=null.session, iterations=8
+        evidence.train, (), rules.retune_widening * evidence.session_sigma, session=null.session, iterations=8
     )
     models = (
         (np.zeros(len(EFFECT_TABLE)), ()),
@@ -53,15 +50,19 @@ def held_out_error(
         if errors is not None:
             braked.append(model.run.name)
             manoeuvres.append(errors**2)
-    channels = _errors(np.array(square), names, dict(zip(CHANNELS, CHANNEL_UNITS, strict=True)))
-    return channels, _errors(np.array(manoeuvres), braked, MANOEUVRE_UNITS) if braked else {}
+    channels = _errors(
+        np.array(square), names, dict(zip(CHANNELS, CHANNEL_UNITS, strict=True)), rules.error_resamples
+    )
+    if not braked:
+        return channels, {}
+    return channels, _errors(np.array(manoeuvres), braked, MANOEUVRE_UNITS, rules.error_resamples)
 
 
 def _errors(
-    square: NDArray[np.float64], runs: list[str], units: Mapping[str, str]
+    square: NDArray[np.float64], runs: list[str], units: Mapping[str, str], resamples: int
 ) -> dict[str, ChannelError]:
     """Root mean squares with bootstrap intervals from mean squares by run and model, float64 [R, 3, C]."""
-    draws = np.random.Generator(np.random.Philox(0)).integers(0, len(runs), (ERROR_DRAWS, len(runs)))
+    draws = np.random.Generator(np.random.Philox(0)).integers(0, len(runs), (resamples, len(runs)))
     errors = {}
     for c, (name, unit) in enumerate(units.items()):
         frozen, tuned, after = np.sqrt(square[:, :, c].mean(axis=0))

@@ -11,20 +11,15 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit
-from tasks.identification.inference.linearisation import rederived
-
-SECANTS = 5
-"""Points of the profile that are tried on each side of an estimate."""
-CLOSE = 0.05
-"""Relative error of the limit, as a root of the deviance, at which the profile is followed no further."""
+from tasks.identification.inference.linearisation import differentiate_at
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
-def refitted(
+def refit_named(
     evidence: Evidence, base: Fit, candidates: Sequence[Candidate]
 ) -> tuple[Evidence, Fit, list[Candidate]]:
-    """What is named, fitted with derivatives that are taken at it.
+    """Return the named effects, fitted with derivatives that are taken at them.
 
     Derivatives of the nuisances that were taken elsewhere take too little from those of an effect: on a road feature
     that is reached a moment later most of all. The search can live with that; the information that they promise is up
@@ -40,7 +35,7 @@ def refitted(
     -------
     The runs with derivatives at ``base``, the fits again.
     """
-    here = rederived(evidence, base, library=False)
+    here = differentiate_at(evidence, base, library=False)
 
     def again(fitted: Fit) -> Fit:
         return fit(
@@ -55,7 +50,7 @@ def refitted(
     return here, again(base), [replace(c, fitted=again(c.fitted)) for c in candidates]
 
 
-def quantile(candidate: Candidate) -> float:
+def student_quantile(candidate: Candidate) -> float:
     """Student's t with as many runs as inform the parameter, less one: the runs' scatter is itself estimated."""
     return float(student.ppf(0.975, max(candidate.informed - 1, 1)))
 
@@ -75,9 +70,9 @@ def curvature_interval(candidate: Candidate) -> Bounds:
     k = len(h.names)
     values = candidate.fitted.values[-k:]
     variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation
-    # the session's own doubt about the same number belongs to the car's
-    doubt = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
-    reach = np.sqrt(variance + np.square(doubt)) * quantile(candidate)
+    # the session's own tolerance of the same number belongs to the car's
+    tolerance = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
+    reach = np.sqrt(variance + np.square(tolerance)) * student_quantile(candidate)
     return np.clip(values - reach, h.lower, h.upper), np.clip(values + reach, h.lower, h.upper)
 
 
@@ -108,33 +103,33 @@ def profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
         iterations=4,
     )  # fmt: skip
     for j in range(k):
-        low[j] = _limit(candidate, centre, evidence, j, low[j], candidate.hypothesis.lower[j])
-        high[j] = _limit(candidate, centre, evidence, j, high[j], candidate.hypothesis.upper[j])
+        low[j] = _find_limit(candidate, centre, evidence, j, low[j], candidate.hypothesis.lower[j])
+        high[j] = _find_limit(candidate, centre, evidence, j, high[j], candidate.hypothesis.upper[j])
     values = fitted.values[-k:]
     return np.minimum(low, values), np.maximum(high, values)
 
 
-def _limit(
+def _find_limit(
     candidate: Candidate, centre: Fit, evidence: Evidence, place: int, guess: float, bound: float
 ) -> float:
     """Where the profile's root deviance reaches the quantile between the estimate and a bound, by false position."""
     k = len(candidate.hypothesis.names)
-    wanted = quantile(candidate)
+    wanted = student_quantile(candidate)
     inside, outside = float(centre.values[place - k]), float(bound)
     if inside == outside:
         return outside
 
     def root(x: float) -> float:
-        rise = _pinned(centre, evidence, place - k, x).objective - centre.objective
+        rise = _fit_pinned(centre, evidence, place - k, x).objective - centre.objective
         return float(np.sqrt(max(rise, 0.0) / candidate.inflation))
 
     at_inside, at_outside = 0.0, root(outside)
     if at_outside <= wanted:
         return outside
     x = guess if min(inside, outside) < guess < max(inside, outside) else 0.5 * (inside + outside)
-    for _ in range(SECANTS):
+    for _ in range(evidence.rules.profile_points):
         here = root(x)
-        if abs(here - wanted) < CLOSE * wanted:
+        if abs(here - wanted) < evidence.rules.profile_tolerance * wanted:
             return x
         if here < wanted:
             inside, at_inside = x, here
@@ -146,7 +141,7 @@ def _limit(
     return x
 
 
-def _pinned(centre: Fit, evidence: Evidence, place: int, value: float) -> Fit:
+def _fit_pinned(centre: Fit, evidence: Evidence, place: int, value: float) -> Fit:
     """The best fit that holds one parameter of the last hypothesis (``place`` counts from the end)."""
     last = centre.parts[-1]
     lower, upper = last.lower.copy(), last.upper.copy()

@@ -1,4 +1,4 @@
-"""What cannot be told from what was named, and how large an effect would have to be to be named at all."""
+"""Rivals of the named effects, and how large an effect would have to be to be named at all."""
 
 from dataclasses import dataclass, replace
 
@@ -6,18 +6,15 @@ import numpy as np
 
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (  # fmt: skip
-    ACCEPT_SCORE,
-    RIVAL_SPAN,
-    WIN_SHARE,
     Candidate,
-    judge,
-    ladder,
-    nested,
-    win_share,
-    without,
+    bootstrap_win_share,
+    is_nested,
+    judge_hypothesis,
+    refine_candidates,
+    refit_without,
 )
 from tasks.identification.decision.screening import inflation
-from tasks.identification.decision.search import RETUNE_PULL, Round
+from tasks.identification.decision.search import Round
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, misfit_by_run
 
@@ -40,7 +37,7 @@ class Compared:
     near: tuple[tuple[Candidate, float], ...]
 
 
-def compare(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Compared]:
+def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Compared]:
     """Hold every accepted effect against its alternatives, all other accepted ones present.
 
     Parameters
@@ -54,21 +51,21 @@ def compare(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Co
         rest, own, tried = found.base, found.accepted, found.tried
         if i + 1 < len(rounds):
             # what was accepted later may change how this effect compares with its rivals
-            rest = without(base, i, evidence)
+            rest = refit_without(base, i, evidence)
             at = sum(len(p.names) for p in base.parts[:i])
             part = replace(base.parts[i], start=base.values[at : at + len(base.parts[i].names)])
-            own = judge(evidence, rest, misfit_by_run(evidence.held_out, rest), part)
-            tried = tuple(ladder(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
+            own = judge_hypothesis(evidence, rest, misfit_by_run(evidence.held_out, rest), part)
+            tried = tuple(refine_candidates(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
-        share = win_share([own, *others], rest)
-        shares = [win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
+        share = bootstrap_win_share([own, *others], rest)
+        shares = [bootstrap_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
         near = tuple(
             (c, wins)
             for c, wins in zip(others, shares, strict=True)
             if c.score > 0.0
-            and _close(own, share, c, wins)
-            and not nested(own.hypothesis, c.hypothesis)
-            and _credible(c, own, evidence)
+            and _is_close(own, share, c, wins)
+            and not is_nested(own.hypothesis, c.hypothesis)
+            and _is_credible(c, own, evidence)
         )
         compared.append(
             Compared(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
@@ -76,17 +73,18 @@ def compare(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Co
     return compared
 
 
-def _close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
-    return other.score > own.score - RIVAL_SPAN or (share < WIN_SHARE and wins > 0.5 * (1.0 - WIN_SHARE))
+def _is_close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
+    needed = own.rules.win_share
+    return other.score > own.score - own.rules.rival_span or (share < needed and wins > 0.5 * (1.0 - needed))
 
 
-def _credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
+def _is_credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
     """An explanation that still bends the session beyond belief is none, beside one that does not."""
     bent, straight = (float(np.max(np.abs(c.fitted.session) / evidence.session_sigma)) for c in (other, own))
-    return bent <= RETUNE_PULL or straight > RETUNE_PULL
+    return bent <= evidence.rules.retune_pull or straight > evidence.rules.retune_pull
 
 
-def detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
+def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:
     """Smallest first parameter whose linear gain would pass the score gate, at the level of the null's inflation.
 
     Infinite where the library's bounds end before.
@@ -108,7 +106,9 @@ def detectable(evidence: Evidence, base: Fit) -> dict[str, float]:
     information = np.diag(library) - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(session), cross)
     sizes = {}
     for effect, known in zip(evidence.effects, information, strict=True):
-        needed = 2.0 * level * (ACCEPT_SCORE + len(effect.parameters) * np.log(evidence.samples))
+        needed = (
+            2.0 * level * (evidence.rules.accept_score + len(effect.parameters) * np.log(evidence.samples))
+        )
         first = effect.parameters[0]
         size = float(np.sqrt(needed / known)) if known > 0 else np.inf
         sizes[effect.name] = size if size <= max(first.upper, -first.lower) else np.inf

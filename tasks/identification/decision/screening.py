@@ -7,9 +7,6 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import second_values
 from tasks.identification.inference.fit import Fit
 
-ALIKE = 0.85
-"""Cosine between two library directions, nuisances taken out, from which both are refined if one is good."""
-
 
 def screen(
     evidence: Evidence, at: Fit
@@ -106,4 +103,5 @@ def look_alikes(evidence: Evidence, index: int) -> list[int]:
     gram = gram - cross @ np.linalg.solve(session, cross.T)
     length = np.sqrt(np.maximum(np.diag(gram), 1e-30))
     cosine = np.abs(gram[index]) / (length * length[index])
-    return [int(j) for j in np.argsort(-cosine, kind="stable") if j != index and cosine[j] > ALIKE]
+    least = evidence.rules.look_alike_cosine
+    return [int(j) for j in np.argsort(-cosine, kind="stable") if j != index and cosine[j] > least]

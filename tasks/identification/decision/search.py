@@ -7,33 +7,18 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (
-    ACCEPT_SCORE,
-    HELD_OUT_GAIN,
-    LARGE_GAIN,
-    REFINED,
-    RIVAL_SPAN,
     Candidate,
-    assess,
-    judge,
-    ladder,
-    nested,
+    assess_fit,
+    is_nested,
+    judge_hypothesis,
+    refine_candidates,
 )
 from tasks.identification.decision.forms import RIDGE
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.fit import Fit, fall, fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, fit, misfit_by_run, sum_misfit_falls
 from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import fit_disturbance, rederived, whitened_residuals
-
-MAX_EFFECTS = 3
-RETUNE_PULL = 4.0
-"""Pull of a session nuisance, in prior sigmas, from which it is called a wrong number of the vehicle."""
-NEAR = 0.1
-"""Relative change of the parameters below which derivatives need not be taken anew once more."""
-EXPLORED = 3
-"""Candidates that are refined while only the disturbances are to be scaled: any that explains as much will do."""
-SETTLED = 2
-"""Candidates of a round that are settled, if their gain is large."""
+from tasks.identification.inference.linearisation import differentiate_at, fit_disturbance, whitened_residuals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +52,7 @@ class Found:
     tried: tuple[Candidate, ...] = ()
 
 
-def settle(
+def relinearise_candidate(
     evidence: Evidence, base: Fit, candidate: Candidate, *, gated: bool = True, known: Evidence | None = None
 ) -> tuple[Evidence, Candidate]:
     """Take derivatives anew at a candidate whose gain is large, refit it and judge it there.
@@ -84,24 +69,24 @@ def settle(
     -------
     The runs with derivatives that hold at the candidate, and the candidate.
     """
-    if candidate.gain < LARGE_GAIN:
+    if candidate.gain < evidence.rules.relinearisation_gain:
         return evidence, candidate
     here, fitted = evidence, candidate.fitted
     for _ in range(2):
-        here = known or rederived(here, fitted, library=True)
+        here = known or differentiate_at(here, fitted, library=True)
         known = None
         again = fit(
             here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
         )  # fmt: skip
         shift = np.abs(again.values - fitted.values) / np.maximum(np.abs(again.values), 1e-9)
         fitted = again
-        if np.all(shift < NEAR):
+        if np.all(shift < evidence.rules.relinearisation_change):
             break
     base_held_out = misfit_by_run(evidence.held_out, base) if gated else None
-    return here, assess(here, base, base_held_out, candidate.hypothesis, fitted)
+    return here, assess_fit(here, base, base_held_out, candidate.hypothesis, fitted)
 
 
-def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
+def search_library(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
     """Add library effects one by one, the best first.
 
     Parameters
@@ -110,27 +95,29 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
     gated : accept only what passes every gate; else whatever explains most, to learn what is left beside it
     explored : an earlier search whose first effect, where it is met again, need not be looked for anew
     """
-    state = start
+    state, rules = start, start.evidence.rules
     met = frozenset(r.accepted.hypothesis.name for r in explored.rounds) if explored else frozenset()
-    for _ in range(MAX_EFFECTS):
-        count = REFINED if gated else EXPLORED
-        tried = ladder(state.evidence, state.base, count, gated=gated, also=met)
+    for _ in range(rules.most_effects):
+        count = rules.refined_candidates if gated else rules.explored_candidates
+        tried = refine_candidates(state.evidence, state.base, count, gated=gated, also=met)
         places: dict[str, Evidence] = {}
-        for i, candidate in enumerate(tried[:SETTLED] if gated else tried[:1]):
-            if candidate.score > max(ACCEPT_SCORE, 0.3 * tried[0].score):
+        for i, candidate in enumerate(tried[: rules.relinearised_candidates] if gated else tried[:1]):
+            if candidate.score > max(rules.accept_score, 0.3 * tried[0].score):
                 near, known = candidate, None
-                if explored and candidate.gain >= LARGE_GAIN:
-                    near, known = _met_before(explored, candidate)
-                places[candidate.hypothesis.name], tried[i] = settle(
+                if explored and candidate.gain >= rules.relinearisation_gain:
+                    near, known = _recall_candidate(explored, candidate)
+                places[candidate.hypothesis.name], tried[i] = relinearise_candidate(
                     state.evidence, state.base, near, gated=gated, known=known
                 )
         tried.sort(key=lambda c: -c.score)
-        passing = [c for c in tried if (c.passes if gated else c.score > ACCEPT_SCORE)]
+        passing = [c for c in tried if (c.passes if gated else c.score > rules.accept_score)]
         if not passing:
             return replace(state, tried=tuple(tried))
         best = passing[0]
         simpler = [
-            c for c in passing if nested(c.hypothesis, best.hypothesis) and c.score > best.score - RIVAL_SPAN
+            c
+            for c in passing
+            if is_nested(c.hypothesis, best.hypothesis) and c.score > best.score - rules.rival_span
         ]
         best = simpler[0] if simpler else best
         here = places.get(best.hypothesis.name, state.evidence)
@@ -138,7 +125,7 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
             held_out = misfit_by_run(state.evidence.held_out, state.base)
             tried = [
                 c if c.score < 0.3 * best.score or c.hypothesis.name in places
-                else judge(here, state.base, held_out, c.hypothesis)
+                else judge_hypothesis(here, state.base, held_out, c.hypothesis)
                 for c in tried
             ]  # fmt: skip
         state = Found(
@@ -149,7 +136,7 @@ def search(start: Found, *, gated: bool, explored: Found | None = None) -> Found
     return state
 
 
-def _met_before(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
+def _recall_candidate(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
     """The candidate at the values that an earlier search settled it at, and its derivatives there."""
     k = len(candidate.hypothesis.names)
     for earlier in explored.rounds:
@@ -159,7 +146,7 @@ def _met_before(explored: Found, candidate: Candidate) -> tuple[Candidate, Evide
             near = replace(
                 candidate, fitted=replace(candidate.fitted, values=values, session=known.fitted.session)
             )
-            alone = len(known.fitted.values) == len(values) and known.gain >= LARGE_GAIN
+            alone = len(known.fitted.values) == len(values) and known.gain >= known.rules.relinearisation_gain
             return near, earlier.evidence if alone else None
     return candidate, None
 
@@ -181,7 +168,7 @@ def scale_disturbances(explored: Found, splines: tuple[NDArray[np.float64], ...]
     )
 
 
-def retuned(start: Found, reasons: list[str]) -> Found:
+def find_retune(start: Found, reasons: list[str]) -> Found:
     """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session.
 
     Parameters
@@ -192,7 +179,7 @@ def retuned(start: Found, reasons: list[str]) -> Found:
     evidence, null = start.evidence, start.base
     pulls = np.abs(null.session / evidence.session_sigma)
     judged = []
-    for place in np.flatnonzero(pulls > RETUNE_PULL):
+    for place in np.flatnonzero(pulls > evidence.rules.retune_pull):
         reasons.append(f"session nuisance {SESSION[place]} is pulled by {pulls[place]:.1f} sigma")
         effect = next(
             e for e in evidence.effects if e.parameters[0].name == SESSION[place] and len(e.parameters) == 1
@@ -200,10 +187,12 @@ def retuned(start: Found, reasons: list[str]) -> Found:
         frozen = null.session.copy()
         frozen[place] = 0.0
         held_out = misfit_by_run(evidence.held_out, replace(null, session=frozen))
-        found = judge(evidence, null, held_out, library_hypothesis(effect, float(null.session[place])))
-        gained = fall(held_out, misfit_by_run(evidence.held_out, found.fitted))
+        found = judge_hypothesis(
+            evidence, null, held_out, library_hypothesis(effect, float(null.session[place]))
+        )
+        gained = sum_misfit_falls(held_out, misfit_by_run(evidence.held_out, found.fitted))
         judged.append(replace(found, held_out_gain=gained / found.inflation))
-    accepted = [c for c in judged if c.held_out_gain > HELD_OUT_GAIN and c.gain > 0.0]
+    accepted = [c for c in judged if c.held_out_gain > evidence.rules.held_out_gain and c.gain > 0.0]
     if not accepted:
         return start
     best = max(accepted, key=lambda c: c.gain)

@@ -7,22 +7,21 @@ import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Verdict, VerdictName, named_effect
-from tasks.identification.decision.attribution import RIVAL_SPAN, Candidate
+from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.correlation import residual_input_correlation
 from tasks.identification.decision.discovery import search_all
 from tasks.identification.decision.experiment import next_experiment
 from tasks.identification.decision.held_out import held_out_error
-from tasks.identification.decision.intervals import curvature_interval, profile_interval, refitted
-from tasks.identification.decision.rivals import Compared, compare, detectable
+from tasks.identification.decision.intervals import curvature_interval, profile_interval, refit_named
+from tasks.identification.decision.rivals import Compared, compare_with_rivals, find_detectable_sizes
 from tasks.identification.decision.search import Found
 from tasks.identification.inference.fit import Fit, fit
 from tasks.identification.inference.hypothesis import compose
-from tasks.identification.inference.linearisation import prepare
+from tasks.identification.inference.linearisation import prepare_evidence
+from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
-
-WORSE_LIMIT = 1.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,11 +42,12 @@ class Trace:
     compared: tuple[Compared, ...]
 
 
-def attribute(
+def find_missing_effects(
     campaign: Campaign,
     vehicle: Vehicle,
     surface: SurfaceParameters,
     effects: tuple[Effect, ...],
+    rules: DecisionRules,
     *,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Trace:
@@ -58,6 +58,7 @@ def attribute(
     campaign : measured runs with their split
     vehicle, surface : the model that is judged
     effects : the library of candidates
+    rules : by which it is decided
     progress : called with the name of each stage as it begins
 
     Returns
@@ -65,17 +66,19 @@ def attribute(
     The verdict and what it stands on; nothing in it has been fitted to a held-out run.
     """
     progress("derivatives")
-    evidence = prepare(campaign, vehicle, surface, tuple(e for e in effects if not _fixed(e, vehicle)))
+    evidence = prepare_evidence(
+        campaign, vehicle, surface, tuple(e for e in effects if not _is_fixed(e, vehicle)), rules
+    )
     reasons: list[str] = []
     progress("search")
     null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
     start, found, near_form = search_all(evidence, null, reasons)
     progress("rivals")
-    compared = compare(found.evidence, found.base, found.rounds)
+    compared = compare_with_rivals(found.evidence, found.base, found.rounds)
     progress("held-out error")
     error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     tried = list(found.tried)
-    while compared and (worse := _worse(error)):
+    while compared and (worse := _worse_channels(error, rules.worse_limit)):
         # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
         reasons.append(
             f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
@@ -87,11 +90,11 @@ def attribute(
             start, base=last.base, rounds=found.rounds[:-1],
             evidence=found.rounds[-2].evidence if found.rounds[1:] else start.evidence,
         )  # fmt: skip
-        compared = compare(found.evidence, found.base, found.rounds)
+        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
         error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     progress("intervals")
     if compared:
-        here, settled, again = refitted(found.evidence, found.base, [c.own for c in compared])
+        here, settled, again = refit_named(found.evidence, found.base, [c.own for c in compared])
         found = replace(found, evidence=here, base=settled)
         compared = [replace(c, own=own) for c, own in zip(compared, again, strict=True)]
         error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
@@ -105,10 +108,10 @@ def attribute(
         near.append(
             (named[0].name, named_effect(near_form, 0.0, profile_interval(near_form, start.evidence)))
         )
-    kind = _kind(named, near)
+    kind = _verdict_name(named, near)
     if kind == "SET":
         reasons.append(
-            f"{len(near)} other explanation(s) lie within {RIVAL_SPAN:g} units or win too many resamples"
+            f"{len(near)} other explanation(s) lie within {rules.rival_span:g} units or win too many resamples"
         )
     if not named and not reasons:
         reasons.append("no candidate passes the score, held-out and bound gates together")
@@ -130,28 +133,28 @@ def attribute(
         tried=tuple(named_effect(c, 0.0, curvature_interval(c)) for c in tried[:6]),
         error=error,
         manoeuvre_error=manoeuvres,
-        correlation=residual_input_correlation(start.evidence.held_out, *grown),
+        correlation=residual_input_correlation(start.evidence.held_out, *grown, rules.longest_lag),
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
         noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
         disturbance=start.evidence.disturbance,
-        detectable=detectable(start.evidence, start.base),
+        detectable=find_detectable_sizes(start.evidence, start.base),
         campaign=campaign.name,
         content_hash=campaign.content_hash,
         split_hash=campaign.split_hash,
         theta=theta,
         slots=slots,
         experiment=experiment,
-        torn=evidence.torn,
+        forked=evidence.forked,
         reasons=tuple(reasons),
     )
     return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
 
 
-def _worse(error: Mapping[str, ChannelError]) -> list[str]:
-    return [name for name, e in error.items() if e.after > WORSE_LIMIT * e.frozen and e.change_low > 0.0]
+def _worse_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:
+    return [name for name, e in error.items() if e.after > limit * e.frozen and e.change_low > 0.0]
 
 
-def _fixed(effect: Effect, vehicle: Vehicle) -> bool:
+def _is_fixed(effect: Effect, vehicle: Vehicle) -> bool:
     """Whether the vehicle has an effect of several parameters already: those cannot be found as a change of it."""
     return len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
 
@@ -171,7 +174,7 @@ def _to_tell_apart(
     return own.fitted, other.fitted
 
 
-def _kind(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
+def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
     if not named:
         return "NOTHING"
     classes = {effect.effect_class for effect in named}

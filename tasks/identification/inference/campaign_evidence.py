@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import Tolerances
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import RunEvidence
+from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.library import Effect
 
 
@@ -20,7 +21,8 @@ class Evidence:
     train, held_out : runs
     effects : the library
     tolerances, disturbance : priors of session, offsets and disturbances
-    torn : names of the runs that fork when the integration step is halved, and are left out
+    rules : by which a verdict is reached
+    forked : names of the runs that fork when the integration step is halved, and are left out
     """
 
     train: tuple[RunEvidence, ...]
@@ -28,7 +30,8 @@ class Evidence:
     effects: tuple[Effect, ...]
     tolerances: Tolerances
     disturbance: Disturbance
-    torn: tuple[str, ...] = ()
+    rules: DecisionRules
+    forked: tuple[str, ...] = ()
 
     @property
     def session_sigma(self) -> NDArray[np.float64]:

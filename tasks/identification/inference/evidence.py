@@ -151,7 +151,7 @@ def run_evidence(
 
     columns = [
         slope(base, 0.02, initial_speed=starting_speed(model, base) + 0.02),
-        slope(_moved(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
+        slope(_shifted_vector(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
     ]
     for name in ("longitudinal_acceleration", "pitch"):
         offset = np.zeros_like(y)
@@ -173,7 +173,7 @@ def run_evidence(
             )
             columns.append(slope(base, step, (slot,), branch=(first, simulated)))
     session = [
-        slope(_moved(base, i, 0.5 * s), 0.5 * s)
+        slope(_shifted_vector(base, i, 0.5 * s), 0.5 * s)
         for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
     ]
     library, others = [], []
@@ -183,7 +183,7 @@ def run_evidence(
         if base[leading.index] == 0.0:
             for parameter in effect.parameters[1:]:
                 theta[parameter.index] = parameter.start
-        library.append(slope(_moved(theta, leading.index, leading.step), leading.step))
+        library.append(slope(_shifted_vector(theta, leading.index, leading.step), leading.step))
     for place, value in second_values(effects):
         leading, second = effects[place].parameters
         theta = base.copy()
@@ -191,7 +191,9 @@ def run_evidence(
         # an effect that is there already is not looked for
         there = base[leading.index] != 0.0
         others.append(
-            np.zeros_like(y) if there else slope(_moved(theta, leading.index, leading.step), leading.step)
+            np.zeros_like(y)
+            if there
+            else slope(_shifted_vector(theta, leading.index, leading.step), leading.step)
         )
     library, others = library or [np.zeros_like(y)], others or [np.zeros_like(y)]
     nuisance = whiten(np.stack(columns, axis=-1), rho, sigma)
@@ -239,7 +241,7 @@ def second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
     ]
 
 
-def _moved(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
+def _shifted_vector(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
     moved = theta.copy()
     moved[index] += step
     return moved

@@ -9,11 +9,11 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.inference.evidence import SESSION_INDEX, RunEvidence
 from tasks.identification.inference.hypothesis import Hypothesis, compose
 from tasks.identification.inference.linearisation_points import (
-    Place,
+    LinearisedRun,
+    linearise_at,
+    linearise_runs,
     misfits,
-    places_at,
-    relinearised,
-    settled,
+    move_linearisation_points,
 )
 
 HELD = 1e18
@@ -99,8 +99,12 @@ def fit(
     taken = [SESSION.index(name) for part in parts for name in part.names if name in SESSION]
     s[taken], prior[taken] = 0.0, HELD
     k = len(x)
-    places = settled(evidence, parts, x, s) if offsets is None else places_at(evidence, parts, x, s, offsets)
-    objective = _objective(places, prior, s)
+    points = (
+        linearise_runs(evidence, parts, x, s)
+        if offsets is None
+        else linearise_at(evidence, parts, x, s, offsets)
+    )
+    objective = _total_misfit(points, prior, s)
     slopes: list[Slopes] = []
     normal = np.eye(k + len(s))
     blind, fell, foreseen = False, np.inf, np.inf
@@ -117,33 +121,33 @@ def fit(
             # a threshold of what is still 0 shows only once that has moved
             blind = bool(np.any(np.diag(normal)[:k] == 0.0))
         right = np.concatenate((np.zeros(k), -prior * s))
-        for place, (columns, q) in zip(places, slopes, strict=True):
-            right += columns.T @ place.residual - q.T @ place.projected
-        move = _move(normal, right, x, lower, upper)
+        for point, (columns, q) in zip(points, slopes, strict=True):
+            right += columns.T @ point.residual - q.T @ point.projected
+        move = _gauss_newton_step(normal, right, x, lower, upper)
         foreseen = float(move @ right)
         if foreseen < 0.1 and abs(fell) < 3.0:
             break
         before = objective
         # parameters and each run's own offsets move together; where that does not help, one after the other
         ahead = tuple(
-            run.offsets(place.projected - q @ move)
-            for run, place, (_, q) in zip(evidence, places, slopes, strict=True)
+            run.offsets(point.projected - q @ move)
+            for run, point, (_, q) in zip(evidence, points, slopes, strict=True)
         )
         for share, together in TRIALS:
             x_try, s_try = np.clip(x + share * move[:k], lower, upper), s + share * move[k:]
             own = tuple(
-                place.offsets + share * together * (d - place.offsets)
-                for place, d in zip(places, ahead, strict=True)
+                point.offsets + share * together * (d - point.offsets)
+                for point, d in zip(points, ahead, strict=True)
             )
-            trial = places_at(evidence, parts, x_try, s_try, own)
-            better = _objective(trial, prior, s_try) < objective
+            trial = linearise_at(evidence, parts, x_try, s_try, own)
+            better = _total_misfit(trial, prior, s_try) < objective
             if better or foreseen < 0.1:
                 break
         if not better:
             break
         x, s = x_try, s_try
-        places = trial if together else relinearised(evidence, parts, x, s, trial)
-        objective = _objective(places, prior, s)
+        points = trial if together else move_linearisation_points(evidence, parts, x, s, trial)
+        objective = _total_misfit(points, prior, s)
         fell = before - objective
         if abs(fell) < 0.3 and foreseen < 0.5:
             break
@@ -153,8 +157,8 @@ def fit(
     covariance = np.asarray(inverse[:k, :k], dtype=np.float64)
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
-        by_run=misfits(places), covariance=covariance,
-        residuals=tuple(place.residual for place in places), offsets=tuple(place.offsets for place in places),
+        by_run=misfits(points), covariance=covariance,
+        residuals=tuple(point.residual for point in points), offsets=tuple(point.offsets for point in points),
     )  # fmt: skip
 
 
@@ -185,7 +189,7 @@ def _slopes(
     return slopes
 
 
-def _move(
+def _gauss_newton_step(
     normal: NDArray[np.float64],
     right: NDArray[np.float64],
     x: NDArray[np.float64],
@@ -211,11 +215,11 @@ def misfit_by_run(
     evidence: tuple[RunEvidence, ...], fitted: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Marginalised misfit of runs under a fit made on other runs, and how far it is from settled; float64 [R]."""
-    places = settled(evidence, fitted.parts, fitted.values, fitted.session)
-    return misfits(places), np.array([place.doubt for place in places])
+    points = linearise_runs(evidence, fitted.parts, fitted.values, fitted.session)
+    return misfits(points), np.array([point.linearisation_error for point in points])
 
 
-def fall(
+def sum_misfit_falls(
     before: tuple[NDArray[np.float64], NDArray[np.float64]],
     after: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> float:
@@ -229,5 +233,7 @@ def fall(
     return float(np.sum(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0)))
 
 
-def _objective(places: tuple[Place, ...], prior: NDArray[np.float64], session: NDArray[np.float64]) -> float:
-    return float(misfits(places).sum() + np.sum(prior * session**2))
+def _total_misfit(
+    points: tuple[LinearisedRun, ...], prior: NDArray[np.float64], session: NDArray[np.float64]
+) -> float:
+    return float(misfits(points).sum() + np.sum(prior * session**2))

@@ -1,4 +1,4 @@
-"""What may be added to the model: parameters with bounds, and how they enter."""
+"""Hypotheses: parameters with bounds that may be added to the model, and how they enter."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ Build = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], tuple[Slot, .
 
 @dataclass(frozen=True, kw_only=True)
 class Hypothesis:
-    """What may be added to the model: parameters and how they enter.
+    """Something that may be added to the model: parameters and how they enter.
 
     Parameters
     ----------

@@ -15,20 +15,22 @@ from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import SUBSTEPS, RunModel, predict, run_model
 from tasks.identification.inference.hypothesis import compose
 from tasks.identification.inference.noise import channel_noise, whiten
+from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import EFFECT_TABLE
 from tasks.vehicle.parameters import Vehicle
 
-TORN = 100.0
-"""Misfit by halving the step from which a run is left out: sound runs have under 20, forked ones over 10,000."""
-FEWEST = 3
 FREED = 20.0
 """Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
 
 
-def prepare(
-    campaign: Campaign, vehicle: Vehicle, surface: SurfaceParameters, effects: tuple[Effect, ...]
+def prepare_evidence(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    effects: tuple[Effect, ...],
+    rules: DecisionRules,
 ) -> Evidence:
     """Noise and derivatives about the model as it stands, under the first guess of the disturbances.
 
@@ -37,6 +39,7 @@ def prepare(
     campaign : measured runs with their split
     vehicle, surface : the model that is judged
     effects : the library of candidates
+    rules : which runs are left out, and by which all is decided
     """
     rho, sigma = channel_noise(campaign)
     plain = np.zeros(len(EFFECT_TABLE))
@@ -47,19 +50,19 @@ def prepare(
 
     def derived(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
         own = [m for m in models if m.run.held_out == held_out]
-        sound = [m for m in own if step_change(m, rho, sigma) <= TORN]
+        sound = [m for m in own if step_change(m, rho, sigma) <= rules.forked_misfit]
         # too few sound runs to do without the others
-        kept = sound if len(sound) >= FEWEST else own
+        kept = sound if len(sound) >= rules.fewest_runs else own
         used.extend(m.run.name for m in kept)
         return tuple(
             run_evidence(model, rho, sigma, plain, library, campaign.tolerances, guess) for model in kept
         )
 
     train, held_out = derived(False, effects), derived(True, ())
-    torn = tuple(run.name for run in campaign.runs if run.name not in used)
+    forked = tuple(run.name for run in campaign.runs if run.name not in used)
     return Evidence(
         train=train, held_out=held_out, effects=effects,
-        tolerances=campaign.tolerances, disturbance=guess, torn=torn,
+        tolerances=campaign.tolerances, disturbance=guess, rules=rules, forked=forked,
     )  # fmt: skip
 
 
@@ -76,7 +79,7 @@ def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.flo
     return float(np.sum(whiten(change, rho, sigma) ** 2))
 
 
-def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
+def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     """The same runs with derivatives taken about a fit.
 
     Parameters
@@ -103,7 +106,7 @@ def rederived(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     )
 
 
-def rescaled(evidence: Evidence, disturbance: Disturbance) -> Evidence:
+def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Evidence:
     """The same runs under other scales of the disturbances.
 
     Parameters

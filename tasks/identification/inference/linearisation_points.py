@@ -13,12 +13,12 @@ SETTLING = 4
 """Moves of a run's point of linearisation before its misfit is taken."""
 SLACK = 1.0
 """Rise of a run's misfit that is taken for rounding when its point of linearisation moves."""
-SETTLED = 0.05
+MISFIT_SETTLED = 0.05
 """Change of a run's misfit by a full move of its point of linearisation below which it is moved no further."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class LinearisedRun:
     """A run at some parameters, linearised about its own offsets.
 
     Parameters
@@ -34,15 +34,15 @@ class Place:
     residual: NDArray[np.float64]
     projected: NDArray[np.float64]
     misfit: float
-    doubt: float = np.inf
+    linearisation_error: float = np.inf
 
 
-def settled(
+def linearise_runs(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
-) -> tuple[Place, ...]:
+) -> tuple[LinearisedRun, ...]:
     """Every run linearised about its posterior, from offsets of 0.
 
     Parameters
@@ -52,19 +52,19 @@ def settled(
     x : float64 [K] their parameters
     s : float64 [7] session nuisances
     """
-    places = places_at(evidence, parts, x, s, (None,) * len(evidence))
+    points = linearise_at(evidence, parts, x, s, (None,) * len(evidence))
     for _ in range(SETTLING):
-        places = relinearised(evidence, parts, x, s, places)
-    return places
+        points = move_linearisation_points(evidence, parts, x, s, points)
+    return points
 
 
-def relinearised(
+def move_linearisation_points(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
-    places: tuple[Place, ...],
-) -> tuple[Place, ...]:
+    points: tuple[LinearisedRun, ...],
+) -> tuple[LinearisedRun, ...]:
     """Move every run's point of linearisation towards its posterior, as far as the run does not fit worse.
 
     Parameters
@@ -73,33 +73,33 @@ def relinearised(
     parts : hypotheses, in the order of the parameters
     x : float64 [K] their parameters
     s : float64 [7] session nuisances
-    places : where they are
+    points : where they are
     """
     theta, slots = compose(parts, x, s)
-    after = list(places)
-    for i, (run, place) in enumerate(zip(evidence, places, strict=True)):
-        if place.doubt < SETTLED:
+    after = list(points)
+    for i, (run, point) in enumerate(zip(evidence, points, strict=True)):
+        if point.linearisation_error < MISFIT_SETTLED:
             continue
-        move = run.offsets(place.projected) - place.offsets
-        doubt = np.inf
+        move = run.offsets(point.projected) - point.offsets
+        linearisation_error = np.inf
         for share in (1.0, 0.4):
-            trial = _place(run, theta, slots, place.offsets + share * move)
+            trial = _linearise_run(run, theta, slots, point.offsets + share * move)
             if share == 1.0:
-                doubt = abs(trial.misfit - place.misfit)
-            after[i] = replace(place, doubt=doubt)
-            if trial.misfit <= place.misfit + SLACK:
-                after[i] = replace(trial, doubt=doubt)
+                linearisation_error = abs(trial.misfit - point.misfit)
+            after[i] = replace(point, linearisation_error=linearisation_error)
+            if trial.misfit <= point.misfit + SLACK:
+                after[i] = replace(trial, linearisation_error=linearisation_error)
                 break
     return tuple(after)
 
 
-def places_at(
+def linearise_at(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
     offsets: tuple[NDArray[np.float64] | None, ...],
-) -> tuple[Place, ...]:
+) -> tuple[LinearisedRun, ...]:
     """Every run linearised about given offsets.
 
     Parameters
@@ -111,20 +111,20 @@ def places_at(
     offsets : float64 [D] of each run; None is 0 everywhere
     """
     theta, slots = compose(parts, x, s)
-    return tuple(_place(run, theta, slots, d) for run, d in zip(evidence, offsets, strict=True))
+    return tuple(_linearise_run(run, theta, slots, d) for run, d in zip(evidence, offsets, strict=True))
 
 
-def _place(
+def _linearise_run(
     run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64] | None
-) -> Place:
+) -> LinearisedRun:
     residual = run.residual(theta, slots, offsets)
     projected = run.project(residual)
-    return Place(
+    return LinearisedRun(
         offsets=np.zeros(run.nuisance.shape[1]) if offsets is None else offsets, residual=residual,
         projected=projected, misfit=float(residual @ residual - projected @ projected),
     )  # fmt: skip
 
 
-def misfits(places: tuple[Place, ...]) -> NDArray[np.float64]:
+def misfits(points: tuple[LinearisedRun, ...]) -> NDArray[np.float64]:
     """Marginalised misfit of each run, float64 [R]."""
-    return np.array([place.misfit for place in places])
+    return np.array([point.misfit for point in points])

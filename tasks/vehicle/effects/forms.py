@@ -80,7 +80,7 @@ def coefficient_count(shape: str) -> int:
 
 
 def form_name(port: str, variable: str, shape: str, scale: float) -> str:
-    """What a form is called: its port, its shape, and what x is.
+    """Return the name of a form: its port, its shape, and what x is.
 
     Parameters
     ----------

@@ -18,12 +18,12 @@ from tasks.vehicle.paper.wheels import Wheels
 from tasks.vehicle.tyres.contract import Tyre
 
 _BRAKE_FORM, _FRICTION_FORM = PORTS.index("brake_torque"), PORTS.index("friction")
-Senses = tuple[float, float, float, float, float, float, float, float, float]
-"""What a form can depend on, in the order of `VARIABLES`."""
+FormVariables = tuple[float, float, float, float, float, float, float, float, float]
+"""Variables that a form can depend on, in the order of `VARIABLES`."""
 
 
 class AxlePorts(NamedTuple):
-    """What acts at one axle.
+    """Forces and torques at one axle.
 
     Parameters
     ----------
@@ -95,8 +95,10 @@ def lock_share(omega: float, lock_speed: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def senses_of(speed: float, load_ratio: float, strut: Strut, memory: AxleMemory, instant: Instant) -> Senses:
-    """What a form at an axle can depend on, in the order of `VARIABLES`.
+def form_variables(
+    speed: float, load_ratio: float, strut: Strut, memory: AxleMemory, instant: Instant
+) -> FormVariables:
+    """Return what a form at an axle can depend on, in the order of `VARIABLES`.
 
     Parameters
     ----------
@@ -165,9 +167,9 @@ def rolling_axle(
     grip = friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet)
     pressure = acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
     if forms is not None:
-        senses = senses_of(speed, load_ratio, strut, memory, instant)
-        grip *= max(1.0 + slot_sum(_FRICTION_FORM, senses, forms), 0.0)
-        pressure *= max(1.0 + slot_sum(_BRAKE_FORM, senses, forms), 0.0)
+        variables = form_variables(speed, load_ratio, strut, memory, instant)
+        grip *= max(1.0 + slot_sum(_FRICTION_FORM, variables, forms), 0.0)
+        pressure *= max(1.0 + slot_sum(_BRAKE_FORM, variables, forms), 0.0)
     sticking = stick_share(speed, effects)
     tyre_force = signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
     wanted = abs_command(slip, tyre.target_slip, wheels.release_width) if speed >= effects.abs_cutoff else 1.0
@@ -226,7 +228,7 @@ def with_links(ports: AxlePorts, force: float) -> AxlePorts:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def reserve_of(ports: AxlePorts, tyre: Tyre) -> float:
+def axle_grip_reserve(ports: AxlePorts, tyre: Tyre) -> float:
     """Sideways grip that an axle has left; none off the road [1].
 
     Parameters

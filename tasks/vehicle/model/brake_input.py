@@ -1,4 +1,4 @@
-"""What the driver does: a brake command, or brake pressure as it was measured."""
+"""Input of the driver: a brake command, or brake pressure as it was measured."""
 
 from math import inf
 from typing import NamedTuple

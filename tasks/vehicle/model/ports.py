@@ -15,9 +15,9 @@ from tasks.vehicle.effects.slots import SlotTables, slot_sum
 from tasks.vehicle.half_car import HalfCarState
 from tasks.vehicle.model.axle_ports import (
     AxlePorts,
-    reserve_of,
+    axle_grip_reserve,
+    form_variables,
     rolling_axle,
-    senses_of,
     standing_axle,
     with_links,
 )
@@ -33,7 +33,7 @@ _FORCE_FORM, _PITCH_FORM, _STRUT_FORM = (
 
 
 class Ports(NamedTuple):
-    """What acts on the vehicle at one instant.
+    """Forces and moments on the vehicle at one instant.
 
     Parameters
     ----------
@@ -121,19 +121,19 @@ def ports_at(
     lift_r = link_lift(rear.tyre_force, chassis.transfer, effects.anti_lift, effects.stick_anti_lift, share)
     if effects.scrub_stiffness != 0.0 and not standing:
         scrub = effects.scrub_stiffness * (1.0 - share)
-        lift_f -= scrub * body.spring_f * strut_f.travel * reserve_of(front, tyre)
-        lift_r += scrub * body.spring_r * strut_r.travel * reserve_of(rear, tyre)
+        lift_f -= scrub * body.spring_f * strut_f.travel * axle_grip_reserve(front, tyre)
+        lift_r += scrub * body.spring_r * strut_r.travel * axle_grip_reserve(rear, tyre)
     slope_f, slope_r = ground_f.load * ground_f.slope, ground_r.load * ground_r.slope
     drag = wheels.mass * wheels.coast + resistance(effects, speed, chassis.direction, chassis.snow_depth_mm)
     drag += wheels.mass * chassis.climb
     moment = effects.aero_pitch * speed * speed
     if forms is not None:
-        senses_f = senses_of(speed, ground_f.load / body.static_f, strut_f, memory.front, instant)
-        senses_r = senses_of(speed, ground_r.load / body.static_r, strut_r, memory.rear, instant)
-        lift_f -= slot_sum(_STRUT_FORM, senses_f, forms)
-        lift_r += slot_sum(_STRUT_FORM, senses_r, forms)
-        drag += slot_sum(_FORCE_FORM, senses_f, forms)
-        moment += slot_sum(_PITCH_FORM, senses_f, forms)
+        variables_f = form_variables(speed, ground_f.load / body.static_f, strut_f, memory.front, instant)
+        variables_r = form_variables(speed, ground_r.load / body.static_r, strut_r, memory.rear, instant)
+        lift_f -= slot_sum(_STRUT_FORM, variables_f, forms)
+        lift_r += slot_sum(_STRUT_FORM, variables_r, forms)
+        drag += slot_sum(_FORCE_FORM, variables_f, forms)
+        moment += slot_sum(_PITCH_FORM, variables_f, forms)
     front, rear = with_links(front, -lift_f), with_links(rear, lift_r)
     acceleration = 0.0
     if not (standing or instant.held):

@@ -19,7 +19,7 @@ class Motion(NamedTuple):
 
 
 class AxleMemory(NamedTuple):
-    """What an axle's tyres and discs carry on from before.
+    """Slip and heat of an axle's tyres and discs, which depend on what went before.
 
     Parameters
     ----------
@@ -34,14 +34,14 @@ class AxleMemory(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What both axles carry on from before."""
+    """Slip and heat of both axles."""
 
     front: AxleMemory
     rear: AxleMemory
 
 
 class Instant(NamedTuple):
-    """What acts from outside at one instant.
+    """Inputs from outside at one instant.
 
     Parameters
     ----------
@@ -121,8 +121,8 @@ def state_of_row(row: NDArray[np.float64]) -> VehicleState:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def moved_motion(motion: Motion, rate: Motion, step: float) -> Motion:
-    """The longitudinal state after going along a rate for a step [s]."""
+def advance_motion(motion: Motion, rate: Motion, step: float) -> Motion:
+    """Return the longitudinal state after going along a rate for a step [s]."""
     return Motion(
         motion.station + step * rate.station,
         motion.speed + step * rate.speed,
@@ -132,8 +132,8 @@ def moved_motion(motion: Motion, rate: Motion, step: float) -> Motion:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def moved_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemory:
-    """What an axle remembers after going along a rate for a step [s]."""
+def advance_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemory:
+    """Return slip and heat of an axle after going along a rate for a step [s]."""
     return AxleMemory(
         memory.slip + step * rate.slip,
         memory.slip_heat + step * rate.slip_heat,
@@ -143,7 +143,7 @@ def moved_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemory:
 
 @njit(cache=True, nogil=True, forceinline=True)
 def without_slip(memory: Memory) -> Memory:
-    """The same with tyres that have come to rest; what is warm stays warm."""
+    """Return the same without slip, as at rest; tyres and discs stay warm."""
     front, rear = memory.front, memory.rear
     return Memory(
         AxleMemory(0.0, front.slip_heat, front.disc_rise), AxleMemory(0.0, rear.slip_heat, rear.disc_rise)

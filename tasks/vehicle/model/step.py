@@ -14,7 +14,7 @@ from tasks.vehicle.model.axle_ports import AxlePorts, relaxation_rate
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.ports import Ports, ports_at
 from tasks.vehicle.model.slip_matrix import GAMMA, axle_slope, solve_slip, without_speed
-from tasks.vehicle.model.states import AxleMemory, Instant, Memory, Motion, moved_axle, moved_motion
+from tasks.vehicle.model.states import AxleMemory, Instant, Memory, Motion, advance_axle, advance_motion
 from tasks.vehicle.paper.wheels import Axle
 from tasks.vehicle.road import RoadFeature
 from tasks.vehicle.tyres.contract import Tyre
@@ -153,8 +153,10 @@ def take_step(
     f1 = motion_rates(motion, ports, instant.standing, chassis)
     k1, m1 = solve_slip(f1, memory_rates(memory, motion, ports, chassis), front, rear, GAMMA * step)
     h1 = body_rates(x, ports, body)
-    ahead, x_ahead = moved_motion(motion, k1, step), moved(x, h1, step)
-    memory_ahead = Memory(moved_axle(memory.front, m1.front, step), moved_axle(memory.rear, m1.rear, step))
+    ahead, x_ahead = advance_motion(motion, k1, step), moved(x, h1, step)
+    memory_ahead = Memory(
+        advance_axle(memory.front, m1.front, step), advance_axle(memory.rear, m1.rear, step)
+    )
     later = ports_at(
         ahead, memory_ahead, x_ahead, next_instant, ports.front.abs_scale, ports.rear.abs_scale, step, forms,
         chassis, tyre, road,
@@ -162,8 +164,8 @@ def take_step(
     f2 = motion_rates(ahead, later, instant.standing, chassis)
     g2 = memory_rates(memory_ahead, ahead, later, chassis)
     k2, m2 = solve_slip(
-        moved_motion(f2, k1, -2.0),
-        Memory(moved_axle(g2.front, m1.front, -2.0), moved_axle(g2.rear, m1.rear, -2.0)),
+        advance_motion(f2, k1, -2.0),
+        Memory(advance_axle(g2.front, m1.front, -2.0), advance_axle(g2.rear, m1.rear, -2.0)),
         front,
         rear,
         GAMMA * step,
@@ -176,11 +178,12 @@ def take_step(
         motion.omega_r + step * (1.5 * k1.omega_r + 0.5 * k2.omega_r),
     )
     remembered = Memory(
-        _stepped(memory.front, m1.front, m2.front, step), _stepped(memory.rear, m1.rear, m2.rear, step)
+        _advance_axle_twice(memory.front, m1.front, m2.front, step),
+        _advance_axle_twice(memory.rear, m1.rear, m2.rear, step),
     )
     return after, remembered, moved(moved(x, h1, 0.5 * step), h2, 0.5 * step)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _stepped(memory: AxleMemory, k1: AxleMemory, k2: AxleMemory, step: float) -> AxleMemory:
-    return moved_axle(moved_axle(memory, k1, 1.5 * step), k2, 0.5 * step)
+def _advance_axle_twice(memory: AxleMemory, k1: AxleMemory, k2: AxleMemory, step: float) -> AxleMemory:
+    return advance_axle(advance_axle(memory, k1, 1.5 * step), k2, 0.5 * step)

@@ -1,4 +1,4 @@
-"""What carries an axle at one instant: the road under it, its load, and the strut above it."""
+"""Road under an axle, its load, and the strut above it, at one instant."""
 
 from typing import NamedTuple
 

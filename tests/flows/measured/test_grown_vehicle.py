@@ -18,7 +18,7 @@ def drag(value: float, name: str = "aerodynamic_drag") -> NamedEffect:
         ci_high=value + 0.1,
         lower=0.0,
         upper=3.0,
-        unit="m^2",
+        unit="m2",
     )
     return NamedEffect(
         name=name, effect_class="effect", port="longitudinal_force", variable="speed", parameters=(parameter,),
@@ -32,7 +32,7 @@ def verdict_of(
     return Verdict(
         verdict="SET" if rivals else "FOUND", effects=(effect,), rivals=rivals, tried=(), error={}, manoeuvre_error={},
         correlation={}, session_pulls={}, noise={}, disturbance=Disturbance(), detectable={}, campaign=campaign,
-        content_hash="c" * 64, split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, torn=(), reasons=(),
+        content_hash="c" * 64, split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, forked=(), reasons=(),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import Run
-from tasks.identification.decision.excitation import reached
+from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.forms import PORT_STEP, RANGE, form_in_range
 from tasks.identification.inference.forward import run_model, simulate_run
 from tasks.surface.road_profile import RoadHazard
@@ -156,7 +156,7 @@ def test_a_form_at_any_port_over_any_variable_drives_in_a_dataset_as_it_was_fitt
 def test_a_form_that_was_found_is_in_the_vehicle_with_its_range_and_where_it_comes_from(tmp_path):
     found = found_form("brake_torque", "pressure", "a + b x", 3.6, 0.05, 0.2)
     model, _ = fitted_run("dry", PLAIN)
-    low, high = reached([model], PLAIN, (), "pressure")
+    low, high = find_reached_range([model], PLAIN, (), "pressure")
     assert low == 0.0 and high == pytest.approx(1.6)
     path = grown_file(tmp_path / "grown.yaml", found, reached={"pressure": (low, high)})
     (form,) = load_vehicle(path).forms
@@ -169,7 +169,7 @@ def test_a_form_that_was_found_is_in_the_vehicle_with_its_range_and_where_it_com
 
 def test_the_range_that_runs_reach_is_that_of_the_model():
     models = [fitted_run(name, PLAIN)[0] for name in ("dry", "hump")]
-    ranges = {variable: reached(models, PLAIN, (), variable) for variable in VARIABLES}
+    ranges = {variable: find_reached_range(models, PLAIN, (), variable) for variable in VARIABLES}
     assert ranges["speed"][1] == pytest.approx(25.0) and ranges["time"] == (0.0, 2.99)
     assert ranges["pressure_rate"] == pytest.approx((-4.0, 4.0))
     assert 0.1 < ranges["load_ratio"][0] < 0.9 and 1.2 < ranges["load_ratio"][1] < 2.0

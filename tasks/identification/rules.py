@@ -1,0 +1,69 @@
+"""The rules by which a verdict is reached, apart from the solvers that reach it."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class DecisionRules:
+    """Thresholds and counts of a decision; values, units and reasons stand in catalogs/decision_rules.yaml.
+
+    Parameters
+    ----------
+    accept_score : score from which an effect may be named: gain / inflation - parameters x log N [1]
+    held_out_gain : fall of the held-out misfit from which an effect may be named [1]
+    rival_span : difference of scores within which two explanations cannot be told apart [1]
+    win_share : share of bootstrap resamples that the named effect must win [1]
+    bootstrap_resamples : bootstrap resamples of the runs [1]
+    refined_candidates : candidates of a screening that are refined through the simulation [1]
+    refined_look_alikes : look-alikes of the best candidate that are refined too [1]
+    look_alike_cosine : cosine between two library directions, nuisances taken out, from which they look alike [1]
+    trusted_screen_share : share of the best gain below which the linear screen is believed without refinement [1]
+    relinearisation_gain : gain from which derivatives taken without an effect no longer hold with it [1]
+    reached_share : share of the linear gain that a first fit must reach to need no other start [1]
+    most_effects : effects that one campaign can name [1]
+    explored_candidates : candidates refined while only the disturbances are to be scaled [1]
+    relinearised_candidates : candidates of a round whose derivatives are taken anew, if their gain is large [1]
+    relinearisation_change : relative change of parameters below which derivatives need not be taken anew once more [1]
+    retune_pull : pull of a session nuisance, in prior sigmas, from which it is a wrong number of the vehicle [1]
+    relinearisation_pull : pull, in prior sigmas, from which derivatives are taken anew at the session [1]
+    disagreement : inflation of a named effect from which a form alone is held against it [1]
+    lone_form_share : share of the named effects' gain from which a form alone is held against them [1]
+    least_expected_d2 : expected squared distance below which a planned run says nothing [1]
+    retune_widening : factor on the session's tolerances when a model is re-tuned without any new effect [1]
+    error_resamples : bootstrap resamples of the held-out errors [1]
+    worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
+    longest_lag : longest lag at which residual and brake pressure are correlated [s]
+    profile_points : points of the profile likelihood tried on each side of an estimate [1]
+    profile_tolerance : relative error of the root deviance at which the profile is followed no further [1]
+    forked_misfit : misfit by halving the step from which a run forks and is left out [1]
+    fewest_runs : runs below which those that fork are used all the same [1]
+    """
+
+    accept_score: float
+    held_out_gain: float
+    rival_span: float
+    win_share: float
+    bootstrap_resamples: int
+    refined_candidates: int
+    refined_look_alikes: int
+    look_alike_cosine: float
+    trusted_screen_share: float
+    relinearisation_gain: float
+    reached_share: float
+    most_effects: int
+    explored_candidates: int
+    relinearised_candidates: int
+    relinearisation_change: float
+    retune_pull: float
+    relinearisation_pull: float
+    disagreement: float
+    lone_form_share: float
+    least_expected_d2: float
+    retune_widening: float
+    error_resamples: int
+    worse_limit: float
+    longest_lag: float
+    profile_points: int
+    profile_tolerance: float
+    forked_misfit: float
+    fewest_runs: int
