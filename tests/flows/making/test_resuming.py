@@ -65,7 +65,7 @@ def test_what_a_run_left_that_stopped_after_its_manifest_goes_with_the_next_run_
     def refuse(*args: object, **kwargs: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("flows.making.seal.publish", refuse)
+    monkeypatch.setattr("flows.making.seal.send_files", refuse)
     with pytest.raises(OSError, match="No space"):
         make(grid, tmp_path / "data")
     monkeypatch.undo()
