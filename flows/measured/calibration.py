@@ -14,6 +14,7 @@ from catalogs.entries import find_entry
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
 from catalogs.vehicles import load_vehicle
 from catalogs.vehicles.frozen import frozen_text
+from flows.measured.grown_vehicle import tyre_beside
 from flows.store.outputs import Outputs
 from flows.studies.vehicle_model import agreement_of
 from manifests.canonical import sha256_of_file
@@ -57,7 +58,8 @@ def calibrate(
     InputError
         Listing every problem of traces, vehicle or procedure.
     """
-    results = Outputs(out, "calibrate", f"{name}.yaml", "calibration.json")
+    beside = tyre_beside(vehicle)
+    results = Outputs(out, "calibrate", f"{name}.yaml", "calibration.json", *beside)
     start = load_vehicle(vehicle)
     steps, interval = load_procedure(procedure)
     reference = read_reference(Path(traces), split=split)
@@ -70,6 +72,8 @@ def calibrate(
     fitted = _rounded(fitted, steps)
     target = results.path(f"{name}.yaml")
     data = {case.case: sha256_of_file(trace_file(Path(traces), case.case)) for case, _ in reference}
+    for file, content in beside.items():
+        results.write(file, content)
     results.write(f"{name}.yaml", _frozen(fitted, vehicle, procedure, steps, split, data))
     frozen = load_vehicle(target)
     after = agreement_of(frozen, reference, steps.mode)

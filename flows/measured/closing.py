@@ -15,7 +15,7 @@ from catalogs.vehicles import load_vehicle
 from flows.measured.closing_ledger import record_reading
 from flows.measured.closing_report import report_html
 from flows.measured.closing_residuals import residual_rmse
-from flows.measured.grown_vehicle import grown_vehicle
+from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of_file
 from manifests.provenance import code_version
@@ -48,7 +48,8 @@ def close_loop(
     name = vehicle or measured.vehicle
     model, road = load_vehicle(name), load_surface(surface)
     grown = f"{Path(name).stem}-grown.yaml"
-    results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown)
+    beside = tyre_beside(name)
+    results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown, *beside)
     results.write_json("split.json", split_of(measured))
     earlier = record_reading(measured, sha256_of_file(find_entry("vehicle", name)))
     trace = find_missing_effects(measured, model, road, load_effects(), load_decision_rules())
@@ -67,6 +68,8 @@ def close_loop(
     text, missing = grown_vehicle(name, verdict, ranges)
     result["vehicle_file"] = None
     if text is not None:
+        for file, content in beside.items():
+            results.write(file, content)
         results.write(grown, text)
         load_vehicle(results.path(grown))
         result["vehicle_file"] = str(results.path(grown))

@@ -7,7 +7,7 @@ import yaml
 
 from catalogs.effects import LIBRARY_FILE
 from catalogs.entries import find_entry
-from catalogs.vehicles import load_vehicle
+from catalogs.vehicles import load_vehicle, vehicle_tyre_source
 from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of_file
@@ -19,6 +19,23 @@ from tasks.vehicle.effects.grown import FAMILY, apply_effects
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
 from tasks.vehicle.effects.table import PARAMETERS, EffectParameter
 from tasks.vehicle.parameters import Vehicle
+
+
+def tyre_beside(name: str) -> dict[str, bytes]:
+    """Return the property file that lies beside a vehicle's file, by its name: what grows from it needs that too.
+
+    Parameters
+    ----------
+    name : catalogue name or file of the vehicle
+
+    Returns
+    -------
+    One file, or none where the vehicle names no tyre or one of the catalogue.
+    """
+    tyre = vehicle_tyre_source(name)
+    if tyre is None or tyre.parent != find_entry("vehicle", name).parent:
+        return {}
+    return {tyre.name: tyre.read_bytes()}
 
 
 def grown_vehicle(

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.brake import brake_pressure
+from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE, EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.model.brake_input import brake_command, measured_trace
@@ -85,6 +87,24 @@ def test_inference_may_take_steps_of_2_ms(run):
     coarse, fine = run(substeps=5), run(substeps=40)
     assert np.abs(coarse.column("speed") - fine.column("speed")).max() < 0.003
     assert np.abs(np.degrees(coarse.column("pitch") - fine.column("pitch"))).max() < 0.005
+
+
+class TestEffectsOfAVehicle:
+    def test_each_kind_acts_on_its_fields(self, vehicle):
+        grown = apply_effects(
+            replace(vehicle, effects={"lag": 0.02}),
+            {"lag": 0.03, "mass": 0.1, "wheel_inertia": 1.5, "friction": -0.2, "drag_area": 0.7},
+        )
+        assert grown.effects == {"lag": 0.05, "drag_area": 0.7}
+        assert grown.sprung_mass == vehicle.sprung_mass * 1.1
+        assert grown.wheel_inertia_f == vehicle.wheel_inertia_f + 1.5
+        for kind in ("dry", "snow", "ice"):
+            peaks = [surface_response(car, kind, 0.2).tyre.peak for car in (grown, vehicle)]
+            assert peaks[0] == pytest.approx(0.8 * peaks[1])
+
+    def test_a_grade_and_an_instrument_are_no_part_of_it(self, vehicle):
+        with pytest.raises(InputError, match="speed_scale: no vehicle carries it"):
+            apply_effects(vehicle, {"slope": 0.01, "speed_scale": 0.02})
 
 
 class TestTheTableOfEffects:

@@ -26,7 +26,8 @@ def apply_effects(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
     foreign = [name for name in values if name not in PARAMETERS or not PARAMETERS[name].of_vehicle]
     if foreign:
         raise InputError([f"effect parameter {name}: no vehicle carries it" for name in foreign])
-    effects, families = dict(vehicle.effects), dict(vehicle.families)
+    effects = dict(vehicle.effects)
+    families, shared = dict(vehicle.families), dict(vehicle.shared_families)
     fields: dict[str, float] = {}
     for name, value in values.items():
         row = PARAMETERS[name]
@@ -35,10 +36,11 @@ def apply_effects(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
                 effects[field] = effects.get(field, 0.0) + value
             elif field.startswith(FAMILY):
                 table = field.removeprefix(FAMILY)
-                for weather, family in families.items():
-                    scaled = tuple(v * (1.0 + value) for v in getattr(family, table))
-                    families[weather] = replace(family, **{table: scaled})
+                for group in (families, shared):
+                    for weather, family in group.items():
+                        scaled = tuple(v * (1.0 + value) for v in getattr(family, table))
+                        group[weather] = replace(family, **{table: scaled})
             else:
                 old = fields.get(field, getattr(vehicle, field))
                 fields[field] = old * (1.0 + value) if row.kind == "scaled" else old + value
-    return replace(vehicle, effects=effects, families=families, **fields)  # type: ignore[arg-type]
+    return replace(vehicle, effects=effects, families=families, shared_families=shared, **fields)  # type: ignore[arg-type]
