@@ -75,7 +75,7 @@ def grown_vehicle(
             entry["forms"] = [*entry.get("forms", ()), _form_entry(form, source_text, verdict.campaign)]
             bounds |= {f"{effect.name}: {p.name}": _limits(p) for p in effect.parameters}
             continue
-        if not all(PARAMETERS[p.name].of_vehicle for p in effect.parameters):
+        if not all(p.name in PARAMETERS and PARAMETERS[p.name].of_vehicle for p in effect.parameters):
             missing += [f"{effect.name}: {p.name}" for p in effect.parameters]
             continue
         for p in effect.parameters:

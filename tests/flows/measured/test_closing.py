@@ -192,7 +192,7 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
 
 def test_the_verdict_has_the_keys_that_others_read_and_is_plain_json() -> None:
     content = verdict_json(
-        verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m^2")))
+        verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2")))
     )
     assert {"verdict", "effects", "rivals", "discriminating_experiment", "error"} <= set(content)
     effect = content["effects"][0]
@@ -205,7 +205,7 @@ def test_the_verdict_has_the_keys_that_others_read_and_is_plain_json() -> None:
 
 def test_the_grown_vehicle_has_the_effect_the_retuned_number_and_where_they_come_from(tmp_path: Path) -> None:
     verdict = verdict_of(
-        named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m^2")),
+        named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2")),
         named("retuned_pressure_gain", "retune", parameter("pressure_gain", 0.1)),
         named("retuned_friction_level", "retune", parameter("friction", -0.05)),
     )
@@ -234,7 +234,7 @@ def test_sensor_faults_do_not_change_the_car_and_what_is_not_carried_is_named() 
 def test_a_dataset_is_planned_with_the_grown_vehicle_in_coupled_mode(tmp_path: Path) -> None:
     text, _ = grown_vehicle(
         "paper-reference",
-        verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m^2"))),
+        verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2"))),
         {},
     )
     assert text is not None
