@@ -32,7 +32,7 @@ LONGEST_MESSAGE = 20_000
 """Characters of all the sentences about one input."""
 START = "spawn"
 """How processes begin: with nothing of this one's memory."""
-RETIRED_BYTES = 3 * 2**28
+RETIRED_BYTES = 5 * 2**27
 """A process that has come to hold this much is replaced: what libraries keep is not the input's."""
 CHUNK = 100
 """Inputs that a process is given at once."""
@@ -189,7 +189,7 @@ def read_watched(
                     continue
                 if worker.left:
                     waiting.append((worker.parser, worker.left))
-                if worker.alive and waiting and worker.may_read(waiting[-1][0]):
+                if worker.alive and waiting and worker.peak_bytes < RETIRED_BYTES:
                     worker.give(waiting.pop())
                 else:
                     worker.stop()
@@ -223,10 +223,6 @@ class _Worker:
         self._heard, self._started = time.monotonic(), False
         with contextlib.suppress(BrokenPipeError):
             self.line.send(task)
-
-    def may_read(self, parser: str) -> bool:
-        """Whether it may go on with a parser: what libraries keep of other parsers' inputs counts as no input's."""
-        return parser == self.parser and self.peak_bytes < RETIRED_BYTES
 
     @property
     def is_late(self) -> bool:

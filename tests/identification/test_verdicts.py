@@ -96,7 +96,7 @@ def test_two_effects_at_once_are_both_named() -> None:
 
 
 def test_what_stops_of_one_kind_cannot_tell_apart_is_a_set_with_the_run_that_can() -> None:
-    verdict = judged({"pad_drag": 60.0}, design=load_closing_study().drives())
+    verdict = judged({"pad_drag": 40.0}, design=load_closing_study().drives())
     told = {*names(verdict), *(rival.name for _, rival in verdict.rivals)}
     assert verdict.verdict == "SET" and "pad_drag" in told
     assert verdict.experiment is not None and verdict.experiment.expected_d2 > 10.0

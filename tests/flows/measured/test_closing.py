@@ -191,9 +191,7 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
 
 
 def test_the_verdict_has_the_keys_that_others_read_and_is_plain_json() -> None:
-    content = verdict_json(
-        verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2")))
-    )
+    content = verdict_json(verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2"))))
     assert {"verdict", "effects", "rivals", "discriminating_experiment", "error"} <= set(content)
     effect = content["effects"][0]
     assert {"name", "class", "port", "variable", "parameters", "score"} <= set(effect)
