@@ -132,11 +132,15 @@ def weather_rows(clips: list[JudgedClip]) -> Iterator[Row]:
         station, control_station = clip.frames["station"], control.frames["station"]
         forward = motion.normalised_path, other.normalised_path
         for window in WINDOWS:
-            error = None if failure else weather_error(
-                forward[0][:, 0], forward[1][:, 0], station, control_station, window
-            )  # fmt: skip
-            floor = weather_error(station, control_station, station, control_station, window)
-            yield figure_row("e_weather", method, label, error, "1", note=failure, window=window, floor=floor)
+            try:
+                floor = weather_error(station, control_station, station, control_station, window)
+                error = None if failure else weather_error(
+                    forward[0][:, 0], forward[1][:, 0], station, control_station, window
+                )  # fmt: skip
+                note = failure
+            except InputError as fault:
+                floor, error, note = None, None, str(fault)
+            yield figure_row("e_weather", method, label, error, "1", note=note, window=window, floor=floor)
         error = None if failure else path_error(forward[0][:, :2], forward[1][:, :2])
         yield figure_row("e_path", method, label, error, "1", note=failure, floor=0.0)
 

@@ -45,8 +45,17 @@ def smooth_signal(values: Floats, window: int | None, order: int = 2) -> Floats:
     values : [F] [any]
     window : odd, above the order, None for no smoothing [frames]
     order : of the polynomial [1]
+
+    Raises
+    ------
+    InputError
+        If there are fewer frames than the window holds.
     """
-    return values.copy() if window is None else savgol_filter(values, window, order)
+    if window is None:
+        return values.copy()
+    if len(values) < window:
+        raise InputError(f"A smoothing window of {window} frames needs as many; the clip has {len(values)}.")
+    return savgol_filter(values, window, order)
 
 
 def normalised_progress(forward: Floats, window: int | None, order: int = 2) -> Floats:

@@ -12,6 +12,7 @@ from tasks.eval.video_motion import (
     normalised_progress,
     path_error,
     reference_progress,
+    smooth_signal,
     weather_error,
 )
 
@@ -82,3 +83,9 @@ def test_braking_longer_on_the_same_path_is_no_path_error() -> None:
 def test_retention_takes_off_the_braking_and_ignores_sign_and_scale() -> None:
     dive = 0.03 * np.exp(-((TIMES - 4) ** 2))
     assert motion_retention(HUMP + dive, dive, -0.5 * HUMP + dive, dive) == pytest.approx(1.0)
+
+
+def test_a_clip_shorter_than_the_smoothing_window_is_told() -> None:
+    with pytest.raises(InputError, match="9 frames needs as many; the clip has 8"):
+        smooth_signal(STOP[:8], 9)
+    assert smooth_signal(STOP[:8], 7).shape == (8,)
