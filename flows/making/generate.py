@@ -102,7 +102,7 @@ def generate_dataset(
 
 def _clear_up(layout: Layout) -> None:
     """Remove what a run left that was stopped between its manifest and its end; a run that is there does so itself."""
-    if left_overs(layout):
+    if layout.staging.is_dir() or left_overs(layout):
         with suppress(InputError, OSError), sole_writer(layout):
             remove_left_overs(layout)
 

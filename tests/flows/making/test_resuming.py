@@ -76,6 +76,10 @@ def test_what_a_run_left_that_stopped_after_its_manifest_goes_with_the_next_run_
         assert files_of(tmp_path / "data") == stopped
     make(grid, tmp_path / "data")
     assert files_of(tmp_path / "data") == whole
+    (tmp_path / "data" / ".staging").mkdir()
+    (tmp_path / "data" / ".staging" / "lock").touch()
+    make(grid, tmp_path / "data")
+    assert files_of(tmp_path / "data") == whole
 
 
 def test_a_run_that_was_begun_can_be_begun_anew_with_another_grid(grid, tmp_path, monkeypatch):
