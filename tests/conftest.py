@@ -13,6 +13,15 @@ for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 DATA = Path(os.environ.get("MUSYNC_DATA", Path(__file__).resolve().parents[2] / "shared"))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def own_notes_of_places(tmp_path_factory):
+    """Equal scenes of two test processes lie in two places, and a test changes its own: each process notes its own."""
+    folder = tmp_path_factory.mktemp("notes")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("flows.making.places.cache_root", lambda: folder)
+        yield
+
+
 @pytest.fixture
 def outside_data() -> Path:
     """The folder with reference/ and measured/; skips where it is absent."""

@@ -70,6 +70,18 @@ def test_each_worker_process_sees_one_gpu_of_those_visible(monkeypatch):
     assert sorted(seen.values()) == ["0", "1"]
 
 
+USE_A_CLUSTER = """
+import sys
+from distributed import Client
+from flows.running.runner import open_executor
+
+with Client(sys.argv[1]) as client:
+    client.wait_for_workers(1, timeout=60)
+with open_executor("dask", None, sys.argv[1]) as executor:
+    print(executor.submit(abs, -7).result())
+"""
+
+
 @contextmanager
 def cluster(
     folder: Path, workers: int, tls: Sequence[str] = ()
@@ -144,7 +156,6 @@ def test_a_worker_that_dies_while_it_compiles_is_passed_over(tmp_path):
 
 def test_a_cluster_behind_certificates_is_used_with_those_that_dask_is_configured_with(tmp_path):
     pytest.importorskip("cryptography", reason="makes the certificate of this test")
-    import dask
     from distributed.security import Security
 
     made = Security.temporary()
@@ -154,9 +165,9 @@ def test_a_cluster_behind_certificates_is_used_with_those_that_dask_is_configure
         (tmp_path / file).write_text(parts[option])
     tls = [word for option, file in names.items() for word in (f"--tls-{option}", str(tmp_path / file))]
     settings = {
-        "distributed.comm.tls.ca-file": str(tmp_path / "ca.pem"),
-        "distributed.comm.tls.client.cert": str(tmp_path / "cert.pem"),
-        "distributed.comm.tls.client.key": str(tmp_path / "key.pem"),
+        "DASK_DISTRIBUTED__COMM__TLS__CA_FILE": str(tmp_path / "ca.pem"),
+        "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT": str(tmp_path / "cert.pem"),
+        "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY": str(tmp_path / "key.pem"),
     }
     with cluster(tmp_path / "cluster", 1, tls) as (address, _):
         assert address.startswith("tls://")
@@ -165,11 +176,11 @@ def test_a_cluster_behind_certificates_is_used_with_those_that_dask_is_configure
             open_executor("dask", 1, address),
         ):
             pass
-        with dask.config.set(settings):
-            with Client(address) as client:
-                client.wait_for_workers(1, timeout=60)
-            with open_executor("dask", None, address) as executor:
-                assert executor.submit(abs, -7).result() == 7
+        used = subprocess.run(
+            [sys.executable, "-c", USE_A_CLUSTER, address],
+            env={**os.environ, **settings}, capture_output=True, text=True, timeout=120,
+        )  # fmt: skip
+        assert used.stdout.strip() == "7", used.stderr
 
 
 @pytest.fixture
