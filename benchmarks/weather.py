@@ -28,7 +28,7 @@ STATES = {
     "snow 3": SurfaceState(kind="snow", precipitation_mm_h=3, snow_depth_mm=30, snow_coverage=1.0),
 }
 LIMIT = {"rain": 1.2, "snow": 0.6}
-"""What a weather may add, as a share of the clear frame's CPU time."""
+"""Time that a weather may add, as a share of the clear frame's CPU time."""
 
 SPEED = 16.0
 STATION = 40

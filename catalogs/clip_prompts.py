@@ -18,7 +18,7 @@ class Prompts(CatalogueEntry):
 
 
 PROMPT_FILE = TypeAdapter(dict[WeatherName, Prompts])
-"""What the file holds, in the order of the rows of `text_features`."""
+"""Content of the file, in the order of the rows of `text_features`."""
 
 
 def load_prompts() -> dict[str, tuple[str, ...]]:

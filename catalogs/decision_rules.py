@@ -14,7 +14,7 @@ Level = Annotated[Scalar, require_quantity("1", above=0)]
 
 
 class DecisionRulesEntry(CatalogueEntry):
-    """What the file must hold; the meanings stand at ``DecisionRules``."""
+    """Content of the file; the meanings are given by ``DecisionRules``."""
 
     accept_score: Level
     held_out_gain: Level

@@ -13,7 +13,7 @@ PAPER_METRICS = Path(__file__).with_name("paper_metrics.yaml")
 ClipSet = Literal["stops", "rain-stops", "snow-stops", "dry-features"]
 """Braking clips on a flat road in every weather, in rain, in snow; dry clips with a road feature."""
 FILE = TypeAdapter(dict[str, dict[ClipSet, Annotated[Scalar, require_quantity("1")]]])
-"""What the file must hold: printed figures by metric and by the clips that they are a mean over."""
+"""Content of the file: printed figures by metric and by the clips that they are a mean over."""
 
 
 @cache

@@ -24,7 +24,7 @@ def _choose_type(name: str) -> Any:
 _FIELDS: dict[str, Any] = {field.name: (_choose_type(field.name), ...) for field in fields(StreetLayout)}
 
 StreetEntry = create_model("StreetEntry", __base__=CatalogueEntry, **_FIELDS)
-"""What the street's file must hold: every field of `StreetLayout`."""
+"""Content of the street's file: every field of `StreetLayout`."""
 
 
 def load_street_layout(path: Path = STREET_FILE) -> StreetLayout:

@@ -19,7 +19,7 @@ VARIANTS: dict[Variant, str] = {
     "fixed-mu": "one friction for all rain, one for all snow",
     "full": "nothing is cut",
 }
-"""What each variant does (paper, Section 4.4)."""
+"""Effect of each variant (paper, Section 4.4)."""
 
 Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 

@@ -9,8 +9,9 @@ import pyarrow.parquet as pq
 
 from flows.auditing.verify import compare_files
 from flows.making.generate import create_frame_arrays, fan_out
+from flows.making.grid_inputs import input_sources
 from flows.making.input_changes import recorded_input
-from flows.making.plan import Plan, input_sources, read_plan
+from flows.making.plan import Plan, read_plan
 from flows.making.seal import clips_table, pairs_table, preview_sheet, table_parts, write_part
 from flows.running.orchestration import run_as_stage
 from flows.running.runner import RunnerName

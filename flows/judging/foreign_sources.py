@@ -27,7 +27,7 @@ NO_PLAYLISTS = (
     "protocol_whitelist;file|format_whitelist;"
     "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpeg,mpegts,mpegvideo,h264,hevc,ivf,asf,flv,ogg,yuv4mpegpipe,gif,apng"
 )
-"""What FFmpeg may open: containers of frames. A playlist's text would send it to other files, and to the network."""
+"""Options that let FFmpeg open containers of frames only: a playlist would send it to other files or the network."""
 CHUNK = 64
 """Frames that are undistorted at once."""
 LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.scenes import scene_identity
+from flows.making.grid_inputs import input_sources
 from flows.making.places import find_scene, noted_place
-from flows.making.plan import input_sources
 from flows.store.layout import Layout
 from flows.store.sealed import read_plan_record, recorded_grid
 from manifests.canonical import sha256_of, sha256_of_file
@@ -57,7 +57,7 @@ def recorded_input(
     Parameters
     ----------
     layout : of the dataset
-    sources : `flows.making.plan.input_sources` of its grid
+    sources : `flows.making.grid_inputs.input_sources` of its grid
     name, digest : of the input
     """
     for find in (lambda: layout.inputs / name, sources.get(name), lambda: noted_place(digest)):

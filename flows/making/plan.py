@@ -1,23 +1,15 @@
 """From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from catalogs.cameras import load_camera
-from catalogs.entries import find_entry
-from catalogs.gates import GATES
 from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
-from catalogs.hazard_markings import load_marking
-from catalogs.scenario import Scenario, route_problems
-from catalogs.scenes import load_scene, scene_identity
-from catalogs.studies import SENSITIVITY
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_provenance, vehicle_tyre_source
-from catalogs.weather import FOLDER as WEATHER_FOLDER
-from flows.making.memory import memory_problems
+from catalogs.scenario import Scenario
+from catalogs.vehicles import vehicle_provenance
+from flows.making.grid_inputs import input_sources, read_grid_inputs, recorded_settings
 from flows.making.places import remember_place
 from flows.store.layout import Layout
 from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
@@ -26,17 +18,8 @@ from manifests.explain import format_value, input_differences, value_differences
 from manifests.provenance import code_version, library_versions
 from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
-from tasks.render.sensor import Sensor
-from tasks.surface.weather import WEATHERS
 
 TICK_RATE_HZ = 1000
-LOADERS: Mapping[str, Callable[[Path], Any]] = {
-    "vehicle.yaml": load_vehicle,
-    "surface.yaml": load_surface,
-    "camera.yaml": load_camera,
-    "hazard_marking.yaml": load_marking,
-}
-"""Loaders that check the catalogue entries that a user may bring."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +109,7 @@ def make_plan(
     try:
         grid = source if isinstance(source, Grid) else load_grid(source)
     except FaultyGrid as faults:
-        behind = [] if faults.grid is None else _read_behind(faults.grid)[2]
+        behind = [] if faults.grid is None else read_grid_inputs(faults.grid, TICK_RATE_HZ)[2]
         raise InputError([*faults.problems, *(f"{source}: {problem}" for problem in behind)]) from None
     if vehicle is not None:
         grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
@@ -139,7 +122,7 @@ def make_plan(
 def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, bytes]]:
     """`make_plan` of a grid that is already read; ``source`` is what messages call it."""
     settings = grid.settings
-    inputs, scene, problems = _read_behind(grid)
+    inputs, scene, problems = read_grid_inputs(grid, TICK_RATE_HZ)
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
     hashes = {name: sha256_of([content]) for name, content in inputs.items()}
@@ -180,54 +163,6 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
     return plan, inputs
 
 
-def recorded_settings(settings: GridFile) -> GridFile:
-    """The settings as a dataset records them: with files by their name alone where their path is a private matter.
-
-    Parameters
-    ----------
-    settings : as asked for
-    """
-    references = {
-        name: recorded_reference(value)
-        for name in ("scene", "vehicle", "surface", "camera", "hazard_marking")
-        if (value := getattr(settings, name)) is not None
-    }
-    return settings.model_copy(update=references)
-
-
-def recorded_reference(reference: str) -> str:
-    """A catalogue name, or a path below the folder of the run, as it is; of any other path the last part."""
-    path = Path(reference)
-    return path.name if path.is_absolute() or path.parts[:1] == ("~",) or ".." in path.parts else reference
-
-
-def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
-    """Return the catalogue files that a grid can use, every kind of weather among them: name under ``inputs/`` to the
-    function that finds it."""
-    marking = settings.hazard_marking
-    weather = {f"weather/{path.name}": path for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
-    return {
-        "vehicle.yaml": partial(find_entry, "vehicle", settings.vehicle),
-        "surface.yaml": partial(find_entry, "surface", settings.surface),
-        "camera.yaml": partial(find_entry, "camera", settings.camera),
-        "gates.yaml": lambda: GATES,
-        "study.yaml": lambda: SENSITIVITY,
-        **{name: partial(Path, path) for name, path in weather.items()},
-        **(
-            {} if marking is None else {"hazard_marking.yaml": partial(find_entry, "hazard marking", marking)}
-        ),
-        **({} if (tyre := _tyre_behind(settings)) is None else {tyre.name: partial(Path, tyre)}),
-    }
-
-
-def _tyre_behind(settings: GridFile) -> Path | None:
-    """The tyre's file; None where there is none, or where the vehicle is faulty, which its own lookup tells."""
-    try:
-        return vehicle_tyre_source(settings.vehicle)
-    except InputError:
-        return None
-
-
 @lru_cache(maxsize=4)
 def read_plan(root: Path) -> Plan:
     """The plan of a dataset.
@@ -263,54 +198,6 @@ def plan_differences(
     ]
 
 
-def _read_behind(grid: Grid) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
-    """Return the catalogue files and the scene behind a grid, and the problems of these and of the grid with them."""
-    weathers = {scenario.weather for _, scenario in grid.scenarios}
-    inputs, scene, problems = _read_entries(grid.settings, weathers)
-    if not problems:
-        problems += _weather_problems(grid.settings, weathers)
-    if scene:
-        problems += _route_problems(grid)
-    return inputs, scene, problems + _camera_problems(grid.settings)
-
-
-def _read_entries(
-    settings: GridFile, weathers: Collection[str]
-) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
-    """Return the catalogue files that a grid names or whose weather it has, its scene, and their problems."""
-    inputs: dict[str, bytes] = {}
-    scene: dict[str, str] = {}
-    problems: list[str] = []
-    unasked = {f"weather/{kind}.yaml" for kind in WEATHERS if kind not in weathers}
-    for name, lookup in input_sources(settings).items():
-        if name in unasked:
-            continue
-        try:
-            source = lookup()
-            LOADERS.get(name, Path.stat)(source)
-            inputs[name] = source.read_bytes()
-        except InputError as error:
-            problems += error.problems
-    try:
-        scene = {"name": recorded_reference(settings.scene), "sha256": scene_identity(settings.scene)}
-        remember_place(scene["sha256"], settings.scene)
-    except InputError as error:
-        problems += error.problems
-    return inputs, scene, problems
-
-
-def _weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
-    """Kinds of weather in which the vehicle has no tyres."""
-    vehicle = load_vehicle(settings.vehicle)
-    problems: list[str] = []
-    for kind in sorted(weathers & WEATHERS.keys()):
-        try:
-            vehicle.tyre_family(kind)
-        except InputError as error:
-            problems += error.problems
-    return problems
-
-
 def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:
     provenance = vehicle_provenance(vehicle)
     mode = settings.vehicle_mode if provenance is None else provenance.mode
@@ -337,29 +224,3 @@ def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
             split=split,
             calibration=calibration,
         )
-
-
-def _camera_problems(settings: GridFile) -> list[str]:
-    """List settings that exceed the camera or the memory of this machine; a faulty camera is reported elsewhere."""
-    try:
-        camera = load_camera(settings.camera)
-    except InputError:
-        return []
-    ticks = int((settings.frames - 1) / settings.frame_rate_hz * TICK_RATE_HZ) + 1
-    problems = memory_problems(settings, camera, ticks)
-    if settings.composition == "linear" or (camera.plain and camera.sensor == Sensor()):
-        return problems
-    return [
-        *problems,
-        f"composition: paper is one of finished 8-bit pictures; {camera.name} has a lens, a shutter or a sensor that"
-        " needs linear light: take a plain camera or composition: linear",
-    ]
-
-
-def _route_problems(grid: Grid) -> list[str]:
-    route = load_scene(grid.settings.scene).route
-    problems: dict[str, str] = {}
-    for label, scenario in grid.scenarios:
-        for problem in route_problems(scenario, route.length, grid.settings.scene):
-            problems.setdefault(problem, f"scenario {label}: {problem}")
-    return list(problems.values())

@@ -81,7 +81,7 @@ def close_loop(
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:
-    """What is fixed before anything is fitted: hashes and the two parts of the split."""
+    """Return the facts that are fixed before any fit: hashes and the two parts of the split."""
     return {
         "campaign": campaign.name,
         "content_sha256": campaign.content_hash,

@@ -8,7 +8,7 @@ ASKED = {
     "wrong single label": "0",
     "outside the library: form with right port and variable": "at least 60 %",
 }
-"""What each figure should be, where something was asked."""
+"""Required value of each figure that has one."""
 KINDS = (
     "right",
     "right form",

@@ -8,7 +8,7 @@ from flows.measured.closing_benchmark import engine_hash
 
 
 def error_rates_html(named: list[str]) -> str:
-    """What the benchmark says about nulls, library effects, and the effects that this verdict names.
+    """Return the benchmark's error rates as HTML: for nulls, library effects, and what this verdict names.
 
     Parameters
     ----------

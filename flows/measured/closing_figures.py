@@ -100,7 +100,7 @@ def spline(trace: Trace) -> str:
 
 
 def leftovers(trace: Trace) -> str:
-    """What a spline at every scanned port and variable would gain, before and after."""
+    """Return the gain of a spline at every scanned port and variable, before and after."""
     before = scan_leftovers(trace.start.evidence, trace.start.base)
     after = scan_leftovers(trace.end.evidence, trace.end.base)
     keys = [(x.port, x.variable) for x in sorted(before, key=lambda x: (x.port, x.variable))]

@@ -1,4 +1,4 @@
-"""What the model leaves of every run and channel, frozen and after: as RMSE and over time."""
+"""Residuals of every run and channel, frozen and after: as RMSE and over time."""
 
 from collections.abc import Iterator
 

@@ -29,7 +29,7 @@ from tasks.kernel_cache import cache_root
 Wanted = Callable[[str], bool]
 SHOWN = 5
 PREPARED = ("inputs/", "frames.zarr/", ".staging/")
-"""What is sent before a plan, and means nothing without it."""
+"""Files that are sent before the plan, and mean nothing without it."""
 
 
 def want_everything(name: str) -> bool:

@@ -80,7 +80,7 @@ class DriveStyle:
 
 @dataclass(frozen=True, kw_only=True)
 class Bus:
-    """What is emitted, and of which car.
+    """A car and the signals that its bus sends.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ LONGEST_STOP_S = 60.0
 
 @dataclass(frozen=True, kw_only=True)
 class WeatherStudy:
-    """What is varied in one kind of weather.
+    """Parameters that are varied in one kind of weather, and how.
 
     Parameters
     ----------

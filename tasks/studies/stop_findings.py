@@ -1,4 +1,4 @@
-"""What a measured stop does that the model cannot, put in numbers."""
+"""Figures of a measured stop that the model cannot reproduce."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -51,7 +51,7 @@ class Rung:
 
 @dataclass(frozen=True, kw_only=True)
 class RungResult:
-    """What a rung found on the training stop and how it did on both.
+    """Parameters that a rung found on the training stop, and its errors on both stops.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class SurfaceParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceState:
-    """What lies on the road and how it grips (paper, Eq. surface_state: w, r, h_t, h_s, c_s; mu_c).
+    """State of the road: weather, film, snow and friction (paper, Eq. surface_state: w, r, h_t, h_s, c_s; mu_c).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a mode hands to the rollout."""
+"""The columns and times that a mode returns to the rollout."""
 
 from dataclasses import dataclass
 

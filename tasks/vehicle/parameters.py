@@ -153,7 +153,7 @@ class Vehicle:
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceResponse:
-    """What the frozen tables give on one surface.
+    """Values of the frozen tables on one surface.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ TICK_NS = 1_000_000
 
 @dataclass(frozen=True, kw_only=True)
 class Controls:
-    """What the driver does (paper, Eq. overall_pipeline: u).
+    """Inputs of the driver (paper, Eq. overall_pipeline: u).
 
     Parameters
     ----------

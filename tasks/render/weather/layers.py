@@ -45,7 +45,7 @@ from tasks.surface.weather import DRY
 
 @dataclass(frozen=True, kw_only=True)
 class Overcast:
-    """What a clip under cloud has beyond its state.
+    """Light, air and falling particles of a clip under cloud.
 
     Parameters
     ----------

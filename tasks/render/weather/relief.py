@@ -37,7 +37,7 @@ WIDEST_ROAD_M = 30.0
 
 @dataclass(frozen=True, kw_only=True)
 class ReliefLight:
-    """What lights a flat road.
+    """Light of sky, sun and ground on a flat road.
 
     Parameters
     ----------

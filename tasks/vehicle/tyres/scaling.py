@@ -12,7 +12,7 @@ from tasks.vehicle.tyres.magic_formula import Combined, Lateral, Longitudinal, M
 
 
 class CoefficientNames(NamedTuple):
-    """What a tyre property file of one version says about the forces.
+    """Names of the force coefficients in a tyre property file of one version.
 
     Parameters
     ----------

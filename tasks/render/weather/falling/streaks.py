@@ -13,7 +13,7 @@ PIXEL_VARIANCE = 1 / 12 + 0.12
 
 @dataclass(frozen=True, kw_only=True)
 class ParticleLayer:
-    """What the drawn particles do to a picture: ``picture (1 - alpha) + rgb``.
+    """Light and opacity of the drawn particles, to be composed as ``picture (1 - alpha) + rgb``.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ PLANE_CELL_M = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class AnchorParameters:
-    """What a road Gaussian must be to carry snow.
+    """Limits within which a road Gaussian carries snow.
 
     Parameters
     ----------

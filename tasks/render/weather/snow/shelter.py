@@ -1,4 +1,4 @@
-"""What hangs over a place keeps falling snow from it: a crown, a roof, a scaffold's upper planks."""
+"""Shelter: a thing above a place keeps falling snow from it, such as a crown, a roof, a scaffold's upper planks."""
 
 import numpy as np
 from numpy.typing import NDArray

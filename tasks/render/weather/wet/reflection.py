@@ -1,4 +1,4 @@
-"""What a wet road mirrors: marching along the mirrored ray through the picture's own depth.
+"""Reflections in a wet road: marching along the mirrored ray through the picture's own depth.
 
 A ray that meets a surface of the picture takes its colour. A ray that passes behind a surface and does not
 come out again takes that surface's colour: a car's front stands for its underside, and no ray that passes
@@ -21,7 +21,7 @@ HALVINGS = 5
 THICKNESS_M, THICKNESS_SHARE = 0.4, 0.04
 NEAREST_Z_M = 0.2
 UNDERSIDE_M = 1.0
-"""What ends lower than this over the road, a car or a bench, is solid from there up; crowns and signs are not."""
+"""A thing whose lower edge is below this, a car or a bench, is solid from there up; crowns and signs are not [m]."""
 EDGE_FADE = 0.35
 """Share of the picture's height over which the surface at its edge is trusted to go on."""
 

@@ -1,0 +1,163 @@
+"""The catalogue files and the scene that a grid uses: found, read, and checked together with the grid."""
+
+from collections.abc import Callable, Collection, Mapping, Set
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from catalogs.cameras import load_camera
+from catalogs.entries import find_entry
+from catalogs.gates import GATES
+from catalogs.grids import Grid, GridFile
+from catalogs.hazard_markings import load_marking
+from catalogs.scenario import route_problems
+from catalogs.scenes import load_scene, scene_identity
+from catalogs.studies import SENSITIVITY
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle, vehicle_tyre_source
+from catalogs.weather import FOLDER as WEATHER_FOLDER
+from flows.making.memory import memory_problems
+from flows.making.places import remember_place
+from tasks.errors import InputError
+from tasks.render.sensor import Sensor
+from tasks.surface.weather import WEATHERS
+
+LOADERS: Mapping[str, Callable[[Path], Any]] = {
+    "vehicle.yaml": load_vehicle,
+    "surface.yaml": load_surface,
+    "camera.yaml": load_camera,
+    "hazard_marking.yaml": load_marking,
+}
+"""Loaders that check the catalogue entries that a user may bring."""
+
+
+def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
+    """Return the catalogue files that a grid can use, every kind of weather among them: name under ``inputs/`` to the
+    function that finds it."""
+    marking = settings.hazard_marking
+    weather = {f"weather/{path.name}": path for path in sorted(WEATHER_FOLDER.glob("*.yaml"))}
+    return {
+        "vehicle.yaml": partial(find_entry, "vehicle", settings.vehicle),
+        "surface.yaml": partial(find_entry, "surface", settings.surface),
+        "camera.yaml": partial(find_entry, "camera", settings.camera),
+        "gates.yaml": lambda: GATES,
+        "study.yaml": lambda: SENSITIVITY,
+        **{name: partial(Path, path) for name, path in weather.items()},
+        **(
+            {} if marking is None else {"hazard_marking.yaml": partial(find_entry, "hazard marking", marking)}
+        ),
+        **({} if (tyre := _tyre_behind(settings)) is None else {tyre.name: partial(Path, tyre)}),
+    }
+
+
+def _tyre_behind(settings: GridFile) -> Path | None:
+    """The tyre's file; None where there is none, or where the vehicle is faulty, which its own lookup tells."""
+    try:
+        return vehicle_tyre_source(settings.vehicle)
+    except InputError:
+        return None
+
+
+def recorded_settings(settings: GridFile) -> GridFile:
+    """The settings as a dataset records them: with files by their name alone where their path is a private matter.
+
+    Parameters
+    ----------
+    settings : as asked for
+    """
+    references = {
+        name: recorded_reference(value)
+        for name in ("scene", "vehicle", "surface", "camera", "hazard_marking")
+        if (value := getattr(settings, name)) is not None
+    }
+    return settings.model_copy(update=references)
+
+
+def recorded_reference(reference: str) -> str:
+    """A catalogue name, or a path below the folder of the run, as it is; of any other path the last part."""
+    path = Path(reference)
+    return path.name if path.is_absolute() or path.parts[:1] == ("~",) or ".." in path.parts else reference
+
+
+def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
+    """Return the catalogue files and the scene of a grid, and the problems of these and of the grid with them.
+
+    Parameters
+    ----------
+    grid : read from its file
+    tick_rate_hz : of the telemetry [Hz]
+
+    Returns
+    -------
+    Name under ``inputs/`` to the file's bytes; name and hash of the scene; one sentence for each problem.
+    """
+    weathers = {scenario.weather for _, scenario in grid.scenarios}
+    inputs, scene, problems = _read_entries(grid.settings, weathers)
+    if not problems:
+        problems += _weather_problems(grid.settings, weathers)
+    if scene:
+        problems += _route_problems(grid)
+    return inputs, scene, problems + _camera_problems(grid.settings, tick_rate_hz)
+
+
+def _read_entries(
+    settings: GridFile, weathers: Collection[str]
+) -> tuple[dict[str, bytes], dict[str, str], list[str]]:
+    """Return the catalogue files that a grid names or whose weather it has, its scene, and their problems."""
+    inputs: dict[str, bytes] = {}
+    scene: dict[str, str] = {}
+    problems: list[str] = []
+    unasked = {f"weather/{kind}.yaml" for kind in WEATHERS if kind not in weathers}
+    for name, lookup in input_sources(settings).items():
+        if name in unasked:
+            continue
+        try:
+            source = lookup()
+            LOADERS.get(name, Path.stat)(source)
+            inputs[name] = source.read_bytes()
+        except InputError as error:
+            problems += error.problems
+    try:
+        scene = {"name": recorded_reference(settings.scene), "sha256": scene_identity(settings.scene)}
+        remember_place(scene["sha256"], settings.scene)
+    except InputError as error:
+        problems += error.problems
+    return inputs, scene, problems
+
+
+def _weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
+    """Kinds of weather in which the vehicle has no tyres."""
+    vehicle = load_vehicle(settings.vehicle)
+    problems: list[str] = []
+    for kind in sorted(weathers & WEATHERS.keys()):
+        try:
+            vehicle.tyre_family(kind)
+        except InputError as error:
+            problems += error.problems
+    return problems
+
+
+def _camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:
+    """List settings that exceed the camera or the memory of this machine; a faulty camera is reported elsewhere."""
+    try:
+        camera = load_camera(settings.camera)
+    except InputError:
+        return []
+    ticks = int((settings.frames - 1) / settings.frame_rate_hz * tick_rate_hz) + 1
+    problems = memory_problems(settings, camera, ticks)
+    if settings.composition == "linear" or (camera.plain and camera.sensor == Sensor()):
+        return problems
+    return [
+        *problems,
+        f"composition: paper is one of finished 8-bit pictures; {camera.name} has a lens, a shutter or a sensor that"
+        " needs linear light: take a plain camera or composition: linear",
+    ]
+
+
+def _route_problems(grid: Grid) -> list[str]:
+    route = load_scene(grid.settings.scene).route
+    problems: dict[str, str] = {}
+    for label, scenario in grid.scenarios:
+        for problem in route_problems(scenario, route.length, grid.settings.scene):
+            problems.setdefault(problem, f"scenario {label}: {problem}")
+    return list(problems.values())
