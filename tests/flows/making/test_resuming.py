@@ -196,7 +196,7 @@ def test_a_run_that_waited_while_another_ended_makes_nothing_and_leaves_nothing(
 
 
 def test_a_damaged_note_of_where_a_scene_lies_is_made_anew(toy_dataset, tmp_path, monkeypatch):
-    monkeypatch.setenv("MUSYNC_CACHE", str(tmp_path))
+    monkeypatch.setattr("flows.making.places.cache_root", lambda: tmp_path)
     scene, digest = toy_dataset.root.parent / "scene", "0" * 64
     remember_place(digest, scene)
     (note,) = (tmp_path / "places").iterdir()
