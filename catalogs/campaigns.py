@@ -17,11 +17,14 @@ from catalogs.campaign_files import (
 from catalogs.channel_maps import Tolerances as TolerancesEntry
 from catalogs.documents import read_content
 from catalogs.quantities import Text, parse_entry
-from catalogs.sentences import cap_problems, shorten
+from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign, Run, Tolerances
+from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.run_validation import COLUMN_UNITS, run_problems
 from tasks.errors import InputError
 
+NEEDED = ("brake_pressure", "speed")
+"""Channels without which a campaign says nothing."""
 TOLERANCE_KEYS = (
     "pressure_gain",
     "mass",
@@ -51,6 +54,7 @@ class MeasuredHeader(CampaignHeader):
 
     split: Split
     tolerances_1sigma: TolerancesEntry
+    not_measured: tuple[Text, ...] = ()
 
 
 def read_campaign(folder: str | Path) -> Campaign:
@@ -74,6 +78,8 @@ def read_campaign(folder: str | Path) -> Campaign:
     header, rows = _read_header_and_runs(folder, header_bytes, table_bytes)
     train, held_out = header.split.train, header.split.held_out
     problems = _split_problems([row["run"] for row in rows], train, held_out)
+    problems += _channel_problems(header.not_measured)
+    needed = [name for name in ("time", *NEEDED, *CHANNELS) if name not in header.not_measured]
     digest = hashlib.sha256(header_bytes + table_bytes)
     interval, judged = 1.0 / header.sample_rate_hz, set(held_out)
     runs = []
@@ -86,7 +92,8 @@ def read_campaign(folder: str | Path) -> Campaign:
             content = read_content(path, "run", LARGEST_RUN)
             digest.update(row["run"].encode() + content)
             columns, units = parse_columns(content, path.name, COLUMN_UNITS)
-            found = run_problems(columns, units, interval)
+            columns = {name: values for name, values in columns.items() if name not in header.not_measured}
+            found = run_problems(columns, units, interval, needed)
         except InputError as error:
             found = list(error.problems)
         problems += [f"{row['run']}: {problem}" for problem in found]
@@ -102,6 +109,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         tolerances=_make_tolerances(header.tolerances_1sigma),
         content_hash=digest.hexdigest(),
         split_hash=hashlib.sha256(split.encode()).hexdigest(),
+        channels=tuple(name for name in CHANNELS if name in needed),
     )
 
 
@@ -143,14 +151,29 @@ def _split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequen
         for name in sorted({*train, *held_out} - set(names))
     ]
     problems += [
-        f"split {part} needs at least 3 runs; it has {len(runs)}"
+        f"split {part} needs at least one run; it has none"
         for part, runs in (("train", train), ("held_out", held_out))
-        if len(runs) < 3
+        if not runs
     ]
     return problems
 
 
+def _channel_problems(not_measured: Sequence[str]) -> list[str]:
+    """Sentences on channels that do not exist, and on those without which nothing can be judged."""
+    problems = [
+        f"not_measured: {shorten_value(name)} is no channel; there are: {', '.join(CHANNELS_BY_NAME)}"
+        for name in not_measured
+        if name not in CHANNELS_BY_NAME
+    ]
+    return problems + [
+        f"channel {name} must be measured: closing the loop compares the speed under a known brake"
+        for name in NEEDED
+        if name in not_measured
+    ]
+
+
 def _make_run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: bool, interval: float) -> Run:
+    pressure = columns["brake_pressure"]
     return Run(
         name=row["run"],
         held_out=held_out,
@@ -163,8 +186,11 @@ def _make_run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: boo
         hazard_length=float(row["hazard_length_m"]),
         hazard_height=float(row["hazard_height_m"]),
         interval=interval,
-        pressure=columns["brake_pressure"],
-        response=np.column_stack([columns[name] for name in CHANNELS]),
+        pressure=pressure,
+        response=np.column_stack([columns.get(name, np.zeros(len(pressure))) for name in CHANNELS]),
+        drive_torque=columns.get("engine_torque"),
+        road_slope=np.radians(columns["road_slope"]) if "road_slope" in columns else None,
+        throttle=columns.get("throttle"),
     )
 
 

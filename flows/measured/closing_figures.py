@@ -68,7 +68,10 @@ def _force_points(
     )
     channel = CHANNELS.index("longitudinal_acceleration")
     y = predict(model, theta, slots=slots)
-    force = model.vehicle.mass * (model.measured - y)[:, channel]
+    left = (model.measured - y)[:, channel]
+    if not model.measured[:, channel].any():  # no accelerometer
+        left = np.gradient((model.measured - y)[:, CHANNELS.index("speed")], model.run.interval)
+    force = model.vehicle.mass * left
     x = {
         "speed": y[:, 0],
         "pressure": model.run.pressure[: model.samples],
@@ -170,12 +173,13 @@ def traces(trace: Trace) -> str:
         return float(np.log(frozen / after))
 
     ranked = sorted(runs, key=gain)
+    shown = [channel for channel in SHOWN if np.isfinite(runs[0].sigma[CHANNELS.index(channel)])]
     figure = Figure(figsize=(11, 6.4), layout="constrained")
-    axes = figure.subplots(len(SHOWN), 2, sharex="col", squeeze=False)
+    axes = figure.subplots(len(shown), 2, sharex="col", squeeze=False)
     for column, (run, title) in enumerate(((ranked[-1], "gained most"), (ranked[0], "gained least"))):
         frozen, after = predict(run.model, plain), predict(run.model, theta, slots=slots)
         time = np.arange(run.model.samples, dtype=np.float64) * run.model.run.interval
-        for row, channel in enumerate(SHOWN):
+        for row, channel in enumerate(shown):
             c = CHANNELS.index(channel)
             _trace(axes[row, column], time, run.model.measured[:, c], frozen[:, c], after[:, c])
             axes[row, column].set_ylabel(f"{channel.replace('_', ' ')}\n[{CHANNEL_UNITS[c]}]", fontsize=8)

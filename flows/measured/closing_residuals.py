@@ -55,6 +55,7 @@ def residual_rmse(trace: Trace) -> dict[str, dict[str, dict[str, float]]]:
                 for title, left in zip(TITLES, both, strict=True)
             }
             for c, channel in enumerate(CHANNELS)
+            if np.isfinite(run.sigma[c])
         }
         for run, both in residuals(trace, (*evidence.train, *evidence.held_out))
     }
@@ -70,17 +71,18 @@ def residuals_over_time(trace: Trace) -> str:
     runs = trace.start.evidence.train
     colours = colormaps["turbo"](np.linspace(0.05, 0.95, len(runs)))
     figure = Figure(figsize=(11, 11), layout="constrained")
-    axes = figure.subplots(len(CHANNELS), 2, sharex=True, sharey="row")
+    seen = np.flatnonzero(np.isfinite(runs[0].sigma))
+    axes = figure.subplots(len(seen), 2, sharex=True, sharey="row", squeeze=False)
     for (run, both), colour in zip(residuals(trace, runs), colours, strict=True):
         time = np.arange(run.model.samples) * run.model.run.interval
         for column, left in enumerate(both):
-            for c in range(len(CHANNELS)):
-                axes[c, column].plot(
+            for row, c in enumerate(seen):
+                axes[row, column].plot(
                     time, left[:, c], lw=0.6, color=colour, label=escape_formulas(run.model.run.name)
                 )
-    for c, (channel, unit) in enumerate(zip(CHANNELS, CHANNEL_UNITS, strict=True)):
-        axes[c, 0].set_ylabel(f"{channel.replace('_', ' ')}\n[{unit}]", fontsize=7)
-        for axis in axes[c]:
+    for row, c in enumerate(seen):
+        axes[row, 0].set_ylabel(f"{CHANNELS[c].replace('_', ' ')}\n[{CHANNEL_UNITS[c]}]", fontsize=7)
+        for axis in axes[row]:
             axis.axhline(0.0, color="#888888", lw=0.8)
     for axis, title in zip(axes[0], TITLES, strict=True):
         axis.set_title(title)

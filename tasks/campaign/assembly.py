@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import UNITS
+from tasks.campaign.run_validation import LEAST_SAMPLES
 from tasks.campaign.signals import (
     ChannelRule,
     Signal,
@@ -16,8 +17,6 @@ from tasks.campaign.signals import (
     resample_on_clock,
 )
 
-MINIMUM_SAMPLES = 100
-"""Shorter runs hold too little data to separate noise from motion."""
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
     "°": "deg", "°/s": "deg/s", "1/min": "rpm", "-": "1",
@@ -71,9 +70,9 @@ def assemble_run(
     if not usable:
         return Assembled(start=start, columns={}, problems=tuple(problems))
     clock = make_common_clock([signal for signals in usable.values() for signal in signals], rate)
-    if len(clock) < MINIMUM_SAMPLES:
+    if len(clock) < LEAST_SAMPLES:
         problems.append(
-            f"has {len(clock)} samples that all channels share; a run needs {MINIMUM_SAMPLES}: widen its window"
+            f"has {len(clock)} samples that all channels share; a run needs {LEAST_SAMPLES}: widen its window"
         )
         return Assembled(start=start, columns={}, problems=tuple(problems))
     columns = {

@@ -50,7 +50,10 @@ class Run:
     hazard_center, hazard_length, hazard_height : road feature [m]; length 0 is a flat road
     interval : time between samples [s]
     pressure : float64 [N] measured brake pressure [MPa]
-    response : float64 [N, 7] measured channels in the order of `CHANNELS`
+    response : float64 [N, 7] measured channels in the order of `CHANNELS`; 0 where a channel was not measured
+    drive_torque : float64 [N] of the engine at the wheels, driving positive [N m]; None where it was not measured
+    road_slope : float64 [N] of the road, uphill positive [rad]; None where it was not measured
+    throttle : float64 [N] share of the full throttle [1]; None where it was not measured
     """
 
     name: str
@@ -66,6 +69,9 @@ class Run:
     interval: float
     pressure: NDArray[np.float64]
     response: NDArray[np.float64]
+    drive_torque: NDArray[np.float64] | None = None
+    road_slope: NDArray[np.float64] | None = None
+    throttle: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +85,7 @@ class Campaign:
     tolerances : uncertainties of a session and of a run
     content_hash : SHA-256 over every file read
     split_hash : SHA-256 over the names of the training and held-out runs
+    channels : of `CHANNELS`, those that were measured
     """
 
     name: str
@@ -87,6 +94,12 @@ class Campaign:
     tolerances: Tolerances
     content_hash: str
     split_hash: str
+    channels: tuple[str, ...] = CHANNELS
+
+    @property
+    def is_measured(self) -> NDArray[np.bool_]:
+        """Whether each of `CHANNELS` was measured, bool [7]."""
+        return np.array([name in self.channels for name in CHANNELS])
 
     @property
     def train(self) -> tuple[Run, ...]:

@@ -63,8 +63,10 @@ SIDE_CHANNELS = (
     _make_channel("lateral_acceleration", "m/s^2", 20.0, "left positive", moves=False),
     _make_channel("brake_torque", "N m", 40000.0, "all wheels together, braking positive", moves=False),
     _make_channel("engine_torque", "N m", 40000.0, "at the wheels, driving positive", moves=False),
+    _make_channel("road_slope", "deg", 30.0, "of the road, uphill positive", moves=False),
+    _make_channel("throttle", "1", 1.2, "share of the full throttle", moves=False),
 )
-"""Channels that selection rules and residual plots use."""
+"""Channels that selection rules, residual plots and the closing of the loop use where they were measured."""
 
 CHANNELS_BY_NAME = {channel.name: channel for channel in (*MAIN_CHANNELS, *SIDE_CHANNELS)}
 

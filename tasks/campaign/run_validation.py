@@ -1,22 +1,26 @@
 """Validation of a campaign's run: its columns, their declared clock, and the rules for measured channels."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
-from tasks.campaign.channels import MAIN_CHANNELS
+from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
 
-COLUMN_UNITS = {"time": "s", **{channel.name: channel.unit for channel in MAIN_CHANNELS}}
-LEAST_SAMPLES = 100
+COLUMN_UNITS = {"time": "s", **{name: channel.unit for name, channel in CHANNELS_BY_NAME.items()}}
+LEAST_SAMPLES = 20
+"""A shorter run holds no stop: 20 samples are a second at 20 Hz."""
 CLOCK_STEP, CLOCK_DRIFT = 0.1, 0.001
 """Share by which a step, and a run, may be longer or shorter than declared [1]."""
 
 
 def run_problems(
-    columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str], interval: float
+    columns: Mapping[str, NDArray[np.float64]],
+    units: Mapping[str, str],
+    interval: float,
+    needed: Collection[str],
 ) -> list[str]:
     """Return every problem of one run, one sentence each; empty when it can be used.
 
@@ -25,8 +29,13 @@ def run_problems(
     columns : measured columns by name, each float64 [N]
     units : units from the file's metadata, by column; a column without one counts as correct
     interval : declared time between samples [s]
+    needed : columns that there must be
     """
-    problems = [f"channel {name} is missing" for name in COLUMN_UNITS if name not in columns]
+    problems = [
+        f"channel {name} is missing: if nobody measured it, list it under not_measured in campaign.yaml"
+        for name in needed
+        if name not in columns
+    ]
     count = max((len(values) for values in columns.values()), default=0)
     if count < LEAST_SAMPLES:
         return [*problems, f"a run needs at least {LEAST_SAMPLES} samples; it has {count}"]

@@ -16,7 +16,7 @@ from tasks.campaign.campaign import Campaign, Run, Tolerances
 from tasks.campaign.planned_runs import RICH, TRAINING, RunPlan, make_planned_run
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.inference.evidence import SESSION_INDEX
-from tasks.identification.inference.forward import SUBSTEPS, instrument_readings, run_model, simulate_run
+from tasks.identification.inference.forward import instrument_readings, run_model, simulate_run
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX, parameter_vector
@@ -25,7 +25,7 @@ from tasks.vehicle.parameters import Vehicle
 NOISE_SIGMA = np.array([0.03, 0.05, 0.09, 0.09, 0.015, 0.1, 0.1])
 NOISE_RHO = np.array([0.6, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0])
 PRESSURE_NOISE = 0.01
-GENERATOR_SUBSTEPS = 8 * SUBSTEPS
+GENERATOR_REFINEMENT = 8
 TOLERANCES = Tolerances(
     session=(0.02, 0.01, 0.02, 0.005, 0.04, 0.02, 0.0015),
     initial_speed=0.05,
@@ -96,7 +96,7 @@ def _measure_run(
     disturbed = tuple(_disturbance(*entry, drive.duration, rng) for entry in DISTURBANCE)
     speed = drive.speed + TOLERANCES.initial_speed * rng.standard_normal()
     driven = simulate_run(
-        model, own, slots=(*slots, *disturbed), initial_speed=speed, substeps=GENERATOR_SUBSTEPS
+        model, own, slots=(*slots, *disturbed), initial_speed=speed, refinement=GENERATOR_REFINEMENT
     )
     y = instrument_readings(model, own, driven)
     y[:, 1] += TOLERANCES.acceleration_bias * rng.standard_normal()

@@ -18,7 +18,7 @@ EFFECTS = load_effects()
 
 def columns_of(run: Run, theta: np.ndarray) -> dict[str, np.ndarray]:
     """The run as a car with ``theta`` would have been measured."""
-    clean = predict(run_model(run, VEHICLE, SURFACE), theta, substeps=20)
+    clean = predict(run_model(run, VEHICLE, SURFACE), theta, refinement=4)
     response = clean + NOISE * np.random.default_rng(3).standard_normal(clean.shape)
     columns = dict(zip(CHANNELS, response.T, strict=True))
     return {"time": run.interval * np.arange(len(response)), "brake_pressure": run.pressure, **columns}
@@ -33,4 +33,4 @@ def test_an_effect_that_the_model_lacks_is_no_fault(effect: Effect, share: float
         theta[parameter.index] = abs(share) * bound if k == 0 else parameter.start
     for speed, peak in ((6.0, 1.0), (15.0, 1.5), (20.0, 4.0)):
         run = replace(plain_run(speed, peak), disc_rise=150.0)
-        assert run_problems(columns_of(run, theta), {}, run.interval) == []
+        assert run_problems(columns_of(run, theta), {}, run.interval, CHANNELS) == []

@@ -37,6 +37,6 @@ def plain_run(
 def measured(run: Run, theta: np.ndarray, seed: int) -> RunModel:
     """The run as a car with ``theta`` would have been measured, ready for evidence."""
     model = run_model(run, VEHICLE, SURFACE)
-    clean = predict(model, theta, substeps=20)
+    clean = predict(model, theta, refinement=4)
     noise = NOISE * np.random.default_rng(seed).standard_normal(clean.shape)
     return run_model(replace(run, response=clean + noise), VEHICLE, SURFACE)

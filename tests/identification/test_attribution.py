@@ -128,5 +128,5 @@ def test_every_library_effect_moves_some_instrument_and_zero_moves_none() -> Non
 def test_halving_the_step_changes_less_than_the_noise() -> None:
     model = run_model(plain_run(20.0, 2.0), VEHICLE, SURFACE)
     theta = np.zeros(len(EFFECT_TABLE))
-    difference = np.abs(predict(model, theta) - predict(model, theta, substeps=20))
+    difference = np.abs(predict(model, theta) - predict(model, theta, refinement=4))
     assert np.all(difference.max(axis=0) < 0.35 * NOISE)

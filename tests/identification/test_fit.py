@@ -41,7 +41,7 @@ def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence
 def over_a_hump(speed_offset: float) -> RunModel:
     run = replace(plain_run(11.0, 0.0), hazard_center=12.0, hazard_length=3.7, hazard_height=0.075)
     model = measured(run, PLAIN, 0)
-    late = predict(replace(model, initial_speed=11.0 + speed_offset), PLAIN, substeps=20)
+    late = predict(replace(model, initial_speed=11.0 + speed_offset), PLAIN, refinement=4)
     # the speed before the brake is read off other noise than the hump is: the run starts a little off
     return replace(model, run=replace(model.run, response=late), initial_speed=11.0)
 
@@ -127,7 +127,7 @@ def hump_in_the_brake() -> Evidence:
     models = []
     for i, (speed, peak) in enumerate(((30.0, 1.6), (26.0, 1.2), (20.0, 1.4), (14.0, 1.0), (28.0, 1.0))):
         model = run_model(plain_run(speed, peak), VEHICLE, SURFACE)
-        clean = predict(model, PLAIN, slots=(HUMP,), substeps=20)
+        clean = predict(model, PLAIN, slots=(HUMP,), refinement=4)
         noise = NOISE * np.random.default_rng(i).standard_normal(clean.shape)
         models.append(run_model(replace(model.run, response=clean + noise), VEHICLE, SURFACE))
     return evidence_of(models, (LIBRARY["brake_fade"],))

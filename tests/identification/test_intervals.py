@@ -40,7 +40,7 @@ def rain_stops(speeds: tuple[float, ...], truth: dict[str, float], disturbance: 
     theta, zero, derived = parameter_vector(truth), np.zeros(len(EFFECT_TABLE)), []
     for i, speed in enumerate(speeds):
         run = replace(plain_run(speed, 6.0), weather="rain", precipitation_mm_h=8.0)
-        clean = predict(run_model(run, VEHICLE, SURFACE), theta, substeps=20)
+        clean = predict(run_model(run, VEHICLE, SURFACE), theta, refinement=4)
         noise = NOISE * np.random.default_rng(i).standard_normal(clean.shape)
         model = run_model(replace(run, response=clean + noise), VEHICLE, SURFACE)
         derived.append(run_evidence(model, np.zeros(7), NOISE, zero, LIBRARY, TOLERANCES, disturbance))

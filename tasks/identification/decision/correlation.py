@@ -51,7 +51,10 @@ def residual_input_correlation(
         [(run.model.measured - predict(run.model, p, slots=s)) for run in runs]
         for p, s in ((plain, ()), (theta, slots))
     ]
-    return {name: _channel(runs, residuals, CHANNELS.index(name), longest_lag) for name in CORRELATED}
+    measured = [name for name in CORRELATED if np.isfinite(runs[0].sigma[CHANNELS.index(name)])]
+    return {
+        name: _channel(runs, residuals, CHANNELS.index(name), longest_lag) for name in measured or ["speed"]
+    }
 
 
 def _channel(

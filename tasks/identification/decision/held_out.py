@@ -40,6 +40,7 @@ def held_out_error(
         compose(base.parts, base.values, base.session),
     )
     names, square, braked, manoeuvres = [], [], [], []
+    measured = np.isfinite(evidence.train[0].sigma)
     for run in evidence.held_out:
         model = run.model
         y = np.array([predict(model, theta, slots=slots) for theta, slots in models])
@@ -50,15 +51,18 @@ def held_out_error(
         if errors is not None:
             braked.append(model.run.name)
             manoeuvres.append(errors**2)
-    channels = _errors(
-        np.array(square), names, dict(zip(CHANNELS, CHANNEL_UNITS, strict=True)), rules.error_resamples
-    )
+    units = {n: u for n, u, there in zip(CHANNELS, CHANNEL_UNITS, measured, strict=True) if there}
+    channels = summarise_errors(np.array(square)[:, :, measured], names, units, rules.error_resamples)
     if not braked:
         return channels, {}
-    return channels, _errors(np.array(manoeuvres), braked, MANOEUVRE_UNITS, rules.error_resamples)
+    seen = [figure for figure in MANOEUVRE_UNITS if figure != "peak_pitch" or "pitch" in units]
+    figures = np.array(manoeuvres)[:, :, [list(MANOEUVRE_UNITS).index(figure) for figure in seen]]
+    return channels, summarise_errors(
+        figures, braked, {f: MANOEUVRE_UNITS[f] for f in seen}, rules.error_resamples
+    )
 
 
-def _errors(
+def summarise_errors(
     square: NDArray[np.float64], runs: list[str], units: Mapping[str, str], resamples: int
 ) -> dict[str, ChannelError]:
     """Root mean squares with bootstrap intervals from mean squares by run and model, float64 [R, 3, C]."""

@@ -135,7 +135,11 @@ def find_missing_effects(
         manoeuvre_error=manoeuvres,
         correlation=residual_input_correlation(start.evidence.held_out, *grown, rules.longest_lag),
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
-        noise={name: (float(r), float(s)) for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)},
+        noise={
+            name: (float(r), float(s))
+            for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)
+            if np.isfinite(s)
+        },
         disturbance=start.evidence.disturbance,
         detectable=find_detectable_sizes(start.evidence, start.base),
         campaign=campaign.name,

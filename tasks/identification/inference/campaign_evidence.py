@@ -40,5 +40,5 @@ class Evidence:
 
     @property
     def samples(self) -> int:
-        """Number of whitened training values, N of the score."""
-        return sum(len(run.nuisance) for run in self.train)
+        """Number of measured training values, N of the score."""
+        return sum(run.model.samples * int(np.isfinite(run.sigma).sum()) for run in self.train)

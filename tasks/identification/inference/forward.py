@@ -21,8 +21,8 @@ from tasks.vehicle.parameters import Vehicle, surface_response
 
 MASKED_SPEED = 2.0
 """Below it the slip's denominator is not force-consistent: runs end there [m/s]."""
-SUBSTEPS = 5
-"""Integration steps between samples at 100 Hz; halving the step is a check of its own."""
+STEP = 0.002
+"""Longest integration step [s]; halving it is a check of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +37,7 @@ class RunModel:
     conditions : road feature, snow, direction and discs of the run
     samples : how many samples are used (to the masked speed)
     initial_speed : speed at the first sample, from the line through the speed before the brake [m/s]
+    climb : the force along the road that its measured slope gives; none where it was not measured
     """
 
     run: Run
@@ -45,6 +46,12 @@ class RunModel:
     conditions: Conditions
     samples: int
     initial_speed: float
+    climb: tuple[Slot, ...] = ()
+
+    @property
+    def substeps(self) -> int:
+        """Integration steps between samples."""
+        return max(round(self.run.interval / STEP), 1)
 
     @property
     def measured(self) -> NDArray[np.float64]:
@@ -85,7 +92,16 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
         ),
         samples=int(slow[0]) if slow.size else len(speed),
         initial_speed=float(np.polyfit(np.arange(max(lead, 5)), speed[: max(lead, 5)], 1)[1]),
+        climb=_climb(run, vehicle),
     )
+
+
+def _climb(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
+    """Return the force of the measured slope over time, rearward positive [N]."""
+    if run.road_slope is None:
+        return ()
+    force = vehicle.mass * vehicle.gravity * np.sin(run.road_slope)
+    return (Slot(port="longitudinal_force", variable="time", origin=0.0, spacing=run.interval, values=force),)
 
 
 def starting_speed(model: RunModel, theta: NDArray[np.float64]) -> float:
@@ -106,7 +122,7 @@ def simulate_run(
     slots: tuple[Slot, ...] = (),
     initial_speed: float | None = None,
     branch: tuple[int, Simulation] | None = None,
-    substeps: int = SUBSTEPS,
+    refinement: int = 1,
     keep_states: bool = False,
 ) -> Simulation:
     """Simulate a run under its measured pressure.
@@ -118,7 +134,7 @@ def simulate_run(
     slots : forms on top of the vehicle's own
     initial_speed : replaces the model's [m/s]
     branch : sample, and an earlier simulation with its states, to branch off from; what precedes is taken over
-    substeps : integration steps between samples
+    refinement : factor on the integration steps between samples
     keep_states : keep the states, from which other simulations can branch off
     """
     values = named_values(theta)
@@ -127,14 +143,14 @@ def simulate_run(
     simulated = simulate(
         car,
         surface_response(car, model.run.weather, model.surface_friction),
-        measured_trace(model.run.pressure, model.run.interval),
+        measured_trace(model.run.pressure, model.run.interval, model.run.drive_torque),
         replace(model.conditions, grade=values.get("slope", 0.0)),
         samples=model.samples - first,
-        substeps=substeps,
+        substeps=refinement * model.substeps,
         interval=model.run.interval,
         initial_speed=starting_speed(model, theta) if initial_speed is None else initial_speed,
         start=branch[1].states[first] if branch else None,
-        slots=slots,
+        slots=(*model.climb, *slots),
         keep_states=keep_states,
     )
     if branch is None:
@@ -166,6 +182,8 @@ def instrument_readings(
         simulated.column("longitudinal_acceleration")
         + g * theta[PARAMETER_INDEX["slope"]] * model.run.direction
     )
+    if model.run.road_slope is not None:
+        felt = felt + g * np.sin(model.run.road_slope[: model.samples])
     up = simulated.column("heave_acceleration")
     tilt = e["mount_tilt"]
     ax = (felt - e["gravity_leak"] * g * np.sin(pitch) + tilt * (g + up)) * (1.0 + e["acceleration_scale"])
@@ -201,7 +219,7 @@ def instrument_readings(
 
 
 def predict(
-    model: RunModel, theta: NDArray[np.float64], *, slots: tuple[Slot, ...] = (), substeps: int = SUBSTEPS
+    model: RunModel, theta: NDArray[np.float64], *, slots: tuple[Slot, ...] = (), refinement: int = 1
 ) -> NDArray[np.float64]:
     """Return the predicted channels of a run, float64 [samples, 7]; arguments as in `simulate_run`."""
-    return instrument_readings(model, theta, simulate_run(model, theta, slots=slots, substeps=substeps))
+    return instrument_readings(model, theta, simulate_run(model, theta, slots=slots, refinement=refinement))

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from tasks.campaign.campaign import Campaign, Tolerances
+from tasks.campaign.campaign import SESSION, Campaign, Tolerances
 from tasks.campaign.gauge import denoise_pressure
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance, prior_precision
 from tasks.identification.inference.evidence import RunEvidence, run_evidence, with_disturbance
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.forward import SUBSTEPS, RunModel, predict, run_model
+from tasks.identification.inference.forward import RunModel, predict, run_model
 from tasks.identification.inference.hypothesis import compose
 from tasks.identification.inference.noise import channel_noise, whiten
 from tasks.identification.rules import DecisionRules
@@ -21,6 +21,11 @@ from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import EFFECT_TABLE
 from tasks.vehicle.parameters import Vehicle
 
+BODY_CHANNELS = ("pitch", "pitch_rate", "vertical_acceleration")
+SUSPENSION = ("pitch_gain", "damping", "stiffness")
+"""Session nuisances that only the body's motion shows."""
+UNSEEN = 1e-3
+"""Factor on the tolerance of a nuisance that no channel shows: it stays where it is."""
 FREED = 20.0
 """Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
 
@@ -42,6 +47,7 @@ def prepare_evidence(
     rules : which runs are left out, and by which all is decided
     """
     rho, sigma = channel_noise(campaign)
+    tolerances = _without_unseen(campaign)
     plain = np.zeros(len(EFFECT_TABLE))
     guess = Disturbance()
     runs = [replace(run, pressure=denoise_pressure(run.pressure)) for run in campaign.runs]
@@ -54,16 +60,25 @@ def prepare_evidence(
         # too few sound runs to do without the others
         kept = sound if len(sound) >= rules.fewest_runs else own
         used.extend(m.run.name for m in kept)
-        return tuple(
-            run_evidence(model, rho, sigma, plain, library, campaign.tolerances, guess) for model in kept
-        )
+        return tuple(run_evidence(model, rho, sigma, plain, library, tolerances, guess) for model in kept)
 
     train, held_out = derived(False, effects), derived(True, ())
     forked = tuple(run.name for run in campaign.runs if run.name not in used)
     return Evidence(
         train=train, held_out=held_out, effects=effects,
-        tolerances=campaign.tolerances, disturbance=guess, rules=rules, forked=forked,
+        tolerances=tolerances, disturbance=guess, rules=rules, forked=forked,
     )  # fmt: skip
+
+
+def _without_unseen(campaign: Campaign) -> Tolerances:
+    """Return the tolerances with the suspension held where no channel shows the body's motion."""
+    if any(name in campaign.channels for name in BODY_CHANNELS):
+        return campaign.tolerances
+    session = (
+        UNSEEN * s if name in SUSPENSION else s
+        for name, s in zip(SESSION, campaign.tolerances.session, strict=True)
+    )
+    return replace(campaign.tolerances, session=tuple(session))
 
 
 def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.float64]) -> float:
@@ -75,7 +90,7 @@ def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.flo
     rho, sigma : channel noise
     """
     plain = np.zeros(len(EFFECT_TABLE))
-    change = predict(model, plain) - predict(model, plain, substeps=2 * SUBSTEPS)
+    change = predict(model, plain) - predict(model, plain, refinement=2)
     return float(np.sum(whiten(change, rho, sigma) ** 2))
 
 

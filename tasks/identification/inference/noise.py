@@ -21,8 +21,9 @@ def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.f
     """AR(1) coefficient and standard deviation of every channel.
 
     The half variogram of AR(1) noise under a smooth motion is sigma^2 (1 - rho^k) + a k^2 at lag k; rho is
-    taken on a grid, sigma^2 and a by least squares, over what precedes the brake on flat roads. A coarse channel
-    has the variance of its rounding, step^2 / 12, at least.
+    taken on a grid, sigma^2 and a by least squares, over what precedes the brake on flat roads; over the whole runs
+    where too little does. A coarse channel has the variance of its rounding, step^2 / 12, at least. A channel that was
+    not measured has an infinite standard deviation: it weighs nothing.
 
     Parameters
     ----------
@@ -35,11 +36,13 @@ def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.f
     Raises
     ------
     InputError
-        If no training run is quiet for long enough, or a channel never changes.
+        If a measured channel never changes, or the training runs are too short.
     """
     sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros(len(LAGS))
-    for run in campaign.train:
-        quiet = run.response[: _quiet_samples(run)].copy()
+    stretches = [run.response[: _quiet_samples(run)].copy() for run in campaign.train]
+    if max(len(stretch) for stretch in stretches) <= 3 * LAGS[-1]:
+        stretches = [run.response.copy() for run in campaign.train]
+    for run, quiet in zip(campaign.train, stretches, strict=True):
         for level, rate in INTEGRALS:
             # what the rate explains is motion, not noise of the level
             quiet[:, level] -= np.cumsum(quiet[:, rate]) * run.interval
@@ -48,14 +51,14 @@ def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.f
                 difference = quiet[lag:] - quiet[:-lag]
                 sums[i] += 0.5 * np.sum((difference - difference.mean(0)) ** 2, axis=0)
                 counts[i] += len(difference) - 1
-    floor = _rounding_variance(campaign)
-    problems = _problems(campaign, floor)
+    floor = np.where(campaign.is_measured, _rounding_variance(campaign), np.inf)
+    problems = _problems(campaign, floor, max(len(stretch) for stretch in stretches))
     if problems:
         raise InputError(problems)
     variogram = np.maximum(sums / counts[:, None], floor)
     rho, sigma = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     k = np.array(LAGS, dtype=np.float64)
-    for j in range(len(CHANNELS)):
+    for j in np.flatnonzero(campaign.is_measured):
         best = np.inf
         for trial in np.arange(0.0, 0.95, 0.02):
             basis = np.column_stack((1.0 - trial**k, k**2)) / variogram[:, j : j + 1]
@@ -84,21 +87,15 @@ def _rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
     return np.where(np.isfinite(steps), steps, np.nan) ** 2 / 12
 
 
-def _problems(campaign: Campaign, floor: NDArray[np.float64]) -> list[str]:
+def _problems(campaign: Campaign, floor: NDArray[np.float64], longest: int) -> list[str]:
     problems = [
         f"{campaign.name}: channel {CHANNELS[j]} must change; it holds one value in all training runs: record it anew"
         for j in np.flatnonzero(np.isnan(floor))
     ]
-    longest = max(campaign.train, key=_quiet_samples)
-    needed = 3 * LAGS[-1] + 1
-    if _quiet_samples(longest) < needed:
-        seconds = (needed + BEFORE_BRAKE) * longest.interval
-        pressed = np.flatnonzero(longest.pressure > QUIET_PRESSURE)
-        first = f"{pressed[0] * longest.interval:.2f} s" if pressed.size else "the end"
+    if longest <= 3 * LAGS[-1]:
         problems.append(
-            f"{campaign.name}: sensor noise is read before the brake, so at least one training run must stay at or"
-            f" below {QUIET_PRESSURE:g} MPa for its first {seconds:.2f} s; the longest, {longest.name}, does until"
-            f" {first}: start the runs earlier, best 0.4 s before the brake in three training runs"
+            f"{campaign.name}: sensor noise is read from training runs, so one must hold more than {3 * LAGS[-1]}"
+            f" samples; the longest has {longest}: lengthen the runs"
         )
     return problems
 

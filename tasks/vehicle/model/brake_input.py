@@ -1,4 +1,4 @@
-"""Input of the driver: a brake command, or brake pressure as it was measured."""
+"""Input of the driver: a brake command, or brake pressure and engine torque as they were measured."""
 
 from math import inf
 from typing import NamedTuple
@@ -22,12 +22,14 @@ class BrakeInput(NamedTuple):
     trace : float64 [N] pressure at samples, linear between them and held beyond the last; empty for a command [MPa]
     interval : between the samples [s]
     hold_speed : keep the speed until the command's onset
+    engine : float64 [N] torque of the engine at the wheels at the samples, driving positive; empty for none [N m]
     """
 
     profile: PressureProfile
     trace: NDArray[np.float64]
     interval: float
     hold_speed: bool
+    engine: NDArray[np.float64]
 
 
 def brake_command(profile: PressureProfile, *, hold_speed: bool = False) -> BrakeInput:
@@ -38,18 +40,21 @@ def brake_command(profile: PressureProfile, *, hold_speed: bool = False) -> Brak
     profile : the command
     hold_speed : keep the speed until its onset
     """
-    return BrakeInput(profile, NO_TRACE, 1.0, hold_speed)
+    return BrakeInput(profile, NO_TRACE, 1.0, hold_speed, NO_TRACE)
 
 
-def measured_trace(pressure: NDArray[np.float64], interval: float) -> BrakeInput:
-    """Return a measured pressure as an input.
+def measured_trace(
+    pressure: NDArray[np.float64], interval: float, engine: NDArray[np.float64] | None = None
+) -> BrakeInput:
+    """Return a measured pressure as an input, with the engine's torque where that was measured.
 
     Parameters
     ----------
     pressure : float64 [N] at the samples [MPa]
     interval : between them [s]
+    engine : float64 [N] torque at the wheels, driving positive [N m]
     """
-    return BrakeInput(NO_COMMAND, pressure, interval, False)
+    return BrakeInput(NO_COMMAND, pressure, interval, False, NO_TRACE if engine is None else engine)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -63,11 +68,24 @@ def pressure_at(time: float, onset: float, delay: float, drive: BrakeInput) -> f
     delay : by which the pressure is late [s]
     drive : the input
     """
-    last = len(drive.trace) - 1
-    if last < 0:
+    if len(drive.trace) == 0:
         return brake_pressure(time - onset - delay, drive.profile)
-    u = max(time - delay, 0.0) / drive.interval
+    return value_at(time - delay, drive.trace, drive.interval)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def value_at(time: float, trace: NDArray[np.float64], interval: float) -> float:
+    """Value of a trace, linear between its samples and held beyond both ends.
+
+    Parameters
+    ----------
+    time : since the start of the run [s]
+    trace : float64 [N], at least one sample
+    interval : between the samples [s]
+    """
+    last = len(trace) - 1
+    u = max(time, 0.0) / interval
     k = int(u)
     if k >= last:
-        return float(drive.trace[last])
-    return float(drive.trace[k] + (u - k) * (drive.trace[k + 1] - drive.trace[k]))
+        return float(trace[last])
+    return float(trace[k] + (u - k) * (trace[k + 1] - trace[k]))

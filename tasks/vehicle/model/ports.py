@@ -86,7 +86,8 @@ def ports_at(
 
     The body's pitch moment follows from the forces at the ground: each axle passes its longitudinal link force
     on at wheel height, and its brake and shaft torques. With F_x at the ground this is the same as F_x on the
-    height of the body's centre of gravity less the inertia of axles and wheels.
+    height of the body's centre of gravity less the inertia of axles and wheels. What the engine was measured to give
+    goes to the axles as the brake's torque does: no vehicle file says which it drives.
 
     Parameters
     ----------
@@ -107,13 +108,15 @@ def ports_at(
         front, rear = standing_axle(ground_f, strut_f, wheels), standing_axle(ground_r, strut_r, wheels)
     else:
         gain_f, gain_r = brake_gains(instant.pressure, chassis)
-        engine = effects.engine_torque + effects.engine_viscous * motion.omega_f
+        share = gain_f / (gain_f + gain_r)
+        engine = effects.engine_torque + effects.engine_viscous * motion.omega_f - share * instant.engine
+        engine_r = -(1.0 - share) * instant.engine
         front = rolling_axle(
             ground_f, strut_f, speed, motion.omega_f, memory.front, scale_f, gain_f, engine, body.static_f,
             body.tyre_f, step, instant, forms, chassis, tyre,
         )  # fmt: skip
         rear = rolling_axle(
-            ground_r, strut_r, speed, motion.omega_r, memory.rear, scale_r, gain_r, 0.0, body.static_r,
+            ground_r, strut_r, speed, motion.omega_r, memory.rear, scale_r, gain_r, engine_r, body.static_r,
             body.tyre_r, step, instant, forms, chassis, tyre,
         )  # fmt: skip
     share = 0.0 if standing else stick_share(speed, effects)
@@ -140,7 +143,8 @@ def ports_at(
         acceleration = -(front.tyre_force + rear.tyre_force + slope_f + slope_r + drag) / wheels.mass
     link_f = front.tyre_force + slope_f + body.unsprung_f * (acceleration + chassis.climb)
     link_r = rear.tyre_force + slope_r + body.unsprung_r * (acceleration + chassis.climb)
-    braking = (link_f + link_r) * chassis.lever + front.brake_torque + rear.brake_torque + front.shaft_torque
+    braking = (link_f + link_r) * chassis.lever + front.brake_torque + rear.brake_torque
+    braking += front.shaft_torque + rear.shaft_torque
     moment += braking * (1.0 + effects.pitch_gain)
     return Ports(
         front, rear, -slope_f - slope_r, drag, acceleration, moment, effects.aero_lift * speed * speed

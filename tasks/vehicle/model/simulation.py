@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tasks.vehicle.brake import onset_by_position
 from tasks.vehicle.effects.brake_line import line_after
 from tasks.vehicle.effects.slots import Slot, SlotTables, slot_tables
-from tasks.vehicle.model.brake_input import BrakeInput, pressure_at
+from tasks.vehicle.model.brake_input import BrakeInput, pressure_at, value_at
 from tasks.vehicle.model.chassis import Chassis, Conditions, chassis_of
 from tasks.vehicle.model.ports import ports_at
 from tasks.vehicle.model.states import (
@@ -200,7 +200,11 @@ def integrate(
             line, commanded, pressure_at(time + step, onset, dead, drive), step, chassis.effects
         )
         rate = (next_line - line) / step
-        instant = Instant(time, line, rate, deceleration, standing, held)
+        engine, next_engine = 0.0, 0.0
+        if len(drive.engine) > 0:
+            engine = value_at(time, drive.engine, drive.interval)
+            next_engine = value_at(time + step, drive.engine, drive.interval)
+        instant = Instant(time, line, rate, deceleration, standing, held, engine)
         ports = ports_at(motion, memory, x, instant, scale_f, scale_r, step, slots, chassis, tyre, road)
         if n % substeps == 0:
             f, r = ports.front, ports.rear
@@ -216,7 +220,7 @@ def integrate(
         if n == last:
             break
         deceleration = -ports.acceleration
-        next_instant = Instant(time + step, next_line, rate, deceleration, standing, held)
+        next_instant = Instant(time + step, next_line, rate, deceleration, standing, held, next_engine)
         motion, memory, x = take_step(
             motion, memory, x, ports, instant, next_instant, step, slots, chassis, tyre, road
         )

@@ -50,6 +50,7 @@ class Instant(NamedTuple):
     deceleration : -dv/dt of the evaluation before, which forms of it read [m/s2]
     standing : the vehicle has come to rest
     held : its speed is held from outside
+    engine : torque of the engine at the wheels, driving positive [N m]
     """
 
     time: float
@@ -58,6 +59,7 @@ class Instant(NamedTuple):
     deceleration: float
     standing: bool
     held: bool
+    engine: float
 
 
 STATE_WIDTH = 27

@@ -58,7 +58,7 @@ def fitted_run(manoeuvre, theta, slots=(), vehicle=VEHICLE):
         pressure=np.array([brake_pressure(t - 0.5, brake_of(peak).profile) for t in TIME]), response=response,
     )  # fmt: skip
     model = run_model(run, vehicle, SURFACE)
-    return model, simulate_run(model, theta, slots=slots, substeps=20)
+    return model, simulate_run(model, theta, slots=slots, refinement=4)
 
 
 def brake_of(peak):
@@ -136,7 +136,7 @@ def test_a_vehicle_that_calibration_grew_grows_further_and_keeps_what_it_had(tmp
     model, fitted = fitted_run(
         "hump", parameter_vector({"lag": 0.08, "rolling_coefficient": 0.004}), (), base
     )
-    again = simulate_run(replace(model, vehicle=car), PLAIN, substeps=20)
+    again = simulate_run(replace(model, vehicle=car), PLAIN, refinement=4)
     np.testing.assert_allclose(again.history, fitted.history, atol=ROUNDING)
 
 

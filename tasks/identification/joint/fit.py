@@ -1,0 +1,226 @@
+"""One robust least squares over all numbers of a car and all offsets of its runs, from several starts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from tasks.campaign.campaign import CHANNELS
+from tasks.identification.joint.numbers import JointNumber
+from tasks.identification.joint.stops import (
+    FITTED,
+    OFFSET_LIMIT,
+    OFFSET_SIGMA,
+    OFFSETS,
+    Stop,
+    predict_stop,
+)
+
+SCALES = {"speed": 0.15, "longitudinal_acceleration": 0.6, "wheel_speed_front": 0.6, "wheel_speed_rear": 0.6}
+"""Size of a misfit that counts one before the residuals say how large it is [the channel's unit]."""
+STEPS = 1.0 / 30.0
+"""Finite-difference step over the prior sigma."""
+OFFSET_STEP = 0.02
+FACTORS = (1.0, 0.5, 2.0)
+"""Brake gains from which a fit starts, over the gain that the deceleration by pressure suggests."""
+MOST_EVALUATIONS = 30
+ENOUGH = 1e-4
+"""Relative change of cost and numbers at which a fit has converged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointFit:
+    """A fit of numbers and offsets.
+
+    Parameters
+    ----------
+    numbers : that were fitted
+    values : float64 [K] of the numbers
+    offsets : float64 [R, 3] of the runs
+    cost : robust misfit with the priors, over 2
+    residuals : weighted, one float64 [N C] a run
+    slopes : derivatives by the numbers, the run's own offsets taken out, one float64 [N C, K] a run
+    information : float64 [K, K] of the numbers, offsets taken out, priors included
+    scales : size of a misfit that counts one, by place in `CHANNELS` [the channel's unit]
+    """
+
+    numbers: tuple[JointNumber, ...]
+    values: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    cost: float
+    residuals: tuple[NDArray[np.float64], ...]
+    slopes: tuple[NDArray[np.float64], ...]
+    information: NDArray[np.float64]
+    scales: NDArray[np.float64]
+
+    @property
+    def by_name(self) -> dict[str, float]:
+        """Values of the numbers."""
+        return {n.name: float(v) for n, v in zip(self.numbers, self.values, strict=True)}
+
+
+def fit_jointly(
+    stops: Sequence[Stop],
+    numbers: tuple[JointNumber, ...],
+    starts: Sequence[Mapping[str, float]],
+    *,
+    scales: NDArray[np.float64] | None = None,
+    offsets: NDArray[np.float64] | None = None,
+) -> list[JointFit]:
+    """Fit numbers and offsets from each start, the best fit first.
+
+    Parameters
+    ----------
+    stops : training runs
+    numbers : that are free
+    starts : values by name; others start at 0
+    scales : float64 [7] size of a misfit that counts one; None takes the first guess
+    offsets : float64 [R, 3] where the runs' own numbers start
+    """
+    sizes = np.array([SCALES.get(name, 1.0) for name in CHANNELS]) if scales is None else scales
+    fits = [_fit_from(stops, numbers, start, sizes, offsets) for start in starts]
+    return sorted(fits, key=lambda found: found.cost)
+
+
+def suggest_starts(stops: Sequence[Stop]) -> list[dict[str, float]]:
+    """Return starts about the brake gain that the deceleration by pressure suggests.
+
+    Parameters
+    ----------
+    stops : training runs
+    """
+    slopes = []
+    for stop in stops:
+        if stop.onset + 5 >= stop.model.samples:
+            continue
+        speed = stop.model.measured[stop.onset :, CHANNELS.index("speed")]
+        pressure = stop.model.run.pressure[stop.onset : stop.model.samples]
+        impulse = float(pressure.sum()) * stop.model.run.interval
+        slopes.append(float(speed[0] - speed[-1]) / max(impulse, 1e-9))
+    if not slopes:
+        return [{}]
+    vehicle = stops[0].model.vehicle
+    expected = vehicle.brake_gain / (vehicle.wheel_radius * vehicle.mass)
+    ratio = float(np.median(slopes)) / expected
+    return [{"pressure_gain": factor * ratio - 1.0} for factor in FACTORS]
+
+
+def lead_offsets(
+    stop: Stop, numbers: Mapping[str, float], scales: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return a run's own offsets from what precedes the brake alone, so that the stop itself is predicted.
+
+    Parameters
+    ----------
+    stop : a run that no fit has seen
+    numbers : of the car
+    scales : float64 [7] size of a misfit that counts one
+    """
+    end = max(stop.onset - 1, 3) if stop.onset < stop.model.samples else max(stop.model.samples // 5, 3)
+
+    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate((_weighted(stop, numbers, x, scales)[:end].ravel(), x / OFFSET_SIGMA))
+
+    limit = OFFSET_LIMIT
+    found = least_squares(
+        residual, np.zeros(len(OFFSETS)), bounds=(-limit, limit), diff_step=OFFSET_STEP, max_nfev=15
+    )
+    return np.asarray(found.x)
+
+
+def _weighted(
+    stop: Stop, numbers: Mapping[str, float], offsets: NDArray[np.float64], scales: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return measured less model over the scales, float64 [N, C]; each sample weighs as at 20 Hz."""
+    left = stop.measured - predict_stop(stop, numbers, offsets)[:, stop.channels]
+    weight = np.sqrt(min(stop.model.run.interval / 0.05, 1.0))
+    return np.asarray(weight * left / scales[stop.channels], dtype=np.float64)
+
+
+def _fit_from(
+    stops: Sequence[Stop],
+    numbers: tuple[JointNumber, ...],
+    start: Mapping[str, float],
+    scales: NDArray[np.float64],
+    offsets: NDArray[np.float64] | None,
+) -> JointFit:
+    k, own = len(numbers), len(OFFSETS)
+    sigma = np.array([n.sigma for n in numbers])
+    lower = np.concatenate(([n.lower for n in numbers], np.tile(-OFFSET_LIMIT, len(stops))))
+    upper = np.concatenate(([n.upper for n in numbers], np.tile(OFFSET_LIMIT, len(stops))))
+    began = np.zeros((len(stops), own)) if offsets is None else offsets
+    x = np.concatenate(
+        ([start.get(n.name, 0.3 * n.sigma if n.lower == 0.0 else 0.0) for n in numbers], began.ravel())
+    )
+    x = np.clip(x, lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower))
+    prior = np.concatenate((1.0 / sigma, np.tile(1.0 / OFFSET_SIGMA, len(stops))))
+    steps = np.concatenate((STEPS * sigma, np.full(own * len(stops), OFFSET_STEP)))
+    names = [n.name for n in numbers]
+
+    def of_run(i: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        values = dict(zip(names, x[:k].tolist(), strict=True))
+        return _weighted(stops[i], values, x[k + own * i : k + own * (i + 1)], scales).ravel()
+
+    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate((*(of_run(i, x) for i in range(len(stops))), prior * x))
+
+    def run_slopes(i: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        here = of_run(i, x)
+        columns = np.zeros((len(here), len(x)))
+        for j in (*range(k), *range(k + own * i, k + own * (i + 1))):
+            step = steps[j] if x[j] + steps[j] <= upper[j] else -steps[j]
+            moved = x.copy()
+            moved[j] += step
+            columns[:, j] = (of_run(i, moved) - here) / step
+        return columns
+
+    def jacobian(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.vstack((*(run_slopes(i, x) for i in range(len(stops))), np.diag(prior)))
+
+    found = least_squares(
+        residual, x, jac=jacobian, bounds=(lower, upper), loss="soft_l1", x_scale="jac", ftol=ENOUGH, xtol=ENOUGH,
+        max_nfev=MOST_EVALUATIONS,
+    )  # fmt: skip
+    residuals = tuple(of_run(i, found.x) for i in range(len(stops)))
+    full = [run_slopes(i, found.x) for i in range(len(stops))]
+    slopes = tuple(
+        _without_offsets(columns[:, :k], columns[:, k + own * i : k + own * (i + 1)])
+        for i, columns in enumerate(full)
+    )
+    information = np.diag(1.0 / sigma**2) + sum(a.T @ a for a in slopes)
+    return JointFit(
+        numbers=numbers, values=found.x[:k], offsets=found.x[k:].reshape(-1, own), cost=float(found.cost),
+        residuals=residuals, slopes=slopes, information=np.asarray(information), scales=scales,
+    )  # fmt: skip
+
+
+def _without_offsets(numbers: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return derivatives by the numbers with what the run's own offsets can take from them taken out."""
+    inner = offsets.T @ offsets + np.diag(1.0 / OFFSET_SIGMA**2)
+    return np.asarray(numbers - offsets @ np.linalg.solve(inner, offsets.T @ numbers), dtype=np.float64)
+
+
+def misfit_scales(fitted: JointFit, stops: Sequence[Stop]) -> NDArray[np.float64]:
+    """Return the size of each channel's misfit by its residuals, robustly; float64 [7] [the channel's unit].
+
+    Noise and what the model does not know count together: no channel weighs more than the model can follow it.
+
+    Parameters
+    ----------
+    fitted : a first fit
+    stops : its runs
+    """
+    scales = fitted.scales.copy()
+    for name in FITTED:
+        place = CHANNELS.index(name)
+        left = [
+            stop.measured[:, list(stop.channels).index(place)]
+            - predict_stop(stop, fitted.by_name, offsets)[:, place]
+            for stop, offsets in zip(stops, fitted.offsets, strict=True)
+            if place in stop.channels
+        ]
+        if left:
+            scales[place] = max(1.4826 * float(np.median(np.abs(np.concatenate(left)))), 0.2 * SCALES[name])
+    return scales

@@ -1,0 +1,138 @@
+"""A run as a joint fit sees it: its model, its own offsets, and what drove the car before the brake."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNELS, Run
+from tasks.identification.inference.forward import (
+    RunModel,
+    instrument_readings,
+    run_model,
+    simulate_run,
+    starting_speed,
+)
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.table import PARAMETERS, parameter_vector
+from tasks.vehicle.parameters import Vehicle
+
+FITTED = ("speed", "longitudinal_acceleration", "wheel_speed_front", "wheel_speed_rear")
+"""Channels that a joint fit compares: those of the motion along the road."""
+OFFSETS = ("initial_speed", "drive", "acceleration_bias")
+"""A run's own numbers: speed at its start [m/s], drive force over mass before the brake and bias [m/s2]."""
+OFFSET_SIGMA = np.array([0.3, 2.0, 0.3])
+"""Their priors."""
+OFFSET_LIMIT = np.array([3.0, 8.0, 3.0])
+BRAKED = 0.1
+"""Share of a run's largest pressure from which the driver brakes [1]."""
+LIFT = 0.2
+"""Time in which a driver lifts the throttle, centred on the brake where no throttle was measured [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """A run made ready for a joint fit.
+
+    Parameters
+    ----------
+    model : the run with what was measured of engine and road
+    drive : float64 [N] share of the drive force that acts before the brake; zero where the engine was measured
+    onset : first sample at which the driver brakes; the number of samples where he does not
+    channels : int64 [C] places of the measured channels of `FITTED`
+    """
+
+    model: RunModel
+    drive: NDArray[np.float64]
+    onset: int
+    channels: NDArray[np.int64]
+
+    @property
+    def measured(self) -> NDArray[np.float64]:
+        """float64 [N, C] measured channels that are compared."""
+        return self.model.measured[:, self.channels]
+
+
+def make_stop(run: Run, vehicle: Vehicle, surface: SurfaceParameters, channels: tuple[str, ...]) -> Stop:
+    """Return a run ready for a joint fit.
+
+    Parameters
+    ----------
+    run : measured
+    vehicle, surface : the model as it stands
+    channels : that were measured
+    """
+    model = run_model(run, vehicle, surface)
+    pressure = model.run.pressure[: model.samples]
+    peak = float(pressure.max())
+    pressed = np.flatnonzero(pressure > BRAKED * peak) if peak > 0.0 else np.empty(0, dtype=np.int64)
+    onset = int(pressed[0]) if pressed.size else model.samples
+    seen = [
+        name
+        for name in FITTED
+        if name in channels and not (name == FITTED[3] and _is_copy(model, FITTED[2], FITTED[3]))
+    ]
+    return Stop(
+        model=model,
+        drive=_drive_share(model, onset),
+        onset=onset,
+        channels=np.array([CHANNELS.index(name) for name in seen]),
+    )
+
+
+def _is_copy(model: RunModel, one: str, other: str) -> bool:
+    """Whether one signal stands for both axles: it counts once."""
+    a, b = (model.measured[:, CHANNELS.index(name)] for name in (one, other))
+    return bool(np.array_equal(a, b))
+
+
+def _drive_share(model: RunModel, onset: int) -> NDArray[np.float64]:
+    """Return how much of the drive force before the brake acts: by the throttle, else until the brake is pressed."""
+    run, count = model.run, model.samples
+    if run.drive_torque is not None:
+        return np.zeros(count)
+    if run.throttle is not None:
+        return np.clip(run.throttle[:count], 0.0, 1.0)
+    if onset == count:
+        return np.zeros(count)  # without a brake it coasts: that is what such a run is for
+    late = (np.arange(count) - onset) * run.interval
+    return np.clip(0.5 - late / LIFT, 0.0, 1.0)
+
+
+def predict_stop(
+    stop: Stop, numbers: Mapping[str, float], offsets: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the readings of a run, float64 [N, 7] in the order of `CHANNELS`.
+
+    Parameters
+    ----------
+    stop : the run
+    numbers : of the table of effects, on top of the vehicle
+    offsets : float64 [3] in the order of `OFFSETS`
+    """
+    model = stop.model
+    theta = parameter_vector(complete_numbers(numbers))
+    if stop.drive.any():
+        torque = offsets[1] * model.vehicle.mass * model.vehicle.wheel_radius * stop.drive
+        model = replace(model, run=replace(model.run, drive_torque=torque))
+    speed = starting_speed(model, theta) + float(offsets[0])
+    y = instrument_readings(model, theta, simulate_run(model, theta, initial_speed=speed))
+    y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
+    return y
+
+
+def complete_numbers(numbers: Mapping[str, float]) -> dict[str, float]:
+    """Return the numbers with the thresholds that act with them, each at its start value.
+
+    Parameters
+    ----------
+    numbers : of the table of effects
+    """
+    complete = dict(numbers)
+    for name, value in numbers.items():
+        if value != 0.0:
+            for row in PARAMETERS.values():
+                if row.effect == PARAMETERS[name].effect and row.start != 0.0:
+                    complete.setdefault(row.name, row.start)
+    return complete

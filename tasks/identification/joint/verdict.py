@@ -1,0 +1,361 @@
+"""The verdict on a car that the vehicle file hardly knows: calibrated, then named what earns its place."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
+from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
+from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict, VerdictName
+from tasks.identification.decision.held_out import summarise_errors
+from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.joint.elimination import (
+    CERTAIN,
+    Substitute,
+    certainty,
+    eliminate,
+    find_substitutes,
+    quantile,
+    refit,
+    standard_errors,
+)
+from tasks.identification.joint.fit import (
+    JointFit,
+    fit_jointly,
+    lead_offsets,
+    misfit_scales,
+    suggest_starts,
+)
+from tasks.identification.joint.numbers import JointNumber, choose_numbers, saturates
+from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop, predict_stop
+from tasks.identification.rules import DecisionRules
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.effects.table import PARAMETERS, parameter_vector
+from tasks.vehicle.parameters import Vehicle
+
+FIRST = ("lag", "drag_area", "speed_delay")
+"""Numbers that are free beside those of every car while the best start is looked for."""
+GRIPS = (0.0, 0.2, 0.5)
+"""Friction from which the last fits start, where runs saturate the tyres [1]."""
+PREDICTS_BETTER = 0.9
+"""Share of the held-out error below which a model without a number predicts better than with it [1]."""
+UNKNOWN_GAIN = 0.1
+"""Tolerance of the brake gain from which a vehicle file hardly knows its car [1]."""
+FEW_RUNS = 3
+"""Training or held-out runs below which their scatter says too little to screen effects one by one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTrace:
+    """A verdict with what it stands on.
+
+    Parameters
+    ----------
+    verdict : the answer
+    fitted : the fit that it rests on
+    train, held_out : the runs
+    predicted : by held-out run, float64 [3, N, 7] readings of the frozen, the re-tuned and the grown model
+    substitutes : what explains nearly as much as a named number
+    agreeing : starts that reach the same fit, of all
+    sentence : the answer in plain words
+    """
+
+    verdict: Verdict
+    fitted: JointFit
+    train: tuple[Stop, ...]
+    held_out: tuple[Stop, ...]
+    predicted: tuple[NDArray[np.float64], ...]
+    substitutes: tuple[Substitute, ...]
+    agreeing: tuple[int, int]
+    sentence: str
+
+
+def needs_joint_fit(campaign: Campaign) -> bool:
+    """Whether a campaign says too little, or its vehicle file knows too little, to look for one effect at a time.
+
+    Parameters
+    ----------
+    campaign : measured runs with their tolerances
+    """
+    few = min(len(campaign.train), len(campaign.held_out)) < FEW_RUNS
+    return few or campaign.tolerances.session[SESSION.index("pressure_gain")] >= UNKNOWN_GAIN
+
+
+def judge_jointly(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    library: Sequence[Effect],
+    numbers: Sequence[JointNumber],
+    rules: DecisionRules,
+    *,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> JointTrace:
+    """Calibrate a car on its training runs, take away what does not earn its place, and name what is left.
+
+    Parameters
+    ----------
+    campaign : measured runs with their split; nothing is fitted to a held-out run but its own start
+    vehicle, surface : the model that is judged
+    library : names of effects
+    numbers : that a fit may move
+    rules : by which errors are summarised and compared
+    progress : called with the name of each stage as it begins
+    """
+    stops = [make_stop(run, vehicle, surface, campaign.channels) for run in campaign.runs]
+    train = tuple(stop for stop in stops if not stop.model.run.held_out)
+    held_out = tuple(stop for stop in stops if stop.model.run.held_out)
+    shown = choose_numbers(numbers, campaign, [stop.model for stop in train])
+    progress("starts")
+    everything = _fit_everything(train, shown)
+    progress("elimination")
+    fitted, agreeing = _settle(train, eliminate(train, everything))
+    kept = tuple(n for n in shown if not n.removable)
+    retuned = refit(train, fitted, kept)
+    progress("held-out error")
+    reasons: list[str] = []
+    fitted = _drop_what_predicts_worse(train, held_out, fitted, reasons)
+    predicted = _predict_held_out(held_out, retuned, fitted)
+    error, manoeuvres = _summarise(held_out, predicted, rules)
+    progress("rivals")
+    substitutes = tuple(find_substitutes(train, fitted, shown))
+    effects, rivals = _named(fitted, substitutes, library)
+    kind = _kind(effects, rivals)
+    reasons += _what_was_used(campaign, train, agreeing)
+    reasons += [
+        f"{rival.name} explains the runs nearly as well as {of}: {SEPARATE[_group(fitted, of)]}"
+        for of, rival in rivals
+    ]
+    verdict = Verdict(
+        verdict=kind,
+        effects=tuple(effects),
+        rivals=tuple(rivals),
+        tried=(),
+        error=error,
+        manoeuvre_error=manoeuvres,
+        correlation={},
+        session_pulls={},
+        noise={name: (0.0, float(fitted.scales[CHANNELS.index(name)])) for name in FITTED if name in campaign.channels},
+        disturbance=Disturbance(),
+        detectable={},
+        campaign=campaign.name,
+        content_hash=campaign.content_hash,
+        split_hash=campaign.split_hash,
+        theta=parameter_vector(complete_numbers(fitted.by_name)),
+        slots=(),
+        experiment=None,
+        forked=(),
+        reasons=tuple(reasons),
+    )  # fmt: skip
+    return JointTrace(
+        verdict=verdict, fitted=fitted, train=train, held_out=held_out, predicted=predicted, substitutes=substitutes,
+        agreeing=agreeing, sentence=_say(fitted, kind, error, manoeuvres),
+    )  # fmt: skip
+
+
+SEPARATE = {
+    "resistance": "coast down from the highest speed to 5 m/s with the clutch open, and once in gear",
+    "delay": "press the brake in steps from constant speed, logging at 100 Hz or more",
+    "curve": "brake at three constant pressures from the same speed",
+    "sensor": "log the speed by a second instrument",
+}
+"""The run that tells numbers of one group apart."""
+
+
+def _fit_everything(train: Sequence[Stop], shown: tuple[JointNumber, ...]) -> JointFit:
+    """Return the fit of every number: from the best of several starts of the few that matter most."""
+    few = tuple(n for n in shown if not n.removable or n.name in FIRST)
+    best = fit_jointly(train, few, suggest_starts(train))[0]
+    scales = misfit_scales(best, train)
+    return fit_jointly(train, shown, [best.by_name], scales=scales, offsets=best.offsets)[0]
+
+
+def _settle(train: Sequence[Stop], fitted: JointFit) -> tuple[JointFit, tuple[int, int]]:
+    """Return the best fit of the numbers left from several starts, and how many of these reach it."""
+    grips = GRIPS if "friction" in fitted.by_name else (0.0,)
+    starts = [
+        fitted.by_name,
+        *({**start, "friction": grip} for start in suggest_starts(train) for grip in grips),
+    ]
+    fits = fit_jointly(train, fitted.numbers, starts, scales=fitted.scales)
+    error = standard_errors(fits[0])
+    same = sum(bool(np.all(np.abs(f.values - fits[0].values) < 2.0 * error)) for f in fits)
+    return fits[0], (same, len(fits))
+
+
+def _drop_what_predicts_worse(
+    train: Sequence[Stop], held_out: Sequence[Stop], fitted: JointFit, reasons: list[str]
+) -> JointFit:
+    """Return the fit without the numbers whose absence predicts the speed of held-out runs better, and say so.
+
+    A fit that prediction contradicts holds what its few runs had in common, and no property of the car.
+    """
+    there = _speed_error(held_out, fitted)
+    trials = []
+    for number, _ in _certain(fitted, removable=True):
+        without = refit(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
+        trials.append((_speed_error(held_out, without), number, without))
+    if not trials:
+        return fitted
+    gone, number, without = min(trials, key=lambda trial: trial[0])
+    if gone >= PREDICTS_BETTER * there:
+        return fitted
+    reasons.append(
+        f"{number.name} = {fitted.by_name[number.name]:.3g} would fit, but without it the speed of the held-out runs is"
+        f" predicted better ({gone:.3g} against {there:.3g} m/s): not named"
+    )
+    return _drop_what_predicts_worse(train, held_out, eliminate(train, without), reasons)
+
+
+def _speed_error(held_out: Sequence[Stop], fitted: JointFit) -> float:
+    """Return the RMSE of speed on held-out runs, each run counted once [m/s]."""
+    place = CHANNELS.index("speed")
+    squares = []
+    for stop in held_out:
+        y = predict_stop(stop, fitted.by_name, lead_offsets(stop, fitted.by_name, fitted.scales))
+        squares.append(float(np.mean((stop.model.measured - y)[:, place] ** 2)))
+    return float(np.sqrt(np.mean(squares)))
+
+
+def _predict_held_out(
+    held_out: Sequence[Stop], retuned: JointFit, fitted: JointFit
+) -> tuple[NDArray[np.float64], ...]:
+    """Return the readings of each held-out run by the frozen, the re-tuned and the grown model, float64 [3, N, 7]."""
+    models: tuple[Mapping[str, float], ...] = ({}, retuned.by_name, fitted.by_name)
+    return tuple(
+        np.array([predict_stop(stop, m, lead_offsets(stop, m, fitted.scales)) for m in models])
+        for stop in held_out
+    )
+
+
+def _summarise(
+    held_out: Sequence[Stop], predicted: Sequence[NDArray[np.float64]], rules: DecisionRules
+) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
+    """Return errors by channel, and of the stopping distance where runs brake."""
+    names = [stop.model.run.name for stop in held_out]
+    places = held_out[0].channels
+    square = np.array(
+        [
+            np.mean((stop.model.measured - y) ** 2, axis=1)[:, places]
+            for stop, y in zip(held_out, predicted, strict=True)
+        ]
+    )
+    units = {CHANNELS[c]: CHANNEL_UNITS[c] for c in places}
+    channels = summarise_errors(square, names, units, rules.error_resamples)
+    braked, distances = [], []
+    for stop, y in zip(held_out, predicted, strict=True):
+        pressure = stop.model.run.pressure[: stop.model.samples]
+        figures = manoeuvre_errors(stop.model.measured, y, pressure, stop.model.run.interval)
+        if figures is not None:
+            braked.append(stop.model.run.name)
+            distances.append(figures[:, :1] ** 2)
+    if not braked:
+        return channels, {}
+    unit = {"stopping_distance": MANOEUVRE_UNITS["stopping_distance"]}
+    return channels, summarise_errors(np.array(distances), braked, unit, rules.error_resamples)
+
+
+def _certain(fitted: JointFit, *, removable: bool) -> list[tuple[JointNumber, float]]:
+    """Return the numbers that differ from the vehicle file for certain, and by how many standard errors."""
+    return [
+        (number, float(sure))
+        for number, sure in zip(fitted.numbers, certainty(fitted), strict=True)
+        if number.removable == removable and sure >= CERTAIN
+    ]
+
+
+def _named(
+    fitted: JointFit, substitutes: Sequence[Substitute], library: Sequence[Effect]
+) -> tuple[list[NamedEffect], list[tuple[str, NamedEffect]]]:
+    """Return what is named, new physics first, and its rivals."""
+    by_number = {e.parameters[0].name: e for e in reversed(library)}
+    effects = [_named_effect(fitted, n, by_number[n.name]) for n, _ in _certain(fitted, removable=True)]
+    effects += [_named_effect(fitted, n, by_number[n.name]) for n, _ in _certain(fitted, removable=False)]
+    order = {"effect": 0, "sensor": 1, "retune": 2}
+    effects.sort(key=lambda e: order[e.effect_class])
+    rivals = []
+    for other in substitutes:
+        number = next(n for n in other.fitted.numbers if n.name == other.name)
+        rivals.append((by_number[other.of].name, _named_effect(other.fitted, number, by_number[other.name])))
+    return effects, rivals
+
+
+def _named_effect(fitted: JointFit, number: JointNumber, effect: Effect) -> NamedEffect:
+    place = fitted.numbers.index(number)
+    value, error = float(fitted.values[place]), float(standard_errors(fitted)[place])
+    reach, row = quantile(fitted) * error, PARAMETERS[number.name]
+    sure = float(certainty(fitted)[place])
+    return NamedEffect(
+        name=effect.name,
+        effect_class=effect.effect_class,
+        port=effect.port,
+        variable=effect.variable,
+        parameters=(
+            Parameter(
+                name=number.name, value=value, ci_low=max(value - reach, number.lower),
+                ci_high=min(value + reach, number.upper), lower=number.lower, upper=number.upper, unit=row.unit,
+            ),
+        ),
+        score=sure**2,
+        gain=0.5 * sure**2,
+        inflation=1.0,
+        held_out_gain=0.0,
+        win_share=1.0,
+    )  # fmt: skip
+
+
+def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:
+    classes = {effect.effect_class for effect in effects}
+    if "effect" in classes:
+        return "SET" if rivals else "FOUND"
+    return "SENSOR" if "sensor" in classes else "RETUNE" if classes else "NOTHING"
+
+
+def _group(fitted: JointFit, effect: str) -> str:
+    groups = {n.name: n.group for n in fitted.numbers}
+    return next((group for name, group in groups.items() if name in effect or effect in name), "resistance")
+
+
+def _what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tuple[int, int]) -> list[str]:
+    """Return sentences on channels, inputs, range and stability."""
+    runs = campaign.runs
+    inputs = ["brake pressure"]
+    inputs += ["engine torque"] if any(run.drive_torque is not None for run in runs) else []
+    inputs += ["throttle"] if any(run.throttle is not None for run in runs) else []
+    inputs += ["road slope"] if any(run.road_slope is not None for run in runs) else []
+    speeds = np.concatenate([stop.model.measured[:, 0] for stop in train])
+    pressure = max(float(stop.model.run.pressure.max()) for stop in train)
+    seen = [CHANNELS[c].replace("_", " ") for c in train[0].channels]
+    grip = "" if any(saturates(stop.model) for stop in train) else "; no run came near the tyres' limit"
+    return [
+        f"inputs that were measured: {', '.join(inputs)}; compared: {', '.join(seen)}",
+        f"the training runs reach {speeds.min():.3g} to {speeds.max():.3g} m/s and {pressure:.3g} MPa{grip}: beyond"
+        " that nothing is claimed",
+        f"{agreeing[0]} of {agreeing[1]} starts reach this fit",
+    ]
+
+
+def _say(
+    fitted: JointFit,
+    kind: VerdictName,
+    error: Mapping[str, ChannelError],
+    manoeuvres: Mapping[str, ChannelError],
+) -> str:
+    """Return the verdict in plain words, with what it does to the error."""
+    told = [n.says.format(value=f"{fitted.by_name[n.name]:.2g}") for n, _ in _certain(fitted, removable=True)]
+    told = told or [
+        n.says.format(value=f"{fitted.by_name[n.name]:.2g}") for n, _ in _certain(fitted, removable=False)
+    ]
+    if not told:
+        return "Nothing is missing that these runs can show."
+    name, of = ("stopping_distance", "stopping distance") if manoeuvres else ("speed", "speed")
+    e = (manoeuvres or error)[name]
+    text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    how = "that takes" if len(told) == 1 else "together they take"
+    return (
+        f"{text[0].upper()}{text[1:]}; with the brake's gain fitted, {how} the error of the {of} on runs that no fit"
+        f" has seen from {e.frozen:.2g} to {e.after:.2g} {e.unit}."
+    )
