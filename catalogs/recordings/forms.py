@@ -20,7 +20,7 @@ LARGEST_FILE = 2**30
 """Bytes of a recording that is read whole, also when unpacked [1]: a day of twenty channels at 100 Hz as text."""
 MOST_COLUMNS = 64
 """Elements of a list, or columns of a matrix, that become signals [1]; longer ones are pictures and clouds."""
-MOST_NAMES = 100_000
+MOST_NAMES = 20_000
 """Signals of one file [1]."""
 
 

@@ -1,9 +1,7 @@
 """Variables of MATLAB files up to version 7, read by scipy: numbers, text and structs; code and objects stay unread."""
 
 import io
-import struct
 import warnings
-import zlib
 from typing import Any
 
 import numpy as np
@@ -12,6 +10,7 @@ from scipy.io import loadmat
 from scipy.io.matlab import MatlabFunction, MatlabObject, MatlabOpaque, mat_struct
 
 from catalogs.recordings.forms import LARGEST_FILE
+from catalogs.recordings.matlab_elements import check_elements
 from catalogs.recordings.matlab_values import (
     DEEPEST_STRUCT,
     Array,
@@ -21,10 +20,6 @@ from catalogs.recordings.matlab_values import (
     spread_elements,
     squeeze_shape,
 )
-from tasks.errors import InputError
-
-HEADER, COMPRESSED, BLOCK = 128, 15, 2**24
-"""Bytes before the first element [1], the type of a packed element, and bytes that are unpacked at once [1]."""
 
 
 def load_v5_variables(content: bytes) -> Struct:
@@ -37,31 +32,15 @@ def load_v5_variables(content: bytes) -> Struct:
     Raises
     ------
     InputError
-        If its packed elements are too large.
+        If its elements break the format, or are too large when unpacked.
     """
-    _bound_unpacked_size(content)
+    check_elements(content, LARGEST_FILE)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # names that stand twice, and objects, which are refused below
         loaded = loadmat(io.BytesIO(content), struct_as_record=False, squeeze_me=False, chars_as_strings=True)
     return spread_elements(
         (name, _convert_value(value, 0)) for name, value in loaded.items() if not name.startswith("__")
     )
-
-
-def _bound_unpacked_size(content: bytes) -> None:
-    """Unpack the packed elements block by block, so that a few bytes cannot claim all memory."""
-    order = {b"IM": "<", b"MI": ">"}.get(content[HEADER - 2 : HEADER])
-    place, total = HEADER, 0
-    while order is not None and place + 8 <= len(content):
-        kind, size = struct.unpack_from(f"{order}II", content, place)
-        packed = content[place + 8 : place + 8 + size] if kind == COMPRESSED else b""
-        place += 8 + size
-        unpacker = zlib.decompressobj()
-        while packed and not unpacker.eof:
-            total += len(unpacker.decompress(packed, BLOCK))
-            packed = unpacker.unconsumed_tail
-            if total > LARGEST_FILE:
-                raise InputError(f"must have at most {LARGEST_FILE} bytes when unpacked; it has more")
 
 
 def _convert_value(value: Any, depth: int) -> Struct | list[Struct | Refused] | Array | Refused | str:

@@ -28,9 +28,21 @@ BUMP_FIGURES = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlati
 
 
 def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
-    """Return the report of an import, or a table of signals for each recording."""
-    signals: dict[str, Any] = result.get("signals", result)
-    return signals
+    """Return the report of an import, or a narrow table of signals for each recording."""
+    if "signals" not in result:
+        return result
+    return {file: [_shorten_signal(row) for row in rows] for file, rows in result["signals"].items()}
+
+
+def _shorten_signal(row: dict[str, Any]) -> dict[str, Any]:
+    def join(low: float | None, high: float | None) -> str | None:
+        return None if low is None else f"{low:.6g} to {high:.6g}"
+
+    return {
+        **{key: row[key] for key in ("signal", "unit", "samples", "rate_hz")},
+        "time_s": join(row["start_s"], row["end_s"]),
+        "range": join(row["lowest"], row["highest"]),
+    }
 
 
 def shorten_brake_protocol(result: dict[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """MATLAB files of both kinds give the values that were saved, each on the clock that stands nearest."""
 
+import struct
 import zlib
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 from scipy.io import savemat
 from scipy.io.matlab import MatlabFunction
 
-from catalogs.recordings import matlab_v5, read_signals, summarise_signals
+from catalogs.recordings import matlab_hdf, matlab_v5, read_signals, summarise_signals
 from tasks.errors import InputError
 from tests.catalogs.recordings.written import make_map, take_speed, write_hdf
 
@@ -131,7 +132,7 @@ def test_objects_and_functions_are_refused_by_name_and_hurt_nothing_else(tmp_pat
     assert len(read_signals(tmp_path / "hdf.mat", take_speed("v", time={"source": "t"}))["v"].values) == 4
 
 
-def test_hdf_that_leads_to_other_files_or_in_circles_is_not_followed(tmp_path):
+def test_hdf_that_leads_to_other_files_or_in_circles_is_not_followed(tmp_path, monkeypatch):
     write_hdf(tmp_path / "secret.mat", {"v": SPEED})
     write_hdf(tmp_path / "log.mat", {"t": TIME, "s": {"x": SPEED}})
     with h5py.File(tmp_path / "log.mat", "r+") as file:
@@ -148,7 +149,8 @@ def test_hdf_that_leads_to_other_files_or_in_circles_is_not_followed(tmp_path):
     with h5py.File(path, "r+") as file:
         file["s/again"] = file["s"]
         file["s/twice"] = file["s"]
-    with pytest.raises(InputError, match="must have at most 100000 values"):
+    monkeypatch.setattr(matlab_hdf, "MOST_NAMES", 1000)
+    with pytest.raises(InputError, match="must have at most 1000 values"):
         summarise_signals(path, None)
 
 
@@ -157,6 +159,38 @@ def test_a_dataset_that_claims_billions_is_not_read(tmp_path):
     with h5py.File(tmp_path / "log.mat", "r+") as file:
         file.create_dataset("v", (10**12,), float, chunks=(1000,))
     assert "signal v must be a vector" in refusal(tmp_path / "log.mat", "v", "t")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            (9, 32),
+            (99, 32),
+            "a type that cannot stand in its array",
+        ),  # the values: scipy ends the process at this one
+        ((9, 32), (14, 32), "a type that cannot stand in its array"),
+        ((9, 32), (9, 2**31), "ends within an element"),
+        ((14, 80), (14, 72), "ends within an element"),
+        ((6, 8), (5, 8), "an array without its class"),
+    ],
+)
+def test_elements_that_would_end_the_process_are_refused(tmp_path, old, new, words):
+    path = saved(tmp_path, savemat, {"v": SPEED})
+    content = path.read_bytes()
+    before, after = (struct.pack("<II", *pair) for pair in (old, new))
+    assert content.count(before) == 1
+    path.write_bytes(content.replace(before, after))
+    assert words in refusal(path, "v")
+
+
+def test_a_complex_array_without_its_second_element_is_refused(tmp_path):
+    path = saved(tmp_path, savemat, {"v": SPEED})
+    content = path.read_bytes()
+    path.write_bytes(
+        content.replace(struct.pack("<II", 6, 8) + b"\x06\x00", struct.pack("<II", 6, 8) + b"\x06\x08")
+    )
+    assert "too many or too few elements" in refusal(path, "v")
 
 
 def test_packed_bytes_that_claim_all_memory_are_refused(tmp_path, monkeypatch):
@@ -171,7 +205,7 @@ def test_packed_bytes_that_claim_all_memory_are_refused(tmp_path, monkeypatch):
 def test_a_damaged_file_is_one_sentence(tmp_path, content):
     (tmp_path / "log.mat").write_bytes(content)
     told = refusal(tmp_path / "log.mat", "v")
-    assert "must be a readable MATLAB file" in told or "signal v is missing" in told
+    assert told.startswith("log.mat: must be a whole") or "must be a readable MATLAB file" in told
 
 
 def test_without_h5py_the_reader_says_what_to_install(tmp_path, monkeypatch):
