@@ -33,7 +33,7 @@ from catalogs.grids import load_grid
 from catalogs.hazard_markings import load_marking
 from catalogs.learned_judges import load_judges
 from catalogs.protocols import load_protocol
-from catalogs.recordings import read_signals
+from catalogs.recordings import read_signals, summarise_signals
 from catalogs.references import read_reference
 from catalogs.scenes.folder import read_scene
 from catalogs.scenes.gaussian_files import read_gaussians
@@ -139,6 +139,14 @@ def read_signature(folder: Path) -> None:
     found = signature_findings(Layout(folder), str(folder / "public.pem"))
     if not found["signed"]:
         raise InputError(found["signature"])
+
+
+def read_recording(folder: Path) -> None:
+    """A recording as an import reads it, and as a list of its signals."""
+    channel_map, _ = load_channel_map(folder / "map.yaml")
+    path = next(folder.glob("log.*"))
+    summarise_signals(path, channel_map)
+    read_signals(path, channel_map)
 
 
 def import_scene(folder: Path) -> None:
@@ -272,9 +280,13 @@ PARSERS: tuple[Parser, ...] = (
                     values=("nan", "inf")), files_inside("run")),
     ),
     Parser(
-        name="recording", write=recorded.write_recordings, targets=(r"log\..*",), share=4,
-        read=lambda folder: read_signals(next(folder.glob("log.*")), load_channel_map(folder / "map.yaml")[0]),
+        name="recording", write=recorded.write_recordings, targets=(r"log\..*",), share=4, read=read_recording,
     ),
+    Parser(
+        name="MATLAB recording", write=recorded.write_matlab_recordings, targets=(r"log\..*",), share=2,
+        read=read_recording,
+    ),
+    Parser(name="bag", write=recorded.write_bags, targets=(r"log\..*",), share=2, read=read_recording),
     Parser(
         name="reference", write=recorded.write_references, read=read_reference, share=4,
         rules=(FINITE, files_inside(r"\d+\|case"), Rule(name="cases are names", where=r"\d+\|case", values=("*", "?"))),

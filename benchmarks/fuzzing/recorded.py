@@ -3,19 +3,25 @@
 import csv
 import io
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
 import cv2
 import gaussforge
+import h5py
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
+from rosbags import rosbag1, rosbag2
+from rosbags.typesys import Stores, get_typestore
+from scipy.io import savemat
 
 from benchmarks.fuzzing.sound import CATALOGUE, small_scene, write_file
 from catalogs.scenes.gaussian_files import write_gaussians
 from tasks.campaign.campaign import CHANNELS
+from tasks.campaign.channels import MAIN_CHANNELS
 
 
 def make_stop(samples: int = 120, rate: float = 100.0) -> dict[str, np.ndarray]:
@@ -87,6 +93,73 @@ def write_recordings(folder: Path) -> None:
     for form, content in forms.items():
         write_file(folder / form / f"log.{form}", content)
         write_file(folder / form / "map.yaml", yaml.safe_dump(channel_map).encode())
+
+
+def write_matlab_recordings(folder: Path) -> None:
+    """A struct of vectors as MATLAB 5, 7 and 7.3 write it, with its channel map."""
+    columns = make_stop()
+    for name in ("v5", "v7", "v73"):
+        (folder / name).mkdir(parents=True)
+        write_file(folder / name / "map.yaml", _map_speed("log.speed"))
+    savemat(folder / "v5" / "log.mat", {"log": columns})
+    savemat(folder / "v7" / "log.mat", {"log": columns, "t": columns["time"]}, do_compression=True)
+    with h5py.File(folder / "v73" / "log.mat", "w", userblock_size=512) as file:
+        group = file.create_group("log")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, values in columns.items():
+            group.create_dataset(name, data=values[None, :], compression="gzip")
+
+
+def write_bags(folder: Path) -> None:
+    """Messages with and without a header in a ROS 1 bag, a ROS 2 database and MCAP files, with their channel map."""
+    columns = make_stop()
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    number, wrench = store.types["std_msgs/msg/Float64"], store.types["geometry_msgs/msg/AccelStamped"]
+    header, stamp = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
+    accel, vector = store.types["geometry_msgs/msg/Accel"], store.types["geometry_msgs/msg/Vector3"]
+    for form in ("bag", "db3", "mcap", "zstd"):
+        name = "mcap" if form == "zstd" else form
+        path = folder / form / f"log.{name}"
+        path.parent.mkdir(parents=True)
+        if form == "bag":
+            bag: Any = rosbag1.Writer(path)
+            bag.set_compression(rosbag1.Writer.CompressionFormat.LZ4)
+        else:
+            plugin = rosbag2.StoragePlugin.SQLITE3 if form == "db3" else rosbag2.StoragePlugin.MCAP
+            bag = rosbag2.Writer(path.parent / "made", version=9, storage_plugin=plugin)
+        if form == "zstd":
+            bag.set_compression(rosbag2.CompressionMode.STORAGE, rosbag2.CompressionFormat.ZSTD)
+        pack = store.serialize_ros1 if form == "bag" else store.serialize_cdr
+        with bag:
+            speeds = bag.add_connection("/speed", number.__msgtype__, typestore=store)
+            motions = bag.add_connection("/motion", wrench.__msgtype__, typestore=store)
+            for t, v, a in zip(
+                columns["time"], columns["speed"], columns["longitudinal_acceleration"], strict=True
+            ):
+                log_time = 10**18 + round(t * 1e9)
+                bag.write(speeds, log_time, pack(number(v), number.__msgtype__))
+                zero = vector(0.0, 0.0, 0.0)
+                when = header(stamp(log_time // 10**9, log_time % 10**9), "car")
+                motion = wrench(when, accel(vector(a, 0.0, 9.81), zero))
+                bag.write(motions, log_time, pack(motion, wrench.__msgtype__))
+        if form != "bag":
+            (path.parent / "made" / f"made.{name}").rename(path)
+            shutil.rmtree(path.parent / "made")
+        write_file(path.parent / "map.yaml", _map_speed("/speed.data", "/motion.accel.linear.x"))
+
+
+def _map_speed(speed: str, acceleration: str | None = None) -> bytes:
+    """A channel map of speed, and of acceleration where there is one."""
+    channel_map = yaml.safe_load((CATALOGUE / "channel_maps" / "bmw-m8.yaml").read_text())
+    channels = {"speed": {"source": speed, "unit": "m/s"}}
+    if acceleration is not None:
+        channels["longitudinal_acceleration"] = {"source": acceleration, "unit": "m/s^2"}
+    missing = [channel.name for channel in MAIN_CHANNELS if channel.name not in channels]
+    channel_map |= {
+        "channels": channels, "not_measured": missing,
+        "time": {"source": "time", "unit": "s"}, "runs": [],
+    }  # fmt: skip
+    return yaml.safe_dump(channel_map).encode()
 
 
 def write_references(folder: Path) -> None:

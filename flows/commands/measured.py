@@ -27,6 +27,24 @@ WIDE_COLUMNS = {
 BUMP_FIGURES = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
 
 
+def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
+    """Return the report of an import, or a narrow table of signals for each recording."""
+    if "signals" not in result:
+        return result
+    return {file: [_shorten_signal(row) for row in rows] for file, rows in result["signals"].items()}
+
+
+def _shorten_signal(row: dict[str, Any]) -> dict[str, Any]:
+    def join(low: float | None, high: float | None) -> str | None:
+        return None if low is None else f"{low:.6g} to {high:.6g}"
+
+    return {
+        **{key: row[key] for key in ("signal", "unit", "samples", "rate_hz")},
+        "time_s": join(row["start_s"], row["end_s"]),
+        "range": join(row["lowest"], row["highest"]),
+    }
+
+
 def shorten_brake_protocol(result: dict[str, Any]) -> dict[str, Any]:
     """Return a brake protocol without its events and the widest columns of its tables."""
     brief = {key: value for key, value in result.items() if key != "events"}
@@ -89,15 +107,27 @@ COMMANDS = (
         sentence="Make a campaign folder of measured recordings, or say what is wrong in which run and channel.",
         function="flows.measured.importing:import_measurements",
         options=(
-            define_argument("source", str, "CSV, Parquet or MDF4 file, or a folder of them."),
+            define_argument(
+                "source",
+                str,
+                "CSV, Parquet, MDF4, MATLAB, ROS bag, MCAP or bus-JSON file, ROS 2 bag folder, or a folder of them.",
+            ),
             define_option(
                 "map",
-                str,
+                str | None,
                 "Channel map: YAML file, or the name of one that ships.",
+                None,
                 known="catalogs/channel_maps/*.yaml",
             ),
-            define_option("out", str, "Campaign folder to make."),
+            define_option("out", str | None, "Campaign folder to make.", None),
+            define_option(
+                "list_signals",
+                bool,
+                "List every signal with unit, samples, rate, times and range, and make nothing.",
+                False,
+            ),
         ),
+        brief=shorten_import,
     ),
     Command(
         name="brake-protocol",

@@ -14,8 +14,9 @@ import yaml
 from catalogs.campaign_files import MOST_SAMPLES
 from catalogs.channel_maps import ChannelMap, Conditions, FaultyMap, SegmentEntry, load_channel_map
 from catalogs.names import name_problem
-from catalogs.recordings import read_signals, recording_files
+from catalogs.recordings import read_signals, recording_files, recording_root, stored_files
 from catalogs.sentences import shorten
+from flows.measured.signal_listing import list_recorded_signals
 from flows.store.layout import write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
@@ -38,24 +39,34 @@ class PlannedRun:
     conditions: Conditions
 
 
-def import_measurements(source: str, *, map: str, out: str) -> dict[str, Any]:
-    """Read recordings through a channel map and write a campaign folder.
+def import_measurements(
+    source: str, *, map: str | None = None, out: str | None = None, list_signals: bool = False
+) -> dict[str, Any]:
+    """Read recordings through a channel map and write a campaign folder; or list the signals for such a map.
 
     Parameters
     ----------
-    source : a CSV, Parquet or MDF4 file, or a folder of them
+    source : a recording of one of the forms of ``catalogs.recordings``, or a folder of them
     map : channel map by name or YAML file
     out : campaign folder to make; new or empty
+    list_signals : list the signals and write nothing; a map, as far as it is written, then tells the clock of tables
 
     Returns
     -------
-    What was made: ``campaign``, ``runs[]``, ``train``, ``held_out``, ``channels``, ``not_measured``, ``sources``.
+    Report on what was made: ``campaign``, ``runs[]``, ``channels``, ``not_measured``, ``sources``; or ``signals``, a
+    row for each in every recording.
 
     Raises
     ------
     InputError
         Listing every problem of every run and channel; then nothing is written.
     """
+    if list_signals:
+        return list_recorded_signals(source, map)
+    if map is None or out is None:
+        raise InputError(
+            "import-measurements needs --map and --out, or --list-signals to see what a map can name"
+        )
     folder = Path(out)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(
@@ -83,8 +94,12 @@ def import_measurements(source: str, *, map: str, out: str) -> dict[str, Any]:
     ]
     if problems:
         raise InputError(problems)
-    root = Path(source) if Path(source).is_dir() else Path(source).parent
-    sources = {file.relative_to(root).as_posix(): sha256_of_file(file) for file in recordings}
+    root = recording_root(Path(source))
+    sources = {
+        file.relative_to(root).as_posix(): sha256_of_file(file)
+        for recording in recordings
+        for file in stored_files(recording)
+    }
     return write_campaign(folder, root, channel_map, made, sources, sha256_of_file(map_file))
 
 

@@ -1,0 +1,88 @@
+"""Signals as A2D2 stores a car's bus: JSON with a unit and [time, value] pairs for each name."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catalogs.channel_maps import ChannelMap
+from catalogs.documents import parse_json, read_content
+from catalogs.recordings.forms import (
+    LARGEST_FILE,
+    Form,
+    SignalSummary,
+    describe_missing,
+    signal_names,
+    summarise_signal,
+)
+from tasks.campaign.channels import unit_factor
+from tasks.campaign.signals import Signal
+from tasks.errors import InputError
+
+
+def read_bus(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
+    """Return the signals of a bus file that a map names; the unit of its times is the map's.
+
+    Raises
+    ------
+    InputError
+        With one sentence per problem.
+    """
+    content, names = _load_content(path), signal_names(channel_map)
+    problems = describe_missing(path, names, content, content)
+    found = {
+        name: _take_signal(content[name], _time_factor(channel_map)) for name in names if name in content
+    }
+    problems += [
+        f"{path.name}: signal {name} must have values of [time, value], and a unit as text"
+        for name, signal in found.items()
+        if signal is None
+    ]
+    if problems:
+        raise InputError(problems)
+    return {name: signal for name, signal in found.items() if signal is not None}
+
+
+def summarise_bus(path: Path, channel_map: ChannelMap | None) -> list[SignalSummary]:
+    """Return a row for each signal; without a map its times are taken as s.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    factor = 1.0 if channel_map is None else _time_factor(channel_map)
+    return [
+        summarise_signal(name, signal)
+        for name, entry in _load_content(path).items()
+        if (signal := _take_signal(entry, factor)) is not None
+    ]
+
+
+def _load_content(path: Path) -> dict[str, Any]:
+    content = parse_json(
+        read_content(path, "recording", LARGEST_FILE), path, "recording", large_integers=True
+    )
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: must be a table of signals, each with values of [time, value]")
+    return content
+
+
+def _time_factor(channel_map: ChannelMap) -> float:
+    return unit_factor(channel_map.time.unit, "s") if channel_map.time else 1.0
+
+
+def _take_signal(entry: Any, factor: float) -> Signal | None:
+    """Return the signal that an entry holds; None if it holds none."""
+    try:
+        pairs = np.asarray(entry["values"], dtype=np.float64)
+        unit = entry.get("unit") or ""
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError):
+        return None
+    if (pairs.size and pairs.shape[1:] != (2,)) or not isinstance(unit, str):
+        return None
+    pairs = pairs.reshape(-1, 2)
+    return Signal(time=pairs[:, 0] * factor, values=pairs[:, 1], unit=unit)
+
+
+BUS_JSON = Form(read=read_bus, summarise=summarise_bus)

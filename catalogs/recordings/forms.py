@@ -1,0 +1,158 @@
+"""Helpers shared by the readers of all forms: names, clocks, summaries, limits and optional packages."""
+
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catalogs.channel_maps import ChannelMap, TimeEntry
+from catalogs.sentences import shorten
+from tasks.campaign.channels import unit_factor
+from tasks.campaign.signals import Signal
+from tasks.errors import InputError
+
+LARGEST_FILE = 2**30
+"""Bytes of a recording that is read whole, also when unpacked [1]: a day of twenty channels at 100 Hz as text."""
+MOST_COLUMNS = 64
+"""Elements of a list, or columns of a matrix, that become signals [1]; longer ones are pictures and clouds."""
+MOST_NAMES = 20_000
+"""Signals of one file [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalSummary:
+    """A signal as one row of a list.
+
+    Parameters
+    ----------
+    signal : name by which a channel map takes it
+    unit : unit that the file states; empty if it states none
+    samples : number of values [1]
+    rate_hz : mean rate; None without a clock [Hz]
+    start_s, end_s : times of the first and the last sample; None without a clock [s]
+    lowest, highest : range of the finite values; None without any [the unit]
+    """
+
+    signal: str
+    unit: str
+    samples: int
+    rate_hz: float | None
+    start_s: float | None
+    end_s: float | None
+    lowest: float | None
+    highest: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """A form of recordings.
+
+    Parameters
+    ----------
+    read : returns the signals of a file that a map names
+    summarise : returns a row for each signal of a file; a map, if there is one, tells the clock and the form of text
+    """
+
+    read: Callable[[Path, ChannelMap], dict[str, Signal]]
+    summarise: Callable[[Path, ChannelMap | None], list[SignalSummary]]
+
+
+def signal_names(channel_map: ChannelMap) -> tuple[str, ...]:
+    """Return the signals that a map reads, each once."""
+    return tuple(dict.fromkeys(name for rule in channel_map.rules for name in rule.sources))
+
+
+def require_clock(path: Path, channel_map: ChannelMap) -> TimeEntry:
+    """Return the map's clock for a file whose signals have none of their own.
+
+    Raises
+    ------
+    InputError
+        If the map names none.
+    """
+    if channel_map.time is None:
+        raise InputError(f"{path}: a file without its own clock needs time: {{source: COLUMN}} in the map")
+    return channel_map.time
+
+
+def sample_column(
+    stamps: NDArray[np.float64], values: NDArray[np.float64], clock: TimeEntry, unit: str = ""
+) -> Signal:
+    """Return a column on its clock, without the rows that hold no time or no value.
+
+    Parameters
+    ----------
+    stamps : float64 [N] [the clock's unit]
+    values : float64 [N] [unit]; NaN where a table of several rates has no sample
+    clock : from the channel map
+    unit : unit that the file states
+    """
+    time = stamps * unit_factor(clock.unit, "s")
+    usable = np.isfinite(time) & ~np.isnan(values)
+    if clock.repeats == "keep_first":
+        usable &= np.concatenate(([True], np.diff(time) != 0.0))[: len(time)]
+    return Signal(time=time[usable], values=values[usable], unit=unit)
+
+
+def summarise_signal(name: str, signal: Signal) -> SignalSummary:
+    """Return the row of a signal.
+
+    Parameters
+    ----------
+    name : in its file
+    signal : on its clock; without times if its clock is not known
+    """
+    values = signal.values[~np.isnan(signal.values)]
+    finite = values[np.isfinite(values)]
+    times = signal.time[np.isfinite(signal.time)]
+    span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
+    return SignalSummary(
+        signal=name,
+        unit=signal.unit,
+        samples=len(values),
+        rate_hz=(len(times) - 1) / span if span > 0.0 else None,
+        start_s=float(times[0]) if len(times) else None,
+        end_s=float(times[-1]) if len(times) else None,
+        lowest=float(finite.min()) if len(finite) else None,
+        highest=float(finite.max()) if len(finite) else None,
+    )
+
+
+def describe_missing(
+    path: Path, names: tuple[str, ...], there: Collection[str], known: Iterable[str]
+) -> list[str]:
+    """Return a sentence for each missing name, with similar names of the file."""
+    listed = [str(name) for name in known]
+    problems = []
+    for name in names:
+        if name not in there:
+            near = get_close_matches(name, listed, n=3) or listed[:12]
+            problems.append(f"{path.name}: signal {name} is missing; there are: {shorten(', '.join(near))}")
+    return problems
+
+
+def import_package(package: str, kind: str, extra: str) -> ModuleType:
+    """Return an optional package.
+
+    Parameters
+    ----------
+    package : its name
+    kind : files that it reads, for the sentence
+    extra : muSync's extra that installs it
+
+    Raises
+    ------
+    InputError
+        If it is not installed.
+    """
+    try:
+        return import_module(package)
+    except ImportError:
+        raise InputError(
+            f'reading {kind} needs the package {package}: install it with pip install "musync[{extra}]"'
+        ) from None
