@@ -1,12 +1,14 @@
 """A vehicle grown twice carries both, and its file says what the runs could not tell."""
 
 import hashlib
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from catalogs.entries import find_entry
+from catalogs.entries import entry_folder, find_entry
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_provenance
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from manifests.canonical import sha256_of_file
@@ -81,3 +83,15 @@ def test_the_tyre_that_the_extended_vehicle_has_beside_it_goes_with_what_grows(t
     assert tyre_beside(str(tmp_path / "car.yaml")) == {"mine.tir": tyre.read_bytes()}
     (tmp_path / "base.yaml").write_text("extends: paper-reference\ntyre: pacejka-205-60r15\n")
     assert tyre_beside(str(tmp_path / "car.yaml")) == {}
+
+
+def test_a_tyre_beside_a_vehicle_of_the_catalogue_goes_along_with_what_extends_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for kind in ("vehicle", "tyre"):
+        shutil.copytree(entry_folder(kind), tmp_path / entry_folder(kind).name)
+    monkeypatch.setattr("catalogs.entries.CATALOGUE", tmp_path)
+    (tmp_path / "vehicles" / "slick.yaml").write_text("extends: paper-reference\ntyre: slick\n")
+    (tmp_path / "tyres" / "pacejka-205-60r15.tir").rename(tmp_path / "vehicles" / "slick.tir")
+    (tmp_path / "car.yaml").write_text("extends: slick\n")
+    assert list(tyre_beside(str(tmp_path / "car.yaml"))) == ["slick.tir"]
