@@ -16,7 +16,10 @@ from flows.running.failures import CHECK_FAILED
 from flows.running.terminal import print_lines
 from tasks.errors import InputError
 
-SUBCOMMANDS = {"scene": "Build a scene from recordings or from other tools."}
+SUBCOMMANDS = {
+    "scene": "Build a scene from recordings or from other tools.",
+    "vehicle": "Describe a car of your own, and check what its file says.",
+}
 """Help of the words that stand before the names of several commands."""
 AS_JSON = Option(name="json", kind=bool, help="Print the whole result as JSON.", default=False)
 AS_FLOW = Option(
@@ -116,10 +119,10 @@ def _make_callback(command: Command) -> Callable[..., None]:
     """Return the function that Typer calls, whose signature carries the command's options."""
 
     def callback(**words: Any) -> None:
-        given = {option.name: words[option.keyword] for option in command.options}
-        as_flow = words.get(AS_FLOW.keyword, False) or "PREFECT_API_URL" in os.environ
+        given = {option.name: words[option.name] for option in command.options}
+        as_flow = words.get(AS_FLOW.name, False) or "PREFECT_API_URL" in os.environ
         result = run_function(command, given, as_flow)
-        as_json = words.get(AS_JSON.keyword, False) or given.get(command.json_with, False)
+        as_json = words.get(AS_JSON.name, False) or given.get(command.json_with, False)
         _print_as_asked(command, result, as_json)
         if not command.passed(result):
             raise typer.Exit(CHECK_FAILED)
@@ -139,15 +142,17 @@ def _make_parameter(option: Option) -> Parameter:
     details: dict[str, Any] = {"help": option.help, "min": option.minimum, "max": option.maximum}
     if option.known:
         details["autocompletion"] = lambda incomplete: _complete_value(option, incomplete)
+    word = option.keyword.replace("_", "-")
     if option.positional:
         declared = typer.Argument(**details)
-    elif option.kind is bool and option.default is False:
-        declared = typer.Option(f"--{option.keyword.replace('_', '-')}", **details)
+    elif option.kind is bool and option.default is True:
+        declared = typer.Option(f"--{word}/--no-{word}", **details)
     else:
-        declared = typer.Option(**details)
+        declared = typer.Option(f"--{word}", **details)
     default = Parameter.empty if option.default is REQUIRED else option.default
     kind: Any = Annotated[option.kind, declared]
-    return Parameter(option.keyword, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+    # the option's own name: its spelling may be a word of Python, such as from
+    return Parameter(option.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
 
 def _complete_value(option: Option, incomplete: str) -> list[str]:

@@ -4,13 +4,14 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-from flows.commands import audits, datasets, evaluation, measured, scenes, studies
+from flows.commands import audits, datasets, evaluation, measured, scenes, studies, vehicles
 from flows.commands.command import Command
 
 COMMANDS: tuple[Command, ...] = (
     *datasets.COMMANDS,
     *audits.COMMANDS,
     *evaluation.COMMANDS,
+    *vehicles.COMMANDS,
     *measured.COMMANDS,
     *scenes.COMMANDS,
     *studies.COMMANDS,

@@ -62,9 +62,19 @@ def frozen_text(entry: Mapping[str, Any], provenance: Mapping[str, Any], title: 
     provenance : all of ``Provenance`` but its hash
     title : first line, a comment
     """
-    content = {**entry, "provenance": dict(provenance)}
-    body = f"# {title}\n" + yaml.safe_dump(content, sort_keys=False, width=110, default_flow_style=None)
+    body = plain_text({**entry, "provenance": dict(provenance)}, title)
     return f"{body}{SEAL}{hashlib.sha256(body.encode()).hexdigest()}\n"
+
+
+def plain_text(entry: Mapping[str, Any], title: str) -> str:
+    """The text of a vehicle file that is not frozen.
+
+    Parameters
+    ----------
+    entry : the vehicle's catalogue entry, as plain values
+    title : first line, a comment
+    """
+    return f"# {title}\n" + yaml.safe_dump(dict(entry), sort_keys=False, width=110, default_flow_style=None)
 
 
 def check_seal(content: bytes, place: object) -> None:

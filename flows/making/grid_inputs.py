@@ -14,7 +14,7 @@ from catalogs.scenario import route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
 from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_tyre_source
+from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.making.memory import memory_problems
 from flows.making.places import remember_place
@@ -29,6 +29,8 @@ LOADERS: Mapping[str, Callable[[Path], Any]] = {
     "hazard_marking.yaml": load_marking,
 }
 """Loaders that check the catalogue entries that a user may bring."""
+READERS: Mapping[str, Callable[[Path], bytes]] = {"vehicle.yaml": vehicle_content}
+"""What a dataset keeps of entries that need other files: the whole entry. Of any other it keeps the file's bytes."""
 
 
 def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
@@ -114,7 +116,7 @@ def _read_entries(
         try:
             source = lookup()
             LOADERS.get(name, Path.stat)(source)
-            inputs[name] = source.read_bytes()
+            inputs[name] = READERS.get(name, Path.read_bytes)(source)
         except InputError as error:
             problems += error.problems
     try:

@@ -6,11 +6,11 @@ from typing import Any
 import yaml
 
 from catalogs.effects import LIBRARY_FILE
-from catalogs.entries import find_entry
-from catalogs.vehicles import load_vehicle, vehicle_tyre_source
+from catalogs.entries import entry_folder, find_entry
+from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
 from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
-from manifests.canonical import sha256_of_file
+from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
 from tasks.identification.decision.forms import form_in_range
@@ -22,7 +22,8 @@ from tasks.vehicle.parameters import Vehicle
 
 
 def tyre_beside(name: str) -> dict[str, bytes]:
-    """Return the property file that lies beside a vehicle's file, by its name: what grows from it needs that too.
+    """Return the property file that lies beside a vehicle's file, or beside one that it extends: what grows from it
+    needs that too.
 
     Parameters
     ----------
@@ -30,10 +31,10 @@ def tyre_beside(name: str) -> dict[str, bytes]:
 
     Returns
     -------
-    One file, or none where the vehicle names no tyre or one of the catalogue.
+    One file by its name, or none where the vehicle names no tyre or one of the catalogue.
     """
     tyre = vehicle_tyre_source(name)
-    if tyre is None or tyre.parent != find_entry("vehicle", name).parent:
+    if tyre is None or tyre.parent == entry_folder("tyre"):
         return {}
     return {tyre.name: tyre.read_bytes()}
 
@@ -56,8 +57,8 @@ def grown_vehicle(
     -------
     The text, or None where nothing was added; and the parameters that could not be.
     """
-    source = find_entry("vehicle", name)
-    entry: dict[str, Any] = yaml.safe_load(source.read_text(encoding="utf-8"))
+    source, content = find_entry("vehicle", name), vehicle_content(name)
+    entry: dict[str, Any] = yaml.safe_load(content)
     before = entry.pop("provenance", None) or {"bounds": {}}
     base = load_vehicle(name)
     bounds: dict[str, dict[str, Any]] = {}
@@ -97,7 +98,7 @@ def grown_vehicle(
     provenance = {
         "mode": "coupled",
         "base": source.stem,
-        "base_sha256": sha256_of_file(source),
+        "base_sha256": sha256_of([content]),
         "procedure": f"close-loop, verdict {verdict.verdict}: {', '.join(e.name for e in verdict.effects)}{untold}",
         "procedure_sha256": sha256_of_file(LIBRARY_FILE),
         "version": code_version()["version"],

@@ -1,11 +1,17 @@
 """A vehicle grown twice carries both, and its file says what the runs could not tell."""
 
+import hashlib
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from catalogs.vehicles import load_vehicle
-from flows.measured.grown_vehicle import grown_vehicle
+from catalogs.entries import entry_folder, find_entry
+from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_provenance
+from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
+from manifests.canonical import sha256_of_file
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
 
@@ -54,3 +60,38 @@ def test_what_the_runs_could_not_tell_from_it_stands_in_its_provenance(tmp_path:
     rivals = (("aerodynamic_drag", drag(0.1, "headwind")),)
     path = grown("paper-reference", verdict_of(drag(0.5), "spring", rivals), tmp_path / "set.yaml")
     assert "the runs cannot tell it from headwind" in " ".join(path.read_text().split())
+
+
+def test_what_grows_from_a_vehicle_that_extends_another_is_whole_and_has_the_hash_of_all_of_it(
+    tmp_path: Path,
+) -> None:
+    car, elsewhere = tmp_path / "car.yaml", tmp_path / "elsewhere"
+    car.write_text("extends: paper-reference\nsprung_mass: {value: 1500, unit: kg, source: scales}\n")
+    elsewhere.mkdir()
+    path = grown(str(car), verdict_of(drag(0.5), "spring"), elsewhere / "grown.yaml")
+    base = vehicle_provenance(path).base_sha256
+    assert b"extends" not in path.read_bytes()
+    assert load_vehicle(path) == replace(load_vehicle(car), name="grown", effects={"drag_area": 0.5})
+    assert base == hashlib.sha256(vehicle_content(car)).hexdigest() != sha256_of_file(car)
+
+
+def test_the_tyre_that_the_extended_vehicle_has_beside_it_goes_with_what_grows(tmp_path: Path) -> None:
+    tyre = find_entry("tyre", "pacejka-205-60r15")
+    (tmp_path / "base.yaml").write_text("extends: paper-reference\ntyre: mine\n")
+    (tmp_path / "mine.tir").write_bytes(tyre.read_bytes())
+    (tmp_path / "car.yaml").write_text("extends: base.yaml\n")
+    assert tyre_beside(str(tmp_path / "car.yaml")) == {"mine.tir": tyre.read_bytes()}
+    (tmp_path / "base.yaml").write_text("extends: paper-reference\ntyre: pacejka-205-60r15\n")
+    assert tyre_beside(str(tmp_path / "car.yaml")) == {}
+
+
+def test_a_tyre_beside_a_vehicle_of_the_catalogue_goes_along_with_what_extends_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for kind in ("vehicle", "tyre"):
+        shutil.copytree(entry_folder(kind), tmp_path / entry_folder(kind).name)
+    monkeypatch.setattr("catalogs.entries.CATALOGUE", tmp_path)
+    (tmp_path / "vehicles" / "slick.yaml").write_text("extends: paper-reference\ntyre: slick\n")
+    (tmp_path / "tyres" / "pacejka-205-60r15.tir").rename(tmp_path / "vehicles" / "slick.tir")
+    (tmp_path / "car.yaml").write_text("extends: slick\n")
+    assert list(tyre_beside(str(tmp_path / "car.yaml"))) == ["slick.tir"]

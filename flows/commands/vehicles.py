@@ -1,0 +1,37 @@
+"""Commands for a car of one's own: a file for its data sheet, and what of its numbers is implausible."""
+
+from flows.commands.command import VEHICLE, Command, define_argument, define_option, require_key
+
+GROUP = "Measured data"
+
+COMMANDS = (
+    Command(
+        name="vehicle new",
+        group=GROUP,
+        sentence="Write a short file for the data sheet of a car, which inherits every other number.",
+        function="flows.measured.vehicle_template:make_vehicle_template",
+        options=(
+            define_option("out", str, "File to write, NAME.yaml; it must not exist."),
+            define_option(
+                "base",
+                str,
+                "Vehicle to inherit from: a name, or a file in the folder of --out.",
+                "paper-reference",
+                spelling="from",
+                known=VEHICLE.known,
+            ),
+            define_option(
+                "name", str | None, "What the file calls the car; by default the file's name.", None
+            ),
+        ),
+    ),
+    Command(
+        name="vehicle check",
+        group=GROUP,
+        sentence="Say which figures of a vehicle are implausible, and which of its numbers to look at.",
+        function="flows.measured.vehicle_check:check_vehicle",
+        options=(define_argument("vehicle", str, VEHICLE.help, known=VEHICLE.known),),
+        passed=require_key("plausible"),
+        output="sentences",
+    ),
+)

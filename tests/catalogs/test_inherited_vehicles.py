@@ -1,0 +1,238 @@
+"""A vehicle that extends another one: what is inherited, what is refused, and what a copy of it holds."""
+
+import hashlib
+from dataclasses import replace
+
+import pytest
+
+from catalogs.entries import entry_names, find_entry
+from catalogs.vehicles import (
+    load_tolerances,
+    load_vehicle,
+    vehicle_content,
+    vehicle_provenance,
+    vehicle_tyre_source,
+)
+from catalogs.vehicles.inherited import MOST_GENERATIONS
+from tasks.errors import InputError
+from tasks.vehicle.effects.table import EFFECT_UNITS
+from tasks.vehicle.parameters import Vehicle
+
+HEAVY = "sprung_mass: {value: 1500, unit: kg, source: scales, tolerance: 15}\n"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(name, text):
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def refusal(path):
+    with pytest.raises(InputError) as caught:
+        load_vehicle(path)
+    (problem,) = caught.value.problems
+    return problem
+
+
+def test_what_is_not_given_is_that_of_the_other_vehicle(write):
+    base = load_vehicle("paper-reference")
+    car = load_vehicle(write("car.yaml", f"extends: paper-reference\n{HEAVY}"))
+    assert car == replace(base, name="car", sprung_mass=1500)
+
+
+def test_families_their_tables_and_effects_are_inherited_one_by_one_and_forms_as_a_whole(write):
+    write(
+        "base.yaml",
+        """
+extends: paper-reference
+effects:
+  drag_area: {value: 0.6, unit: m2, source: data sheet}
+  lag: {value: 0.05, unit: s, source: stop}
+tyre: pacejka-205-60r15
+""",
+    )
+    car = load_vehicle(
+        write(
+            "car.yaml",
+            """
+extends: base.yaml
+families:
+  rain: {efficiency: {value: [0.8, 0.8, 0.8, 0.8], unit: "1", source: worn}}
+effects:
+  lag: {value: 0.1, unit: s, source: another stop}
+""",
+        )
+    )
+    base = load_vehicle("paper-reference")
+    assert car.effects == {"drag_area": 0.6, "lag": 0.1}
+    assert car.tyre is not None
+    assert car.families == {
+        **base.families,
+        "rain": replace(base.families["rain"], efficiency=(0.8, 0.8, 0.8, 0.8)),
+    }
+    assert load_vehicle(write("bare.yaml", "extends: base.yaml\ntyre: null\n")).tyre is None
+
+
+def test_a_number_is_inherited_with_its_tolerance_or_given_whole(write):
+    write("base.yaml", f"extends: paper-reference\n{HEAVY}")
+    assert load_tolerances(write("car.yaml", "extends: base.yaml\n")) == {"sprung_mass": 0.01}
+    own = write("own.yaml", "extends: base.yaml\nsprung_mass: {value: 1400, unit: kg, source: scales}\n")
+    assert load_tolerances(own) == {}
+    half = write("half.yaml", "extends: base.yaml\nsprung_mass: {tolerance: 3}\n")
+    with pytest.raises(InputError, match=r"sprung_mass\.value is missing"):
+        load_vehicle(half)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("extends: tractor", "a file beside this one; tractor: no such vehicle; give a YAML file or one of: bmw-m8"),
+        ("extends: tractor.yaml", "tractor.yaml: no such vehicle"),
+        ("extends: ../car.yaml", "the name of the vehicle that it extends must be no path; it is '../car.yaml'"),
+        ("extends: ''", "must have 1 to 100 characters"),
+        ("extends: [paper-reference]", "extends must be the name of a vehicle; it is ['paper-reference']"),
+        ("extends: car.yaml", "car.yaml -> car.yaml leads back to itself: remove one extends"),
+        ("extends: paper-reference\nsprung_mass: {value: 1, unit: g, source: s}", "unit must be kg; it is g"),
+        ("extends: paper-reference\ncolour: 3", "colour: unknown key"),
+        ("extends: paper-reference\nfamilies:", "families: must be a table of keys and values; it is None"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_inherited_is_one_sentence(write, text, words):
+    path = write("car.yaml", text)
+    problem = refusal(path)
+    assert words in problem and problem.startswith(str(path))
+
+
+def test_a_loop_is_told_with_every_file_of_it(write):
+    write("a.yaml", "extends: b.yaml")
+    write("b.yaml", "extends: c.yaml")
+    write("c.yaml", "extends: b.yaml")
+    path = write("car.yaml", "extends: a.yaml")
+    assert "car.yaml -> a.yaml -> b.yaml -> c.yaml -> b.yaml leads back to itself" in refusal(path)
+
+
+def test_a_line_of_files_has_an_end(write):
+    write("0.yaml", "extends: paper-reference")
+    for k in range(1, MOST_GENERATIONS):
+        write(f"{k}.yaml", f"extends: {k - 1}.yaml")
+    assert load_vehicle(write("last.yaml", f"extends: {MOST_GENERATIONS - 3}.yaml")).mass == 1308
+    assert "at most 8 files may extend each other" in refusal(
+        write("car.yaml", f"extends: {MOST_GENERATIONS - 1}.yaml")
+    )
+
+
+def test_a_problem_of_the_other_vehicle_is_told_of_its_file(write):
+    base = write("base.yaml", "extends: paper-reference\nwheel_radius: {value: -1, unit: m, source: tape}")
+    problem = refusal(write("car.yaml", "extends: base.yaml"))
+    assert problem.startswith(f"{base}: wheel_radius")
+
+
+@pytest.mark.parametrize("name", entry_names("vehicle"))
+def test_a_vehicle_that_extends_none_is_kept_as_its_file_is(name):
+    assert vehicle_content(name) == find_entry("vehicle", name).read_bytes()
+
+
+@pytest.mark.parametrize("base", entry_names("vehicle"))
+def test_the_whole_copy_loads_alone_as_the_same_car(write, tmp_path, base):
+    write(
+        "base.yaml", f"extends: {base}\ncg_height: {{value: 0.6, unit: m, source: guess, tolerance: 0.03}}\n"
+    )
+    path = write("car.yaml", f"extends: base.yaml\n{HEAVY}")
+    (tmp_path / "elsewhere").mkdir()
+    copy = tmp_path / "elsewhere" / "car.yaml"
+    copy.write_bytes(vehicle_content(path))
+    assert b"extends" not in copy.read_bytes()
+    assert load_vehicle(copy) == load_vehicle(path)
+    assert (
+        load_tolerances(copy)
+        == load_tolerances(path)
+        == {"cg_height": pytest.approx(0.05), "sprung_mass": 0.01}
+    )
+    assert vehicle_content(copy) == copy.read_bytes()
+    assert vehicle_provenance(copy) == vehicle_provenance(path)
+
+
+def test_the_whole_copy_names_the_hash_of_every_file_in_it(write):
+    base = write("base.yaml", "extends: paper-reference\n")
+    path = write("car.yaml", f"extends: base.yaml\n{HEAVY}")
+    before = vehicle_content(path)
+    first = before.splitlines()[0].decode()
+    for content in (path.read_bytes(), vehicle_content(base)):
+        assert hashlib.sha256(content).hexdigest() in first
+    base.write_text("extends: paper-reference\n# another word, and the same car\n")
+    assert (
+        vehicle_content(path) != before and vehicle_content(path).splitlines()[1:] == before.splitlines()[1:]
+    )
+
+
+def test_numbers_over_a_frozen_vehicle_keep_its_mode_and_bounds_and_say_whose_they_are(write):
+    path = write("car.yaml", f"extends: multibody-grown\n{HEAVY}")
+    provenance, before = vehicle_provenance(path), vehicle_provenance("multibody-grown")
+    assert (provenance.mode, provenance.bounds, provenance.base) == (
+        "coupled",
+        before.bounds,
+        "multibody-grown",
+    )
+    assert provenance.base_sha256 == hashlib.sha256(vehicle_content("multibody-grown")).hexdigest()
+    assert provenance.procedure_sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert provenance.procedure == f"numbers of its own over those of multibody-grown: {before.procedure}"
+
+
+def test_a_frozen_vehicle_that_was_changed_lends_nothing(write):
+    frozen = find_entry("vehicle", "multibody-grown").read_text()
+    write("base.yaml", frozen.replace("value: 1200.58", "value: 1200.59"))
+    assert "a frozen vehicle must be as it was frozen" in refusal(write("car.yaml", "extends: base.yaml"))
+
+
+def test_a_frozen_vehicle_extends_none(write):
+    body = "extends: paper-reference\nprovenance:\n  mode: paper\n"
+    path = write("car.yaml", f"{body}  sha256: {hashlib.sha256(body.encode()).hexdigest()}\n")
+    assert "a frozen vehicle must be whole; it has provenance and extends" in refusal(path)
+
+
+def test_the_tyre_lies_beside_the_file_that_names_it(write, tmp_path):
+    tyre = find_entry("tyre", "pacejka-205-60r15")
+    (tmp_path / tyre.name).write_bytes(tyre.read_bytes())
+    write("base.yaml", "extends: paper-reference\ntyre: pacejka-205-60r15\n")
+    assert vehicle_tyre_source(write("car.yaml", "extends: base.yaml")) == tmp_path / tyre.name
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (
+            "{value: 0.55, unit: m, source: s, tolerance: 0}",
+            "cg_height.tolerance: must be greater than 0; it is 0",
+        ),
+        ("{value: 0.55, unit: m, source: s, tolerance: 5 %}", "must be a valid number; it is '5 %'"),
+        ("{value: 0.55, unit: m, source: s, tolerance: .nan}", "must be a finite number"),
+    ],
+)
+def test_a_tolerance_that_is_none_is_refused(write, number, words):
+    assert words in refusal(write("car.yaml", f"extends: paper-reference\ncg_height: {number}\n"))
+
+
+def test_a_tolerance_is_one_sigma_in_the_numbers_own_unit_and_is_asked_for_as_a_share_of_the_value(write):
+    path = write(
+        "car.yaml",
+        """
+extends: paper-reference
+static_pitch: {value: -0.5, unit: deg, source: level, tolerance: 0.1}
+effects:
+  drag_area: {value: 0.6, unit: m2, source: data sheet, tolerance: 0.03}
+""",
+    )
+    assert load_tolerances(path) == pytest.approx({"static_pitch": 0.2, "drag_area": 0.05})
+    assert load_tolerances("paper-reference") == {}
+    zero = write(
+        "zero.yaml", "extends: car.yaml\nstatic_pitch: {value: 0, unit: deg, source: s, tolerance: 0.1}\n"
+    )
+    assert "static_pitch: a value of 0 must have no tolerance" in refusal(zero)
+
+
+def test_fields_and_numbers_of_effects_share_no_name():
+    assert not EFFECT_UNITS.keys() & Vehicle.__dataclass_fields__.keys()
