@@ -1,6 +1,5 @@
 """Repair of a finished dataset: damaged and missing files are made again byte for byte, or a sentence says why not."""
 
-import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import PurePosixPath
 from typing import Any
@@ -156,15 +155,14 @@ def _prepare_scratch(layout: Layout, scratch: Layout, manifest: Manifest) -> Pla
     sources = input_sources(plan.settings)
     problems = []
     for name, digest in manifest["inputs"].items():
-        source = recorded_input(layout, sources, name, digest)
-        if source is None:
+        content = recorded_input(layout, sources, name, digest)
+        if content is None:
             problems.append(
                 f"{layout.inputs / name}: damaged, and the catalogue here has no entry with its bytes"
                 f" (SHA-256 {digest[:12]}...): put the file back and repair again"
             )
             continue
-        (scratch.inputs / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, scratch.inputs / name)
+        write_atomically(scratch.inputs / name, content)
     if problems:
         raise InputError(problems)
     create_frame_arrays(scratch, plan)

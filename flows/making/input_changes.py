@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.scenes import scene_identity
-from flows.making.grid_inputs import input_sources
+from flows.making.grid_inputs import READERS, input_sources
 from flows.making.places import find_scene, noted_place
 from flows.store.layout import Layout
 from flows.store.sealed import read_plan_record, recorded_grid
@@ -42,17 +42,17 @@ def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
     }
     sources = input_sources(recorded_grid(manifest["grid"], layout.manifest))
     recorded = {
-        name: file.read_bytes()
+        name: content
         for name, digest in manifest["inputs"].items()
-        if (file := recorded_input(layout, sources, name, digest)) is not None
+        if (content := recorded_input(layout, sources, name, digest)) is not None
     }
     return input_differences(manifest, here, recorded, present) + parameter_differences(manifest, plan)
 
 
 def recorded_input(
     layout: Layout, sources: Mapping[str, Callable[[], Path]], name: str, digest: str
-) -> Path | None:
-    """A file with the recorded bytes of an input, from the dataset, the catalogue or where it lay; None if none has it.
+) -> bytes | None:
+    """The recorded bytes of an input, from the dataset, the catalogue or where it lay; None if none has them.
 
     Parameters
     ----------
@@ -63,10 +63,14 @@ def recorded_input(
     for find in (lambda: layout.inputs / name, sources.get(name), lambda: noted_place(digest)):
         try:
             file = find() if find is not None else None
+            if file is None or not file.is_file():
+                continue
+            if sha256_of_file(file) == digest:
+                return file.read_bytes()
+            if name in READERS and sha256_of([content := READERS[name](file)]) == digest:
+                return content
         except InputError:
             continue
-        if file is not None and file.is_file() and sha256_of_file(file) == digest:
-            return file
     return None
 
 

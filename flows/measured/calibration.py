@@ -12,12 +12,12 @@ import yaml
 from catalogs.calibration import load_procedure
 from catalogs.entries import find_entry
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
-from catalogs.vehicles import load_vehicle
+from catalogs.vehicles import load_vehicle, vehicle_content
 from catalogs.vehicles.frozen import frozen_text
 from flows.measured.grown_vehicle import tyre_beside
 from flows.store.outputs import Outputs
 from flows.studies.vehicle_model import agreement_of
-from manifests.canonical import sha256_of_file
+from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.errors import InputError
 from tasks.identification.calibration.identifiability import identifiability
@@ -165,8 +165,8 @@ def _frozen(
     fitted: Vehicle, base: str, procedure_name: str, procedure: Procedure, split: str, data: dict[str, str]
 ) -> str:
     """The frozen file: the base's entry with the calibrated values in it, and where they come from."""
-    source = find_entry("vehicle", base)
-    entry = yaml.safe_load(source.read_text(encoding="utf-8"))
+    source, content = find_entry("vehicle", base), vehicle_content(base)
+    entry = yaml.safe_load(content)
     before = entry.pop("provenance", None) or {"bounds": {}}
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
     for group in procedure.groups:
@@ -186,7 +186,7 @@ def _frozen(
     provenance = {
         "mode": procedure.mode,
         "base": source.stem,
-        "base_sha256": sha256_of_file(source),
+        "base_sha256": sha256_of([content]),
         "procedure": Path(procedure_name).stem,
         "procedure_sha256": sha256_of_file(find_entry("calibration procedure", procedure_name)),
         "version": code_version()["version"],

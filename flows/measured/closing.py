@@ -9,15 +9,14 @@ import numpy as np
 from catalogs.campaigns import read_campaign
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
-from catalogs.entries import find_entry
 from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.vehicles import load_vehicle, vehicle_content
 from flows.measured.closing_ledger import record_reading
 from flows.measured.closing_report import report_html
 from flows.measured.closing_residuals import residual_rmse
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from flows.store.outputs import Outputs
-from manifests.canonical import sha256_of_file
+from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
@@ -51,7 +50,7 @@ def close_loop(
     beside = tyre_beside(name)
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown, *beside)
     results.write_json("split.json", split_of(measured))
-    earlier = record_reading(measured, sha256_of_file(find_entry("vehicle", name)))
+    earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
     trace = find_missing_effects(measured, model, road, load_effects(), load_decision_rules())
     result = verdict_json(trace.verdict)
     result["residual_rmse"] = residual_rmse(trace)

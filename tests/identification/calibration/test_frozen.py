@@ -208,3 +208,25 @@ def test_a_vehicle_that_close_loop_grew_is_calibrated_further_and_keeps_what_it_
     car = load_vehicle(tmp_path / "out" / "car.yaml")
     assert car.forms == truth.forms and car.effects["lag"] == 0.08
     assert car.effects["drag_area"] == pytest.approx(0.6, abs=0.1)
+
+
+def test_a_vehicle_that_extends_another_is_frozen_whole(vehicle, make_traces, tmp_path):
+    traces = make_traces(vehicle, "coupled", ("wet",))
+    entry = yaml.safe_load(find_entry("calibration procedure", "coupled-grown").read_text())
+    entry["stages"] = [
+        {
+            "name": "air",
+            "groups": ["drag_area"],
+            "responses": ["speed"],
+            "kinds": ["flat"],
+            "phase": "braking",
+        }
+    ]
+    entry["passes"]["value"] = entry["evaluations"]["value"] = 1
+    procedure, base = tmp_path / "short.yaml", tmp_path / "base.yaml"
+    procedure.write_text(yaml.safe_dump(entry))
+    base.write_text("extends: paper-reference\nsprung_mass: {value: 1210, unit: kg, source: scales}\n")
+    calibrate(str(traces), out=str(tmp_path / "out"), vehicle=str(base), procedure=str(procedure), name="car")
+    path = tmp_path / "out" / "car.yaml"
+    assert load_vehicle(path).sprung_mass == 1210 and b"extends" not in path.read_bytes()
+    assert vehicle_provenance(path).base_sha256 != sha256_of_file(base)
