@@ -38,8 +38,8 @@ def _check(entries: dict[str, JointNumberEntry]) -> dict[str, JointNumberEntry]:
             problems.append(f"{name} must be in {PARAMETERS[name].unit}; it is in {entry.unit}")
         if not entry.lower <= 0.0 <= entry.upper:
             problems.append(f"{name} must have 0, the vehicle file's value, within its limits")
-        if "{value}" not in entry.says:
-            problems.append(f"{name} must say its value: says needs {{value}}")
+        if not ("{value}" in entry.says or "{share}" in entry.says):
+            problems.append(f"{name} must say its value: says needs {{value}} or {{share}}")
         problems += [
             f"{name} needs {need}, which is no channel" for need in entry.needs if need not in CHANNELS
         ]

@@ -9,19 +9,27 @@ import numpy as np
 from catalogs.campaigns import read_campaign
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
+from catalogs.joint_numbers import load_joint_numbers
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_content
 from flows.measured.closing_ledger import record_reading
 from flows.measured.closing_report import report_html
 from flows.measured.closing_residuals import residual_rmse
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
+from flows.measured.joint_report import joint_report_html
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
-from tasks.campaign.campaign import Campaign
+from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
-from tasks.identification.decision.verdict import find_missing_effects
+from tasks.identification.decision.verdict import Trace, find_missing_effects
+from tasks.identification.joint.elimination import standard_errors
+from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
+from tasks.vehicle.effects.table import PARAMETERS
+
+SEARCHES = ("one effect at a time", "joint fit")
+"""How a verdict was reached."""
 
 
 def close_loop(
@@ -51,20 +59,20 @@ def close_loop(
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown, *beside)
     results.write_json("split.json", split_of(measured))
     earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
-    trace = find_missing_effects(measured, model, road, load_effects(), load_decision_rules())
-    result = verdict_json(trace.verdict)
-    result["residual_rmse"] = residual_rmse(trace)
+    effects, rules = load_effects(), load_decision_rules()
+    trace: Trace | JointTrace
+    if needs_joint_fit(measured):
+        trace = judge_jointly(measured, model, road, effects, load_joint_numbers(), rules)
+        result = verdict_json(trace.verdict) | joint_facts(trace)
+    else:
+        trace = find_missing_effects(measured, model, road, effects, rules)
+        result = verdict_json(trace.verdict) | {"search": SEARCHES[0], "residual_rmse": residual_rmse(trace)}
     result["held_out_readings_before"] = earlier
     if earlier:
         result["reasons"].append(
             f"the held-out runs of this campaign have been read {earlier} time(s) before: this is no first look"
         )
-    verdict, runs = trace.verdict, [run.model for run in trace.end.evidence.train]
-    forms = {effect.variable for effect in verdict.effects if effect.effect_class == "form"}
-    ranges = {
-        variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms
-    }
-    text, missing = grown_vehicle(name, verdict, ranges)
+    text, missing = grown_vehicle(name, trace.verdict, _reached_ranges(trace))
     result["vehicle_file"] = None
     if text is not None:
         for file, content in beside.items():
@@ -74,9 +82,44 @@ def close_loop(
         result["vehicle_file"] = str(results.path(grown))
     result["not_carried_by_coupled_mode"] = missing
     results.write_json("verdict.json", result)
-    results.write("report.html", report_html(trace, result, measured))
+    if isinstance(trace, JointTrace):
+        page = joint_report_html(trace, result, measured)
+    else:
+        page = report_html(trace, result, measured)
+    results.write("report.html", page)
     result["report"] = str(results.path("report.html"))
     return result
+
+
+def _reached_ranges(trace: Trace | JointTrace) -> dict[str, tuple[float, float]]:
+    """Return what the training runs reached of the variable of each form that is named."""
+    if isinstance(trace, JointTrace):
+        return {}  # a joint fit names no forms
+    verdict, runs = trace.verdict, [run.model for run in trace.end.evidence.train]
+    forms = {effect.variable for effect in verdict.effects if effect.effect_class == "form"}
+    return {variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms}
+
+
+def joint_facts(trace: JointTrace) -> dict[str, Any]:
+    """Return what a joint fit says beside its verdict, as plain values."""
+    residuals: dict[str, dict[str, dict[str, float]]] = {}
+    for stop, predicted in zip(trace.held_out, trace.predicted, strict=True):
+        left = np.sqrt(np.mean((stop.model.measured - predicted) ** 2, axis=1))
+        residuals[stop.model.run.name] = {
+            CHANNELS[c]: {"frozen": float(left[0, c]), "after": float(left[2, c])} for c in stop.channels
+        }
+    return {
+        "search": SEARCHES[1],
+        "sentence": trace.sentence,
+        "numbers": {
+            number.name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[number.name].unit}
+            for number, value, error in zip(
+                trace.fitted.numbers, trace.fitted.values, standard_errors(trace.fitted), strict=True
+            )
+        },
+        "starts_agreeing": {"agreeing": trace.agreeing[0], "of": trace.agreeing[1]},
+        "residual_rmse": residuals,
+    }  # fmt: skip
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:

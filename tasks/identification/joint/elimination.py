@@ -11,10 +11,8 @@ from tasks.identification.joint.fit import JointFit, fit_jointly
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.stops import Stop
 
-CERTAIN = 3.0
-"""Standard errors from 0 from which a number is named."""
-HARDLY = 1.0
-"""Standard errors below which one number of each group goes in the same step."""
+TAIL = 0.00135
+"""Chance that a number which is 0 is named for one sign: three standard errors of a normal distribution."""
 FEWEST_RUNS = 4
 """Runs from which their scatter says how certain a number is; with fewer, the residuals' correlation does."""
 LONGEST_MEMORY = 0.98
@@ -87,6 +85,16 @@ def quantile(fitted: JointFit) -> float:
     return float(student.ppf(0.975, max(len(fitted.residuals) - 1, 2)))
 
 
+def certain_from(fitted: JointFit) -> float:
+    """Return the standard errors from 0 from which a number is named: Student's t, for few runs tell their scatter ill.
+
+    Parameters
+    ----------
+    fitted : the fit
+    """
+    return float(student.ppf(1.0 - TAIL, max(len(fitted.residuals), FEWEST_RUNS) - 1))
+
+
 def certainty(fitted: JointFit) -> NDArray[np.float64]:
     """Return by how many standard errors each number differs from the vehicle file's, float64 [K].
 
@@ -100,27 +108,56 @@ def certainty(fitted: JointFit) -> NDArray[np.float64]:
 def eliminate(stops: Sequence[Stop], fitted: JointFit) -> JointFit:
     """Return the fit of what is left when every number that may go and is not certain has gone.
 
+    What is named must not hang on one run: from `FEWEST_RUNS` runs on, a number goes that elimination about the same
+    fit would take away without any one of them (stability selection, Meinshausen and Buehlmann 2010,
+    doi:10.1111/j.1467-9868.2010.00740.x).
+
     Parameters
     ----------
     stops : training runs
     fitted : with every number free
     """
+    unstable = {n.name for n in fitted.numbers if n.removable} - _stable_names(fitted)
+    if unstable:
+        fitted = refit(stops, fitted, tuple(n for n in fitted.numbers if n.name not in unstable))
     while True:
-        weak = _weakest(fitted)
-        if not weak:
+        sure = certainty(fitted)
+        weak = [(float(here), n.name) for n, here in zip(fitted.numbers, sure, strict=True) if n.removable]
+        if not weak or min(weak)[0] >= certain_from(fitted):
             return fitted
-        fitted = refit(stops, fitted, tuple(n for n in fitted.numbers if n.name not in weak))
+        fitted = refit(stops, fitted, tuple(n for n in fitted.numbers if n.name != min(weak)[1]))
 
 
-def _weakest(fitted: JointFit) -> set[str]:
-    """Return the numbers that go next: the least certain one, and of every other group one that is hardly there."""
-    sure = certainty(fitted)
-    weak: dict[str, tuple[float, str]] = {}
-    for number, here in zip(fitted.numbers, sure, strict=True):
-        if number.removable and here < CERTAIN:
-            weak[number.group] = min(weak.get(number.group, (np.inf, "")), (float(here), number.name))
-    least = min(weak.values(), default=(0.0, ""))
-    return {name for here, name in weak.values() if name == least[1] or here < HARDLY}
+def _stable_names(fitted: JointFit) -> set[str]:
+    """Return the removable numbers that a linear elimination keeps with all runs, and without any one of them."""
+    runs = range(len(fitted.residuals))
+    samples = [tuple(runs)]
+    if len(samples[0]) >= FEWEST_RUNS:
+        samples += [tuple(i for i in runs if i != gone) for gone in runs]
+    return set.intersection(*(_kept_linearly(fitted, sample) for sample in samples))
+
+
+def _kept_linearly(fitted: JointFit, runs: tuple[int, ...]) -> set[str]:
+    """Return the removable numbers that backward elimination keeps on some runs, linear about the fit."""
+    residual = [_softened(fitted.residuals[i]) for i in runs]
+    slopes = [fitted.slopes[i] for i in runs]
+    prior = np.array([1.0 / n.sigma**2 for n in fitted.numbers])
+    information = np.diag(prior) + sum(a.T @ a for a in slopes)
+    # residuals fall along the slopes: the right-hand side of the values themselves, not of a move
+    right = np.asarray(
+        information @ fitted.values - sum(a.T @ r for a, r in zip(slopes, residual, strict=True))
+    )
+    right -= prior * fitted.values
+    wide = max(_lag_inflation(r) * float(np.mean(r**2)) for r in residual)
+    left = list(range(len(fitted.numbers)))
+    while True:
+        inverse = np.linalg.inv(information[np.ix_(left, left)])
+        values = inverse @ right[left]
+        sure = np.abs(values) / np.sqrt(np.diag(inverse) * max(wide, 1.0))
+        weak = [(float(s), j) for s, j in zip(sure, left, strict=True) if fitted.numbers[j].removable]
+        if not weak or min(weak)[0] >= certain_from(fitted):
+            return {fitted.numbers[j].name for j in left if fitted.numbers[j].removable}
+        left.remove(min(weak)[1])
 
 
 def refit(

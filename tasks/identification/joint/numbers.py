@@ -8,8 +8,20 @@ import numpy as np
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.inference.forward import RunModel
 
-SATURATING = 0.95
-"""Share of the tyres' peak friction from which a stop says something about friction."""
+SATURATING = 1.05
+"""Share of the model's peak friction beyond which a stop shows that the tyres grip better than it says."""
+STOPS_OF_A_CURVE = 3
+"""Stops from which the shape of the brake's curve can be read."""
+BRAKES = 1.5
+"""Deceleration from which a run brakes [m/s2]."""
+CALIBRATED = ("gain", "friction", "radius")
+"""Groups of numbers that re-tuning moves."""
+QUICK = 0.012
+"""Interval between samples up to which a log tells a lag from a dead time [s]."""
+COASTED = 0.3
+"""Share of its speed that a coast-down loses [1]."""
+CLOSED = 0.05
+"""Share of the throttle up to which it is closed [1]."""
 LEAST_PRESSURE = 1.0
 """Brake pressure that a campaign is taken to reach at least [MPa]."""
 SMOOTHED = 0.3
@@ -28,7 +40,7 @@ class JointNumber:
     group : numbers of one group stand in for each other on few runs
     removable : must earn its place
     needs : channels of which one must be measured
-    says : the finding in plain words, with {value} in it
+    says : the finding in plain words, with {value} or {share} in it
     of_pressure : sigma is a share of the largest brake pressure of the training runs
     """
 
@@ -41,6 +53,16 @@ class JointNumber:
     needs: tuple[str, ...]
     says: str
     of_pressure: bool = False
+
+    def say(self, value: float) -> str:
+        """Return the finding in plain words.
+
+        Parameters
+        ----------
+        value : that was found [unit of the table]
+        """
+        share = f"{abs(100.0 * value):.2g} % {'above' if value >= 0.0 else 'below'}"
+        return self.says.format(value=f"{value:.2g}", share=share)
 
 
 def choose_numbers(
@@ -60,6 +82,11 @@ def choose_numbers(
             continue
         if number.name == "engine_torque" and any(run.drive_torque is not None for run in campaign.runs):
             continue  # an input, and no unknown
+        if (
+            number.group == "curve"
+            and sum(peak_deceleration(model) > BRAKES for model in models) < STOPS_OF_A_CURVE
+        ):
+            continue  # one stop gives a gain and a delay, and no curve
         if number.name == "friction" and not any(saturates(model) for model in models):
             continue
         if number.of_pressure:
@@ -69,8 +96,40 @@ def choose_numbers(
     return tuple(chosen)
 
 
+def free_numbers(shown: Sequence[JointNumber], models: Sequence[RunModel]) -> tuple[JointNumber, ...]:
+    """Return those of the numbers that a fit may move together; others only stand in for one of them.
+
+    Resistances are one lump until a car has coasted down, and a lag and a dead time are one delay until a log is quick
+    enough to tell them apart.
+
+    Parameters
+    ----------
+    shown : that the campaign can show
+    models : of its training runs
+    """
+    lumped = {"delay"} if models[0].run.interval > QUICK else set()
+    if not any(coasts_down(model) for model in models):
+        lumped.add("resistance")
+    first: dict[str, str] = {}
+    for number in shown:
+        first.setdefault(number.group, number.name)
+    return tuple(n for n in shown if n.group not in lumped or first[n.group] == n.name)
+
+
+def coasts_down(model: RunModel) -> bool:
+    """Whether a run loses speed without brake and throttle, over so wide a range that resistances differ.
+
+    Parameters
+    ----------
+    model : the run
+    """
+    run, speed = model.run, model.measured[:, CHANNELS.index("speed")]
+    driven = run.throttle is not None and bool(np.max(run.throttle) > CLOSED)
+    return not run.pressure.any() and not driven and float(speed[0] - speed[-1]) > COASTED * float(speed[0])
+
+
 def saturates(model: RunModel) -> bool:
-    """Whether a run decelerates as hard as the tyres of the model nearly allow.
+    """Whether a run decelerates harder than the tyres of the model allow.
 
     Parameters
     ----------

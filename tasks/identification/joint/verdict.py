@@ -12,8 +12,8 @@ from tasks.identification.decision.answer import ChannelError, NamedEffect, Para
 from tasks.identification.decision.held_out import summarise_errors
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.elimination import (
-    CERTAIN,
     Substitute,
+    certain_from,
     certainty,
     eliminate,
     find_substitutes,
@@ -28,7 +28,13 @@ from tasks.identification.joint.fit import (
     misfit_scales,
     suggest_starts,
 )
-from tasks.identification.joint.numbers import JointNumber, choose_numbers, saturates
+from tasks.identification.joint.numbers import (
+    CALIBRATED,
+    JointNumber,
+    choose_numbers,
+    free_numbers,
+    saturates,
+)
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop, predict_stop
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
@@ -40,7 +46,7 @@ FIRST = ("lag", "drag_area", "speed_delay")
 """Numbers that are free beside those of every car while the best start is looked for."""
 GRIPS = (0.0, 0.2, 0.5)
 """Friction from which the last fits start, where runs saturate the tyres [1]."""
-PREDICTS_BETTER = 0.9
+PREDICTS_BETTER = 0.75
 """Share of the held-out error below which a model without a number predicts better than with it [1]."""
 UNKNOWN_GAIN = 0.1
 """Tolerance of the brake gain from which a vehicle file hardly knows its car [1]."""
@@ -110,14 +116,13 @@ def judge_jointly(
     held_out = tuple(stop for stop in stops if stop.model.run.held_out)
     shown = choose_numbers(numbers, campaign, [stop.model for stop in train])
     progress("starts")
-    everything = _fit_everything(train, shown)
+    everything = _fit_everything(train, free_numbers(shown, [stop.model for stop in train]))
     progress("elimination")
     fitted, agreeing = _settle(train, eliminate(train, everything))
-    kept = tuple(n for n in shown if not n.removable)
-    retuned = refit(train, fitted, kept)
     progress("held-out error")
     reasons: list[str] = []
     fitted = _drop_what_predicts_worse(train, held_out, fitted, reasons)
+    retuned = refit(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
     predicted = _predict_held_out(held_out, retuned, fitted)
     error, manoeuvres = _summarise(held_out, predicted, rules)
     progress("rivals")
@@ -125,9 +130,10 @@ def judge_jointly(
     effects, rivals = _named(fitted, substitutes, library)
     kind = _kind(effects, rivals)
     reasons += _what_was_used(campaign, train, agreeing)
+    groups = {n.name: n.group for n in shown}
     reasons += [
-        f"{rival.name} explains the runs nearly as well as {of}: {SEPARATE[_group(fitted, of)]}"
-        for of, rival in rivals
+        f"{rival.name} explains the runs nearly as well as {of}: {SEPARATE[groups[other.of]]}"
+        for other, (of, rival) in zip(substitutes, rivals, strict=True)
     ]
     verdict = Verdict(
         verdict=kind,
@@ -195,7 +201,7 @@ def _drop_what_predicts_worse(
     """
     there = _speed_error(held_out, fitted)
     trials = []
-    for number, _ in _certain(fitted, removable=True):
+    for number, _ in _certain(fitted):
         without = refit(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
         trials.append((_speed_error(held_out, without), number, without))
     if not trials:
@@ -258,12 +264,12 @@ def _summarise(
     return channels, summarise_errors(np.array(distances), braked, unit, rules.error_resamples)
 
 
-def _certain(fitted: JointFit, *, removable: bool) -> list[tuple[JointNumber, float]]:
-    """Return the numbers that differ from the vehicle file for certain, and by how many standard errors."""
+def _certain(fitted: JointFit) -> list[tuple[JointNumber, float]]:
+    """Return the numbers that earned their place for certain, and by how many standard errors."""
     return [
         (number, float(sure))
         for number, sure in zip(fitted.numbers, certainty(fitted), strict=True)
-        if number.removable == removable and sure >= CERTAIN
+        if number.removable and sure >= certain_from(fitted)
     ]
 
 
@@ -272,8 +278,9 @@ def _named(
 ) -> tuple[list[NamedEffect], list[tuple[str, NamedEffect]]]:
     """Return what is named, new physics first, and its rivals."""
     by_number = {e.parameters[0].name: e for e in reversed(library)}
-    effects = [_named_effect(fitted, n, by_number[n.name]) for n, _ in _certain(fitted, removable=True)]
-    effects += [_named_effect(fitted, n, by_number[n.name]) for n, _ in _certain(fitted, removable=False)]
+    # what every car needs anew is told whatever its size: the prediction rests on it
+    named = [n for n, _ in _certain(fitted)] + [n for n in fitted.numbers if not n.removable]
+    effects = [_named_effect(fitted, n, by_number[n.name]) for n in named]
     order = {"effect": 0, "sensor": 1, "retune": 2}
     effects.sort(key=lambda e: order[e.effect_class])
     rivals = []
@@ -314,11 +321,6 @@ def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffec
     return "SENSOR" if "sensor" in classes else "RETUNE" if classes else "NOTHING"
 
 
-def _group(fitted: JointFit, effect: str) -> str:
-    groups = {n.name: n.group for n in fitted.numbers}
-    return next((group for name, group in groups.items() if name in effect or effect in name), "resistance")
-
-
 def _what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tuple[int, int]) -> list[str]:
     """Return sentences on channels, inputs, range and stability."""
     runs = campaign.runs
@@ -329,7 +331,11 @@ def _what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tuple[in
     speeds = np.concatenate([stop.model.measured[:, 0] for stop in train])
     pressure = max(float(stop.model.run.pressure.max()) for stop in train)
     seen = [CHANNELS[c].replace("_", " ") for c in train[0].channels]
-    grip = "" if any(saturates(stop.model) for stop in train) else "; no run came near the tyres' limit"
+    grip = (
+        ""
+        if any(saturates(stop.model) for stop in train)
+        else "; no run passed the limit of the model's tyres"
+    )
     return [
         f"inputs that were measured: {', '.join(inputs)}; compared: {', '.join(seen)}",
         f"the training runs reach {speeds.min():.3g} to {speeds.max():.3g} m/s and {pressure:.3g} MPa{grip}: beyond"
@@ -345,14 +351,13 @@ def _say(
     manoeuvres: Mapping[str, ChannelError],
 ) -> str:
     """Return the verdict in plain words, with what it does to the error."""
-    told = [n.says.format(value=f"{fitted.by_name[n.name]:.2g}") for n, _ in _certain(fitted, removable=True)]
-    told = told or [
-        n.says.format(value=f"{fitted.by_name[n.name]:.2g}") for n, _ in _certain(fitted, removable=False)
-    ]
+    news = [n for n, _ in _certain(fitted)]
+    told = [n.say(fitted.by_name[n.name]) for n in news or fitted.numbers]
     if not told:
         return "Nothing is missing that these runs can show."
-    name, of = ("stopping_distance", "stopping distance") if manoeuvres else ("speed", "speed")
-    e = (manoeuvres or error)[name]
+    figures = {"speed": error["speed"], **manoeuvres}
+    name, e = max(figures.items(), key=lambda pair: pair[1].frozen / max(pair[1].after, 1e-9))
+    of = name.replace("_", " ")
     text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
     how = "that takes" if len(told) == 1 else "together they take"
     return (
