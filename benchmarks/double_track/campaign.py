@@ -133,12 +133,13 @@ def measure_run(
         "hazard_center_m": hazard[0], "hazard_length_m": hazard[1], "hazard_height_m": hazard[2],
     }  # fmt: skip
     return MeasuredRun(
-        row=row, columns={"time": np.arange(count) * INTERVAL, "brake_pressure": gauge} | channels
+        row=row,
+        columns={"time": np.arange(count, dtype=np.float64) * INTERVAL, "brake_pressure": gauge} | channels,
     )
 
 
 def _inputs(pressure: NDArray[np.float64], truth: Truth, key: tuple[str | int, ...], on: float) -> Inputs:
-    time = np.arange(len(pressure)) * INTERVAL
+    time = np.arange(len(pressure), dtype=np.float64) * INTERVAL
     tables = [
         on * draw_smooth(keyed_generator(*key, port), time, entry["sigma"], entry["time"])
         for port, entry in read_declared("designs")["disturbances"].items()

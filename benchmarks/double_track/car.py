@@ -124,7 +124,7 @@ def _place_masses(
     change: Mapping[str, float],
     radius: float,
 ) -> None:
-    """Masses, levers and the loads at rest; the height of the body's centre follows from the whole, axles at wheel height."""
+    """Masses, levers and loads at rest; the body's height follows from the whole car's, with axles at wheel height."""
     front, rear = catalogue["unsprung_mass_f"], catalogue["unsprung_mass_r"]
     plain = catalogue["sprung_mass"]
     whole = plain + front + rear
