@@ -11,6 +11,7 @@ from benchmarks.double_track.brakes import BUILD, NO_CAP, OFF, cap_rates, contro
 from benchmarks.double_track.motion import (
     DISC,
     LINE,
+    PUSH,
     SPEED,
     STATES,
     TURN,
@@ -22,8 +23,9 @@ from benchmarks.double_track.motion import (
 TOLERANCE, LONGEST_STEP = 1e-6, 0.02
 """Relative tolerance [1] and longest step [s] of the integrator; steps longer than a ramp would miss it."""
 ABSOLUTE = np.full(STATES, 1e-6)
+ABSOLUTE[PUSH : PUSH + 4] = 1e-9
 ABSOLUTE[LINE:] = 1e-4, 1e-2, 1e-2, 1.0, 1.0, 1.0, 1.0
-"""Absolute tolerances of the states; heat is counted in kelvin and joule."""
+"""Absolute tolerances of the states; a micrometre of a bushing is a newton, heat is in kelvin and joule."""
 Event = Callable[[float, NDArray[np.float64]], float]
 
 
