@@ -97,7 +97,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         except InputError as error:
             found = list(error.problems)
         problems += [f"{row['run']}: {problem}" for problem in found]
-        if not found:
+        if not found and all(name in columns for name in NEEDED):
             runs.append(_make_run(row, columns, row["run"] in judged, interval))
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))

@@ -19,6 +19,7 @@ class DecisionRulesEntry(CatalogueEntry):
     accept_score: Level
     held_out_gain: Level
     rival_span: Level
+    rival_gain_share: Share
     win_share: Share
     bootstrap_resamples: Count
     refined_candidates: Count

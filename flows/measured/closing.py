@@ -1,6 +1,6 @@
 """Closing the loop: a measured campaign in, a verdict, a grown vehicle and a report out."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,10 @@ def close_loop(
         result["reasons"].append(
             f"the held-out runs of this campaign have been read {earlier} time(s) before: this is no first look"
         )
-    text, missing = grown_vehicle(name, trace.verdict, _reached_ranges(trace))
+    found = trace.verdict
+    if isinstance(trace, JointTrace):
+        found = replace(found, effects=(*found.effects, *trace.calibrated))
+    text, missing = grown_vehicle(name, found, _reached_ranges(trace))
     result["vehicle_file"] = None
     if text is not None:
         for file, content in beside.items():
@@ -111,6 +114,7 @@ def joint_facts(trace: JointTrace) -> dict[str, Any]:
     return {
         "search": SEARCHES[1],
         "sentence": trace.sentence,
+        "calibrated": [effect_json(effect) for effect in trace.calibrated],
         "numbers": {
             number.name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[number.name].unit}
             for number, value, error in zip(

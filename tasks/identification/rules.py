@@ -12,6 +12,7 @@ class DecisionRules:
     accept_score : score from which an effect may be named: gain / inflation - parameters x log N [1]
     held_out_gain : fall of the held-out misfit from which an effect may be named [1]
     rival_span : difference of scores within which two explanations cannot be told apart [1]
+    rival_gain_share : share of the named effect's gain from which another explains the runs as well [1]
     win_share : share of bootstrap resamples that the named effect must win [1]
     bootstrap_resamples : bootstrap resamples of the runs [1]
     refined_candidates : candidates of a screening that are refined through the simulation [1]
@@ -42,6 +43,7 @@ class DecisionRules:
     accept_score: float
     held_out_gain: float
     rival_span: float
+    rival_gain_share: float
     win_share: float
     bootstrap_resamples: int
     refined_candidates: int

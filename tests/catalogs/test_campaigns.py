@@ -165,6 +165,44 @@ def test_a_missing_channel_and_a_missing_file_are_both_listed(folder: Path) -> N
     assert "run-02: channel pitch_rate is missing" in text and "run-05" in text
 
 
+def test_what_was_not_measured_is_stated_and_counts_as_nothing(folder: Path) -> None:
+    missing = ["pitch", "pitch_rate", "vertical_acceleration", "wheel_speed_rear"]
+    changed(folder, lambda h: h.update(not_measured=missing))
+    for seed, name in enumerate(NAMES):
+        columns = braking_columns(seed)
+        for channel in missing[:-1]:
+            del columns[channel]
+        write_run(folder, name, columns)
+    campaign = read_campaign(folder)
+    assert campaign.channels == ("speed", "longitudinal_acceleration", "wheel_speed_front")
+    assert not campaign.runs[0].response[:, ~campaign.is_measured].any()
+
+
+def test_engine_slope_and_throttle_are_read_where_they_were_measured(folder: Path) -> None:
+    extra = {"engine_torque": -300.0, "road_slope": 2.0, "throttle": 0.4}
+    write_run(
+        folder, "run-02", {**braking_columns(1), **{name: np.full(300, v) for name, v in extra.items()}}
+    )
+    plain, full = read_campaign(folder).runs[:2]
+    assert plain.drive_torque is plain.road_slope is plain.throttle is None
+    assert full.drive_torque is not None and full.drive_torque[7] == -300.0
+    assert full.road_slope is not None and full.road_slope[7] == pytest.approx(np.radians(2.0))
+    assert full.throttle is not None and full.throttle[7] == 0.4
+
+
+def test_without_brake_or_speed_there_is_nothing_to_judge(folder: Path) -> None:
+    changed(folder, lambda h: h.update(not_measured=["brake_pressure", "sped"]))
+    text = problems_of(folder)
+    assert "channel brake_pressure must be measured" in text and "'sped' is no channel" in text
+
+
+def test_one_run_to_learn_from_and_one_to_judge_are_enough(folder: Path) -> None:
+    changed(folder, lambda h: h.update(split={"train": NAMES[:5], "held_out": NAMES[5:]}))
+    assert len(read_campaign(folder).held_out) == 1
+    changed(folder, lambda h: h.update(split={"train": NAMES, "held_out": []}))
+    assert "split held_out needs at least one run" in problems_of(folder)
+
+
 def test_a_run_in_both_parts_of_the_split_is_refused(folder: Path) -> None:
     header = yaml.safe_load((folder / "campaign.yaml").read_text())
     header["split"]["held_out"].append("run-01")

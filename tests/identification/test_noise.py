@@ -56,18 +56,36 @@ def test_one_coarse_channel_leaves_the_others_as_they_are() -> None:
     assert (rho[fine] == whole_rho[fine]).all() and (sigma[fine] == whole_sigma[fine]).all()
 
 
-def test_braking_from_the_first_sample_is_told_with_what_to_do() -> None:
-    with pytest.raises(InputError, match=r"first 0\.30 s; the longest, run-01, does until 0\.1\d s.*three"):
-        channel_noise(quiet_campaign(brake_at=0.1))
+def test_runs_that_brake_from_the_first_sample_show_their_noise_as_a_whole() -> None:
+    rho, sigma = channel_noise(quiet_campaign(brake_at=0.1))
+    assert np.isfinite(sigma).all() and (sigma > 0.0).all() and (rho < 0.95).all()
 
 
-def test_a_channel_that_never_changes_is_named_beside_the_missing_quiet() -> None:
-    campaign = quiet_campaign(brake_at=0.1)
+def test_a_channel_that_was_not_measured_weighs_nothing() -> None:
+    campaign = quiet_campaign()
+    seen = tuple(name for name in CHANNELS if name != "pitch")
+    _, sigma = channel_noise(replace(campaign, channels=seen))
+    assert (
+        np.isinf(sigma[CHANNELS.index("pitch")])
+        and np.isfinite(np.delete(sigma, CHANNELS.index("pitch"))).all()
+    )
+    assert (
+        whiten(np.ones((5, 7)), np.zeros(7), sigma).reshape(5, 7)[:, CHANNELS.index("pitch")] == 0.0
+    ).all()
+
+
+def test_a_channel_that_never_changes_and_runs_that_are_too_short_are_both_named() -> None:
+    campaign = quiet_campaign()
     runs = []
     for run in campaign.runs:
-        still = run.response.copy()
+        still = run.response[:22].copy()
         still[:, CHANNELS.index("pitch")] = 0.0
-        runs.append(replace(run, response=still))
+        runs.append(replace(run, response=still, pressure=run.pressure[:22]))
     with pytest.raises(InputError) as caught:
         channel_noise(replace(campaign, runs=tuple(runs)))
-    assert len(caught.value.problems) == 2 and "channel pitch must change" in str(caught.value)
+    text = str(caught.value)
+    assert (
+        len(caught.value.problems) == 2
+        and "channel pitch must change" in text
+        and "more than 24 samples" in text
+    )

@@ -82,6 +82,18 @@ def test_a_grade_takes_its_share_of_gravity_and_pitches_the_body_as_braking_does
     assert abs(up.column("pitch")[250] - flat.column("pitch")[250]) < np.radians(0.02)
 
 
+def test_a_measured_engine_torque_acts_through_the_wheels(vehicle, run):
+    """A held torque decelerates the whole inertia; on ice it cannot take more than the tyres pass on."""
+    none, torque = np.zeros(300), np.full(300, -600.0)
+    coast, dragged = run(measured_trace(none, 0.01)), run(measured_trace(none, 0.01, torque))
+    turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
+    lost = coast.column("longitudinal_acceleration")[250] - dragged.column("longitudinal_acceleration")[250]
+    assert lost == pytest.approx(600.0 / vehicle.wheel_radius / (vehicle.mass + turning), rel=5e-3)
+    assert dragged.column("wheel_speed_f")[250] < dragged.column("speed")[250] / vehicle.wheel_radius
+    hard = measured_trace(none, 0.01, np.full(300, -40000.0))
+    assert -run(hard).column("longitudinal_acceleration").min() < 1.05 * 0.5 * vehicle.gravity
+
+
 def test_inference_may_take_steps_of_2_ms(run):
     """The longest step that stays below the noise of a campaign: 0.03 m/s, 0.015 deg."""
     coarse, fine = run(substeps=5), run(substeps=40)

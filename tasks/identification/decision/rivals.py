@@ -75,6 +75,8 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
 
 def _is_close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
     needed = own.rules.win_share
+    if other.gain > own.rules.rival_gain_share * own.gain:
+        return True
     return other.score > own.score - own.rules.rival_span or (share < needed and wins > 0.5 * (1.0 - needed))
 
 

@@ -111,7 +111,8 @@ def find_missing_effects(
     kind = _verdict_name(named, near)
     if kind == "SET":
         reasons.append(
-            f"{len(near)} other explanation(s) lie within {rules.rival_span:g} units or win too many resamples"
+            f"{len(near)} other explanation(s) lie within {rules.rival_span:g} units, make good"
+            f" {rules.rival_gain_share:.0%} of the gain or win too many resamples"
         )
     if not named and not reasons:
         reasons.append("no candidate passes the score, held-out and bound gates together")

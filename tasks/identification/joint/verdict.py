@@ -48,6 +48,8 @@ GRIPS = (0.0, 0.2, 0.5)
 """Friction from which the last fits start, where runs saturate the tyres [1]."""
 PREDICTS_BETTER = 0.75
 """Share of the held-out error below which a model without a number predicts better than with it [1]."""
+WRONG = 3.0
+"""Tolerances beyond which a number of the vehicle file is wrong."""
 UNKNOWN_GAIN = 0.1
 """Tolerance of the brake gain from which a vehicle file hardly knows its car [1]."""
 FEW_RUNS = 3
@@ -61,6 +63,7 @@ class JointTrace:
     Parameters
     ----------
     verdict : the answer
+    calibrated : numbers that the prediction rests on and that differ from the file by no more than its tolerances
     fitted : the fit that it rests on
     train, held_out : the runs
     predicted : by held-out run, float64 [3, N, 7] readings of the frozen, the re-tuned and the grown model
@@ -70,6 +73,7 @@ class JointTrace:
     """
 
     verdict: Verdict
+    calibrated: tuple[NamedEffect, ...]
     fitted: JointFit
     train: tuple[Stop, ...]
     held_out: tuple[Stop, ...]
@@ -128,6 +132,9 @@ def judge_jointly(
     progress("rivals")
     substitutes = tuple(find_substitutes(train, fitted, shown))
     effects, rivals = _named(fitted, substitutes, library)
+    tolerances = _tolerances(campaign)
+    calibrated = tuple(e for e in effects if _is_within(e, tolerances))
+    effects = [e for e in effects if e not in calibrated]
     kind = _kind(effects, rivals)
     reasons += _what_was_used(campaign, train, agreeing)
     groups = {n.name: n.group for n in shown}
@@ -157,9 +164,16 @@ def judge_jointly(
         reasons=tuple(reasons),
     )  # fmt: skip
     return JointTrace(
-        verdict=verdict, fitted=fitted, train=train, held_out=held_out, predicted=predicted, substitutes=substitutes,
-        agreeing=agreeing, sentence=_say(fitted, kind, error, manoeuvres),
-    )  # fmt: skip
+        verdict=verdict,
+        calibrated=calibrated if effects else (),
+        fitted=fitted,
+        train=train,
+        held_out=held_out,
+        predicted=predicted,
+        substitutes=substitutes,
+        agreeing=agreeing,
+        sentence=_say(fitted, kind, error, manoeuvres),
+    )
 
 
 SEPARATE = {
@@ -182,10 +196,8 @@ def _fit_everything(train: Sequence[Stop], shown: tuple[JointNumber, ...]) -> Jo
 def _settle(train: Sequence[Stop], fitted: JointFit) -> tuple[JointFit, tuple[int, int]]:
     """Return the best fit of the numbers left from several starts, and how many of these reach it."""
     grips = GRIPS if "friction" in fitted.by_name else (0.0,)
-    starts = [
-        fitted.by_name,
-        *({**start, "friction": grip} for start in suggest_starts(train) for grip in grips),
-    ]
+    gains = suggest_starts(train)
+    starts = [fitted.by_name, *(gains[0] | {"friction": grip} for grip in grips), *gains[1:]]
     fits = fit_jointly(train, fitted.numbers, starts, scales=fitted.scales)
     error = standard_errors(fits[0])
     same = sum(bool(np.all(np.abs(f.values - fits[0].values) < 2.0 * error)) for f in fits)
@@ -314,6 +326,22 @@ def _named_effect(fitted: JointFit, number: JointNumber, effect: Effect) -> Name
     )  # fmt: skip
 
 
+def _tolerances(campaign: Campaign) -> dict[str, float]:
+    """Return the declared tolerance of each number that re-tuning moves."""
+    session = dict(zip(SESSION, campaign.tolerances.session, strict=True))
+    names = ("pressure_gain", "wheel_radius")
+    return {name: session[name] for name in names} | {"friction": campaign.tolerances.friction}
+
+
+def _is_within(effect: NamedEffect, tolerances: Mapping[str, float]) -> bool:
+    """Whether a number of the file is off by no more than its tolerance and its own error allow."""
+    number = effect.parameters[0]
+    if number.name not in tolerances:
+        return False
+    error = 0.25 * (number.ci_high - number.ci_low)
+    return abs(number.value) < WRONG * float(np.hypot(tolerances[number.name], error))
+
+
 def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:
     classes = {effect.effect_class for effect in effects}
     if "effect" in classes:
@@ -353,7 +381,7 @@ def _say(
     """Return the verdict in plain words, with what it does to the error."""
     news = [n for n, _ in _certain(fitted)]
     told = [n.say(fitted.by_name[n.name]) for n in news or fitted.numbers]
-    if not told:
+    if kind == "NOTHING" or not told:
         return "Nothing is missing that these runs can show."
     figures = {"speed": error["speed"], **manoeuvres}
     name, e = max(figures.items(), key=lambda pair: pair[1].frozen / max(pair[1].after, 1e-9))

@@ -1,0 +1,122 @@
+"""A joint fit finds what a car has, whatever its file starts from, and names nothing that its runs do not show."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from catalogs.decision_rules import load_decision_rules
+from catalogs.effects import load_effects
+from catalogs.joint_numbers import load_joint_numbers
+from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
+from tasks.vehicle.effects.table import parameter_vector
+from tasks.vehicle.parameters import Vehicle
+from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
+
+SPEED_AND_ACCELERATION = ("speed", "longitudinal_acceleration")
+STOPS = ((27.0, 1.2), (20.0, 2.4), (24.0, 1.8), (16.0, 1.5), (22.0, 2.0))
+"""Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
+
+
+def campaign_of(
+    truth: dict[str, float], channels: tuple[str, ...] = SPEED_AND_ACCELERATION, engine: float | None = None
+) -> Campaign:
+    """Return runs of a car with other numbers than the file's; an engine holds it back once the brake is on."""
+    runs = []
+    for i, (speed, pressure) in enumerate(STOPS):
+        run = plain_run(speed, pressure, name=f"run-{i}")
+        if engine is not None:
+            run = replace(run, drive_torque=np.where(run.pressure > 0.0, engine, 0.0))
+        runs.append(
+            own_channels(measured(run, parameter_vector(truth), 70 + i).run, channels, i == len(STOPS) - 1)
+        )
+    return Campaign(
+        name="known", vehicle="paper-reference", runs=tuple(runs), channels=channels, content_hash="", split_hash="",
+        tolerances=replace(TOLERANCES, session=(0.2, *TOLERANCES.session[1:])),
+    )  # fmt: skip
+
+
+def own_channels(run: Run, channels: tuple[str, ...], held_out: bool) -> Run:
+    seen = np.array([name in channels for name in CHANNELS])
+    return replace(run, response=np.where(seen, run.response, 0.0), held_out=held_out)
+
+
+def judge(campaign: Campaign, vehicle: Vehicle = VEHICLE) -> JointTrace:
+    return judge_jointly(
+        campaign, vehicle, SURFACE, load_effects(), load_joint_numbers(), load_decision_rules()
+    )
+
+
+@cache
+def slow_brakes() -> JointTrace:
+    return judge(campaign_of({"pressure_gain": 0.3, "lag": 0.09}))
+
+
+def named(trace: JointTrace) -> dict[str, tuple[float, float, float]]:
+    return {
+        effect.name: (effect.parameters[0].ci_low, effect.parameters[0].value, effect.parameters[0].ci_high)
+        for effect in (*trace.verdict.effects, *trace.calibrated)
+    }
+
+
+def test_a_lag_is_found_with_the_brakes_gain_and_their_intervals_hold_the_truth():
+    found = named(slow_brakes())
+    assert found.keys() == {"brake_lag", "retuned_pressure_gain"}
+    for effect, truth in (("brake_lag", 0.09), ("retuned_pressure_gain", 0.3)):
+        low, _, high = found[effect]
+        assert low < truth < high and high - low < 0.06
+
+
+def test_the_error_of_a_stop_that_no_fit_has_seen_falls_below_the_re_tuned_models():
+    error = slow_brakes().verdict.error["speed"]
+    assert error.after < 0.5 * error.retuned < error.frozen
+    assert "lag of 0.0" in slow_brakes().sentence and "no fit has seen" in slow_brakes().sentence
+
+
+def test_the_answer_does_not_depend_on_the_numbers_that_the_file_starts_from():
+    truth = campaign_of({"pressure_gain": 0.3, "lag": 0.09})
+    found = named(judge(truth, replace(VEHICLE, brake_gain=0.4 * VEHICLE.brake_gain)))
+    assert found.keys() == {"brake_lag", "retuned_pressure_gain"}
+    assert found["brake_lag"][1] == pytest.approx(named(slow_brakes())["brake_lag"][1], abs=0.01)
+    assert 0.4 * (1.0 + found["retuned_pressure_gain"][1]) == pytest.approx(1.3, abs=0.02)
+
+
+def test_a_car_that_is_as_its_file_says_lacks_nothing():
+    trace = judge(campaign_of({}))
+    assert trace.verdict.verdict == "NOTHING" and not named(trace)
+    assert trace.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_number_of_the_file_is_wrong_only_beyond_its_tolerance():
+    near, far = (judge(campaign_of({"pressure_gain": gain, "lag": 0.09})) for gain in (0.1, 0.9))
+    assert [e.name for e in near.verdict.effects] == ["brake_lag"]
+    assert [e.name for e in near.calibrated] == ["retuned_pressure_gain"]
+    assert {e.name for e in far.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}
+
+
+def test_an_engine_that_was_measured_is_an_input_and_no_effect():
+    campaign = campaign_of({"pressure_gain": 0.3}, engine=-500.0)
+    with_engine = judge(campaign)
+    assert not named(with_engine)
+    assert with_engine.fitted.by_name["pressure_gain"] == pytest.approx(0.3, abs=0.03)
+    assert any("engine torque" in reason for reason in with_engine.verdict.reasons)
+    blind = judge(replace(campaign, runs=tuple(replace(run, drive_torque=None) for run in campaign.runs)))
+    assert blind.verdict.error["speed"].after > 1.5 * with_engine.verdict.error["speed"].after
+
+
+def test_speed_and_pressure_alone_name_a_delay_as_a_set():
+    trace = judge(campaign_of({"pressure_gain": 0.3, "lag": 0.12}, channels=("speed",)))
+    assert trace.verdict.verdict in ("FOUND", "SET")
+    delays = {"brake_lag", "brake_dead_time"}
+    assert delays & (named(trace).keys() | {rival.name for _, rival in trace.verdict.rivals})
+    assert trace.verdict.error.keys() == {"speed"}
+
+
+def test_a_joint_fit_is_for_few_runs_and_for_files_that_hardly_know_the_car():
+    campaign = campaign_of({})
+    sure = replace(campaign, tolerances=TOLERANCES)
+    enough = tuple(replace(run, held_out=i % 2 == 0) for i, run in enumerate(campaign.runs * 2))
+    assert needs_joint_fit(sure) and needs_joint_fit(replace(campaign, runs=enough))
+    assert not needs_joint_fit(replace(sure, runs=enough))
