@@ -1,5 +1,6 @@
 """Closing the loop: a measured campaign in, a verdict, a grown vehicle and a report out."""
 
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_content
+from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_content
 from flows.measured.closing_ledger import record_reading
 from flows.measured.closing_report import report_html
 from flows.measured.closing_residuals import residual_rmse
@@ -20,16 +21,23 @@ from flows.measured.joint_report import joint_report_html
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
-from tasks.campaign.campaign import CHANNELS, Campaign
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
+from tasks.identification.decision.discovery import ForeignCarError
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.verdict import Trace, find_missing_effects
 from tasks.identification.joint.elimination import standard_errors
 from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
+from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import PARAMETERS
+from tasks.vehicle.parameters import Vehicle
 
 SEARCHES = ("one effect at a time", "joint fit")
 """How a verdict was reached."""
+
+
+CARRIED = {name: set(PARAMETERS[name].fields) for name in SESSION if PARAMETERS[name].kind == "scaled"}
+"""Fields of a vehicle whose tolerance is that of a number of the session."""
 
 
 def close_loop(
@@ -59,13 +67,11 @@ def close_loop(
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown, *beside)
     results.write_json("split.json", split_of(measured))
     earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
-    effects, rules = load_effects(), load_decision_rules()
-    trace: Trace | JointTrace
-    if needs_joint_fit(measured):
-        trace = judge_jointly(measured, model, road, effects, load_joint_numbers(), rules)
+    measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
+    trace = _judge(measured, model, road)
+    if isinstance(trace, JointTrace):
         result = verdict_json(trace.verdict) | joint_facts(trace)
     else:
-        trace = find_missing_effects(measured, model, road, effects, rules)
         result = verdict_json(trace.verdict) | {"search": SEARCHES[0], "residual_rmse": residual_rmse(trace)}
     result["held_out_readings_before"] = earlier
     if earlier:
@@ -92,6 +98,32 @@ def close_loop(
     results.write("report.html", page)
     result["report"] = str(results.path("report.html"))
     return result
+
+
+def session_tolerances(vehicle: str) -> dict[str, float]:
+    """Return the tolerances that a vehicle file gives the numbers that a session may be off by.
+
+    A file that says how well it knows its own numbers knows it better than a campaign does.
+
+    Parameters
+    ----------
+    vehicle : catalogue name or file
+    """
+    given = load_tolerances(vehicle)
+    return {
+        name: max(given[f] for f in fields if f in given)
+        for name, fields in CARRIED.items()
+        if given.keys() & fields
+    }
+
+
+def _judge(measured: Campaign, model: Vehicle, road: SurfaceParameters) -> Trace | JointTrace:
+    """Look for one effect at a time where the file knows its car; fit all numbers at once where it does not."""
+    effects, rules = load_effects(), load_decision_rules()
+    if not needs_joint_fit(measured):
+        with suppress(ForeignCarError):
+            return find_missing_effects(measured, model, road, effects, rules)
+    return judge_jointly(measured, model, road, effects, load_joint_numbers(), rules)
 
 
 def _reached_ranges(trace: Trace | JointTrace) -> dict[str, tuple[float, float]]:

@@ -1,6 +1,7 @@
 """A measurement campaign without its files: runs, split, tolerances."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,16 @@ class Tolerances:
     friction: float
     acceleration_bias: float
     pitch_offset: float
+
+    def with_session(self, known: Mapping[str, float]) -> "Tolerances":
+        """Return the tolerances with some of the session's replaced.
+
+        Parameters
+        ----------
+        known : by name of `SESSION` [1]
+        """
+        values = (known.get(name, sigma) for name, sigma in zip(SESSION, self.session, strict=True))
+        return replace(self, session=tuple(values))
 
 
 @dataclass(frozen=True, kw_only=True)

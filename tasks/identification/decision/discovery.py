@@ -21,6 +21,10 @@ from tasks.identification.inference.fit import Fit, fit, misfit_by_run
 from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
 
 
+class ForeignCarError(Exception):
+    """The runs disagree about every direction even beside the best effects: the car's equations are others."""
+
+
 def search_forms(
     start: Found,
     null: Found,
@@ -125,11 +129,18 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
     Returns
     -------
     The start without effects, what was found, and a form alone that cannot be told from the first effect.
+
+    Raises
+    ------
+    ForeignCarError
+        If the model's own misfit would drown what is looked for.
     """
     if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
         evidence = differentiate_at(evidence, null, library=True)
         null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search_library(Found(evidence=evidence, base=null), gated=False)
+    if inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
+        raise ForeignCarError
     splines = spline_slopes(explored.evidence, explored.base)
     scales = scale_disturbances(explored, splines)
     evidence = rescale_disturbances(evidence, scales)

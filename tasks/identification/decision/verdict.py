@@ -64,6 +64,11 @@ def find_missing_effects(
     Returns
     -------
     The verdict and what it stands on; nothing in it has been fitted to a held-out run.
+
+    Raises
+    ------
+    ForeignCarError
+        If the car's equations are not the model's, so that single effects cannot be told; `judge_jointly` can.
     """
     progress("derivatives")
     evidence = prepare_evidence(

@@ -105,6 +105,20 @@ def certainty(fitted: JointFit) -> NDArray[np.float64]:
     return np.asarray(np.abs(fitted.values) / standard_errors(fitted))
 
 
+def certain_numbers(fitted: JointFit) -> list[tuple[JointNumber, float]]:
+    """Return the numbers that earned their place for certain, and by how many standard errors.
+
+    Parameters
+    ----------
+    fitted : the fit
+    """
+    return [
+        (number, float(sure))
+        for number, sure in zip(fitted.numbers, certainty(fitted), strict=True)
+        if number.removable and sure >= certain_from(fitted)
+    ]
+
+
 def eliminate(stops: Sequence[Stop], fitted: JointFit) -> JointFit:
     """Return the fit of what is left when every number that may go and is not certain has gone.
 

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
-from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
-from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict, VerdictName
-from tasks.identification.decision.held_out import summarise_errors
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
+from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict, VerdictName
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.elimination import (
     Substitute,
-    certain_from,
+    certain_numbers,
     certainty,
     eliminate,
     find_substitutes,
@@ -21,21 +19,11 @@ from tasks.identification.joint.elimination import (
     refit,
     standard_errors,
 )
-from tasks.identification.joint.fit import (
-    JointFit,
-    fit_jointly,
-    lead_offsets,
-    misfit_scales,
-    suggest_starts,
-)
-from tasks.identification.joint.numbers import (
-    CALIBRATED,
-    JointNumber,
-    choose_numbers,
-    free_numbers,
-    saturates,
-)
-from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop, predict_stop
+from tasks.identification.joint.fit import JointFit, fit_jointly, misfit_scales, suggest_starts
+from tasks.identification.joint.held_out import drop_what_predicts_worse, predict_held_out, summarise_held_out
+from tasks.identification.joint.numbers import CALIBRATED, JointNumber, choose_numbers, free_numbers
+from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
+from tasks.identification.joint.words import SEPARATE, tell_verdict, tell_what_was_used
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -46,8 +34,6 @@ FIRST = ("lag", "drag_area", "speed_delay")
 """Numbers that are free beside those of every car while the best start is looked for."""
 GRIPS = (0.0, 0.2, 0.5)
 """Friction from which the last fits start, where runs saturate the tyres [1]."""
-PREDICTS_BETTER = 0.75
-"""Share of the held-out error below which a model without a number predicts better than with it [1]."""
 WRONG = 3.0
 """Tolerances beyond which a number of the vehicle file is wrong."""
 UNKNOWN_GAIN = 0.1
@@ -120,15 +106,17 @@ def judge_jointly(
     held_out = tuple(stop for stop in stops if stop.model.run.held_out)
     shown = choose_numbers(numbers, campaign, [stop.model for stop in train])
     progress("starts")
-    everything = _fit_everything(train, free_numbers(shown, [stop.model for stop in train]))
+    known = campaign.tolerances.session[SESSION.index("pressure_gain")] < UNKNOWN_GAIN
+    starts = [{}] if known else suggest_starts(train)
+    everything = _fit_everything(train, starts, free_numbers(shown, [stop.model for stop in train]))
     progress("elimination")
-    fitted, agreeing = _settle(train, eliminate(train, everything))
+    fitted, agreeing = _settle(train, eliminate(train, everything), starts)
     progress("held-out error")
     reasons: list[str] = []
-    fitted = _drop_what_predicts_worse(train, held_out, fitted, reasons)
+    fitted = drop_what_predicts_worse(train, held_out, fitted, reasons)
     retuned = refit(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
-    predicted = _predict_held_out(held_out, retuned, fitted)
-    error, manoeuvres = _summarise(held_out, predicted, rules)
+    predicted = predict_held_out(held_out, retuned, fitted)
+    error, manoeuvres = summarise_held_out(held_out, predicted, rules)
     progress("rivals")
     substitutes = tuple(find_substitutes(train, fitted, shown))
     effects, rivals = _named(fitted, substitutes, library)
@@ -136,7 +124,7 @@ def judge_jointly(
     calibrated = tuple(e for e in effects if _is_within(e, tolerances))
     effects = [e for e in effects if e not in calibrated]
     kind = _kind(effects, rivals)
-    reasons += _what_was_used(campaign, train, agreeing)
+    reasons += tell_what_was_used(campaign, train, agreeing)
     groups = {n.name: n.group for n in shown}
     reasons += [
         f"{rival.name} explains the runs nearly as well as {of}: {SEPARATE[groups[other.of]]}"
@@ -172,117 +160,30 @@ def judge_jointly(
         predicted=predicted,
         substitutes=substitutes,
         agreeing=agreeing,
-        sentence=_say(fitted, kind, error, manoeuvres),
+        sentence=tell_verdict(fitted, kind, error, manoeuvres),
     )
 
 
-SEPARATE = {
-    "resistance": "coast down from the highest speed to 5 m/s with the clutch open, and once in gear",
-    "delay": "press the brake in steps from constant speed, logging at 100 Hz or more",
-    "curve": "brake at three constant pressures from the same speed",
-    "sensor": "log the speed by a second instrument",
-}
-"""The run that tells numbers of one group apart."""
-
-
-def _fit_everything(train: Sequence[Stop], shown: tuple[JointNumber, ...]) -> JointFit:
+def _fit_everything(
+    train: Sequence[Stop], starts: Sequence[Mapping[str, float]], shown: tuple[JointNumber, ...]
+) -> JointFit:
     """Return the fit of every number: from the best of several starts of the few that matter most."""
     few = tuple(n for n in shown if not n.removable or n.name in FIRST)
-    best = fit_jointly(train, few, suggest_starts(train))[0]
+    best = fit_jointly(train, few, starts)[0]
     scales = misfit_scales(best, train)
     return fit_jointly(train, shown, [best.by_name], scales=scales, offsets=best.offsets)[0]
 
 
-def _settle(train: Sequence[Stop], fitted: JointFit) -> tuple[JointFit, tuple[int, int]]:
+def _settle(
+    train: Sequence[Stop], fitted: JointFit, starts: Sequence[Mapping[str, float]]
+) -> tuple[JointFit, tuple[int, int]]:
     """Return the best fit of the numbers left from several starts, and how many of these reach it."""
     grips = GRIPS if "friction" in fitted.by_name else (0.0,)
-    gains = suggest_starts(train)
-    starts = [fitted.by_name, *(gains[0] | {"friction": grip} for grip in grips), *gains[1:]]
-    fits = fit_jointly(train, fitted.numbers, starts, scales=fitted.scales)
+    begins = [fitted.by_name, *({**starts[0], "friction": grip} for grip in grips), *starts[1:]]
+    fits = fit_jointly(train, fitted.numbers, begins, scales=fitted.scales)
     error = standard_errors(fits[0])
     same = sum(bool(np.all(np.abs(f.values - fits[0].values) < 2.0 * error)) for f in fits)
     return fits[0], (same, len(fits))
-
-
-def _drop_what_predicts_worse(
-    train: Sequence[Stop], held_out: Sequence[Stop], fitted: JointFit, reasons: list[str]
-) -> JointFit:
-    """Return the fit without the numbers whose absence predicts the speed of held-out runs better, and say so.
-
-    A fit that prediction contradicts holds what its few runs had in common, and no property of the car.
-    """
-    there = _speed_error(held_out, fitted)
-    trials = []
-    for number, _ in _certain(fitted):
-        without = refit(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
-        trials.append((_speed_error(held_out, without), number, without))
-    if not trials:
-        return fitted
-    gone, number, without = min(trials, key=lambda trial: trial[0])
-    if gone >= PREDICTS_BETTER * there:
-        return fitted
-    reasons.append(
-        f"{number.name} = {fitted.by_name[number.name]:.3g} would fit, but without it the speed of the held-out runs is"
-        f" predicted better ({gone:.3g} against {there:.3g} m/s): not named"
-    )
-    return _drop_what_predicts_worse(train, held_out, eliminate(train, without), reasons)
-
-
-def _speed_error(held_out: Sequence[Stop], fitted: JointFit) -> float:
-    """Return the RMSE of speed on held-out runs, each run counted once [m/s]."""
-    place = CHANNELS.index("speed")
-    squares = []
-    for stop in held_out:
-        y = predict_stop(stop, fitted.by_name, lead_offsets(stop, fitted.by_name, fitted.scales))
-        squares.append(float(np.mean((stop.model.measured - y)[:, place] ** 2)))
-    return float(np.sqrt(np.mean(squares)))
-
-
-def _predict_held_out(
-    held_out: Sequence[Stop], retuned: JointFit, fitted: JointFit
-) -> tuple[NDArray[np.float64], ...]:
-    """Return the readings of each held-out run by the frozen, the re-tuned and the grown model, float64 [3, N, 7]."""
-    models: tuple[Mapping[str, float], ...] = ({}, retuned.by_name, fitted.by_name)
-    return tuple(
-        np.array([predict_stop(stop, m, lead_offsets(stop, m, fitted.scales)) for m in models])
-        for stop in held_out
-    )
-
-
-def _summarise(
-    held_out: Sequence[Stop], predicted: Sequence[NDArray[np.float64]], rules: DecisionRules
-) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
-    """Return errors by channel, and of the stopping distance where runs brake."""
-    names = [stop.model.run.name for stop in held_out]
-    places = held_out[0].channels
-    square = np.array(
-        [
-            np.mean((stop.model.measured - y) ** 2, axis=1)[:, places]
-            for stop, y in zip(held_out, predicted, strict=True)
-        ]
-    )
-    units = {CHANNELS[c]: CHANNEL_UNITS[c] for c in places}
-    channels = summarise_errors(square, names, units, rules.error_resamples)
-    braked, distances = [], []
-    for stop, y in zip(held_out, predicted, strict=True):
-        pressure = stop.model.run.pressure[: stop.model.samples]
-        figures = manoeuvre_errors(stop.model.measured, y, pressure, stop.model.run.interval)
-        if figures is not None:
-            braked.append(stop.model.run.name)
-            distances.append(figures[:, :1] ** 2)
-    if not braked:
-        return channels, {}
-    unit = {"stopping_distance": MANOEUVRE_UNITS["stopping_distance"]}
-    return channels, summarise_errors(np.array(distances), braked, unit, rules.error_resamples)
-
-
-def _certain(fitted: JointFit) -> list[tuple[JointNumber, float]]:
-    """Return the numbers that earned their place for certain, and by how many standard errors."""
-    return [
-        (number, float(sure))
-        for number, sure in zip(fitted.numbers, certainty(fitted), strict=True)
-        if number.removable and sure >= certain_from(fitted)
-    ]
 
 
 def _named(
@@ -291,7 +192,7 @@ def _named(
     """Return what is named, new physics first, and its rivals."""
     by_number = {e.parameters[0].name: e for e in reversed(library)}
     # what every car needs anew is told whatever its size: the prediction rests on it
-    named = [n for n, _ in _certain(fitted)] + [n for n in fitted.numbers if not n.removable]
+    named = [n for n, _ in certain_numbers(fitted)] + [n for n in fitted.numbers if not n.removable]
     effects = [_named_effect(fitted, n, by_number[n.name]) for n in named]
     order = {"effect": 0, "sensor": 1, "retune": 2}
     effects.sort(key=lambda e: order[e.effect_class])
@@ -347,48 +248,3 @@ def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffec
     if "effect" in classes:
         return "SET" if rivals else "FOUND"
     return "SENSOR" if "sensor" in classes else "RETUNE" if classes else "NOTHING"
-
-
-def _what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tuple[int, int]) -> list[str]:
-    """Return sentences on channels, inputs, range and stability."""
-    runs = campaign.runs
-    inputs = ["brake pressure"]
-    inputs += ["engine torque"] if any(run.drive_torque is not None for run in runs) else []
-    inputs += ["throttle"] if any(run.throttle is not None for run in runs) else []
-    inputs += ["road slope"] if any(run.road_slope is not None for run in runs) else []
-    speeds = np.concatenate([stop.model.measured[:, 0] for stop in train])
-    pressure = max(float(stop.model.run.pressure.max()) for stop in train)
-    seen = [CHANNELS[c].replace("_", " ") for c in train[0].channels]
-    grip = (
-        ""
-        if any(saturates(stop.model) for stop in train)
-        else "; no run passed the limit of the model's tyres"
-    )
-    return [
-        f"inputs that were measured: {', '.join(inputs)}; compared: {', '.join(seen)}",
-        f"the training runs reach {speeds.min():.3g} to {speeds.max():.3g} m/s and {pressure:.3g} MPa{grip}: beyond"
-        " that nothing is claimed",
-        f"{agreeing[0]} of {agreeing[1]} starts reach this fit",
-    ]
-
-
-def _say(
-    fitted: JointFit,
-    kind: VerdictName,
-    error: Mapping[str, ChannelError],
-    manoeuvres: Mapping[str, ChannelError],
-) -> str:
-    """Return the verdict in plain words, with what it does to the error."""
-    news = [n for n, _ in _certain(fitted)]
-    told = [n.say(fitted.by_name[n.name]) for n in news or fitted.numbers]
-    if kind == "NOTHING" or not told:
-        return "Nothing is missing that these runs can show."
-    figures = {"speed": error["speed"], **manoeuvres}
-    name, e = max(figures.items(), key=lambda pair: pair[1].frozen / max(pair[1].after, 1e-9))
-    of = name.replace("_", " ")
-    text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
-    how = "that takes" if len(told) == 1 else "together they take"
-    return (
-        f"{text[0].upper()}{text[1:]}; with the brake's gain fitted, {how} the error of the {of} on runs that no fit"
-        f" has seen from {e.frozen:.2g} to {e.after:.2g} {e.unit}."
-    )

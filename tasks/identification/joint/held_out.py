@@ -1,0 +1,115 @@
+"""Runs that no fit has seen: predicted from what precedes the brake, to judge numbers and to report errors."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
+from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
+from tasks.identification.decision.answer import ChannelError
+from tasks.identification.decision.held_out import summarise_errors
+from tasks.identification.joint.elimination import certain_numbers, eliminate, refit
+from tasks.identification.joint.fit import JointFit, lead_offsets
+from tasks.identification.joint.stops import Stop, predict_stop
+from tasks.identification.rules import DecisionRules
+
+PREDICTS_BETTER = 0.75
+"""Share of the held-out error below which a model without a number predicts better than with it [1]."""
+PREDICTS_NO_WORSE = 1.02
+"""Share of the held-out misfit of all channels up to which a model without a number is as good [1]."""
+
+
+def drop_what_predicts_worse(
+    train: Sequence[Stop], held_out: Sequence[Stop], fitted: JointFit, reasons: list[str]
+) -> JointFit:
+    """Return the fit without the numbers whose absence predicts the speed of held-out runs better, and say so.
+
+    A fit that prediction contradicts holds what its few runs had in common, and no property of the car.
+
+    Parameters
+    ----------
+    train, held_out : the runs
+    fitted : after elimination
+    reasons : is added to
+    """
+    there = _held_out_misfit(held_out, fitted)
+    trials = []
+    for number, _ in certain_numbers(fitted):
+        without = refit(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
+        gone = _held_out_misfit(held_out, without)
+        # a number earns its name by what it does to any channel, and not against the speed
+        if gone[0] < PREDICTS_BETTER * there[0] or gone[1] < PREDICTS_NO_WORSE * there[1]:
+            trials.append((gone, number, without))
+    if not trials:
+        return fitted
+    gone, number, without = min(trials, key=lambda trial: trial[0][0] + trial[0][1])
+    reasons.append(
+        f"{number.name} = {fitted.by_name[number.name]:.3g} would fit, but without it the held-out runs are predicted"
+        f" as well or better (speed {gone[0]:.3g} against {there[0]:.3g} m/s, all channels {gone[1]:.3g} against"
+        f" {there[1]:.3g}): not named"
+    )
+    return drop_what_predicts_worse(train, held_out, eliminate(train, without), reasons)
+
+
+def _held_out_misfit(held_out: Sequence[Stop], fitted: JointFit) -> tuple[float, float]:
+    """Return the RMSE on held-out runs of speed [m/s], and of all channels over their scales [1], each run alike."""
+    place = CHANNELS.index("speed")
+    speeds, channels = [], []
+    for stop in held_out:
+        y = predict_stop(stop, fitted.by_name, lead_offsets(stop, fitted.by_name, fitted.scales))
+        left = np.mean((stop.model.measured - y) ** 2, axis=0)
+        speeds.append(float(left[place]))
+        channels.append(float(np.mean(left[stop.channels] / fitted.scales[stop.channels] ** 2)))
+    return float(np.sqrt(np.mean(speeds))), float(np.sqrt(np.mean(channels)))
+
+
+def predict_held_out(
+    held_out: Sequence[Stop], retuned: JointFit, fitted: JointFit
+) -> tuple[NDArray[np.float64], ...]:
+    """Return the readings of each held-out run by the frozen, the re-tuned and the grown model, float64 [3, N, 7].
+
+    Parameters
+    ----------
+    held_out : the runs
+    retuned, fitted : the fits
+    """
+    models: tuple[Mapping[str, float], ...] = ({}, retuned.by_name, fitted.by_name)
+    return tuple(
+        np.array([predict_stop(stop, m, lead_offsets(stop, m, fitted.scales)) for m in models])
+        for stop in held_out
+    )
+
+
+def summarise_held_out(
+    held_out: Sequence[Stop], predicted: Sequence[NDArray[np.float64]], rules: DecisionRules
+) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
+    """Return errors by channel, and of the stopping distance where runs brake.
+
+    Parameters
+    ----------
+    held_out : the runs
+    predicted : by `predict_held_out`
+    rules : number of resamples
+    """
+    names = [stop.model.run.name for stop in held_out]
+    places = held_out[0].channels
+    square = np.array(
+        [
+            np.mean((stop.model.measured - y) ** 2, axis=1)[:, places]
+            for stop, y in zip(held_out, predicted, strict=True)
+        ]
+    )
+    units = {CHANNELS[c]: CHANNEL_UNITS[c] for c in places}
+    channels = summarise_errors(square, names, units, rules.error_resamples)
+    braked, distances = [], []
+    for stop, y in zip(held_out, predicted, strict=True):
+        pressure = stop.model.run.pressure[: stop.model.samples]
+        figures = manoeuvre_errors(stop.model.measured, y, pressure, stop.model.run.interval)
+        if figures is not None:
+            braked.append(stop.model.run.name)
+            distances.append(figures[:, :1] ** 2)
+    if not braked:
+        return channels, {}
+    unit = {"stopping_distance": MANOEUVRE_UNITS["stopping_distance"]}
+    return channels, summarise_errors(np.array(distances), braked, unit, rules.error_resamples)

@@ -1,0 +1,81 @@
+"""A joint verdict in plain words: what was found, on what it rests, and which run would tell more."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tasks.campaign.campaign import CHANNELS, Campaign
+from tasks.identification.decision.answer import ChannelError, VerdictName
+from tasks.identification.joint.elimination import certain_numbers
+from tasks.identification.joint.fit import JointFit
+from tasks.identification.joint.numbers import saturates
+from tasks.identification.joint.stops import Stop
+
+SEPARATE = {
+    "resistance": "coast down from the highest speed to 5 m/s with the clutch open, and once in gear",
+    "delay": "press the brake in steps from constant speed, logging at 100 Hz or more",
+    "curve": "brake at three constant pressures from the same speed",
+    "sensor": "log the speed by a second instrument",
+}
+"""The run that tells numbers of one group apart."""
+
+
+def tell_what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tuple[int, int]) -> list[str]:
+    """Return sentences on channels, inputs, range and stability.
+
+    Parameters
+    ----------
+    campaign : measured runs
+    train : those that were fitted
+    agreeing : starts that reach the same fit, of all
+    """
+    runs = campaign.runs
+    inputs = ["brake pressure"]
+    inputs += ["engine torque"] if any(run.drive_torque is not None for run in runs) else []
+    inputs += ["throttle"] if any(run.throttle is not None for run in runs) else []
+    inputs += ["road slope"] if any(run.road_slope is not None for run in runs) else []
+    speeds = np.concatenate([stop.model.measured[:, 0] for stop in train])
+    pressure = max(float(stop.model.run.pressure.max()) for stop in train)
+    seen = [CHANNELS[c].replace("_", " ") for c in train[0].channels]
+    grip = (
+        ""
+        if any(saturates(stop.model) for stop in train)
+        else "; no run passed the limit of the model's tyres"
+    )
+    return [
+        f"inputs that were measured: {', '.join(inputs)}; compared: {', '.join(seen)}",
+        f"the training runs reach {speeds.min():.3g} to {speeds.max():.3g} m/s and {pressure:.3g} MPa{grip}: beyond"
+        " that nothing is claimed",
+        f"{agreeing[0]} of {agreeing[1]} starts reach this fit",
+    ]
+
+
+def tell_verdict(
+    fitted: JointFit,
+    kind: VerdictName,
+    error: Mapping[str, ChannelError],
+    manoeuvres: Mapping[str, ChannelError],
+) -> str:
+    """Return the verdict in plain words, with what it does to the error.
+
+    Parameters
+    ----------
+    fitted : the fit that it rests on
+    kind : of the verdict
+    error, manoeuvres : on runs that no fit has seen
+    """
+    news = [n for n, _ in certain_numbers(fitted)]
+    told = [n.say(fitted.by_name[n.name]) for n in news or fitted.numbers]
+    if kind == "NOTHING" or not told:
+        return "Nothing is missing that these runs can show."
+    figures = {"speed": error["speed"], **manoeuvres}
+    moved = " and ".join(
+        f"of the {name.replace('_', ' ')} from {e.frozen:.2g} to {e.after:.2g} {e.unit}"
+        for name, e in figures.items()
+    )
+    text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    how = "that takes" if len(told) == 1 else "together they take"
+    return (
+        f"{text[0].upper()}{text[1:]}; with the brake's gain fitted, {how} the error {moved}, on runs that no fit has"
+        " seen."
+    )
