@@ -70,7 +70,7 @@ def next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple[str,
     if result["rivals"]:
         steps.append(
             (
-                "Record the run that tells the explanations apart (below), and import it with the others:",
+                "Record the run that tells the explanations apart (above), and import it with the others:",
                 IMPORT,
             )
         )

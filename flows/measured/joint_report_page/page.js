@@ -32,7 +32,7 @@ function baseLayout(c, height, title, range) {
     // a finger scrolls the page; it zooms by the buttons
     dragmode: touched.matches ? false : "zoom",
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-    hovermode: "x unified", hoversubplots: "axis", hoverlabel: { bgcolor: c.card, bordercolor: c.line, font: { color: c.ink } },
+    hovermode: "x unified", hoversubplots: "single", hoverlabel: { bgcolor: c.card, bordercolor: c.line, font: { color: c.ink } },
     font: { family: "system-ui, sans-serif", size: 11, color: c.soft },
     xaxis: { title: { text: title, standoff: 6 }, gridcolor: c.line, zeroline: false, range: [...range], hoverformat: ".2f" },
   };
@@ -56,7 +56,7 @@ function drawRun(plot, run, shown) {
     heads.push([`${words(channel.name)} [${channel.unit}]`, k * PANEL_PX]);
     for (const model of shown) {
       lines.push({
-        type: "scatter", mode: "lines", name: `${words(channel.name)}, ${NAMES[model]}`, xaxis: "x", yaxis: axis("y", k),
+        type: "scatter", mode: "lines", name: NAMES[model], xaxis: "x", yaxis: axis("y", k),
         x: run.time_s, y: channel[model], hovertemplate: "%{y:.3g}",
         line: { color: c[model], width: model === "after" ? 1.8 : 1.4, dash: DASHES[model] },
       });
