@@ -92,7 +92,7 @@ def close_loop(
     result["not_carried_by_coupled_mode"] = missing
     results.write_json("verdict.json", result)
     if isinstance(trace, JointTrace):
-        page = joint_report_html(trace, result, measured)
+        page = joint_report_html(trace, result, replace(measured, vehicle=name))
     else:
         page = report_html(trace, result, measured)
     results.write("report.html", page)

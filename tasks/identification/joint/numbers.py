@@ -82,10 +82,7 @@ def choose_numbers(
             continue
         if number.name == "engine_torque" and any(run.drive_torque is not None for run in campaign.runs):
             continue  # an input, and no unknown
-        if (
-            number.group == "curve"
-            and sum(peak_deceleration(model) > BRAKES for model in models) < STOPS_OF_A_CURVE
-        ):
+        if number.group == "curve" and sum(brakes(model) for model in models) < STOPS_OF_A_CURVE:
             continue  # one stop gives a gain and a delay, and no curve
         if number.name == "friction" and not any(saturates(model) for model in models):
             continue
@@ -126,6 +123,16 @@ def coasts_down(model: RunModel) -> bool:
     run, speed = model.run, model.measured[:, CHANNELS.index("speed")]
     driven = run.throttle is not None and bool(np.max(run.throttle) > CLOSED)
     return not run.pressure.any() and not driven and float(speed[0] - speed[-1]) > COASTED * float(speed[0])
+
+
+def brakes(model: RunModel) -> bool:
+    """Whether a run brakes hard enough to show something of the brake's curve.
+
+    Parameters
+    ----------
+    model : the run
+    """
+    return peak_deceleration(model) > BRAKES
 
 
 def saturates(model: RunModel) -> bool:

@@ -126,9 +126,10 @@ def judge_jointly(
     kind = _kind(effects, rivals)
     reasons += tell_what_was_used(campaign, train, agreeing)
     groups = {n.name: n.group for n in shown}
+    of_effect = {e.name: groups[e.parameters[0].name] for e in effects}
     reasons += [
-        f"{rival.name} explains the runs nearly as well as {of}: {SEPARATE[groups[other.of]]}"
-        for other, (of, rival) in zip(substitutes, rivals, strict=True)
+        f"{rival.name} explains the runs nearly as well as {of}: {SEPARATE[of_effect[of]]}"
+        for of, rival in rivals
     ]
     verdict = Verdict(
         verdict=kind,
@@ -200,6 +201,10 @@ def _named(
     for other in substitutes:
         number = next(n for n in other.fitted.numbers if n.name == other.name)
         rivals.append((by_number[other.of].name, _named_effect(other.fitted, number, by_number[other.name])))
+    friction = next((n for n in fitted.numbers if n.group == "friction"), None)
+    if friction is not None:  # tyres at their limit bend the brake's curve too
+        grip = _named_effect(fitted, friction, by_number[friction.name])
+        rivals += [(by_number[n.name].name, grip) for n in named if n.group == "curve"]
     return effects, rivals
 
 

@@ -14,7 +14,7 @@ from tasks.identification.joint.stops import Stop
 SEPARATE = {
     "resistance": "coast down from the highest speed to 5 m/s with the clutch open, and once in gear",
     "delay": "press the brake in steps from constant speed, logging at 100 Hz or more",
-    "curve": "brake at three constant pressures from the same speed",
+    "curve": "brake at three constant pressures from the same speed, below the limit of the tyres",
     "sensor": "log the speed by a second instrument",
 }
 """The run that tells numbers of one group apart."""

@@ -1,0 +1,200 @@
+"""The page of a joint fit: what an engineer reads first, nothing from outside, and no text that is more than text."""
+
+import base64
+import hashlib
+import json
+import shutil
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from catalogs.decision_rules import load_decision_rules
+from catalogs.effects import load_effects
+from catalogs.joint_numbers import load_joint_numbers
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
+from flows.measured.closing import joint_facts, verdict_json
+from flows.measured.joint_report import joint_report_html, next_steps
+from flows.measured.joint_report_figures import alike_numbers, brake_curve
+from tasks.campaign.campaign import Campaign
+from tasks.campaign.planned_runs import RunPlan
+from tasks.identification.benchmark import synthetic_campaign
+from tasks.identification.joint.verdict import JointTrace, judge_jointly
+
+VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+STOPS = tuple(
+    RunPlan(speed=speed, peak=peak, duration=2.6, disc_rise=20.0)
+    for speed, peak in ((16.0, 1.2), (20.0, 1.8), (12.0, 0.8))
+)
+HOSTILE = "</script><script>alert('1')</script>\"><img src=https://a.example/x onerror=alert(2)>{{ 7 * 7 }}"
+
+
+class Page(HTMLParser):
+    """Elements, the text of scripts, and all other text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.words = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.cdata_elem == "script":
+            self.scripts[-1] += data
+        elif self.cdata_elem is None:
+            self.words += f"{data} "
+
+
+def facts(trace: JointTrace, **more: Any) -> dict[str, Any]:
+    told: dict[str, Any] = {
+        "held_out_readings_before": 0,
+        "vehicle_file": "out/car-grown.yaml",
+        "not_carried_by_coupled_mode": [],
+    }
+    return verdict_json(trace.verdict) | joint_facts(trace) | told | more
+
+
+@pytest.fixture(scope="module")
+def judged() -> tuple[JointTrace, Campaign]:
+    """A campaign of three stops with a lag, whose runs, vehicle and name would like to be more than text."""
+    made = synthetic_campaign(VEHICLE, SURFACE, {"lag": 0.1}, 7, design=STOPS)
+    runs = tuple(replace(r, name=f"{HOSTILE} {k}", held_out=k == 2) for k, r in enumerate(made.runs))
+    campaign = replace(made, runs=runs, name=HOSTILE, vehicle=HOSTILE)
+    numbers = [n for n in load_joint_numbers() if n.name in {"pressure_gain", "lag", "dead_time"}]
+    return judge_jointly(campaign, VEHICLE, SURFACE, load_effects(), numbers, load_decision_rules()), campaign
+
+
+@pytest.fixture(scope="module")
+def text(judged: tuple[JointTrace, Campaign]) -> str:
+    trace, campaign = judged
+    return joint_report_html(trace, facts(trace), campaign)
+
+
+def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(
+    text: str, judged: tuple[JointTrace, Campaign]
+) -> None:
+    trace, _ = judged
+    words = " ".join(Page(text).words.split())
+    assert words.index(trace.sentence) < words.index("Verdict SET")
+    lag = facts(trace)["effects"][0]["parameters"]["lag"]
+    assert f"lag {lag['value']:.3g} {lag['ci_low']:.3g} to {lag['ci_high']:.3g} s" in words
+    assert "brake lag and brake dead time" in words
+    assert "The run that separates them: press the brake in steps" in words
+    assert "musync generate demo --vehicle out/car-grown.yaml --no-frames --out datasets/car-grown" in words
+    distance = trace.verdict.manoeuvre_error["stopping_distance"]
+    told = f"stopping distance {distance.frozen:.3g} {distance.retuned:.3g} {distance.after:.3g} one run m"
+    assert told in words
+    assert all(reason in words for reason in trace.verdict.reasons)
+
+
+def test_names_of_a_campaign_are_text_and_nothing_comes_from_outside(text: str) -> None:
+    page = Page(text)
+    assert page.words.count(HOSTILE) >= 4
+    assert len(page.scripts) == 3 and "img" not in [tag for tag, _ in page.elements]
+    addresses = [v for _, a in page.elements for k, v in a.items() if k in {"src", "href", "action"}]
+    assert addresses == ["data:,"]
+
+
+def test_the_policy_runs_the_scripts_of_the_page_by_hash_and_no_other(text: str) -> None:
+    page = Page(text)
+    (policy,) = (a["content"] for _, a in page.elements if a.get("http-equiv") == "Content-Security-Policy")
+    hashes = {base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in page.scripts[1:]}
+    rules = dict(rule.strip().split(" ", 1) for rule in str(policy).split(";"))
+    assert set(rules["script-src"].split()) == {f"'sha256-{h}'" for h in hashes}
+    assert rules["default-src"] == "'none'" and "http" not in str(policy)
+
+
+def test_figures_are_of_residuals_and_have_a_text(text: str, judged: tuple[JointTrace, Campaign]) -> None:
+    trace, _ = judged
+    page = Page(text)
+    (run,) = json.loads(page.scripts[0])["runs"]
+    speed = run["channels"][0]
+    left = trace.held_out[0].model.measured[:, 0] - trace.predicted[0][:, :, 0]
+    shown = np.array([speed[key] for key in ("frozen", "retuned", "after")])
+    assert speed["name"] == "speed" and np.allclose(shown, left, rtol=1e-4, atol=1e-6)
+    plots = [a for _, a in page.elements if a.get("class") == "plot"]
+    assert len(plots) == 2 and all(a["tabindex"] == "0" and a["aria-label"] for a in plots)
+
+
+def test_the_curve_follows_what_was_measured_where_the_frozen_model_does_not(
+    judged: tuple[JointTrace, Campaign],
+) -> None:
+    curve = {name: np.array(values, float) for name, values in brake_curve(judged[0]).items()}
+    off = {name: np.abs(curve[name] - curve["measured"]).mean() for name in ("frozen", "fitted")}
+    assert len(curve["low"]) > 4 and off["fitted"] < 0.5 * off["frozen"]
+    assert np.all(curve["low"] <= curve["measured"]) and np.all(curve["measured"] <= curve["high"])
+    assert np.all(np.diff(curve["pressure_mpa"]) > 0)
+
+
+def test_numbers_that_stand_in_for_each_other_are_told_with_the_run_that_separates_them(
+    judged: tuple[JointTrace, Campaign],
+) -> None:
+    fitted = judged[0].fitted
+    gain, lag = fitted.numbers
+    assert (gain.name, lag.name) == ("pressure_gain", "lag")
+    near = replace(fitted, information=np.linalg.inv(np.array([[1.0, -0.095], [-0.095, 0.01]])))
+    (pair,) = alike_numbers(near)
+    assert pair["names"] == ("lag", "pressure_gain") and pair["correlation"] == pytest.approx(-0.95)
+    assert "press the brake in steps" in pair["separate"]
+    far = replace(fitted, information=np.linalg.inv(np.array([[1.0, -0.085], [-0.085, 0.01]])))
+    assert alike_numbers(far) == []
+
+
+@pytest.mark.parametrize(
+    ("more", "commands"),
+    [
+        ({"verdict": "NOTHING", "rivals": [], "vehicle_file": None}, ["import-measurements", "generate"]),
+        ({"verdict": "FOUND", "rivals": []}, ["vehicle", "generate"]),
+        ({}, ["import-measurements", "vehicle", "generate"]),
+    ],
+)
+def test_the_next_step_follows_from_the_verdict(
+    judged: tuple[JointTrace, Campaign], more: dict[str, Any], commands: list[str]
+) -> None:
+    trace, campaign = judged
+    steps = next_steps(facts(trace, **more), replace(campaign, vehicle="a car; rm -r x"))
+    assert [command.split()[1] for _, command in steps] == commands
+    assert all("; rm" not in command or "'a car; rm -r x'" in command for _, command in steps)
+
+
+def test_a_browser_draws_zooms_by_key_and_fetches_nothing(text: str, tmp_path: Path) -> None:
+    api = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed: pip install playwright"
+    )
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if found is None:
+        pytest.skip("no Chromium")
+    (tmp_path / "report.html").write_text(text)
+    with api.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 400, "height": 800}, color_scheme="dark")
+        asked: list[str] = []
+        wrong: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.on("console", lambda message: wrong.append(message.text))
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.goto((tmp_path / "report.html").as_uri())
+        plot = page.locator(".plot").first
+        plot.focus()
+        whole = plot.evaluate("p => p.layout.xaxis.range")
+        page.keyboard.press("+")
+        half = plot.evaluate("p => p.layout.xaxis.range")
+        page.keyboard.press("Home")
+        page.locator("[data-model=frozen]").click()
+        lines = plot.evaluate("p => p.data.map(line => line.name)")
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        back = plot.evaluate("p => p.layout.xaxis.range")
+        browser.close()
+    assert half[1] - half[0] == pytest.approx(0.5 * (whole[1] - whole[0])) and back == pytest.approx(whole)
+    assert not any("frozen" in line for line in lines) and any("after" in line for line in lines)
+    assert wide <= 400 and wrong == [] and [a for a in asked if not a.startswith(("file:", "data:"))] == []
