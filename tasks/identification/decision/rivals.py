@@ -63,7 +63,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             (c, wins)
             for c, wins in zip(others, shares, strict=True)
             if c.score > 0.0
-            and _is_close(own, share, c, wins)
+            and is_close(own, share, c, wins)
             and not is_nested(own.hypothesis, c.hypothesis)
             and _is_credible(c, own, evidence)
         )
@@ -73,7 +73,14 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
     return compared
 
 
-def _is_close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
+def is_close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
+    """Whether another explanation cannot be told from the named one: by score, by gain, or by resamples.
+
+    Parameters
+    ----------
+    own, other : the named effect and the other
+    share, wins : their shares of bootstrap resamples
+    """
     needed = own.rules.win_share
     if other.gain > own.rules.rival_gain_share * own.gain:
         return True

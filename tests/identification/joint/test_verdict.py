@@ -96,6 +96,15 @@ def test_a_number_of_the_file_is_wrong_only_beyond_its_tolerance():
     assert {e.name for e in far.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}
 
 
+def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_run_contradicts_it():
+    windy, calm = campaign_of({"lag": 0.09, "drag_area": 3.0}), campaign_of({"lag": 0.09})
+    everywhere = judge(windy)
+    assert {"brake_lag", "aerodynamic_drag"} <= named(everywhere).keys()
+    contradicted = judge(replace(windy, runs=(*windy.runs[:-1], calm.runs[-1])))
+    assert "aerodynamic_drag" not in named(contradicted)
+    assert any("drag_area" in reason and "not named" in reason for reason in contradicted.verdict.reasons)
+
+
 def test_an_engine_that_was_measured_is_an_input_and_no_effect():
     campaign = campaign_of({"pressure_gain": 0.3}, engine=-500.0)
     with_engine = judge(campaign)

@@ -1,0 +1,33 @@
+"""When two explanations cannot be told apart on a model that is not exact."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from catalogs.decision_rules import load_decision_rules
+from tasks.identification.decision.rivals import is_close
+
+RULES = load_decision_rules()
+
+
+def candidate(score: float, gain: float) -> SimpleNamespace:
+    return SimpleNamespace(score=score, gain=gain, rules=RULES)
+
+
+@pytest.mark.parametrize(
+    ("score", "gain", "close"),
+    [
+        (124.0, 199.0, True),  # itself
+        (115.0, 100.0, True),  # within the span of scores
+        (95.0, 181.0, True),  # a rolling resistance beside a pad drag: 91 % of the gain
+        (22.0, 134.0, False),
+    ],
+)
+def test_a_rival_is_near_in_score_or_makes_good_most_of_the_gain(score: float, gain: float, close: bool):
+    own = candidate(124.0, 199.0)
+    assert is_close(own, 1.0, candidate(score, gain), 0.0) is close
+
+
+def test_a_rival_that_wins_many_resamples_is_near_where_the_named_effect_wins_too_few():
+    assert is_close(candidate(124.0, 199.0), 0.5, candidate(60.0, 100.0), 0.3)
+    assert not is_close(candidate(124.0, 199.0), 0.9, candidate(60.0, 100.0), 0.3)
