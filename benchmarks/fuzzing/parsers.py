@@ -46,6 +46,7 @@ from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
+from catalogs.weather.grip import shared_families
 from flows.auditing.signing import signature_findings
 from flows.auditing.verify import verify_dataset
 from flows.judging.claims import read_claim
@@ -149,6 +150,13 @@ def read_recording(folder: Path) -> None:
     read_signals(path, channel_map)
 
 
+def read_weather(folder: Path) -> None:
+    """How the weathers look, and how they grip: what rolls on a road reads its own parts of the same files."""
+    load_weather(folder)
+    load_surface("dense-asphalt", folder)
+    shared_families(folder)
+
+
 def import_scene(folder: Path) -> None:
     """A file of Gaussians along a route, to the folder that is not written."""
     files = {path.name.partition(".")[0]: path for path in folder.iterdir()}
@@ -212,7 +220,9 @@ PARSERS: tuple[Parser, ...] = (
         "channel map", "channel_maps/*.yaml", load_channel_map, share=3, rules=(files_inside(r"runs\|\d+\|file"),),
     ),
     Parser(
-        name="weather", write=sound.write_weather, read=load_weather, share=1, rules=(FINITE,), known_keys=".*",
+        name="weather", write=sound.write_weather, read=read_weather, share=1, known_keys=".*",
+        rules=(FINITE, Rule(name="values have unit and source", where=r".*\|(unit|source)", values=("", 7, None)),
+               Rule(name="units are those of the field", where=r"(surface|tyre)\|.*\|unit", values=("furlong",))),
     ),
     Parser(
         name="learned judges", share=1, known_keys=".*", read=lambda folder: load_judges(folder / "judges.yaml"),

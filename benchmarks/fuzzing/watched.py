@@ -32,7 +32,7 @@ LONGEST_MESSAGE = 20_000
 """Characters of all the sentences about one input."""
 START = "spawn"
 """How processes begin: with nothing of this one's memory."""
-RETIRED_BYTES = 5 * 2**27
+RETIRED_BYTES = 2**29
 """A process that has come to hold this much is replaced: what libraries keep is not the input's."""
 CHUNK = 100
 """Inputs that a process is given at once."""

@@ -9,7 +9,7 @@ from typing import Any, get_args, get_type_hints
 
 from catalogs.documents import read_yaml
 from catalogs.sentences import cap_problems, shorten, shorten_value
-from catalogs.weather.grip import FOLDER, GRIP_SECTIONS
+from catalogs.weather.grip import FOLDER, GRIP_SECTIONS, KIND_OF_FILE
 from tasks.errors import InputError
 from tasks.render.weather.parameters import KindLook, WeatherParameters
 from tasks.surface.weather import WEATHERS
@@ -59,7 +59,7 @@ def _read_files(form: Any, folder: Path, name: str, problems: list[str]) -> Any:
         problems.append(f"{shorten(path)}: the weather catalogue needs this file; it is not there")
         return None
     try:
-        document = read_yaml(path, "weather catalogue's file", finite=False)
+        document = read_yaml(path, KIND_OF_FILE, finite=False)
     except InputError as error:
         problems += error.problems
         return None
@@ -97,6 +97,9 @@ def _read_value(hint: Any, entry: object, where: str, problems: list[str]) -> An
             f"{where} must have value, unit and source, and nothing else; it is {shorten_value(entry)}"
         )
         return None
+    for name in ("unit", "source"):
+        if not (isinstance(entry[name], str) and entry[name]):
+            problems.append(f"{where}: {name} must be a word; it is {shorten_value(entry[name])}")
     value = entry["value"]
     if hint is str:
         if not isinstance(value, str):

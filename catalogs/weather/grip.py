@@ -4,15 +4,19 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, field_validator
 
-from catalogs.quantities import Bounded, CatalogueEntry, read_entry
+from catalogs.documents import LARGEST_YAML, read_content
+from catalogs.quantities import Bounded, CatalogueEntry, parse_entry, require_quantity
+from catalogs.sentences import shorten
 from catalogs.tyre_families import FamilyEntry
 from tasks.surface.weather import WEATHERS
 from tasks.vehicle.parameters import TyreFamily
 
 FOLDER = Path(__file__).parent
 """Entries that ship: one YAML file for each kind of weather, beside those of the air and the sky."""
+KIND_OF_FILE = "weather catalogue's file"
+"""Name of such a file in sentences."""
 
 
 class GripEntry(CatalogueEntry):
@@ -20,7 +24,8 @@ class GripEntry(CatalogueEntry):
 
     Parameters
     ----------
-    surface : numbers of ``SurfaceParameters`` that this kind has on any pavement
+    surface : numbers of ``SurfaceParameters`` that this kind has on any pavement; above 0, and in mm where the name
+        says so, else without a unit
     tyre : family of vehicles that have none of their own for this kind
     """
 
@@ -28,6 +33,19 @@ class GripEntry(CatalogueEntry):
 
     surface: dict[str, Bounded] = Field(default_factory=dict)
     tyre: FamilyEntry | None = None
+
+    @field_validator("surface")
+    @classmethod
+    def _numbers_keep_their_rules(cls, surface: dict[str, Bounded]) -> dict[str, Bounded]:
+        problems = []
+        for name, number in surface.items():
+            try:
+                require_quantity("mm" if name.endswith("_mm") else "1", above=0).func(number)  # type: ignore[call-arg]
+            except ValueError as error:
+                problems.append(f"{shorten(name, 60)}: {error}")
+        if problems:
+            raise ValueError("; ".join(problems))
+        return surface
 
 
 GRIP_SECTIONS = tuple(GripEntry.model_fields)
@@ -67,10 +85,9 @@ def _load_entries(folder: Path) -> Iterator[tuple[str, GripEntry]]:
     for kind in WEATHERS:
         path = folder / f"{kind}.yaml"
         if path.is_file():
-            status = path.stat()
-            yield kind, _load_entry(path, status.st_mtime_ns, status.st_size)
+            yield kind, _parse_entry(read_content(path, KIND_OF_FILE, LARGEST_YAML), path)
 
 
 @lru_cache(maxsize=64)
-def _load_entry(path: Path, changed_ns: int, size: int) -> GripEntry:
-    return read_entry(GripEntry, path, "weather catalogue's file")
+def _parse_entry(content: bytes, path: Path) -> GripEntry:
+    return parse_entry(GripEntry, content, path, KIND_OF_FILE)

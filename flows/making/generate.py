@@ -29,7 +29,7 @@ from flows.store.frames import create_arrays
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
 from flows.store.sealed import is_committed, read_manifest
-from flows.store.staging import BEGUN, left_overs, remove_left_overs
+from flows.store.staging import BEGUN, is_of_begun_run, left_overs, remove_left_overs
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 from tasks.render.rasterise.backend import select_backend
@@ -164,9 +164,9 @@ def _refuse_other_content(layout: Layout) -> None:
     """Raise `InputError` unless the folder is new, empty, a dataset, or one that a stopped run began."""
     if layout.plan.is_file() or layout.manifest.is_file() or not layout.root.exists():
         return
-    entries = {path.name for path in layout.root.iterdir()} if layout.root.is_dir() else {"a file"}
-    begun = (layout.staging / BEGUN).is_file()
-    if entries - {layout.staging.name} - ({layout.inputs.name, layout.frames.name} if begun else set()):
+    if not layout.root.is_dir() or not all(
+        is_of_begun_run(layout, path.name) for path in layout.root.iterdir()
+    ):
         raise InputError(
             f"{layout}: must be an empty or new folder, or a muSync dataset; it holds other files"
         )

@@ -17,6 +17,7 @@ from tasks.errors import InputError
 BEGUN = "begun"
 """Written before anything else: until there is a plan, `inputs` and `frames.zarr` beside it are muSync's own."""
 _SCRATCH = re.compile(r"scratch-\w+")
+_PLAN_HALF_WRITTEN = re.compile(rf"plan\.json\.\d+-\d+{re.escape(PARTIAL)}")
 _STAGED = re.compile(
     rf"{BEGUN}|[0-9a-f]{{{ID_LENGTH}}}\.(json|({'|'.join(STAGED_TABLES)})\.parquet)|.*{re.escape(PARTIAL)}"
 )
@@ -25,6 +26,14 @@ _STAGED = re.compile(
 def staged_files(layout: Layout) -> list[Path]:
     """Files in the staging folder that muSync wrote, but for the lock."""
     return sorted(path for path in _list_entries(layout) if _STAGED.fullmatch(path.name) and path.is_file())
+
+
+def is_of_begun_run(layout: Layout, name: str) -> bool:
+    """Whether an entry of the folder is of a run that was stopped before its plan was there, by its name."""
+    if name == layout.staging.name:
+        return True
+    ours = name in {layout.inputs.name, layout.frames.name} or _PLAN_HALF_WRITTEN.fullmatch(name) is not None
+    return ours and (layout.staging / BEGUN).is_file()
 
 
 def partial_files(layout: Layout) -> list[Path]:

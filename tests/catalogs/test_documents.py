@@ -3,6 +3,7 @@
 import json
 import os
 import time
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -128,6 +129,26 @@ def test_a_reader_that_refuses_nan_itself_gets_it():
 def test_faulty_json_is_one_sentence(content, words):
     (problem,) = problems_of(parse_json, content)
     assert words in problem and len(problem) < 300
+
+
+@pytest.mark.parametrize("block", [1, 2, 3, 7, 2**18])
+def test_brackets_count_alike_in_blocks_of_any_length(monkeypatch, block):
+    monkeypatch.setattr(documents, "_BLOCK", block)
+    sound = b'{"]]": ["[[{", {"a": []}], "\\"[[": [[]]}' + b" " * 9
+    parse_json(sound, "here", "note")
+    deep = b"[" * (DEEPEST - 4) + sound + b"]" * (DEEPEST - 4)
+    parse_json(deep, "here", "note")
+    (problem,) = problems_of(parse_json, b"[" + deep + b"]")
+    assert problem.endswith(f"it has {DEEPEST + 1}")
+
+
+def test_a_large_document_is_refused_in_a_few_times_its_own_memory():
+    content = b'{"a": ["b", "c"], "d": {}}\n' * 100_000
+    tracemalloc.start()
+    problems_of(parse_json, content)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3 * len(content) + 2**23
 
 
 def test_all_faults_of_json_are_told_at_once():

@@ -1,5 +1,6 @@
 """Surface entries: the shipped one, and how a wrong one is refused."""
 
+import os
 import shutil
 
 import pytest
@@ -89,3 +90,28 @@ def test_a_number_that_no_pavement_takes_is_refused(tmp_path):
         (catalogue / "rain.yaml").write_text(yaml.safe_dump(rain | {"surface": {name: number}}))
         with pytest.raises(InputError, match=f"surface: {name}: no number"):
             load_surface("dense-asphalt", catalogue)
+
+
+def test_numbers_that_a_kind_of_weather_brings_keep_units_limits_and_bounds(tmp_path):
+    shutil.copytree(WEATHER, catalogue := tmp_path / "weather")
+    ice = yaml.safe_load((catalogue / "ice.yaml").read_text())
+    ice["surface"]["glaze_mm"] |= {"unit": "m", "value": -0.4}
+    ice["surface"]["ice_friction"] |= {"unit": "%", "value": 0.5}
+    (catalogue / "ice.yaml").write_text(yaml.safe_dump(ice))
+    with pytest.raises(InputError) as error:
+        load_surface("dense-asphalt", catalogue)
+    for expected in (
+        "glaze_mm: unit must be mm; it is m; value must lie within its bounds 0.2 to 0.6; it is -0.4; must be above 0",
+        "ice_friction: unit must be 1; it is %; value must lie within its bounds 0.05 to 0.15; it is 0.5",
+    ):
+        assert expected in str(error.value)
+
+
+def test_an_entry_of_the_same_size_and_time_is_read_anew(tmp_path):
+    shutil.copytree(WEATHER, catalogue := tmp_path / "weather")
+    path = catalogue / "ice.yaml"
+    text, before = path.read_text(), path.stat()
+    assert load_surface("dense-asphalt", catalogue).glaze_mm == 0.4
+    path.write_text(text.replace("value: 0.4\n", "value: 0.5\n"))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert load_surface("dense-asphalt", catalogue).glaze_mm == 0.5

@@ -13,9 +13,11 @@ from flows.auditing.verify import collect_garbage
 from flows.making.generate import generate_dataset
 from flows.making.places import noted_place, remember_place
 from flows.making.plan import make_plan
-from flows.store.layout import Layout
+from flows.store.layout import PARTIAL, Layout
 from flows.store.lock import sole_writer
 from tasks.errors import InputError
+
+HALF_A_PLAN = f"plan.json.7-7{PARTIAL}"
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +99,25 @@ def test_a_run_that_was_begun_can_be_begun_anew_with_another_grid(grid, tmp_path
     assert make(str(other), tmp_path / "data").manifest.is_file()
 
 
-@pytest.mark.parametrize("name", ["inputs", "frames.zarr", "notes.txt"])
+def test_a_run_that_is_killed_while_it_writes_its_plan_goes_on(grid, whole, tmp_path, monkeypatch):
+    real = flows.making.generate.write_json
+
+    def write_half(path: Path, value: object) -> None:
+        if path.name != "plan.json":
+            return real(path, value)
+        path.with_name(HALF_A_PLAN).write_bytes(b"{")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(flows.making.generate, "write_json", write_half)
+    with pytest.raises(KeyboardInterrupt):
+        make(grid, tmp_path / "data")
+    monkeypatch.undo()
+    assert {HALF_A_PLAN, "inputs/grid.json"} < files_of(tmp_path / "data").keys()
+    make(grid, tmp_path / "data")
+    assert files_of(tmp_path / "data") == whole
+
+
+@pytest.mark.parametrize("name", ["inputs", "frames.zarr", "notes.txt", HALF_A_PLAN])
 def test_a_folder_with_a_name_of_ours_but_without_our_mark_is_left_alone(grid, tmp_path, name):
     (tmp_path / "data" / name).mkdir(parents=True)
     (tmp_path / "data" / name / "precious.txt").write_text("mine")

@@ -68,6 +68,8 @@ def test_all_mistakes_are_told_at_once(copy):
     air = yaml.safe_load((copy / "air.yaml").read_text())
     air["wind_m_s"]["value"] = 3.0
     del air["near"]["nearest_m"]["source"]
+    air["near"]["fade_share"]["source"] = ""
+    air["near"]["farthest_m"]["unit"] = 7
     air["haze_visual_range_m"]["value"] = float("inf")
     (copy / "air.yaml").write_text(yaml.safe_dump(air))
     (copy / "sky.yaml").write_text("a: [")
@@ -82,12 +84,14 @@ def test_all_mistakes_are_told_at_once(copy):
         "rain.yaml: particles: flutter_m is missing",
         "air.yaml: wind_m_s must be a list of finite numbers; it is 3.0",
         "air.yaml: near: nearest_m must have value, unit and source",
+        "air.yaml: near: fade_share: source must be a word; it is ''",
+        "air.yaml: near: farthest_m: unit must be a word; it is 7",
         "air.yaml: haze_visual_range_m must be a finite number; it is inf",
         "sky.yaml: a weather catalogue's file must be valid YAML",
         "hail.yaml: must be of a kind of weather, which are rain, snow",
     ):
         assert part in text
-    assert len(caught.value.problems) == 9
+    assert len(caught.value.problems) == 11
 
 
 def test_an_unedited_copy_is_the_same_catalogue(copy, parameters):
