@@ -1,4 +1,4 @@
-"""What the numbers of a car look like: ranges of its figures, and how far its numbers may be off."""
+"""Ranges in which the figures of a car lie, and how far its numbers may be off."""
 
 from collections.abc import Mapping
 from functools import cache

@@ -30,7 +30,7 @@ LOADERS: Mapping[str, Callable[[Path], Any]] = {
 }
 """Loaders that check the catalogue entries that a user may bring."""
 READERS: Mapping[str, Callable[[Path], bytes]] = {"vehicle.yaml": vehicle_content}
-"""What a dataset keeps of entries that need other files: the whole entry. Of any other it keeps the file's bytes."""
+"""Entries that need other files: a dataset keeps these whole, and of any other the file's bytes."""
 
 
 def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:

@@ -34,8 +34,6 @@ from tasks.vehicle.parameters import Vehicle
 
 SEARCHES = ("one effect at a time", "joint fit")
 """How a verdict was reached."""
-
-
 CARRIED = {name: set(PARAMETERS[name].fields) for name in SESSION if PARAMETERS[name].kind == "scaled"}
 """Fields of a vehicle whose tolerance is that of a number of the session."""
 

@@ -1,4 +1,4 @@
-"""What the numbers of a car look like: every vehicle that ships is one, and each slip of a number is told."""
+"""Every vehicle that ships has the figures of a car, and each slip of a number is told."""
 
 from dataclasses import replace
 

@@ -17,8 +17,6 @@ FEWEST_RUNS = 4
 """Runs from which their scatter says how certain a number is; with fewer, the residuals' correlation does."""
 LONGEST_MEMORY = 0.98
 """Correlation from sample to sample beyond which more is not told apart [1]."""
-AS_GOOD = 0.15
-"""Share of what a number explains that a substitute may miss and still be as good."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,7 +192,7 @@ def refit(
 
 
 def find_substitutes(
-    stops: Sequence[Stop], fitted: JointFit, everything: Sequence[JointNumber]
+    stops: Sequence[Stop], fitted: JointFit, everything: Sequence[JointNumber], share: float
 ) -> list[Substitute]:
     """Return what explains nearly as much as each named number in its place.
 
@@ -206,6 +204,7 @@ def find_substitutes(
     stops : training runs
     fitted : after elimination
     everything : numbers that the campaign could show
+    share : of what a number explains from which a substitute is as good [1]
     """
     left = {n.name for n in fitted.numbers}
     found = []
@@ -218,6 +217,6 @@ def find_substitutes(
         worth = without.cost - fitted.cost
         for other in others:
             instead = refit(stops, without, (*rest, other), {other.name: 0.5 * other.sigma})
-            if instead.cost < fitted.cost + AS_GOOD * worth:
+            if instead.cost < fitted.cost + (1.0 - share) * worth:
                 found.append(Substitute(of=number.name, name=other.name, fitted=instead))
     return found

@@ -110,7 +110,8 @@ def judge_jointly(
     starts = [{}] if known else suggest_starts(train)
     everything = _fit_everything(train, starts, free_numbers(shown, [stop.model for stop in train]))
     progress("elimination")
-    fitted, agreeing = _settle(train, eliminate(train, everything), starts)
+    settled, agreeing = _settle(train, eliminate(train, everything), starts)
+    fitted = eliminate(train, settled)  # at a better fit a number may be no longer certain
     progress("held-out error")
     reasons: list[str] = []
     fitted = drop_what_predicts_worse(train, held_out, fitted, reasons)
@@ -118,7 +119,7 @@ def judge_jointly(
     predicted = predict_held_out(held_out, retuned, fitted)
     error, manoeuvres = summarise_held_out(held_out, predicted, rules)
     progress("rivals")
-    substitutes = tuple(find_substitutes(train, fitted, shown))
+    substitutes = tuple(find_substitutes(train, fitted, shown, rules.rival_gain_share))
     effects, rivals = _named(fitted, substitutes, library)
     tolerances = _tolerances(campaign)
     calibrated = tuple(e for e in effects if _is_within(e, tolerances))

@@ -47,6 +47,7 @@ def tell_what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tupl
         f"the training runs reach {speeds.min():.3g} to {speeds.max():.3g} m/s and {pressure:.3g} MPa{grip}: beyond"
         " that nothing is claimed",
         f"{agreeing[0]} of {agreeing[1]} starts reach this fit",
+        "the held-out runs decide which numbers stay, so their error is not that of a blind test",
     ]
 
 
@@ -76,6 +77,6 @@ def tell_verdict(
     text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
     how = "that takes" if len(told) == 1 else "together they take"
     return (
-        f"{text[0].upper()}{text[1:]}; with the brake's gain fitted, {how} the error {moved}, on runs that no fit has"
-        " seen."
+        f"{text[0].upper()}{text[1:]}; with the brake's gain fitted, {how} the error {moved}, on runs that no"
+        " number was fitted to."
     )

@@ -20,7 +20,7 @@ LATE = 7_000_000
 either = pytest.mark.parametrize("form", FORMS)
 
 
-def drive(store: Any, stamped: bool = True) -> list[tuple[str, int, Any]]:
+def write_drive(store: Any, stamped: bool = True) -> list[tuple[str, int, Any]]:
     """A car's messages, logged 7 ms after their stamps, and one number without a header beside each."""
     number = store.types["std_msgs/msg/Float64"]
     messages = []
@@ -33,7 +33,7 @@ def drive(store: Any, stamped: bool = True) -> list[tuple[str, int, Any]]:
     return messages
 
 
-def refusal(path: Path, source: str) -> str:
+def read_refusal(path: Path, source: str) -> str:
     with pytest.raises(InputError) as caught:
         read_signals(path, take_speed(source))
     return str(caught.value)
@@ -41,7 +41,7 @@ def refusal(path: Path, source: str) -> str:
 
 @either
 def test_fields_elements_and_times_are_those_of_the_messages(tmp_path, form):
-    path = write_bag(tmp_path, form, drive(make_store()))
+    path = write_bag(tmp_path, form, write_drive(make_store()))
     names = [
         "/car.speed",
         "/car.wheels[3]",
@@ -72,7 +72,7 @@ def test_fields_elements_and_times_are_those_of_the_messages(tmp_path, form):
 
 @either
 def test_a_header_that_nobody_filled_in_leaves_the_time_of_the_log(tmp_path, form):
-    path = write_bag(tmp_path, form, drive(make_store(), stamped=False))
+    path = write_bag(tmp_path, form, write_drive(make_store(), stamped=False))
     found = read_signals(path, take_speed("/car.speed"))["/car.speed"]
     np.testing.assert_allclose(found.time, np.array(STAMPS) * 1e-9, atol=1e-12)
 
@@ -83,7 +83,7 @@ def test_the_list_has_a_row_for_each_number_and_none_for_text_header_and_picture
     picture = ("/car", START + 10**9, make_car(store, START + 10**9, 3.0, counts=range(500)))
     rows = {
         row.signal: row
-        for row in summarise_signals(write_bag(tmp_path, form, [*drive(store), picture]), None)
+        for row in summarise_signals(write_bag(tmp_path, form, [*write_drive(store), picture]), None)
     }
     assert set(rows) == {
         "/car.speed", *(f"/car.wheels[{k}]" for k in range(4)), "/car.counts[0]", "/car.counts[1]",
@@ -97,8 +97,8 @@ def test_the_list_has_a_row_for_each_number_and_none_for_text_header_and_picture
 
 
 def test_a_missing_signal_is_named_with_those_that_come_near(tmp_path):
-    path = write_bag(tmp_path, "mcap", drive(make_store()))
-    assert "signal /car.sped is missing; there are: /car.speed" in refusal(path, "/car.sped")
+    path = write_bag(tmp_path, "mcap", write_drive(make_store()))
+    assert "signal /car.sped is missing; there are: /car.speed" in read_refusal(path, "/car.sped")
     for name in (
         "/car.wheels[4]",
         "/car.speed.__class__",
@@ -107,11 +107,11 @@ def test_a_missing_signal_is_named_with_those_that_come_near(tmp_path):
         "/car",
         "/car.note",
     ):
-        assert f"signal {name} is missing" in refusal(path, name)
+        assert f"signal {name} is missing" in read_refusal(path, name)
 
 
 def test_a_bag_folder_is_one_recording_and_its_files_are_those_that_are_hashed(tmp_path):
-    folder = write_bag(tmp_path, "folder", drive(make_store()))
+    folder = write_bag(tmp_path, "folder", write_drive(make_store()))
     assert recording_files(folder) == (folder,) == recording_files(tmp_path)
     assert stored_files(folder) == (folder / "drive.db3",)
     runs = [{"name": "a", "file": "drive"}]
@@ -119,10 +119,10 @@ def test_a_bag_folder_is_one_recording_and_its_files_are_those_that_are_hashed(t
 
 
 def test_files_that_the_folder_names_elsewhere_are_not_read(tmp_path):
-    folder = write_bag(tmp_path, "folder", drive(make_store()))
+    folder = write_bag(tmp_path, "folder", write_drive(make_store()))
     (folder / "drive.db3").rename(tmp_path / "elsewhere.db3")
     other = (
-        write_bag(tmp_path / "b", "mcap", drive(make_store())[:2])
+        write_bag(tmp_path / "b", "mcap", write_drive(make_store())[:2])
         if (tmp_path / "b").mkdir() is None
         else None
     )
@@ -141,11 +141,11 @@ def test_files_that_the_folder_names_elsewhere_are_not_read(tmp_path):
     ],
 )
 def test_a_database_with_programs_in_it_is_refused(tmp_path, view):
-    path = write_bag(tmp_path, "db3", drive(make_store()))
+    path = write_bag(tmp_path, "db3", write_drive(make_store()))
     with sqlite3.connect(path) as database:
         database.execute("DROP TABLE schema")
         database.execute(view)
-    assert "must be a database of plain tables" in refusal(path, "/car.speed")
+    assert "must be a database of plain tables" in read_refusal(path, "/car.speed")
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_a_piece_that_claims_all_memory_is_refused(form, monkeypatch):
 @pytest.mark.parametrize("name", ["log.bag", "log.db3", "log.mcap"])
 def test_a_damaged_bag_is_one_sentence(tmp_path, name):
     (tmp_path / name).write_bytes(b"not what it says")
-    assert "must be a readable bag of ROS messages" in refusal(tmp_path / name, "/car.speed")
+    assert "must be a readable bag of ROS messages" in read_refusal(tmp_path / name, "/car.speed")
 
 
 def test_without_rosbags_the_reader_says_what_to_install(tmp_path, monkeypatch):
@@ -203,5 +203,5 @@ def test_without_rosbags_the_reader_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rosbags", None)
     assert (
         'reading ROS bags and MCAP needs the package rosbags: install it with pip install "musync[ros]"'
-        in refusal(tmp_path / "log.mcap", "/car.speed")
+        in read_refusal(tmp_path / "log.mcap", "/car.speed")
     )

@@ -30,7 +30,7 @@ def saved(tmp_path: Path, write: Any, tree: dict[str, Any]) -> Path:
     return tmp_path / "log.mat"
 
 
-def refusal(path: Path, source: str, time: str = "Time") -> str:
+def read_refusal(path: Path, source: str, time: str = "Time") -> str:
     with pytest.raises(InputError) as caught:
         read_signals(path, take_speed(source, time={"source": time}))
     return str(caught.value)
@@ -94,7 +94,7 @@ def test_elements_of_an_array_of_structs_have_the_names_that_matlab_gives_them(t
         found = read_signals(tmp_path / file, take_speed(name, time={"source": "time"}))[name]
         np.testing.assert_array_equal(found.values, -SPEED)
         np.testing.assert_array_equal(found.time, TIME)
-    assert "it is a cell array" in refusal(tmp_path / "a.mat", "out.signals", "time")
+    assert "it is a cell array" in read_refusal(tmp_path / "a.mat", "out.signals", "time")
 
 
 @either
@@ -107,11 +107,13 @@ def test_samples_without_a_value_are_left_out(tmp_path, write):
 @either
 def test_what_is_no_signal_is_named_with_its_reason(tmp_path, write):
     path = saved(tmp_path, write, {"t": TIME, "v": SPEED, "short": SPEED[:3], "one": 7.0, "word": "fast"})
-    assert "signal vv is missing; there are: v" in refusal(path, "vv", "t")
-    assert "signal v needs its clock; no vector Time" in refusal(path, "v")
-    assert "signal short must have a time for each of its 3 values; t has 4" in refusal(path, "short", "t")
-    assert "signal one must be a vector" in refusal(path, "one", "t")
-    assert "signal word is missing" in refusal(path, "word", "t")
+    assert "signal vv is missing; there are: v" in read_refusal(path, "vv", "t")
+    assert "signal v needs its clock; no vector Time" in read_refusal(path, "v")
+    assert "signal short must have a time for each of its 3 values; t has 4" in read_refusal(
+        path, "short", "t"
+    )
+    assert "signal one must be a vector" in read_refusal(path, "one", "t")
+    assert "signal word is missing" in read_refusal(path, "word", "t")
     with pytest.raises(InputError, match="needs time: "):
         read_signals(path, take_speed("v", time=None))
 
@@ -126,7 +128,7 @@ def test_objects_and_functions_are_refused_by_name_and_hurt_nothing_else(tmp_pat
         object_ = file.create_dataset("ts", data=np.zeros((1, 6), np.uint32))
         object_.attrs["MATLAB_class"] = np.bytes_("timeseries")
         object_.attrs["MATLAB_object_decode"] = np.int32(3)
-    assert "signal ts.Data must be of numbers; it is a MATLAB object" in refusal(
+    assert "signal ts.Data must be of numbers; it is a MATLAB object" in read_refusal(
         tmp_path / "hdf.mat", "ts.Data", "t"
     )
     assert len(read_signals(tmp_path / "hdf.mat", take_speed("v", time={"source": "t"}))["v"].values) == 4
@@ -145,7 +147,7 @@ def test_hdf_that_leads_to_other_files_or_in_circles_is_not_followed(tmp_path, m
         file.create_dataset("u", (4,), float, external=[(str(tmp_path / "raw"), 0, 32)])
     path = tmp_path / "log.mat"
     for name in ("v", "soft", "w", "u"):
-        assert f"signal {name} must stand in the file itself" in refusal(path, name, "t")
+        assert f"signal {name} must stand in the file itself" in read_refusal(path, name, "t")
     with h5py.File(path, "r+") as file:
         file["s/again"] = file["s"]
         file["s/twice"] = file["s"]
@@ -158,7 +160,7 @@ def test_a_dataset_that_claims_billions_is_not_read(tmp_path):
     write_hdf(tmp_path / "log.mat", {"t": TIME})
     with h5py.File(tmp_path / "log.mat", "r+") as file:
         file.create_dataset("v", (10**12,), float, chunks=(1000,))
-    assert "signal v must be a vector" in refusal(tmp_path / "log.mat", "v", "t")
+    assert "signal v must be a vector" in read_refusal(tmp_path / "log.mat", "v", "t")
 
 
 @pytest.mark.parametrize(
@@ -181,7 +183,7 @@ def test_elements_that_would_end_the_process_are_refused(tmp_path, old, new, wor
     before, after = (struct.pack("<II", *pair) for pair in (old, new))
     assert content.count(before) == 1
     path.write_bytes(content.replace(before, after))
-    assert words in refusal(path, "v")
+    assert words in read_refusal(path, "v")
 
 
 def test_a_complex_array_without_its_second_element_is_refused(tmp_path):
@@ -190,7 +192,7 @@ def test_a_complex_array_without_its_second_element_is_refused(tmp_path):
     path.write_bytes(
         content.replace(struct.pack("<II", 6, 8) + b"\x06\x00", struct.pack("<II", 6, 8) + b"\x06\x08")
     )
-    assert "too many or too few elements" in refusal(path, "v")
+    assert "too many or too few elements" in read_refusal(path, "v")
 
 
 def test_packed_bytes_that_claim_all_memory_are_refused(tmp_path, monkeypatch):
@@ -198,20 +200,22 @@ def test_packed_bytes_that_claim_all_memory_are_refused(tmp_path, monkeypatch):
     packed = zlib.compress(bytes(2**22), 9)
     element = (15).to_bytes(4, "little") + len(packed).to_bytes(4, "little") + packed
     (tmp_path / "log.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + element)
-    assert "log.mat: must have at most 1048576 bytes when unpacked" in refusal(tmp_path / "log.mat", "v", "t")
+    assert "log.mat: must have at most 1048576 bytes when unpacked" in read_refusal(
+        tmp_path / "log.mat", "v", "t"
+    )
 
 
 @pytest.mark.parametrize("content", [b"", b"not what it says", b"MATLAB 5.0".ljust(126) + b"IM" + bytes(99)])
 def test_a_damaged_file_is_one_sentence(tmp_path, content):
     (tmp_path / "log.mat").write_bytes(content)
-    told = refusal(tmp_path / "log.mat", "v")
+    told = read_refusal(tmp_path / "log.mat", "v")
     assert told.startswith("log.mat: must be a whole") or "must be a readable MATLAB file" in told
 
 
 def test_without_h5py_the_reader_says_what_to_install(tmp_path, monkeypatch):
     write_hdf(tmp_path / "log.mat", {"t": TIME})
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
-    assert 'pip install "musync[mat]"' in refusal(tmp_path / "log.mat", "v")
+    assert 'pip install "musync[mat]"' in read_refusal(tmp_path / "log.mat", "v")
 
 
 @either

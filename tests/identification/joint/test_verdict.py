@@ -54,7 +54,7 @@ def slow_brakes() -> JointTrace:
     return judge(campaign_of({"pressure_gain": 0.3, "lag": 0.09}))
 
 
-def named(trace: JointTrace) -> dict[str, tuple[float, float, float]]:
+def named_intervals(trace: JointTrace) -> dict[str, tuple[float, float, float]]:
     return {
         effect.name: (effect.parameters[0].ci_low, effect.parameters[0].value, effect.parameters[0].ci_high)
         for effect in (*trace.verdict.effects, *trace.calibrated)
@@ -62,7 +62,7 @@ def named(trace: JointTrace) -> dict[str, tuple[float, float, float]]:
 
 
 def test_a_lag_is_found_with_the_brakes_gain_and_their_intervals_hold_the_truth():
-    found = named(slow_brakes())
+    found = named_intervals(slow_brakes())
     assert found.keys() == {"brake_lag", "retuned_pressure_gain"}
     for effect, truth in (("brake_lag", 0.09), ("retuned_pressure_gain", 0.3)):
         low, _, high = found[effect]
@@ -72,20 +72,20 @@ def test_a_lag_is_found_with_the_brakes_gain_and_their_intervals_hold_the_truth(
 def test_the_error_of_a_stop_that_no_fit_has_seen_falls_below_the_re_tuned_models():
     error = slow_brakes().verdict.error["speed"]
     assert error.after < 0.5 * error.retuned < error.frozen
-    assert "lag of 0.0" in slow_brakes().sentence and "no fit has seen" in slow_brakes().sentence
+    assert "lag of 0.0" in slow_brakes().sentence and "no number was fitted to" in slow_brakes().sentence
 
 
 def test_the_answer_does_not_depend_on_the_numbers_that_the_file_starts_from():
     truth = campaign_of({"pressure_gain": 0.3, "lag": 0.09})
-    found = named(judge(truth, replace(VEHICLE, brake_gain=0.4 * VEHICLE.brake_gain)))
+    found = named_intervals(judge(truth, replace(VEHICLE, brake_gain=0.4 * VEHICLE.brake_gain)))
     assert found.keys() == {"brake_lag", "retuned_pressure_gain"}
-    assert found["brake_lag"][1] == pytest.approx(named(slow_brakes())["brake_lag"][1], abs=0.01)
+    assert found["brake_lag"][1] == pytest.approx(named_intervals(slow_brakes())["brake_lag"][1], abs=0.01)
     assert 0.4 * (1.0 + found["retuned_pressure_gain"][1]) == pytest.approx(1.3, abs=0.02)
 
 
 def test_a_car_that_is_as_its_file_says_lacks_nothing():
     trace = judge(campaign_of({}))
-    assert trace.verdict.verdict == "NOTHING" and not named(trace)
+    assert trace.verdict.verdict == "NOTHING" and not named_intervals(trace)
     assert trace.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.01)
 
 
@@ -99,16 +99,16 @@ def test_a_number_of_the_file_is_wrong_only_beyond_its_tolerance():
 def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_run_contradicts_it():
     windy, calm = campaign_of({"lag": 0.09, "drag_area": 3.0}), campaign_of({"lag": 0.09})
     everywhere = judge(windy)
-    assert {"brake_lag", "aerodynamic_drag"} <= named(everywhere).keys()
+    assert {"brake_lag", "aerodynamic_drag"} <= named_intervals(everywhere).keys()
     contradicted = judge(replace(windy, runs=(*windy.runs[:-1], calm.runs[-1])))
-    assert "aerodynamic_drag" not in named(contradicted)
+    assert "aerodynamic_drag" not in named_intervals(contradicted)
     assert any("drag_area" in reason and "not named" in reason for reason in contradicted.verdict.reasons)
 
 
 def test_an_engine_that_was_measured_is_an_input_and_no_effect():
     campaign = campaign_of({"pressure_gain": 0.3}, engine=-500.0)
     with_engine = judge(campaign)
-    assert not named(with_engine)
+    assert not named_intervals(with_engine)
     assert with_engine.fitted.by_name["pressure_gain"] == pytest.approx(0.3, abs=0.03)
     assert any("engine torque" in reason for reason in with_engine.verdict.reasons)
     blind = judge(replace(campaign, runs=tuple(replace(run, drive_torque=None) for run in campaign.runs)))
@@ -119,7 +119,7 @@ def test_speed_and_pressure_alone_name_a_delay_as_a_set():
     trace = judge(campaign_of({"pressure_gain": 0.3, "lag": 0.12}, channels=("speed",)))
     assert trace.verdict.verdict in ("FOUND", "SET")
     delays = {"brake_lag", "brake_dead_time"}
-    assert delays & (named(trace).keys() | {rival.name for _, rival in trace.verdict.rivals})
+    assert delays & (named_intervals(trace).keys() | {rival.name for _, rival in trace.verdict.rivals})
     assert trace.verdict.error.keys() == {"speed"}
 
 
