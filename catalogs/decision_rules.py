@@ -20,6 +20,7 @@ class DecisionRulesEntry(CatalogueEntry):
     held_out_gain: Level
     rival_span: Level
     rival_gain_share: Share
+    discrepancy_limit: Level
     foreign_inflation: Level
     win_share: Share
     bootstrap_resamples: Count

@@ -13,6 +13,7 @@ class DecisionRules:
     held_out_gain : fall of the held-out misfit from which an effect may be named [1]
     rival_span : difference of scores within which two explanations cannot be told apart [1]
     rival_gain_share : share of the named effect's gain from which another explains the runs as well [1]
+    discrepancy_limit : mean square of a channel's whitened leftover in a run from which its noise is widened [1]
     foreign_inflation : disagreement of the runs beside the best effects from which the car is not the model's [1]
     win_share : share of bootstrap resamples that the named effect must win [1]
     bootstrap_resamples : bootstrap resamples of the runs [1]
@@ -45,6 +46,7 @@ class DecisionRules:
     held_out_gain: float
     rival_span: float
     rival_gain_share: float
+    discrepancy_limit: float
     foreign_inflation: float
     win_share: float
     bootstrap_resamples: int

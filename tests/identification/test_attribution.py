@@ -57,6 +57,7 @@ def evidence_of(theta: np.ndarray) -> Evidence:
         effects=LIBRARY,
         tolerances=TOLERANCES,
         disturbance=QUIET,
+        sensors=(np.zeros(7), NOISE),
         rules=load_decision_rules(),
     )
 

@@ -34,6 +34,7 @@ def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence
     runs = tuple(run_evidence(m, np.zeros(7), NOISE, PLAIN, effects, TOLERANCES, QUIET) for m in models)
     return Evidence(
         train=runs, held_out=runs[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET,
+        sensors=(np.zeros(7), NOISE),
         rules=load_decision_rules(),
     )  # fmt: skip
 

@@ -46,7 +46,7 @@ def rain_stops(speeds: tuple[float, ...], truth: dict[str, float], disturbance: 
         derived.append(run_evidence(model, np.zeros(7), NOISE, zero, LIBRARY, TOLERANCES, disturbance))
     evidence = Evidence(
         train=tuple(derived), held_out=tuple(derived[-2:]), effects=LIBRARY, tolerances=TOLERANCES,
-        disturbance=disturbance, rules=load_decision_rules(),
+        disturbance=disturbance, sensors=(np.zeros(7), NOISE), rules=load_decision_rules(),
     )  # fmt: skip
     base = fit(evidence.train, (), evidence.session_sigma)
     held_out = misfit_by_run(evidence.held_out, base)

@@ -7,7 +7,7 @@ import pytest
 
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.errors import InputError
-from tasks.identification.inference.noise import channel_noise, whiten
+from tasks.identification.inference.noise import channel_noise, unwhiten, whiten
 from tests.identification.synthetic import NOISE, TOLERANCES, plain_run
 
 
@@ -89,3 +89,9 @@ def test_a_channel_that_never_changes_and_runs_that_are_too_short_are_both_named
         and "channel pitch must change" in text
         and "more than 24 samples" in text
     )
+
+
+def test_unwhitening_undoes_whitening() -> None:
+    x = np.random.default_rng(1).standard_normal((40, 7, 3))
+    rho = np.array([0.6, 0.0, 0.9, 0.2, 0.8, 0.0, 0.5])
+    assert unwhiten(whiten(x, rho, NOISE), rho, NOISE) == pytest.approx(x)

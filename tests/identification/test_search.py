@@ -47,6 +47,7 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
         effects=effects,
         tolerances=TOLERANCES,
         disturbance=QUIET,
+        sensors=(np.zeros(7), NOISE),
         rules=load_decision_rules(),
     )
 

@@ -17,8 +17,10 @@ from tasks.identification.decision.search import (
     search_library,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.discrepancy import widen_noise
 from tasks.identification.inference.fit import Fit, fit, misfit_by_run
 from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
+from tasks.identification.rules import DecisionRules
 
 
 class ForeignCarError(Exception):
@@ -46,13 +48,15 @@ def search_forms(
     """
     state, near, rules = start, None, start.evidence.rules
     left = best_form(state.evidence, state.base, splines=splines)
-    over = left is not None and left.passes
+    over = left is not None and left.passes and not _bends_session(left.fitted, state.base, rules)
     disagreeing = any(r.accepted.inflation > rules.disagreement for r in state.rounds)
+    # a number is held to be wrong by its pull, so a form need not reach the score of an effect beside it
+    retuned = all(r.accepted.hypothesis.effect_class == "retune" for r in state.rounds)
     if state.rounds and (over or disagreeing):
         least = rules.lone_form_share * sum(r.accepted.gain for r in state.rounds)
-        alone = best_form(null.evidence, null.base, least)
+        alone = best_form(null.evidence, null.base, least, accept=0.0 if retuned else None)
         ahead = -np.inf
-        if alone is not None and alone.passes:
+        if alone is not None and (alone.passes or retuned):
             # a form has no direction of its own to be judged by, so both sides take the larger inflation
             common = max(alone.inflation, *(r.accepted.inflation for r in state.rounds))
             log_n = float(np.log(state.evidence.samples))
@@ -68,14 +72,19 @@ def search_forms(
                 or (first.variable == "constant" and is_constant(alone.hypothesis))
             )
         )
-        if alone is not None and ahead > rules.rival_span and not dressed:
+        if (
+            alone is not None
+            and alone.passes
+            and not dressed
+            and (ahead > rules.rival_span or (retuned and disagreeing))
+        ):
             reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
             state = Found(
                 evidence=null.evidence,
                 base=alone.fitted,
                 rounds=(Round(base=null.base, tried=(), accepted=alone, evidence=null.evidence),),
             )
-        elif alone is not None and ahead > -rules.rival_span:
+        elif alone is not None and ahead > (0.0 if retuned else -rules.rival_span):
             elsewhere = alone.hypothesis.port != first.port
             near = alone if (ahead > rules.rival_span if dressed else elsewhere or disagreeing) else None
     if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
@@ -88,11 +97,21 @@ def search_forms(
     return state, near
 
 
+def _bends_session(fitted: Fit, base: Fit, rules: DecisionRules) -> bool:
+    """Whether a fit pulls a number of the session beyond belief that was not pulled so before.
+
+    A damping force that is undone by a wrong damping is no discovery.
+    """
+    after, before = (np.abs(f.session / f.session_sigma) for f in (fitted, base))
+    return bool(np.any((after > rules.retune_pull) & (before <= rules.retune_pull)))
+
+
 def best_form(
     evidence: Evidence,
     base: Fit,
     least: float = 0.0,
     splines: tuple[NDArray[np.float64], ...] | None = None,
+    accept: float | None = None,
 ) -> Candidate | None:
     """The form that explains most of what a fit leaves over, refined and judged; None if nothing real is left.
 
@@ -102,9 +121,11 @@ def best_form(
     base : the fit
     least : gain in log likelihood from which a spline is followed up
     splines : `spline_slopes` where they are known
+    accept : score that a spline must promise; None takes that of an effect
     """
+    promised = evidence.rules.accept_score if accept is None else accept
     level = inflation(evidence, base, None)
-    enough = max(evidence.rules.accept_score + float(np.log(evidence.samples)), least / level)
+    enough = max(promised + float(np.log(evidence.samples)), least / level)
     leftovers = [x for x in scan_leftovers(evidence, base, splines)[:2] if x.gain > enough]
     if not leftovers:
         return None
@@ -138,6 +159,8 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
     if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
         evidence = differentiate_at(evidence, null, library=True)
         null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+    evidence = widen_noise(evidence, null)
+    null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search_library(Found(evidence=evidence, base=null), gated=False)
     if inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
         raise ForeignCarError

@@ -80,3 +80,18 @@ def summarise_errors(
             worst_run=runs[int(np.argmax(square[:, 2, c]))], unit=unit,
         )  # fmt: skip
     return errors
+
+
+def find_worse_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:
+    """Return the channels that effects predict worse than the frozen model, if that outweighs what they predict better.
+
+    One channel must not veto what the others prove; the speed, which a stop is made of, may.
+
+    Parameters
+    ----------
+    error : by channel
+    limit : ratio of errors from which a channel is worse, if its resampled change also says so [1]
+    """
+    worse = [name for name, e in error.items() if e.after > limit * e.frozen and e.change_low > 0.0]
+    change = np.mean([np.log(e.after / e.frozen) for e in error.values() if e.frozen > 0.0 and e.after > 0.0])
+    return worse if "speed" in worse or change > 0.0 else []

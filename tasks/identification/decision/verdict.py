@@ -1,17 +1,18 @@
 """The decision: what is missing, how sure, and what it does to the error on runs that no fit has seen."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
-from tasks.identification.decision.answer import ChannelError, NamedEffect, Verdict, VerdictName, named_effect
+from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
+from tasks.identification.decision.answer import NamedEffect, Verdict, VerdictName, named_effect
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.correlation import residual_input_correlation
 from tasks.identification.decision.discovery import search_all
 from tasks.identification.decision.experiment import next_experiment
-from tasks.identification.decision.held_out import held_out_error
+from tasks.identification.decision.held_out import find_worse_channels, held_out_error
 from tasks.identification.decision.intervals import curvature_interval, profile_interval, refit_named
 from tasks.identification.decision.rivals import Compared, compare_with_rivals, find_detectable_sizes
 from tasks.identification.decision.search import Found
@@ -83,7 +84,7 @@ def find_missing_effects(
     progress("held-out error")
     error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
     tried = list(found.tried)
-    while compared and (worse := _worse_channels(error, rules.worse_limit)):
+    while compared and (worse := find_worse_channels(error, rules.worse_limit)):
         # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
         reasons.append(
             f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
@@ -109,6 +110,9 @@ def find_missing_effects(
         for c in compared
         for o, wins in c.near
     ]
+    for other in (*find_pairs(found, compared), *(find_pulled_numbers(found) if compared else ())):
+        near.append((named[0].name, named_effect(other.candidate, 0.0, curvature_interval(other.candidate))))
+        reasons.append(other.reason)
     if near_form is not None:
         near.append(
             (named[0].name, named_effect(near_form, 0.0, profile_interval(near_form, start.evidence)))
@@ -158,10 +162,6 @@ def find_missing_effects(
         reasons=tuple(reasons),
     )
     return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
-
-
-def _worse_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:
-    return [name for name, e in error.items() if e.after > limit * e.frozen and e.change_low > 0.0]
 
 
 def _is_fixed(effect: Effect, vehicle: Vehicle) -> bool:

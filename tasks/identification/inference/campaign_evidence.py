@@ -21,6 +21,7 @@ class Evidence:
     train, held_out : runs
     effects : the library
     tolerances, disturbance : priors of session, offsets and disturbances
+    sensors : AR(1) coefficient and standard deviation of every channel's sensor, float64 [7] each
     rules : by which a verdict is reached
     forked : names of the runs that fork when the integration step is halved, and are left out
     """
@@ -30,6 +31,7 @@ class Evidence:
     effects: tuple[Effect, ...]
     tolerances: Tolerances
     disturbance: Disturbance
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]]
     rules: DecisionRules
     forked: tuple[str, ...] = ()
 

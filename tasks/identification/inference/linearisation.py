@@ -66,7 +66,7 @@ def prepare_evidence(
     forked = tuple(run.name for run in campaign.runs if run.name not in used)
     return Evidence(
         train=train, held_out=held_out, effects=effects,
-        tolerances=tolerances, disturbance=guess, rules=rules, forked=forked,
+        tolerances=tolerances, disturbance=guess, sensors=(rho, sigma), rules=rules, forked=forked,
     )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.errors import InputError
@@ -118,3 +119,26 @@ def whiten(
     r, s = rho.reshape(shape), sigma.reshape(shape)
     white = np.concatenate((x[:1] / s, (x[1:] - r * x[:-1]) / (s * np.sqrt(1.0 - r**2))))
     return white.reshape((-1, *x.shape[2:]))
+
+
+def unwhiten(
+    white: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Undo `whiten`.
+
+    Parameters
+    ----------
+    white : float64 [7 N] or [7 N, P]
+    rho, sigma : float64 [7] that it was whitened with
+
+    Returns
+    -------
+    float64 [N, 7] or [N, 7, P] [unit of the channel]; 0 in a channel that was not measured
+    """
+    rows = white.reshape((-1, len(rho), *white.shape[1:]))
+    x = np.zeros_like(rows)
+    for c in np.flatnonzero(np.isfinite(sigma)):
+        driven = rows[:, c] * sigma[c]
+        driven[1:] *= np.sqrt(1.0 - rho[c] ** 2)
+        x[:, c] = lfilter([1.0], [1.0, -rho[c]], driven, axis=0)
+    return x

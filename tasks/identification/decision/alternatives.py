@@ -1,0 +1,99 @@
+"""Explanations beside those tried one by one: wrong numbers of the vehicle, and two effects that act together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.attribution import Candidate, judge_hypothesis
+from tasks.identification.decision.rivals import Compared
+from tasks.identification.decision.search import Found
+from tasks.identification.inference.hypothesis import library_hypothesis
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alternative:
+    """An explanation that cannot be told from a named effect, or that the named effect leaves open.
+
+    Parameters
+    ----------
+    candidate : the explanation
+    reason : why it stands beside the named effect
+    """
+
+    candidate: Candidate
+    reason: str
+
+
+def find_pulled_numbers(found: Found) -> list[Alternative]:
+    """Return the vehicle's own numbers that stay pulled beyond belief beside what is named.
+
+    An effect that needs the mass off by five tolerances may stand for the wrong mass itself.
+
+    Parameters
+    ----------
+    found : what is named
+    """
+    evidence, base = found.evidence, found.base
+    free = {name for part in base.parts for name in part.names}
+    pulls = base.session / evidence.session_sigma
+    alternatives = []
+    for place in np.flatnonzero(np.abs(pulls) > evidence.rules.retune_pull):
+        if SESSION[place] in free:
+            continue
+        effect = next(
+            e for e in evidence.effects if e.parameters[0].name == SESSION[place] and len(e.parameters) == 1
+        )
+        hypothesis = library_hypothesis(effect, float(base.session[place]))
+        alternatives.append(
+            Alternative(
+                candidate=judge_hypothesis(evidence, base, None, hypothesis),
+                reason=f"{effect.parameters[0].name} is pulled by {abs(pulls[place]):.1f} of its tolerances beside what"
+                " is named: the vehicle's own number may be wrong",
+            )
+        )
+    return alternatives
+
+
+def find_pairs(found: Found, compared: Sequence[Compared]) -> list[Alternative]:
+    """Return the members of two effects that together explain as much as the one that is named alone.
+
+    Drag of the air and of the pads together look like a resistance that grows with speed.
+
+    Parameters
+    ----------
+    found : what is named
+    compared : each named effect beside what was tried in its place; only one alone is held against pairs
+    """
+    if len(compared) != 1 or compared[0].own.hypothesis.effect_class != "effect":
+        return []
+    own, evidence, rest = compared[0].own, found.evidence, found.rounds[0].base
+    rules = evidence.rules
+    alone = [
+        other
+        for other, _ in compared[0].others
+        if other.hypothesis.effect_class == "effect"
+        and len(other.hypothesis.names) == 1
+        and other.gain > rules.lone_form_share * own.gain
+    ]
+    known = {c.hypothesis.name for c, _ in compared[0].near}
+    alternatives = []
+    for a, b in combinations(alone[: rules.refined_look_alikes], 2):
+        if {a.hypothesis.name, b.hypothesis.name} <= known:
+            continue
+        both = judge_hypothesis(evidence, a.fitted, None, b.hypothesis)
+        level = max(own.inflation, both.inflation)
+        gain = 0.5 * (rest.objective - both.fitted.objective)
+        each_counts = gain - max(a.gain, b.gain) > level * rules.held_out_gain
+        if gain >= own.gain and each_counts and not both.fitted.at_bound:
+            first = judge_hypothesis(evidence, b.fitted, None, a.hypothesis)
+            reason = f"{a.hypothesis.name} and {b.hypothesis.name} together explain as much as {own.hypothesis.name}"
+            alternatives += [
+                Alternative(candidate=c, reason=reason)
+                for c in (first, both)
+                if c.hypothesis.name not in known
+            ]
+            known |= {a.hypothesis.name, b.hypothesis.name}
+    return alternatives

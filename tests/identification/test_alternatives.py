@@ -1,0 +1,98 @@
+"""Explanations that no search of one effect at a time meets: a wrong number beside it, two effects together."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catalogs.decision_rules import load_decision_rules
+from catalogs.effects import load_effects
+from tasks.campaign.campaign import CHANNELS
+from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
+from tasks.identification.decision.answer import ChannelError
+from tasks.identification.decision.attribution import Candidate, judge_hypothesis
+from tasks.identification.decision.held_out import find_worse_channels
+from tasks.identification.decision.rivals import Compared
+from tasks.identification.decision.search import Found, Round
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.inference.evidence import run_evidence
+from tasks.identification.inference.fit import Fit, fit
+from tasks.identification.inference.hypothesis import library_hypothesis
+from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
+from tests.identification.synthetic import NOISE, TOLERANCES, measured, plain_run
+
+QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
+NAMES = ("aerodynamic_drag", "pad_drag", "rolling_resistance_speed", "retuned_pressure_gain", "brake_fade")
+LIBRARY = {e.name: e for e in load_effects() if e.name in NAMES}
+
+
+def evidence_of(truth: dict[str, float]) -> tuple[Evidence, Fit]:
+    theta = parameter_vector(truth)
+    runs = [(32.0, 0.0, 1), (22.0, 0.0, -1), (28.0, 1.5, -1), (14.0, 0.0, 1), (15.0, 1.0, -1)]
+    derived = tuple(
+        run_evidence(
+            measured(plain_run(v, p, name=str(i), direction=d), theta, i), np.zeros(7), NOISE,
+            np.zeros(len(EFFECT_TABLE)), tuple(LIBRARY.values()), TOLERANCES, QUIET,
+        )
+        for i, (v, p, d) in enumerate(runs)
+    )  # fmt: skip
+    evidence = Evidence(
+        train=derived, held_out=derived[-2:], effects=tuple(LIBRARY.values()), tolerances=TOLERANCES,
+        disturbance=QUIET, sensors=(np.zeros(7), NOISE), rules=load_decision_rules(),
+    )  # fmt: skip
+    return evidence, fit(derived, (), evidence.session_sigma)
+
+
+def named(evidence: Evidence, null: Fit, name: str) -> tuple[Found, list[Compared]]:
+    """One name as if it had been found, beside the two resistances that were tried in its place."""
+
+    def judged(other: str) -> Candidate:
+        return judge_hypothesis(evidence, null, None, library_hypothesis(LIBRARY[other]))
+
+    own = judged(name)
+    others = tuple((judged(other), 0.0) for other in ("aerodynamic_drag", "pad_drag") if other != name)
+    rounds = (Round(base=null, tried=(), accepted=own, evidence=evidence),)
+    found = Found(evidence=evidence, base=own.fitted, rounds=rounds)
+    return found, [Compared(own=own, share=1.0, others=others, near=())]
+
+
+def test_two_effects_that_together_explain_as_much_stand_beside_the_one_that_is_named() -> None:
+    evidence, null = evidence_of({"drag_area": 0.8, "pad_drag": 60.0})
+    pairs = find_pairs(*named(evidence, null, "rolling_resistance_speed"))
+    assert {other.candidate.hypothesis.name for other in pairs} == {"aerodynamic_drag", "pad_drag"}
+    assert "together" in pairs[0].reason
+
+
+def test_two_effects_do_not_stand_beside_the_truth() -> None:
+    evidence, null = evidence_of({"rolling_speed": 0.0009})
+    assert find_pairs(*named(evidence, null, "rolling_resistance_speed")) == []
+
+
+def test_a_number_that_stays_pulled_beyond_belief_stands_beside_what_is_named() -> None:
+    evidence, null = evidence_of({"pressure_gain": 0.15})
+    found, _ = named(evidence, null, "brake_fade")
+    (other,) = [a for a in find_pulled_numbers(found) if a.candidate.hypothesis.name == "retuned_pressure_gain"]
+    assert other.candidate.fitted.values[-1] == pytest.approx(0.15, abs=0.03)
+    plain, null = evidence_of({})
+    assert find_pulled_numbers(named(plain, null, "brake_fade")[0]) == []
+
+
+class TestHeldOutChannels:
+    ERROR = ChannelError(
+        frozen=1.0, retuned=1.0, after=0.5, ci_low=0.4, ci_high=0.6, change_low=-0.6, change_high=-0.4, wins=5,
+        worst_run="run", unit="1",
+    )  # fmt: skip
+    WORSE = replace(ERROR, after=1.2, change_low=0.1, change_high=0.3)
+
+    def test_one_channel_does_not_veto_what_the_others_prove(self) -> None:
+        error = dict.fromkeys(CHANNELS, self.ERROR) | {"vertical_acceleration": self.WORSE}
+        assert find_worse_channels(error, 1.05) == []
+
+    def test_the_speed_does(self) -> None:
+        error = dict.fromkeys(CHANNELS, self.ERROR) | {"speed": self.WORSE}
+        assert find_worse_channels(error, 1.05) == ["speed"]
+
+    def test_channels_that_are_worse_on_the_whole_do(self) -> None:
+        error = {"speed": replace(self.ERROR, after=0.99), "pitch": self.WORSE}
+        assert find_worse_channels(error, 1.05) == ["pitch"]

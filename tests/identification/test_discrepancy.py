@@ -1,0 +1,76 @@
+"""Misfit of one channel in one run: it widens that channel's noise there, and nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catalogs.decision_rules import load_decision_rules
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.discrepancy import widen_noise
+from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.inference.evidence import run_evidence
+from tasks.identification.inference.fit import fit
+from tasks.identification.inference.forward import RunModel
+from tasks.vehicle.effects.table import EFFECT_TABLE
+from tests.identification.synthetic import NOISE, TOLERANCES, measured, plain_run
+
+FRONT = 2
+QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
+NOTHING = np.zeros(len(EFFECT_TABLE))
+
+
+def cycling(run: RunModel) -> RunModel:
+    """The run with a front wheel that cycles as under a brake's anti-lock, eight times the noise, at 6 Hz."""
+    response = run.run.response.copy()
+    response[:, FRONT] += (
+        8.0 * NOISE[FRONT] * np.sin(2.0 * np.pi * 6.0 * np.arange(len(response)) * run.run.interval)
+    )
+    return replace(run, run=replace(run.run, response=response))
+
+
+def evidence_of(*runs: RunModel) -> Evidence:
+    derived = tuple(run_evidence(r, np.zeros(7), NOISE, NOTHING, (), TOLERANCES, QUIET) for r in runs)
+    return Evidence(
+        train=derived[:2], held_out=derived[2:], effects=(), tolerances=TOLERANCES, disturbance=QUIET,
+        sensors=(np.zeros(7), NOISE), rules=load_decision_rules(),
+    )  # fmt: skip
+
+
+def plain(seed: int, peak: float = 1.5) -> RunModel:
+    return measured(plain_run(25.0, peak, name=str(seed)), NOTHING, seed)
+
+
+@pytest.fixture(scope="module")
+def widened() -> Evidence:
+    evidence = evidence_of(plain(1), cycling(plain(2)), cycling(plain(3)))
+    return widen_noise(evidence, fit(evidence.train, (), evidence.session_sigma))
+
+
+def test_runs_that_the_model_follows_keep_the_noise_of_their_sensors(widened: Evidence) -> None:
+    assert np.array_equal(widened.train[0].sigma, NOISE) and not widened.train[0].rho.any()
+
+
+def test_a_channel_that_cycles_is_widened_where_it_cycles_alone(widened: Evidence) -> None:
+    run = widened.train[1]
+    others = np.arange(7) != FRONT
+    assert np.array_equal(run.sigma[others], NOISE[others])
+    assert run.sigma[FRONT] == pytest.approx(8.0 / np.sqrt(2.0) * NOISE[FRONT], rel=0.2)
+    assert run.rho[FRONT] > 0.8, "a cycle of sixteen samples is no white noise"
+
+
+def test_held_out_runs_are_widened_alike(widened: Evidence) -> None:
+    assert widened.held_out[0].sigma[FRONT] > 4.0 * NOISE[FRONT]
+
+
+def test_what_a_better_fit_follows_again_has_its_sensors_noise_again() -> None:
+    evidence = evidence_of(plain(1), plain(2), plain(3))
+    null = fit(evidence.train, (), evidence.session_sigma)
+    wide = replace(
+        evidence, train=(evidence.train[0], replace(evidence.train[1], sigma=8.0 * NOISE)),
+        held_out=(replace(evidence.held_out[0], sigma=8.0 * NOISE),),
+    )  # fmt: skip
+    again = widen_noise(wide, null)
+    assert np.array_equal(again.train[1].sigma, NOISE) and np.array_equal(again.held_out[0].sigma, NOISE)
+    # its derivatives were whitened by the sensors' noise and are read as of the wide one: eight times larger now
+    assert again.train[1].nuisance == pytest.approx(8.0 * evidence.train[1].nuisance)
