@@ -7,7 +7,7 @@ from pydantic import model_validator
 
 from catalogs.quantities import CatalogueEntry, Scalar, Table, Text
 from catalogs.vehicles.frozen import Limits
-from tasks.vehicle.effects.forms import SHAPES, Form, coefficient_count
+from tasks.vehicle.effects.forms import SHAPES, Form, count_coefficients
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLES
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 
@@ -50,8 +50,8 @@ class FormEntry(CatalogueEntry):
             )
             if entry.unit != unit
         ]
-        if len(self.coefficients.value) != coefficient_count(self.shape):
-            count = coefficient_count(self.shape)
+        if len(self.coefficients.value) != count_coefficients(self.shape):
+            count = count_coefficients(self.shape)
             problems.append(
                 f"the shape {self.shape} has {count} coefficient(s); there are {len(self.coefficients.value)}"
             )

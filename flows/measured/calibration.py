@@ -20,11 +20,11 @@ from flows.studies.vehicle_model import agreement_of
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.errors import InputError
-from tasks.identification.calibration.identifiability import identifiability
+from tasks.identification.calibration.identifiability import compute_identifiability
 from tasks.identification.calibration.residual import WHEELS, CalibrationCase
-from tasks.identification.calibration.scalars import calibration_scalars, scalar_value, with_scalars
+from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
 from tasks.identification.calibration.staged import Procedure
-from tasks.identification.calibration.staged import calibrate as run_stages
+from tasks.identification.calibration.staged import calibrate_vehicle as run_stages
 from tasks.vehicle.effects.table import EFFECT_UNITS, NUMBERS_OF_EFFECTS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode
@@ -90,7 +90,7 @@ def calibrate(
         "before": before["groups"],
         "after": after["groups"],
         "without": _without(frozen, reference, steps.mode),
-        "identifiability": asdict(identifiability(frozen, cases, steps)),
+        "identifiability": asdict(compute_identifiability(frozen, cases, steps)),
     }
     results.write_json("calibration.json", result)
     return result
@@ -157,8 +157,8 @@ def _without(
 
 
 def _rounded(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
-    scalars = calibration_scalars(vehicle, procedure.groups)
-    return with_scalars(vehicle, {s: float(f"{scalar_value(vehicle, s):.{DIGITS}g}") for s in scalars})
+    scalars = list_calibration_scalars(vehicle, procedure.groups)
+    return set_scalars(vehicle, {s: float(f"{read_scalar(vehicle, s):.{DIGITS}g}") for s in scalars})
 
 
 def _frozen(

@@ -18,7 +18,7 @@ from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
 from tasks.campaign.planned_runs import RICH, RunPlan
-from tasks.identification.benchmark import classify_outcome, interval_holds_truth, synthetic_campaign
+from tasks.identification.benchmark import classify_outcome, interval_holds_truth, make_synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import find_missing_effects
 
@@ -100,7 +100,7 @@ def close_loop_benchmark(
             break
         left_out = {name for truth in planned.truths for name in truth.left_out}
         before = time.process_time()
-        campaign = synthetic_campaign(
+        campaign = make_synthetic_campaign(
             model, surface, planned.values, planned.seed,
             slots=tuple(slot for truth in planned.truths for slot in truth.slots), design=planned.design,
         )  # fmt: skip

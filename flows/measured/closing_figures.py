@@ -11,12 +11,17 @@ from numpy.typing import NDArray
 
 from flows.drawing import escape_formulas
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.identification.decision.forms import Leftover, curve, form_hypotheses, scan_leftovers
-from tasks.identification.decision.search import Found
+from tasks.identification.decision.forms import (
+    ResidualSpline,
+    fit_residual_splines,
+    make_form_hypotheses,
+    sample_form,
+)
+from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import RunModel, predict, simulate_run
-from tasks.identification.inference.hypothesis import compose
+from tasks.identification.inference.forward import RunModel, predict_channels, simulate_run
+from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
@@ -59,15 +64,15 @@ def _state_to_show(trace: Trace) -> str:
 
 
 def _force_points(
-    model: RunModel, state: Found, variable: str, grown: bool
+    model: RunModel, state: SearchState, variable: str, grown: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     theta, slots = (
-        compose(state.base.parts, state.base.values, state.base.session)
+        compose_parameters(state.base.parts, state.base.values, state.base.session)
         if grown
         else (np.zeros(len(EFFECT_TABLE)), ())
     )
     channel = CHANNELS.index("longitudinal_acceleration")
-    y = predict(model, theta, slots=slots)
+    y = predict_channels(model, theta, slots=slots)
     left = (model.measured - y)[:, channel]
     if not model.measured[:, channel].any():  # no accelerometer
         left = np.gradient((model.measured - y)[:, CHANNELS.index("speed")], model.run.interval)
@@ -84,7 +89,7 @@ def _force_points(
 
 def spline(trace: Trace) -> str:
     """Shape of what the frozen model leaves over at the port of what is named, with its band and best form."""
-    found = scan_leftovers(trace.start.evidence, trace.start.base)
+    found = fit_residual_splines(trace.start.evidence, trace.start.base)
     ports = [effect.port for effect in trace.verdict.effects]
     left = next((x for x in found if x.port in ports), found[0])
     figure = Figure(figsize=(5.2, 3.4))
@@ -92,8 +97,8 @@ def spline(trace: Trace) -> str:
     band = 1.96 * np.sqrt(np.maximum(np.diag(left.covariance), 0.0))
     axis.fill_between(left.grid, left.values - band, left.values + band, color="#c9dff2", label="95 % band")
     axis.plot(left.grid, left.values, "o-", color=AFTER, label="spline")
-    form = form_hypotheses(left, trace.start.evidence.samples, count=1)[0]
-    x, y = curve(form)
+    form = make_form_hypotheses(left, trace.start.evidence.samples, count=1)[0]
+    x, y = sample_form(form)
     axis.plot(x, y, "--", color=FROZEN, label=form.name.partition(", x")[0])
     axis.axhline(0.0, color="#888888", lw=0.8)
     axis.set_xlabel(f"{left.variable} [{VARIABLE_UNITS[VARIABLES.index(left.variable)]}]")
@@ -104,11 +109,11 @@ def spline(trace: Trace) -> str:
 
 def leftovers(trace: Trace) -> str:
     """Return the gain of a spline at every scanned port and variable, before and after."""
-    before = scan_leftovers(trace.start.evidence, trace.start.base)
-    after = scan_leftovers(trace.end.evidence, trace.end.base)
+    before = fit_residual_splines(trace.start.evidence, trace.start.base)
+    after = fit_residual_splines(trace.end.evidence, trace.end.base)
     keys = [(x.port, x.variable) for x in sorted(before, key=lambda x: (x.port, x.variable))]
 
-    def gains(found: list[Leftover]) -> list[float]:
+    def gains(found: list[ResidualSpline]) -> list[float]:
         known = {(x.port, x.variable): max(x.gain, 0.1) for x in found}
         return [known[key] for key in keys]
 
@@ -161,14 +166,14 @@ def pulls(trace: Trace) -> str:
 def traces(trace: Trace) -> str:
     """Measured, frozen and after on the held-out runs that gained most and least."""
     runs = trace.start.evidence.held_out
-    theta, slots = compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
+    theta, slots = compose_parameters(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
     plain = np.zeros(len(EFFECT_TABLE))
 
     def gain(run: RunEvidence) -> float:
         sigma = run.sigma
         frozen, after = (
             np.mean(((run.model.measured - y) / sigma) ** 2)
-            for y in (predict(run.model, plain), predict(run.model, theta, slots=slots))
+            for y in (predict_channels(run.model, plain), predict_channels(run.model, theta, slots=slots))
         )
         return float(np.log(frozen / after))
 
@@ -177,7 +182,7 @@ def traces(trace: Trace) -> str:
     figure = Figure(figsize=(11, 6.4), layout="constrained")
     axes = figure.subplots(len(shown), 2, sharex="col", squeeze=False)
     for column, (run, title) in enumerate(((ranked[-1], "gained most"), (ranked[0], "gained least"))):
-        frozen, after = predict(run.model, plain), predict(run.model, theta, slots=slots)
+        frozen, after = predict_channels(run.model, plain), predict_channels(run.model, theta, slots=slots)
         time = np.arange(run.model.samples, dtype=np.float64) * run.model.run.interval
         for row, channel in enumerate(shown):
             c = CHANNELS.index(channel)

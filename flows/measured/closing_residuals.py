@@ -12,8 +12,8 @@ from flows.measured.closing_figures import picture
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import predict
-from tasks.identification.inference.hypothesis import compose
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 TITLES = ("frozen", "after")
@@ -31,12 +31,15 @@ def residuals(
     """
     models = (
         (np.zeros(len(EFFECT_TABLE)), ()),
-        compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session),
+        compose_parameters(trace.end.base.parts, trace.end.base.values, trace.end.base.session),
     )
     for run in runs:
         yield (
             run,
-            tuple(run.model.measured - predict(run.model, theta, slots=slots) for theta, slots in models),
+            tuple(
+                run.model.measured - predict_channels(run.model, theta, slots=slots)
+                for theta, slots in models
+            ),
         )
 
 

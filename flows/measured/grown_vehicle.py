@@ -13,7 +13,7 @@ from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
-from tasks.identification.decision.forms import form_in_range
+from tasks.identification.decision.forms import make_form_in_range
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.grown import FAMILY, apply_effects
 from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
@@ -69,7 +69,7 @@ def grown_vehicle(
         if effect.effect_class == "sensor":
             continue
         if effect.effect_class == "form":
-            form = form_in_range(
+            form = make_form_in_range(
                 effect.name, tuple(p.value for p in effect.parameters), *reached[effect.variable]
             )
             source_text = "; ".join(_source(effect, p, verdict) for p in effect.parameters)

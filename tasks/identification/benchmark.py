@@ -16,10 +16,10 @@ from tasks.campaign.campaign import Campaign, Run, Tolerances
 from tasks.campaign.planned_runs import RICH, TRAINING, RunPlan, make_planned_run
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.inference.evidence import SESSION_INDEX
-from tasks.identification.inference.forward import instrument_readings, run_model, simulate_run
+from tasks.identification.inference.forward import compute_instrument_readings, prepare_run, simulate_run
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.slots import Slot
-from tasks.vehicle.effects.table import PARAMETER_INDEX, parameter_vector
+from tasks.vehicle.effects.table import PARAMETER_INDEX, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 NOISE_SIGMA = np.array([0.03, 0.05, 0.09, 0.09, 0.015, 0.1, 0.1])
@@ -41,7 +41,7 @@ DISTURBANCE = (
 """Port, standard deviation [unit of the port], correlation time and knot spacing [s]."""
 
 
-def synthetic_campaign(
+def make_synthetic_campaign(
     vehicle: Vehicle,
     surface: SurfaceParameters,
     truth: Mapping[str, float],
@@ -61,7 +61,7 @@ def synthetic_campaign(
     design : the runs; the first `TRAINING` of them train
     """
     rng = np.random.Generator(np.random.Philox(seed))
-    theta = parameter_vector(truth)
+    theta = build_parameter_vector(truth)
     theta[list(SESSION_INDEX)] += rng.standard_normal(len(SESSION_INDEX)) * TOLERANCES.session
     theta[PARAMETER_INDEX["wheel_inertia"]] += 0.05 * rng.random()
     runs = tuple(
@@ -90,32 +90,32 @@ def _measure_run(
 ) -> Run:
     run = make_planned_run(drive, f"run-{number + 1:02d}", direction, held_out=number >= TRAINING)
     pressure, count = run.pressure, len(run.pressure)
-    model = run_model(run, vehicle, surface)
+    model = prepare_run(run, vehicle, surface)
     own = theta.copy()
     own[PARAMETER_INDEX["friction"]] += TOLERANCES.friction * rng.standard_normal()
-    disturbed = tuple(_disturbance(*entry, drive.duration, rng) for entry in DISTURBANCE)
+    disturbed = tuple(_draw_disturbance(*entry, drive.duration, rng) for entry in DISTURBANCE)
     speed = drive.speed + TOLERANCES.initial_speed * rng.standard_normal()
     driven = simulate_run(
         model, own, slots=(*slots, *disturbed), initial_speed=speed, refinement=GENERATOR_REFINEMENT
     )
-    y = instrument_readings(model, own, driven)
+    y = compute_instrument_readings(model, own, driven)
     y[:, 1] += TOLERANCES.acceleration_bias * rng.standard_normal()
     y[:, 4] += TOLERANCES.pitch_offset * rng.standard_normal()
     for j in range(y.shape[1]):
-        y[:, j] += NOISE_SIGMA[j] * _autoregressive(NOISE_RHO[j], count, rng)
-    seen = np.maximum(pressure + PRESSURE_NOISE * _autoregressive(0.5, count, rng), 0.0)
+        y[:, j] += NOISE_SIGMA[j] * _draw_autoregressive_noise(NOISE_RHO[j], count, rng)
+    seen = np.maximum(pressure + PRESSURE_NOISE * _draw_autoregressive_noise(0.5, count, rng), 0.0)
     return replace(run, response=y, pressure=seen if drive.peak else pressure)
 
 
-def _disturbance(
+def _draw_disturbance(
     port: str, scale: float, time: float, spacing: float, duration: float, rng: np.random.Generator
 ) -> Slot:
     count = int(duration / spacing) + 2
-    values = scale * _autoregressive(float(np.exp(-spacing / time)), count, rng)
+    values = scale * _draw_autoregressive_noise(float(np.exp(-spacing / time)), count, rng)
     return Slot(port=port, variable="time", origin=0.0, spacing=spacing, values=values)
 
 
-def _autoregressive(rho: float, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def _draw_autoregressive_noise(rho: float, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
     x = rng.standard_normal(count)
     for i in range(1, count):
         x[i] = rho * x[i - 1] + np.sqrt(1.0 - rho**2) * x[i]
@@ -162,7 +162,7 @@ def interval_holds_truth(verdict: Verdict, truth: str, values: Mapping[str, floa
     return first.ci_low <= values[first.name] <= first.ci_high
 
 
-def exact_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+def compute_exact_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
     """Clopper-Pearson interval of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404).
 
     Parameters

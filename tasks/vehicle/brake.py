@@ -85,7 +85,7 @@ class BrakeCommand:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def brake_pressure(since_onset: float, profile: PressureProfile) -> float:
+def compute_brake_pressure(since_onset: float, profile: PressureProfile) -> float:
     """Commanded pressure p_b [MPa].
 
     Parameters
@@ -106,7 +106,7 @@ def brake_pressure(since_onset: float, profile: PressureProfile) -> float:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def onset_by_position(time: float, station: float, speed: float, profile: PressureProfile) -> float:
+def find_onset_by_position(time: float, station: float, speed: float, profile: PressureProfile) -> float:
     """Time of the brake onset once its position is passed, else infinity [s].
 
     The position is passed between two samples; the time of passing is that of the present speed.
@@ -124,7 +124,7 @@ def onset_by_position(time: float, station: float, speed: float, profile: Pressu
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def abs_command(braking_slip: float, target_slip: float, release_width: float) -> float:
+def compute_abs_command(braking_slip: float, target_slip: float, release_width: float) -> float:
     """Share of the brake torque that the proportional ABS asks for, q_cmd [1] (paper, Eq. app_abs_command).
 
     Parameters
@@ -138,7 +138,7 @@ def abs_command(braking_slip: float, target_slip: float, release_width: float) -
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def abs_update(command: float, scale: float, build_step: float, release_step: float) -> float:
+def limit_abs_rate(command: float, scale: float, build_step: float, release_step: float) -> float:
     """ABS torque scale q after one step: the command within the rate limits [1] (paper, Appendix B).
 
     With limits of 1 or more a step this is the algebraic rule q = q_cmd exactly.

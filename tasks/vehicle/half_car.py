@@ -44,7 +44,7 @@ class HalfCar(NamedTuple):
     static_r: float
 
 
-def half_car(vehicle: Vehicle) -> HalfCar:
+def build_half_car(vehicle: Vehicle) -> HalfCar:
     """The half-car of a vehicle."""
     static_f, static_r = vehicle.static_axle_loads
     return HalfCar(
@@ -66,7 +66,9 @@ def half_car(vehicle: Vehicle) -> HalfCar:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def contact_load(road_height: float, unsprung_height: float, stiffness: float, static_load: float) -> float:
+def compute_contact_load(
+    road_height: float, unsprung_height: float, stiffness: float, static_load: float
+) -> float:
     """Load of one axle on the road, never negative [N] (paper, Eq. app_unilateral_contact).
 
     Parameters
@@ -79,7 +81,7 @@ def contact_load(road_height: float, unsprung_height: float, stiffness: float, s
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
+def compute_suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
     """Spring and damper force of the front and the rear axle, F_s,f and F_s,r [N] (paper, Appendix B).
 
     Parameters
@@ -98,7 +100,7 @@ def suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def half_car_rates(
+def compute_half_car_rates(
     x: HalfCarState,
     load_f: float,
     load_r: float,
@@ -132,7 +134,7 @@ def half_car_rates(
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def moved(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
+def advance_half_car(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
     """The state after going along a rate for a step [s]."""
     return (
         x[0] + step * rate[0],
@@ -147,12 +149,14 @@ def moved(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
 
 
 @njit(cache=True, nogil=True)
-def forced_rates(x: HalfCarState, road_f: float, road_r: float, moment: float, car: HalfCar) -> HalfCarState:
+def compute_forced_rates(
+    x: HalfCarState, road_f: float, road_r: float, moment: float, car: HalfCar
+) -> HalfCarState:
     """Rate of the half-car state on given road heights [m] and pitch moment [N m]."""
-    load_f = contact_load(road_f, x[2], car.tyre_f, car.static_f)
-    load_r = contact_load(road_r, x[3], car.tyre_r, car.static_r)
-    force_f, force_r = suspension_forces(x, car)
-    return half_car_rates(x, load_f, load_r, force_f, force_r, moment, 0.0, car)
+    load_f = compute_contact_load(road_f, x[2], car.tyre_f, car.static_f)
+    load_r = compute_contact_load(road_r, x[3], car.tyre_r, car.static_r)
+    force_f, force_r = compute_suspension_forces(x, car)
+    return compute_half_car_rates(x, load_f, load_r, force_f, force_r, moment, 0.0, car)
 
 
 @njit(cache=True, nogil=True)
@@ -186,9 +190,15 @@ def integrate_half_car(
         middle_f = 0.5 * (road_f[n] + road_f[n + 1])
         middle_r = 0.5 * (road_r[n] + road_r[n + 1])
         middle_moment = 0.5 * (moment[n] + moment[n + 1])
-        k1 = forced_rates(x, road_f[n], road_r[n], moment[n], car)
-        k2 = forced_rates(moved(x, k1, 0.5 * step), middle_f, middle_r, middle_moment, car)
-        k3 = forced_rates(moved(x, k2, 0.5 * step), middle_f, middle_r, middle_moment, car)
-        k4 = forced_rates(moved(x, k3, step), road_f[n + 1], road_r[n + 1], moment[n + 1], car)
-        x = moved(moved(moved(moved(x, k1, step / 6), k2, step / 3), k3, step / 3), k4, step / 6)
+        k1 = compute_forced_rates(x, road_f[n], road_r[n], moment[n], car)
+        k2 = compute_forced_rates(advance_half_car(x, k1, 0.5 * step), middle_f, middle_r, middle_moment, car)
+        k3 = compute_forced_rates(advance_half_car(x, k2, 0.5 * step), middle_f, middle_r, middle_moment, car)
+        k4 = compute_forced_rates(
+            advance_half_car(x, k3, step), road_f[n + 1], road_r[n + 1], moment[n + 1], car
+        )
+        x = advance_half_car(
+            advance_half_car(advance_half_car(advance_half_car(x, k1, step / 6), k2, step / 3), k3, step / 3),
+            k4,
+            step / 6,
+        )
     return states

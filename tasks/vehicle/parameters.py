@@ -110,7 +110,7 @@ class Vehicle:
     forms: tuple[Form, ...] = ()
     shared_families: Mapping[str, TyreFamily] = field(default_factory=dict)
 
-    def tyre_family(self, weather: str) -> TyreFamily:
+    def find_tyre_family(self, weather: str) -> TyreFamily:
         """The tyre family in a kind of weather: the vehicle's own, else the one that the kind brings.
 
         Parameters
@@ -174,7 +174,7 @@ class SurfaceResponse:
     wet: bool
 
 
-def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> SurfaceResponse:
+def compute_surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> SurfaceResponse:
     """Tyre curve and pitch calibration at one surface friction: piecewise linear, clamped at the end knots.
 
     Parameters
@@ -183,13 +183,13 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
     family : name of a kind of weather
     surface_friction : mu_c [1]
     """
-    table = vehicle.tyre_family(family)
+    table = vehicle.find_tyre_family(family)
     knots = table.surface_friction
 
-    def at(values: tuple[float, ...]) -> float:
+    def interpolate(values: tuple[float, ...]) -> float:
         return float(np.interp(surface_friction, knots, values))
 
-    peak, slip_stiffness = at(table.efficiency) * surface_friction, at(table.slip_stiffness)
+    peak, slip_stiffness = interpolate(table.efficiency) * surface_friction, interpolate(table.slip_stiffness)
     if vehicle.tyre is None:
         tyre: Tyre = scale_burckhardt(table.burckhardt, peak, slip_stiffness)
     else:
@@ -199,9 +199,9 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
     return SurfaceResponse(
         tyre=tyre,
         slip_stiffness=slip_stiffness,
-        pitch_scale=at(table.pitch_scale),
-        hold_s=at(table.hold_s),
-        release_s=at(table.release_s),
+        pitch_scale=interpolate(table.pitch_scale),
+        hold_s=interpolate(table.hold_s),
+        release_s=interpolate(table.release_s),
         extrapolated=not knots[0] - rounding <= surface_friction <= knots[-1] + rounding,
         wet=find_weather(family).wet,
     )

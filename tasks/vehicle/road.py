@@ -16,13 +16,13 @@ class RoadFeature(NamedTuple):
     height: float
 
 
-def road_feature(hazard: RoadHazard) -> RoadFeature:
+def make_road_feature(hazard: RoadHazard) -> RoadFeature:
     """The hazard as numbers; a flat road is a feature of height 0."""
     return RoadFeature(float(hazard.center_m), float(hazard.length_m), float(hazard.height_m))
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def height_at(station: float, road: RoadFeature) -> float:
+def compute_road_height(station: float, road: RoadFeature) -> float:
     """Road height H_g [m] (paper, Eq. shared_road_profile).
 
     Parameters
@@ -37,7 +37,7 @@ def height_at(station: float, road: RoadFeature) -> float:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def slope_at(station: float, road: RoadFeature) -> float:
+def compute_road_slope(station: float, road: RoadFeature) -> float:
     """Road slope dH_g/ds [m/m].
 
     Parameters

@@ -10,12 +10,12 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.events import RecordedRun
-from tasks.identification.inference.forward import predict
+from tasks.identification.inference.forward import predict_channels
 from tasks.studies.stop import Stop, stop_errors, stop_of, stopping_distance
 from tasks.studies.stop_findings import rebound, saturation, slip_cycles
 from tasks.studies.stop_study import Rung, _model, climb, uncalibrated
 from tasks.studies.stop_swing import Swing, fit_swing, swing_acceleration, with_swing
-from tasks.vehicle.effects.table import parameter_vector
+from tasks.vehicle.effects.table import build_parameter_vector
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 INTERVAL = 0.01
@@ -32,7 +32,9 @@ def made_stop(peak: float, speed: float, truth: dict[str, float], name: str) -> 
     }  # fmt: skip
     blank = Stop(name=name, interval=INTERVAL, columns=columns, onset=40)
     # the wheels of a standing car chatter at the slip's floor: the measured car is taken to stand from 2 m/s on
-    values = predict(_model(blank, VEHICLE, SURFACE, engine_torque=True), parameter_vector(truth))
+    values = predict_channels(
+        _model(blank, VEHICLE, SURFACE, engine_torque=True), build_parameter_vector(truth)
+    )
     made = dict(zip(CHANNELS, values.T, strict=True))
     slow = int(np.argmax(made["speed"] < 2.0))
     rest = made["speed"][slow] + made["longitudinal_acceleration"][slow - 1] * INTERVAL * np.arange(

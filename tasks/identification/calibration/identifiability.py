@@ -7,8 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.calibration.residual import CalibrationCase
-from tasks.identification.calibration.scalars import CalibrationScalar, calibration_scalars, scalar_value
-from tasks.identification.calibration.staged import Procedure, Stage, smoothness, stage_jacobian
+from tasks.identification.calibration.scalars import CalibrationScalar, list_calibration_scalars, read_scalar
+from tasks.identification.calibration.staged import (
+    Procedure,
+    Stage,
+    build_smoothness_rows,
+    compute_stage_jacobian,
+)
 from tasks.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -60,7 +65,7 @@ class Identifiability:
     weakest: dict[str, float]
 
 
-def identifiability(
+def compute_identifiability(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
 ) -> Identifiability:
     """Fisher information of all scalars from all responses of all cases, with bounds and smoothness as the
@@ -75,27 +80,27 @@ def identifiability(
     cases : development cases
     procedure : groups, bounds and scales
     """
-    scalars = calibration_scalars(vehicle, procedure.groups)
+    scalars = list_calibration_scalars(vehicle, procedure.groups)
     everything = Stage(
         name="all", groups=procedure.groups, responses=("speed", "pitch", "slip", "wheel_load", "stop"),
         kinds=("flat", "hump", "depression"), phase="event",
     )  # fmt: skip
-    x = np.array([scalar_value(vehicle, s) for s in scalars])
+    x = np.array([read_scalar(vehicle, s) for s in scalars])
     coasting = replace(everything, responses=("speed_drop",), phase="start")
     jacobian = np.vstack(
         [
-            stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
-            stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
-            smoothness(scalars, procedure),
+            compute_stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
+            compute_stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
+            build_smoothness_rows(scalars, procedure),
         ]
     )
     bounds = [procedure.bounds[s.group] for s in scalars]
-    return knowledge(
+    return summarise_jacobian(
         jacobian, scalars, x, [b.unit for b in bounds], np.array([b.upper - b.lower for b in bounds])
     )
 
 
-def knowledge(
+def summarise_jacobian(
     jacobian: Floats,
     scalars: Sequence[CalibrationScalar],
     values: Floats,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
+from tasks.vehicle.rollout import Controls, Mode, Rollout, simulate_scenario
 
 Floats = NDArray[np.float64]
 Response = Literal["speed", "speed_drop", "pitch", "slip", "wheel_load", "stop"]
@@ -75,7 +75,7 @@ class Yardstick:
     margin_s: float
 
 
-def driven(vehicle: Vehicle, case: CalibrationCase, mode: Mode, margin_s: float) -> Rollout:
+def simulate_case(vehicle: Vehicle, case: CalibrationCase, mode: Mode, margin_s: float) -> Rollout:
     """The model's run of a case, to a little past its last sample.
 
     Parameters
@@ -87,10 +87,10 @@ def driven(vehicle: Vehicle, case: CalibrationCase, mode: Mode, margin_s: float)
     """
     duration = float(np.ceil((case.time[-1] + margin_s) * 1000) / 1000)
     surface = SurfaceState(kind=case.family, friction=case.surface_friction)
-    return rollout(vehicle, surface, case.controls, case.hazard, mode=mode, duration_s=duration)
+    return simulate_scenario(vehicle, surface, case.controls, case.hazard, mode=mode, duration_s=duration)
 
 
-def residuals(
+def compute_residuals(
     ride: Rollout, case: CalibrationCase, responses: Sequence[Response], phase: Phase, yardstick: Yardstick
 ) -> Floats:
     """Model less reference of some responses, so scaled that its square sum is the sum of (RMSE / scale)^2.
@@ -114,7 +114,7 @@ def residuals(
     time = model["t_ns"] * 1e-9
     parts = [np.empty(0)]
 
-    def add(
+    def add_residual(
         name: str, values: Floats, reference: Floats, mask: NDArray[np.bool_], share: float = 1.0
     ) -> None:
         if mask.any():
@@ -123,21 +123,21 @@ def residuals(
 
     for response in responses:
         if response == "speed":
-            add("speed", model["speed"], case.speed, counts)
+            add_residual("speed", model["speed"], case.speed, counts)
         elif response == "speed_drop":
             free = counts & (case.time >= case.time[0] + yardstick.settle_s)
             first = int(np.argmax(free))
             begin = float(np.interp(case.time[first], time, model["speed"]))
-            add("speed_drop", model["speed"] - begin, case.speed - case.speed[first], free)
+            add_residual("speed_drop", model["speed"] - begin, case.speed - case.speed[first], free)
         elif response == "pitch":
-            add("pitch", np.rad2deg(model["pitch"] + ride.static_pitch), case.pitch, counts)
+            add_residual("pitch", np.rad2deg(model["pitch"] + ride.static_pitch), case.pitch, counts)
         elif response == "slip":
             for row, axle in zip(case.slip, WHEELS.values(), strict=True):
                 rolling = counts & (case.speed > yardstick.slip_speed)
-                add("slip", model[f"braking_slip_{axle}"], row, rolling, 0.25)
+                add_residual("slip", model[f"braking_slip_{axle}"], row, rolling, 0.25)
         elif response == "wheel_load":
             for row, axle in zip(case.wheel_load, WHEELS.values(), strict=True):
-                add("wheel_load", model[f"axle_load_{axle}"] / 2, row, counts, 0.25)
+                add_residual("wheel_load", model[f"axle_load_{axle}"] / 2, row, counts, 0.25)
         elif case.stopping_distance is not None and phase == "event":
             distance = model["station"][-1] - np.interp(ride.brake_onset_time, time, model["station"])
             parts.append(np.array([distance - case.stopping_distance]) / yardstick.scales["stop"])

@@ -29,7 +29,7 @@ class CalibrationScalar:
     places: tuple[tuple[str, int], ...] = ()
 
 
-def calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[CalibrationScalar, ...]:
+def list_calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[CalibrationScalar, ...]:
     """The scalars of some groups, in their order; all of the paper's groups together hold its 40.
 
     Parameters
@@ -56,12 +56,14 @@ def calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[Calibr
     scalars: list[CalibrationScalar] = []
     for group in groups:
         scalars += (
-            _knots(vehicle, group) if group in KNOT_GROUPS else [CalibrationScalar(name=group, group=group)]
+            _list_knots(vehicle, group)
+            if group in KNOT_GROUPS
+            else [CalibrationScalar(name=group, group=group)]
         )
     return tuple(scalars)
 
 
-def scalar_value(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
+def read_scalar(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
     """The scalar's value in a vehicle, in the unit of its field.
 
     Parameters
@@ -77,7 +79,7 @@ def scalar_value(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
     return float(getattr(vehicle.families[family], scalar.group)[knot])
 
 
-def with_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> Vehicle:
+def set_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> Vehicle:
     """The vehicle with other values of some scalars; moving its centre of gravity leaves the wheelbase as it is.
 
     Parameters
@@ -106,7 +108,7 @@ def _is_field(vehicle: Vehicle, group: str) -> bool:
     return isinstance(vars(vehicle).get(group), float | int)
 
 
-def _knots(vehicle: Vehicle, group: str) -> list[CalibrationScalar]:
+def _list_knots(vehicle: Vehicle, group: str) -> list[CalibrationScalar]:
     scalars = []
     shared: list[tuple[str, int]] = []
     for family, table in vehicle.families.items():

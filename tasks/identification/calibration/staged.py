@@ -14,17 +14,17 @@ from tasks.identification.calibration.residual import (
     Phase,
     Response,
     Yardstick,
-    driven,
-    residuals,
+    compute_residuals,
+    simulate_case,
 )
 from tasks.identification.calibration.scalars import (
     CalibrationScalar,
-    calibration_scalars,
-    scalar_value,
-    with_scalars,
+    list_calibration_scalars,
+    read_scalar,
+    set_scalars,
 )
 from tasks.vehicle.effects.table import EFFECT_UNITS
-from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
 from tasks.vehicle.rollout import Mode
 
 Floats = NDArray[np.float64]
@@ -118,7 +118,7 @@ class StageRecord:
     at_bounds: tuple[str, ...]
 
 
-def calibrate(
+def calibrate_vehicle(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
 ) -> tuple[Vehicle, tuple[StageRecord, ...]]:
     """Go through the stages; a stage that does not lower its own loss is not accepted.
@@ -134,7 +134,7 @@ def calibrate(
     The calibrated vehicle and a record of every stage.
     """
     records: list[StageRecord] = []
-    vehicle = _begun(vehicle, procedure)
+    vehicle = _add_missing_effects(vehicle, procedure)
     for turn in range(1, procedure.passes + 1):
         for stage in procedure.stages:
             vehicle, record = run_stage(vehicle, cases, stage, procedure)
@@ -157,27 +157,29 @@ def run_stage(
     stage : which scalars against which responses
     procedure : bounds, scales, number of evaluations
     """
-    scalars = calibration_scalars(vehicle, stage.groups)
+    scalars = list_calibration_scalars(vehicle, stage.groups)
     chosen = [case for case in cases if case.kind in stage.kinds]
     limits = np.array([(procedure.bounds[s.group].lower, procedure.bounds[s.group].upper) for s in scalars])
     width = limits[:, 1] - limits[:, 0]
-    start = np.array([scalar_value(vehicle, s) for s in scalars])
+    start = np.array([read_scalar(vehicle, s) for s in scalars])
     start = np.clip(start, limits[:, 0] + 1e-6 * width, limits[:, 1] - 1e-6 * width)
 
     prior = np.diag(np.sqrt(12.0) / width)
-    smooth = smoothness(scalars, procedure)
+    smooth = build_smoothness_rows(scalars, procedure)
 
-    def residual(x: Floats) -> Floats:
-        changed = with_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
-        parts = [_case_residual(changed, case, stage, procedure) for case in chosen]
+    def compute_residual(x: Floats) -> Floats:
+        changed = set_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
+        parts = [_compute_case_residual(changed, case, stage, procedure) for case in chosen]
         return np.concatenate([*parts, prior @ (x - start), smooth @ x])
 
-    def jacobian(x: Floats) -> Floats:
-        return np.vstack([stage_jacobian(vehicle, chosen, stage, procedure, scalars, x), prior, smooth])
+    def compute_jacobian(x: Floats) -> Floats:
+        return np.vstack(
+            [compute_stage_jacobian(vehicle, chosen, stage, procedure, scalars, x), prior, smooth]
+        )
 
-    before = float(np.sum(residual(start) ** 2))
+    before = float(np.sum(compute_residual(start) ** 2))
     solution = least_squares(
-        residual, start, jacobian, bounds=(limits[:, 0], limits[:, 1]), x_scale=width,
+        compute_residual, start, compute_jacobian, bounds=(limits[:, 0], limits[:, 1]), x_scale=width,
         max_nfev=procedure.evaluations, xtol=1e-5, ftol=1e-5,
     )  # fmt: skip
     after = float(np.sum(solution.fun**2))
@@ -191,10 +193,10 @@ def run_stage(
         moved=float(np.max(np.abs(best - start) / width)),
         at_bounds=tuple(s.name for s, hit in zip(scalars, on_bound, strict=True) if hit),
     )
-    return with_scalars(vehicle, dict(zip(scalars, map(float, best), strict=True))), record
+    return set_scalars(vehicle, dict(zip(scalars, map(float, best), strict=True))), record
 
 
-def stage_jacobian(
+def compute_stage_jacobian(
     vehicle: Vehicle,
     cases: Sequence[CalibrationCase],
     stage: Stage,
@@ -215,24 +217,24 @@ def stage_jacobian(
     -------
     Shape (residuals, n) [1 / unit].
     """
-    here = with_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
-    unmoved = [np.zeros_like(_case_residual(here, case, stage, procedure)) for case in cases]
+    here = set_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
+    unmoved = [np.zeros_like(_compute_case_residual(here, case, stage, procedure)) for case in cases]
     columns = []
     for scalar in scalars:
-        step, value = procedure.bounds[scalar.group].step, scalar_value(here, scalar)
-        above, below = (with_scalars(here, {scalar: value + side * step}) for side in (1.0, -1.0))
+        step, value = procedure.bounds[scalar.group].step, read_scalar(here, scalar)
+        above, below = (set_scalars(here, {scalar: value + side * step}) for side in (1.0, -1.0))
         parts = []
         for case, zeros in zip(cases, unmoved, strict=True):
-            if _sees_no_difference(above, below, case):
+            if _hides_difference(above, below, case):
                 parts.append(zeros)
                 continue
-            up, down = (_case_residual(side, case, stage, procedure) for side in (above, below))
+            up, down = (_compute_case_residual(side, case, stage, procedure) for side in (above, below))
             parts.append((up - down) / (2 * step))
         columns.append(np.concatenate(parts))
     return np.stack(columns, axis=1)
 
 
-def smoothness(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Floats:
+def build_smoothness_rows(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Floats:
     """Rows that weigh the difference between neighbouring knots of a family, so that interpolation between them
     holds where one of them is poorly determined.
 
@@ -256,21 +258,23 @@ def smoothness(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Fl
     return np.array(rows).reshape(-1, len(scalars))
 
 
-def _begun(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
+def _add_missing_effects(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
     """The vehicle with the start values of effects that it does not have yet."""
     missing = [group for group in procedure.groups if group in EFFECT_UNITS and group not in vehicle.effects]
     starts = {group: procedure.bounds[group].start or 0.0 for group in missing}
     return replace(vehicle, effects={**vehicle.effects, **starts})
 
 
-def _case_residual(vehicle: Vehicle, case: CalibrationCase, stage: Stage, procedure: Procedure) -> Floats:
-    ride = driven(vehicle, case, procedure.mode, procedure.yardstick.margin_s)
-    return residuals(ride, case, stage.responses, stage.phase, procedure.yardstick)
+def _compute_case_residual(
+    vehicle: Vehicle, case: CalibrationCase, stage: Stage, procedure: Procedure
+) -> Floats:
+    ride = simulate_case(vehicle, case, procedure.mode, procedure.yardstick.margin_s)
+    return compute_residuals(ride, case, stage.responses, stage.phase, procedure.yardstick)
 
 
-def _sees_no_difference(one: Vehicle, other: Vehicle, case: CalibrationCase) -> bool:
+def _hides_difference(one: Vehicle, other: Vehicle, case: CalibrationCase) -> bool:
     """Whether a case's conditions hide all that differs between two vehicles."""
     if replace(one, families={}) != replace(other, families={}):
         return False
     at = (case.family, case.surface_friction)
-    return surface_response(one, *at) == surface_response(other, *at)
+    return compute_surface_response(one, *at) == compute_surface_response(other, *at)

@@ -124,7 +124,7 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:
+def make_named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:
     """A candidate as it is reported.
 
     Parameters

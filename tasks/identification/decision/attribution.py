@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
-from tasks.identification.decision.screening import inflation, look_alikes, screen
+from tasks.identification.decision.screening import compute_inflation, find_look_alikes, screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fit, misfit_by_run, sum_misfit_falls
-from tasks.identification.inference.hypothesis import Hypothesis, library_hypothesis
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses, sum_misfit_falls
+from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
 from tasks.identification.rules import DecisionRules
 
 Misfits = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -60,7 +60,7 @@ def judge_hypothesis(
     ----------
     evidence : the runs
     base : fit of what is accepted so far
-    base_held_out : `misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
+    base_held_out : `compute_misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
     hypothesis : what may be added
     foreseen : gain by the linear screen: a first fit that reaches it needs no other start
     """
@@ -77,7 +77,7 @@ def judge_hypothesis(
     trials: list[Fit] = []
     for begin, offsets in starts:
         trials.append(
-            fit(
+            fit_hypotheses(
                 evidence.train,
                 (*base.parts, hypothesis),
                 evidence.session_sigma,
@@ -111,13 +111,13 @@ def assess_fit(
     ----------
     evidence : the runs, with derivatives that hold at the fit
     base : fit of what is accepted so far
-    base_held_out : `misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
+    base_held_out : `compute_misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
     hypothesis : what was added; its parameters come last
     fitted : the joint fit
     """
     gain = 0.5 * (base.objective - fitted.objective)
-    own = _own_scores(evidence, fitted, hypothesis)
-    factor = inflation(evidence, fitted, own)
+    own = _compute_own_scores(evidence, fitted, hypothesis)
+    factor = compute_inflation(evidence, fitted, own)
     penalty = float(len(hypothesis.names) * np.log(evidence.samples))
     if gain / factor - penalty > evidence.rules.accept_score and base_held_out is not None:
         # what the base reaches from here as well is no merit of the hypothesis
@@ -125,7 +125,7 @@ def assess_fit(
     score = gain / factor - penalty
     held_out = 0.0
     if score > evidence.rules.accept_score and base_held_out is not None:
-        held_out = sum_misfit_falls(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
+        held_out = sum_misfit_falls(base_held_out, compute_misfit_by_run(evidence.held_out, fitted)) / factor
     return Candidate(
         hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
         informed=len(own) or len(evidence.train), rules=evidence.rules,
@@ -138,13 +138,13 @@ def _refit_base(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: F
     k = len(hypothesis.names)
     if hypothesis.names[0] in SESSION:
         session[SESSION.index(hypothesis.names[0])] += fitted.values[-k]
-    return fit(
+    return fit_hypotheses(
         evidence.train, base.parts, evidence.session_sigma, values=fitted.values[:-k], session=session,
         offsets=fitted.offsets, iterations=4,
     )  # fmt: skip
 
 
-def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDArray[np.float64]:
+def _compute_own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDArray[np.float64]:
     names = [e.name for e in evidence.effects]
     if hypothesis.name not in names:
         return np.empty(0)
@@ -155,7 +155,7 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
         q = run.library_q[:, j]
         information = float(a @ a - q @ q)
         if information * hypothesis.step[0] ** 2 > 0.05:
-            scores.append(float(a @ r - q @ run.project(r)) / np.sqrt(information))
+            scores.append(float(a @ r - q @ run.project_on_nuisances(r)) / np.sqrt(information))
     return np.array(scores)
 
 
@@ -178,13 +178,13 @@ def refine_candidates(
     also : names of effects that are refined whatever the screen says of them
     """
     rules = evidence.rules
-    gains, estimates, seconds = screen(evidence, base)
-    held_out = misfit_by_run(evidence.held_out, base) if gated else None
+    gains, estimates, seconds = screen_library(evidence, base)
+    held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None
     hopeful = [int(j) for j in np.argsort(-gains, kind="stable") if gains[j] > 0.3 * rules.accept_score]
     order = hopeful[: rules.refined_candidates if count is None else count]
 
-    def judged(j: int) -> Candidate:
-        hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
+    def judge_library_effect(j: int) -> Candidate:
+        hypothesis = make_library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
         return judge_hypothesis(evidence, base, held_out, hypothesis, float(gains[j]))
 
     candidates: list[Candidate] = []
@@ -192,22 +192,24 @@ def refine_candidates(
     for j in order:
         best_so_far = max((c.gain / c.inflation for c in candidates), default=0.0)
         if gains[j] > rules.trusted_screen_share * best_so_far:
-            candidates.append(judged(j))
+            candidates.append(judge_library_effect(j))
             refined.append(j)
     known = {p.name for p in base.parts}
     for j, effect in enumerate(evidence.effects):
         if effect.name in also and effect.name not in known and j not in refined:
-            candidates.append(judged(j))
+            candidates.append(judge_library_effect(j))
             refined.append(j)
     if candidates and gated:
         best = max(range(len(candidates)), key=lambda i: candidates[i].score)
         if candidates[best].score > rules.accept_score:
-            near = [j for j in look_alikes(evidence, refined[best]) if j not in refined and gains[j] > 0.0]
-            candidates += [judged(j) for j in near[: rules.refined_look_alikes]]
+            near = [
+                j for j in find_look_alikes(evidence, refined[best]) if j not in refined and gains[j] > 0.0
+            ]
+            candidates += [judge_library_effect(j) for j in near[: rules.refined_look_alikes]]
     return sorted(candidates, key=lambda c: -c.score)
 
 
-def bootstrap_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
+def compute_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
     """Share of bootstrap resamples of the runs in which the first candidate keeps the best score.
 
     Parameters
@@ -234,7 +236,7 @@ def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
     return set(small.names) < set(large.names)
 
 
-def refit_without(base: Fit, index: int, evidence: Evidence) -> Fit:
+def refit_without_part(base: Fit, index: int, evidence: Evidence) -> Fit:
     """Refit with one accepted part left out.
 
     Parameters
@@ -247,7 +249,7 @@ def refit_without(base: Fit, index: int, evidence: Evidence) -> Fit:
     sizes = [len(p.names) for p in base.parts]
     at = sum(sizes[:index])
     values = np.delete(base.values, np.arange(at, at + sizes[index]))
-    return fit(
+    return fit_hypotheses(
         evidence.train, parts, base.session_sigma, values=values, session=base.session, offsets=base.offsets,
         iterations=8,
     )  # fmt: skip

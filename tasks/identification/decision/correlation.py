@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import predict
-from tasks.identification.inference.noise import whiten
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.slots import Slot
 
 CORRELATED = ("longitudinal_acceleration", "pitch")
@@ -35,7 +35,7 @@ class Correlation:
     band: float
 
 
-def residual_input_correlation(
+def correlate_residual_with_pressure(
     runs: tuple[RunEvidence, ...], theta: NDArray[np.float64], slots: tuple[Slot, ...], longest_lag: float
 ) -> dict[str, Correlation]:
     """Correlation over the held-out runs, residual and pressure whitened by the channel's noise.
@@ -48,16 +48,17 @@ def residual_input_correlation(
     """
     plain = np.zeros(len(theta))
     residuals = [
-        [(run.model.measured - predict(run.model, p, slots=s)) for run in runs]
+        [(run.model.measured - predict_channels(run.model, p, slots=s)) for run in runs]
         for p, s in ((plain, ()), (theta, slots))
     ]
     measured = [name for name in CORRELATED if np.isfinite(runs[0].sigma[CHANNELS.index(name)])]
     return {
-        name: _channel(runs, residuals, CHANNELS.index(name), longest_lag) for name in measured or ["speed"]
+        name: _correlate_channel(runs, residuals, CHANNELS.index(name), longest_lag)
+        for name in measured or ["speed"]
     }
 
 
-def _channel(
+def _correlate_channel(
     runs: tuple[RunEvidence, ...],
     residuals: list[list[NDArray[np.float64]]],
     channel: int,
@@ -69,11 +70,11 @@ def _channel(
     powers, pressed, count = np.zeros(2), 0.0, 0
     for i, run in enumerate(runs):
         rho, sigma = run.rho[channel : channel + 1], run.sigma[channel : channel + 1]
-        u = _white(run.model.run.pressure[: run.model.samples], rho, sigma)
+        u = _whiten_channel(run.model.run.pressure[: run.model.samples], rho, sigma)
         pressed += float(u @ u)
         count += len(u)
         for j in range(2):
-            e = _white(residuals[j][i][:, channel], rho, sigma)
+            e = _whiten_channel(residuals[j][i][:, channel], rho, sigma)
             powers[j] += float(e @ e)
             sums[j] += np.correlate(np.pad(e, most), u, mode="valid")
     scale = np.sqrt(np.maximum(powers * pressed, 1e-300))[:, None]
@@ -86,8 +87,8 @@ def _channel(
     )
 
 
-def _white(
+def _whiten_channel(
     x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    white = whiten(x[:, None], rho, sigma)[1:]
+    white = whiten_channels(x[:, None], rho, sigma)[1:]
     return np.asarray(white - white.mean(), dtype=np.float64)

@@ -6,18 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
-from tasks.identification.decision.forms import form_hypotheses, is_constant, scan_leftovers, spline_slopes
-from tasks.identification.decision.screening import inflation
+from tasks.identification.decision.forms import (
+    differentiate_by_splines,
+    fit_residual_splines,
+    is_constant,
+    make_form_hypotheses,
+)
+from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.search import (
-    Found,
     Round,
+    SearchState,
     find_retune,
     relinearise_candidate,
     scale_disturbances,
     search_library,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
 from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
 
 
@@ -26,11 +31,11 @@ class ForeignCarError(Exception):
 
 
 def search_forms(
-    start: Found,
-    null: Found,
+    start: SearchState,
+    null: SearchState,
     reasons: list[str],
     splines: tuple[NDArray[np.float64], ...] | None = None,
-) -> tuple[Found, Candidate | None]:
+) -> tuple[SearchState, Candidate | None]:
     """Look for forms outside the library: alone against all that was named, and in what the named leave over.
 
     Parameters
@@ -38,19 +43,19 @@ def search_forms(
     start : what the library explains
     null : nothing accepted, same scales
     reasons : is added to
-    splines : `spline_slopes` of ``start`` where they are known
+    splines : `differentiate_by_splines` of ``start`` where they are known
 
     Returns
     -------
     The state, and a form alone that cannot be told from the first effect.
     """
     state, near, rules = start, None, start.evidence.rules
-    left = best_form(state.evidence, state.base, splines=splines)
+    left = find_best_form(state.evidence, state.base, splines=splines)
     over = left is not None and left.passes
     disagreeing = any(r.accepted.inflation > rules.disagreement for r in state.rounds)
     if state.rounds and (over or disagreeing):
         least = rules.lone_form_share * sum(r.accepted.gain for r in state.rounds)
-        alone = best_form(null.evidence, null.base, least)
+        alone = find_best_form(null.evidence, null.base, least)
         ahead = -np.inf
         if alone is not None and alone.passes:
             # a form has no direction of its own to be judged by, so both sides take the larger inflation
@@ -70,7 +75,7 @@ def search_forms(
         )
         if alone is not None and ahead > rules.rival_span and not dressed:
             reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
-            state = Found(
+            state = SearchState(
                 evidence=null.evidence,
                 base=alone.fitted,
                 rounds=(Round(base=null.base, tried=(), accepted=alone, evidence=null.evidence),),
@@ -88,7 +93,7 @@ def search_forms(
     return state, near
 
 
-def best_form(
+def find_best_form(
     evidence: Evidence,
     base: Fit,
     least: float = 0.0,
@@ -101,23 +106,25 @@ def best_form(
     evidence : the runs
     base : the fit
     least : gain in log likelihood from which a spline is followed up
-    splines : `spline_slopes` where they are known
+    splines : `differentiate_by_splines` where they are known
     """
-    level = inflation(evidence, base, None)
+    level = compute_inflation(evidence, base, None)
     enough = max(evidence.rules.accept_score + float(np.log(evidence.samples)), least / level)
-    leftovers = [x for x in scan_leftovers(evidence, base, splines)[:2] if x.gain > enough]
+    leftovers = [x for x in fit_residual_splines(evidence, base, splines)[:2] if x.gain > enough]
     if not leftovers:
         return None
-    held_out = misfit_by_run(evidence.held_out, base)
+    held_out = compute_misfit_by_run(evidence.held_out, base)
     judged = [
         judge_hypothesis(evidence, base, held_out, h)
         for x in leftovers
-        for h in form_hypotheses(x, evidence.samples)
+        for h in make_form_hypotheses(x, evidence.samples)
     ]
     return relinearise_candidate(evidence, base, max(judged, key=lambda c: c.score))[1]
 
 
-def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found, Found, Candidate | None]:
+def search_library_and_forms(
+    evidence: Evidence, null: Fit, reasons: list[str]
+) -> tuple[SearchState, SearchState, Candidate | None]:
     """Scale the disturbances, then search library and forms under every gate.
 
     Parameters
@@ -137,19 +144,19 @@ def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found
     """
     if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
         evidence = differentiate_at(evidence, null, library=True)
-        null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
-    explored = search_library(Found(evidence=evidence, base=null), gated=False)
-    if inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
+        null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+    explored = search_library(SearchState(evidence=evidence, base=null), gated=False)
+    if compute_inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
         raise ForeignCarError
-    splines = spline_slopes(explored.evidence, explored.base)
+    splines = differentiate_by_splines(explored.evidence, explored.base)
     scales = scale_disturbances(explored, splines)
     evidence = rescale_disturbances(evidence, scales)
     explored = replace(
         explored,
         rounds=tuple(replace(r, evidence=rescale_disturbances(r.evidence, scales)) for r in explored.rounds),
     )
-    null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
-    start = Found(evidence=evidence, base=null)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+    start = SearchState(evidence=evidence, base=null)
     found = search_library(start, gated=True, explored=explored)
     if not found.rounds:
         found = replace(find_retune(start, reasons), tried=found.tried)

@@ -21,11 +21,11 @@ def find_reached_range(
     slots : forms found
     variable : one of `VARIABLES`
     """
-    values = [_history(model, theta, slots, variable) for model in models]
+    values = [_simulate_variable(model, theta, slots, variable) for model in models]
     return float(min(v.min() for v in values)), float(max(v.max() for v in values))
 
 
-def _history(
+def _simulate_variable(
     model: RunModel, theta: NDArray[np.float64], slots: tuple[Slot, ...], variable: str
 ) -> NDArray[np.float64]:
     if variable == "time":

@@ -9,13 +9,13 @@ from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fit
-from tasks.identification.inference.forward import predict
-from tasks.identification.inference.hypothesis import compose
+from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 
-def held_out_error(
+def compute_held_out_errors(
     evidence: Evidence, null: Fit, base: Fit
 ) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
     """RMSE on held-out runs under the frozen, the re-tuned and the grown model.
@@ -31,19 +31,19 @@ def held_out_error(
     Errors by channel; and of stopping distance and peak pitch, over the runs that brake.
     """
     rules = evidence.rules
-    retuned = fit(
+    retuned = fit_hypotheses(
         evidence.train, (), rules.retune_widening * evidence.session_sigma, session=null.session, iterations=8
     )
     models = (
         (np.zeros(len(EFFECT_TABLE)), ()),
-        compose((), np.empty(0), retuned.session),
-        compose(base.parts, base.values, base.session),
+        compose_parameters((), np.empty(0), retuned.session),
+        compose_parameters(base.parts, base.values, base.session),
     )
     names, square, braked, manoeuvres = [], [], [], []
     measured = np.isfinite(evidence.train[0].sigma)
     for run in evidence.held_out:
         model = run.model
-        y = np.array([predict(model, theta, slots=slots) for theta, slots in models])
+        y = np.array([predict_channels(model, theta, slots=slots) for theta, slots in models])
         names.append(model.run.name)
         square.append(np.mean((model.measured - y) ** 2, axis=1))
         pressure = model.run.pressure[: model.samples]

@@ -10,7 +10,7 @@ from scipy.stats import t as student
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fit
+from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.linearisation import differentiate_at
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -37,8 +37,8 @@ def refit_named(
     """
     here = differentiate_at(evidence, base, library=False)
 
-    def again(fitted: Fit) -> Fit:
-        return fit(
+    def refit_here(fitted: Fit) -> Fit:
+        return fit_hypotheses(
             here.train,
             fitted.parts,
             here.session_sigma,
@@ -47,15 +47,15 @@ def refit_named(
             iterations=8,
         )
 
-    return here, again(base), [replace(c, fitted=again(c.fitted)) for c in candidates]
+    return here, refit_here(base), [replace(c, fitted=refit_here(c.fitted)) for c in candidates]
 
 
-def student_quantile(candidate: Candidate) -> float:
+def compute_student_quantile(candidate: Candidate) -> float:
     """Student's t with as many runs as inform the parameter, less one: the runs' scatter is itself estimated."""
     return float(student.ppf(0.975, max(candidate.informed - 1, 1)))
 
 
-def curvature_interval(candidate: Candidate) -> Bounds:
+def compute_curvature_interval(candidate: Candidate) -> Bounds:
     """Intervals from the curvature at the estimate, widened by the runs' disagreement, cut at the bounds.
 
     Parameters
@@ -72,11 +72,11 @@ def curvature_interval(candidate: Candidate) -> Bounds:
     variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation
     # the session's own tolerance of the same number belongs to the car's
     tolerance = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
-    reach = np.sqrt(variance + np.square(tolerance)) * student_quantile(candidate)
+    reach = np.sqrt(variance + np.square(tolerance)) * compute_student_quantile(candidate)
     return np.clip(values - reach, h.lower, h.upper), np.clip(values + reach, h.lower, h.upper)
 
 
-def profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
+def compute_profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
     """Intervals of an effect of several parameters from its profile likelihood.
 
     A value belongs to the interval where the best fit that holds it is worse by less than t^2 times the inflation
@@ -93,12 +93,12 @@ def profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
     -------
     Lower and upper ends, float64 [K] each.
     """
-    low, high = curvature_interval(candidate)
+    low, high = compute_curvature_interval(candidate)
     k = len(candidate.hypothesis.names)
     if k == 1:
         return low, high
     fitted = candidate.fitted
-    centre = fit(
+    centre = fit_hypotheses(
         evidence.train, fitted.parts, evidence.session_sigma, values=fitted.values, session=fitted.session,
         iterations=4,
     )  # fmt: skip
@@ -114,21 +114,21 @@ def _find_limit(
 ) -> float:
     """Where the profile's root deviance reaches the quantile between the estimate and a bound, by false position."""
     k = len(candidate.hypothesis.names)
-    wanted = student_quantile(candidate)
+    wanted = compute_student_quantile(candidate)
     inside, outside = float(centre.values[place - k]), float(bound)
     if inside == outside:
         return outside
 
-    def root(x: float) -> float:
+    def compute_root_deviance(x: float) -> float:
         rise = _fit_pinned(centre, evidence, place - k, x).objective - centre.objective
         return float(np.sqrt(max(rise, 0.0) / candidate.inflation))
 
-    at_inside, at_outside = 0.0, root(outside)
+    at_inside, at_outside = 0.0, compute_root_deviance(outside)
     if at_outside <= wanted:
         return outside
     x = guess if min(inside, outside) < guess < max(inside, outside) else 0.5 * (inside + outside)
     for _ in range(evidence.rules.profile_points):
-        here = root(x)
+        here = compute_root_deviance(x)
         if abs(here - wanted) < evidence.rules.profile_tolerance * wanted:
             return x
         if here < wanted:
@@ -152,7 +152,7 @@ def _fit_pinned(centre: Fit, evidence: Evidence, place: int, value: float) -> Fi
     k = len(last.names)
     start[-k:] = np.clip(start[-k:], lower, upper)
     pinned = (*centre.parts[:-1], replace(last, lower=lower, upper=upper))
-    return fit(
+    return fit_hypotheses(
         evidence.train, pinned, evidence.session_sigma, values=start, session=centre.session,
         iterations=4,
     )  # fmt: skip

@@ -7,20 +7,20 @@ import numpy as np
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (  # fmt: skip
     Candidate,
-    bootstrap_win_share,
+    compute_win_share,
     is_nested,
     judge_hypothesis,
     refine_candidates,
-    refit_without,
+    refit_without_part,
 )
-from tasks.identification.decision.screening import inflation
+from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.search import Round
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compared:
+class RivalComparison:
     """An accepted effect beside all else that was tried in its place.
 
     Parameters
@@ -37,7 +37,7 @@ class Compared:
     near: tuple[tuple[Candidate, float], ...]
 
 
-def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Compared]:
+def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[RivalComparison]:
     """Hold every accepted effect against its alternatives, all other accepted ones present.
 
     Parameters
@@ -51,14 +51,14 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
         rest, own, tried = found.base, found.accepted, found.tried
         if i + 1 < len(rounds):
             # what was accepted later may change how this effect compares with its rivals
-            rest = refit_without(base, i, evidence)
+            rest = refit_without_part(base, i, evidence)
             at = sum(len(p.names) for p in base.parts[:i])
             part = replace(base.parts[i], start=base.values[at : at + len(base.parts[i].names)])
-            own = judge_hypothesis(evidence, rest, misfit_by_run(evidence.held_out, rest), part)
+            own = judge_hypothesis(evidence, rest, compute_misfit_by_run(evidence.held_out, rest), part)
             tried = tuple(refine_candidates(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
-        share = bootstrap_win_share([own, *others], rest)
-        shares = [bootstrap_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
+        share = compute_win_share([own, *others], rest)
+        shares = [compute_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
         near = tuple(
             (c, wins)
             for c, wins in zip(others, shares, strict=True)
@@ -68,7 +68,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             and _is_credible(c, own, evidence)
         )
         compared.append(
-            Compared(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
+            RivalComparison(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
         )
     return compared
 
@@ -103,7 +103,7 @@ def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:
     evidence : the runs
     base : fit without effects
     """
-    level = inflation(evidence, base, None)
+    level = compute_inflation(evidence, base, None)
     library = np.zeros((len(evidence.effects),) * 2)
     cross = np.zeros((len(evidence.effects), len(SESSION)))
     session = np.diag(1.0 / np.square(evidence.session_sigma))

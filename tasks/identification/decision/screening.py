@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.evidence import second_values
+from tasks.identification.inference.evidence import list_second_values
 from tasks.identification.inference.fit import Fit
 
 
-def screen(
+def screen_library(
     evidence: Evidence, at: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Gain and estimate of every library effect, linearly, beyond the accepted ones.
@@ -25,16 +25,16 @@ def screen(
     """
     effects = evidence.effects
     accepted = [j for j, e in enumerate(effects) if e.name in {p.name for p in at.parts}]
-    tried = [(j, np.nan) for j in range(len(effects))] + second_values(effects)
+    tried = [(j, np.nan) for j in range(len(effects))] + list_second_values(effects)
     library, n_session = len(tried), len(evidence.session_sigma)
     gram, right = np.zeros((library + n_session,) * 2), np.zeros(library + n_session)
-    several = bool(second_values(effects))
+    several = bool(list_second_values(effects))
     for run, r in zip(evidence.train, at.residuals, strict=True):
         extra, extra_q = ((run.others,), (run.others_q,)) if several else ((), ())
         b = np.column_stack((run.library, *extra, run.session))
         q = np.column_stack((run.library_q, *extra_q, run.session_q))
         gram += b.T @ b - q.T @ q
-        right += b.T @ r - q.T @ run.project(r)
+        right += b.T @ r - q.T @ run.project_on_nuisances(r)
     others = [*accepted, *range(library, library + n_session)]
     precision = np.concatenate((np.zeros(len(accepted)), 1.0 / np.square(evidence.session_sigma)))
     right[library:] -= at.session / np.square(evidence.session_sigma)
@@ -58,7 +58,7 @@ def screen(
     return gains, estimates, seconds
 
 
-def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> float:
+def compute_inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> float:
     """How much the runs disagree beyond their noise about one direction and about the library's in general.
 
     Under a right model every run's score z in any direction is standard normal. Q is the sum of z^2 over runs
@@ -73,7 +73,7 @@ def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> f
     """
     z = np.full((len(evidence.train), len(evidence.effects)), np.nan)
     for i, (run, r) in enumerate(zip(evidence.train, at.residuals, strict=True)):
-        q, qr = run.library_q, run.project(r)
+        q, qr = run.library_q, run.project_on_nuisances(r)
         information = np.einsum("ij,ij->j", run.library, run.library) - np.einsum("ij,ij->j", q, q)
         alive = information * np.array([e.parameters[0].step for e in evidence.effects]) ** 2 > 0.05
         z[i, alive] = ((run.library.T @ r - q.T @ qr) / np.sqrt(np.maximum(information, 1e-30)))[alive]
@@ -85,7 +85,7 @@ def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> f
     return max(level, (float(np.sum(own**2)) + 6.0 * level) / (len(own) - 1 + 6.0))
 
 
-def look_alikes(evidence: Evidence, index: int) -> list[int]:
+def find_look_alikes(evidence: Evidence, index: int) -> list[int]:
     """Library effects that the runs can hardly tell from one of them, the most alike first.
 
     Parameters

@@ -16,9 +16,13 @@ from tasks.identification.decision.attribution import (
 from tasks.identification.decision.forms import RIDGE
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.fit import Fit, fit, misfit_by_run, sum_misfit_falls
-from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import differentiate_at, fit_disturbance, whitened_residuals
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses, sum_misfit_falls
+from tasks.identification.inference.hypothesis import make_library_hypothesis
+from tasks.identification.inference.linearisation import (
+    compute_whitened_residuals,
+    differentiate_at,
+    fit_disturbance,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +39,7 @@ class Round:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class SearchState:
     """State of the search.
 
     Parameters
@@ -75,18 +79,18 @@ def relinearise_candidate(
     for _ in range(2):
         here = known or differentiate_at(here, fitted, library=True)
         known = None
-        again = fit(
+        again = fit_hypotheses(
             here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
         )  # fmt: skip
         shift = np.abs(again.values - fitted.values) / np.maximum(np.abs(again.values), 1e-9)
         fitted = again
         if np.all(shift < evidence.rules.relinearisation_change):
             break
-    base_held_out = misfit_by_run(evidence.held_out, base) if gated else None
+    base_held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None
     return here, assess_fit(here, base, base_held_out, candidate.hypothesis, fitted)
 
 
-def search_library(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
+def search_library(start: SearchState, *, gated: bool, explored: SearchState | None = None) -> SearchState:
     """Add library effects one by one, the best first.
 
     Parameters
@@ -122,13 +126,13 @@ def search_library(start: Found, *, gated: bool, explored: Found | None = None) 
         best = simpler[0] if simpler else best
         here = places.get(best.hypothesis.name, state.evidence)
         if gated and here is not state.evidence:
-            held_out = misfit_by_run(state.evidence.held_out, state.base)
+            held_out = compute_misfit_by_run(state.evidence.held_out, state.base)
             tried = [
                 c if c.score < 0.3 * best.score or c.hypothesis.name in places
                 else judge_hypothesis(here, state.base, held_out, c.hypothesis)
                 for c in tried
             ]  # fmt: skip
-        state = Found(
+        state = SearchState(
             evidence=here,
             base=best.fitted,
             rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best, evidence=here)),
@@ -136,7 +140,7 @@ def search_library(start: Found, *, gated: bool, explored: Found | None = None) 
     return state
 
 
-def _recall_candidate(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
+def _recall_candidate(explored: SearchState, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
     """The candidate at the values that an earlier search settled it at, and its derivatives there."""
     k = len(candidate.hypothesis.names)
     for earlier in explored.rounds:
@@ -151,7 +155,7 @@ def _recall_candidate(explored: Found, candidate: Candidate) -> tuple[Candidate,
     return candidate, None
 
 
-def scale_disturbances(explored: Found, splines: tuple[NDArray[np.float64], ...]) -> Disturbance:
+def scale_disturbances(explored: SearchState, splines: tuple[NDArray[np.float64], ...]) -> Disturbance:
     """Scales of the disturbances beside whatever explains the runs best.
 
     A large effect that is not yet named would otherwise pass for a disturbance, which then hides it.
@@ -159,16 +163,16 @@ def scale_disturbances(explored: Found, splines: tuple[NDArray[np.float64], ...]
     Parameters
     ----------
     explored : an ungated search under a first guess of the scales
-    splines : `spline_slopes` there
+    splines : `differentiate_by_splines` there
     """
-    residuals = whitened_residuals(explored.evidence, explored.base)
+    residuals = compute_whitened_residuals(explored.evidence, explored.base)
     here = explored.evidence
     return fit_disturbance(
         here.train, residuals, here.tolerances, here.effects, here.disturbance, splines, RIDGE
     )
 
 
-def find_retune(start: Found, reasons: list[str]) -> Found:
+def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
     """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session.
 
     Parameters
@@ -186,11 +190,11 @@ def find_retune(start: Found, reasons: list[str]) -> Found:
         )
         frozen = null.session.copy()
         frozen[place] = 0.0
-        held_out = misfit_by_run(evidence.held_out, replace(null, session=frozen))
+        held_out = compute_misfit_by_run(evidence.held_out, replace(null, session=frozen))
         found = judge_hypothesis(
-            evidence, null, held_out, library_hypothesis(effect, float(null.session[place]))
+            evidence, null, held_out, make_library_hypothesis(effect, float(null.session[place]))
         )
-        gained = sum_misfit_falls(held_out, misfit_by_run(evidence.held_out, found.fitted))
+        gained = sum_misfit_falls(held_out, compute_misfit_by_run(evidence.held_out, found.fitted))
         judged.append(replace(found, held_out_gain=gained / found.inflation))
     accepted = [c for c in judged if c.held_out_gain > evidence.rules.held_out_gain and c.gain > 0.0]
     if not accepted:

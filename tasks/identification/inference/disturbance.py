@@ -27,7 +27,7 @@ class Disturbance:
     time: tuple[float, float, float] = (1.0, 0.25, 0.2)
 
 
-def prior_precision(
+def compute_prior_precision(
     knots: tuple[int, ...], tolerances: Tolerances, disturbance: Disturbance
 ) -> tuple[NDArray[np.float64], float]:
     """Precision of a run's offsets and knots (first-order Gauss-Markov processes) and its log determinant."""

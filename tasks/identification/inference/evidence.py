@@ -18,16 +18,16 @@ from tasks.identification.inference.disturbance import (
     KNOT_SPACING,
     N_OFFSETS,
     Disturbance,
-    prior_precision,
+    compute_prior_precision,
 )
 from tasks.identification.inference.forward import (
     RunModel,
-    instrument_readings,
-    predict,
+    compute_instrument_readings,
+    compute_starting_speed,
+    predict_channels,
     simulate_run,
-    starting_speed,
 )
-from tasks.identification.inference.noise import whiten
+from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX
@@ -53,7 +53,7 @@ class RunEvidence:
     information : float64 [D, D] nuisance' nuisance
     session : float64 [M, 7] derivatives by the session's nuisances
     library : float64 [M, E] derivatives by the first parameter of every library effect
-    others : float64 [M, X] the same with the second parameter at `second_values`
+    others : float64 [M, X] the same with the second parameter at `list_second_values`
     factor : Cholesky factor (lower) of information + prior precision
     session_q : float64 [D, 7] factor^-1 nuisance' session
     library_q, others_q : float64 [D, E], [D, X] factor^-1 nuisance' library, and others
@@ -73,7 +73,7 @@ class RunEvidence:
     library_q: NDArray[np.float64]
     others_q: NDArray[np.float64]
 
-    def residual(
+    def compute_residual(
         self,
         theta: NDArray[np.float64],
         slots: tuple[Slot, ...] = (),
@@ -86,10 +86,10 @@ class RunEvidence:
         in them, as on a road feature that is reached a moment later.
         """
         if offsets is None:
-            y = predict(self.model, theta, slots=slots)
+            y = predict_channels(self.model, theta, slots=slots)
             if not np.isfinite(y).all():
                 return np.full(len(self.nuisance), BROKEN)
-            return whiten(self.model.measured - y, self.rho, self.sigma)
+            return whiten_channels(self.model.measured - y, self.rho, self.sigma)
         moved = theta.copy()
         moved[PARAMETER_INDEX["friction"]] += offsets[1]
         at = N_OFFSETS
@@ -100,25 +100,30 @@ class RunEvidence:
                 ),
             )
             at += count
-        speed = starting_speed(self.model, theta) + offsets[0]
+        speed = compute_starting_speed(self.model, theta) + offsets[0]
         simulated = simulate_run(self.model, moved, slots=slots, initial_speed=speed)
-        y = instrument_readings(self.model, moved, simulated)
+        y = compute_instrument_readings(self.model, moved, simulated)
         if not np.isfinite(y).all():
             return np.full(len(self.nuisance), BROKEN)
         y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
         y[:, CHANNELS.index("pitch")] += offsets[3]
-        return whiten(self.model.measured - y, self.rho, self.sigma) + self.nuisance @ offsets
+        return whiten_channels(self.model.measured - y, self.rho, self.sigma) + self.nuisance @ offsets
 
-    def offsets(self, projected: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Posterior mean of the run's offsets and disturbance knots given a residual's `project`, float64 [D]."""
+    def estimate_offsets(self, projected: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the posterior mean of the run's offsets and disturbance knots, float64 [D].
+
+        Parameters
+        ----------
+        projected : float64 [D] a residual's `project_on_nuisances`
+        """
         return solve_triangular(self.factor, projected, lower=True, trans="T", check_finite=False)
 
-    def project(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def project_on_nuisances(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """factor^-1 nuisance' x: what the nuisances can take from x."""
         return solve_triangular(self.factor, self.nuisance.T @ x, lower=True, check_finite=False)
 
 
-def run_evidence(
+def differentiate_run(
     model: RunModel,
     rho: NDArray[np.float64],
     sigma: NDArray[np.float64],
@@ -141,17 +146,17 @@ def run_evidence(
     slots : forms that belong to the base point
     """
     simulated = simulate_run(model, base, slots=slots, keep_states=True)
-    y = instrument_readings(model, base, simulated)
+    y = compute_instrument_readings(model, base, simulated)
 
-    def slope(
+    def differentiate(
         theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
     ) -> NDArray[np.float64]:
         moved = simulate_run(model, theta, slots=(*slots, *extra), **options)
-        return (instrument_readings(model, theta, moved) - y) / step
+        return (compute_instrument_readings(model, theta, moved) - y) / step
 
     columns = [
-        slope(base, 0.02, initial_speed=starting_speed(model, base) + 0.02),
-        slope(_shifted_vector(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
+        differentiate(base, 0.02, initial_speed=compute_starting_speed(model, base) + 0.02),
+        differentiate(_shift_parameter(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
     ]
     for name in ("longitudinal_acceleration", "pitch"):
         offset = np.zeros_like(y)
@@ -171,9 +176,9 @@ def run_evidence(
                 spacing=spacing,
                 values=np.array([0.0, step, 0.0]),
             )
-            columns.append(slope(base, step, (slot,), branch=(first, simulated)))
+            columns.append(differentiate(base, step, (slot,), branch=(first, simulated)))
     session = [
-        slope(_shifted_vector(base, i, 0.5 * s), 0.5 * s)
+        differentiate(_shift_parameter(base, i, 0.5 * s), 0.5 * s)
         for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
     ]
     library, others = [], []
@@ -183,8 +188,8 @@ def run_evidence(
         if base[leading.index] == 0.0:
             for parameter in effect.parameters[1:]:
                 theta[parameter.index] = parameter.start
-        library.append(slope(_shifted_vector(theta, leading.index, leading.step), leading.step))
-    for place, value in second_values(effects):
+        library.append(differentiate(_shift_parameter(theta, leading.index, leading.step), leading.step))
+    for place, value in list_second_values(effects):
         leading, second = effects[place].parameters
         theta = base.copy()
         theta[second.index] = value
@@ -193,10 +198,10 @@ def run_evidence(
         others.append(
             np.zeros_like(y)
             if there
-            else slope(_shifted_vector(theta, leading.index, leading.step), leading.step)
+            else differentiate(_shift_parameter(theta, leading.index, leading.step), leading.step)
         )
     library, others = library or [np.zeros_like(y)], others or [np.zeros_like(y)]
-    nuisance = whiten(np.stack(columns, axis=-1), rho, sigma)
+    nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma)
     evidence = RunEvidence(
         model=model,
         rho=rho,
@@ -204,29 +209,33 @@ def run_evidence(
         nuisance=nuisance,
         knots=tuple(knots),
         information=nuisance.T @ nuisance,
-        session=whiten(np.stack(session, axis=-1), rho, sigma),
-        library=whiten(np.stack(library, axis=-1), rho, sigma),
-        others=whiten(np.stack(others, axis=-1), rho, sigma),
+        session=whiten_channels(np.stack(session, axis=-1), rho, sigma),
+        library=whiten_channels(np.stack(library, axis=-1), rho, sigma),
+        others=whiten_channels(np.stack(others, axis=-1), rho, sigma),
         factor=np.empty(0),
         session_q=np.empty(0),
         library_q=np.empty(0),
         others_q=np.empty(0),
     )
-    return with_disturbance(evidence, tolerances, disturbance)
+    return set_disturbance_prior(evidence, tolerances, disturbance)
 
 
-def with_disturbance(evidence: RunEvidence, tolerances: Tolerances, disturbance: Disturbance) -> RunEvidence:
+def set_disturbance_prior(
+    evidence: RunEvidence, tolerances: Tolerances, disturbance: Disturbance
+) -> RunEvidence:
     """The same run under another prior of the disturbances."""
-    precision = prior_precision(evidence.knots, tolerances, disturbance)[0]
+    precision = compute_prior_precision(evidence.knots, tolerances, disturbance)[0]
     factor = cholesky(evidence.information + precision, lower=True, check_finite=False)
     changed = replace(evidence, factor=factor)
     return replace(
-        changed, session_q=changed.project(changed.session), library_q=changed.project(changed.library),
-        others_q=changed.project(changed.others),
-    )  # fmt: skip
+        changed,
+        session_q=changed.project_on_nuisances(changed.session),
+        library_q=changed.project_on_nuisances(changed.library),
+        others_q=changed.project_on_nuisances(changed.others),
+    )
 
 
-def second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
+def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
     """Places of the effects with a second parameter, and the values at which the screen tries it.
 
     Parameters
@@ -241,7 +250,7 @@ def second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
     ]
 
 
-def _shifted_vector(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
+def _shift_parameter(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
     moved = theta.copy()
     moved[index] += step
     return moved

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
 from tasks.identification.inference.evidence import SESSION_INDEX, RunEvidence
-from tasks.identification.inference.hypothesis import Hypothesis, compose
+from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
 from tasks.identification.inference.linearisation_points import (
     LinearisedRun,
+    collect_misfits,
     linearise_at,
     linearise_runs,
-    misfits,
     move_linearisation_points,
 )
 
@@ -68,7 +68,7 @@ class Fit:
         return bool(np.any(touching & (first.astype(bool) | (self.values != 0.0))))
 
 
-def fit(
+def fit_hypotheses(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     session_sigma: NDArray[np.float64],
@@ -104,7 +104,7 @@ def fit(
         if offsets is None
         else linearise_at(evidence, parts, x, s, offsets)
     )
-    objective = _total_misfit(points, prior, s)
+    objective = _compute_total_misfit(points, prior, s)
     slopes: list[Slopes] = []
     normal = np.eye(k + len(s))
     blind, fell, foreseen = False, np.inf, np.inf
@@ -114,7 +114,9 @@ def fit(
             or (k and np.isfinite(fell) and abs(fell - foreseen) > MISSED * foreseen + 1.0)
             or blind
         ):
-            slopes = _slopes(evidence, parts, x, s, np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps)
+            slopes = _differentiate_runs(
+                evidence, parts, x, s, np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps
+            )
             normal = np.diag(np.concatenate((np.zeros(k), prior)))
             for columns, q in slopes:
                 normal += columns.T @ columns - q.T @ q
@@ -123,14 +125,14 @@ def fit(
         right = np.concatenate((np.zeros(k), -prior * s))
         for point, (columns, q) in zip(points, slopes, strict=True):
             right += columns.T @ point.residual - q.T @ point.projected
-        move = _gauss_newton_step(normal, right, x, lower, upper)
+        move = _compute_gauss_newton_step(normal, right, x, lower, upper)
         foreseen = float(move @ right)
         if foreseen < 0.1 and abs(fell) < 3.0:
             break
         before = objective
         # parameters and each run's own offsets move together; where that does not help, one after the other
         ahead = tuple(
-            run.offsets(point.projected - q @ move)
+            run.estimate_offsets(point.projected - q @ move)
             for run, point, (_, q) in zip(evidence, points, slopes, strict=True)
         )
         for share, together in TRIALS:
@@ -140,14 +142,14 @@ def fit(
                 for point, d in zip(points, ahead, strict=True)
             )
             trial = linearise_at(evidence, parts, x_try, s_try, own)
-            better = _total_misfit(trial, prior, s_try) < objective
+            better = _compute_total_misfit(trial, prior, s_try) < objective
             if better or foreseen < 0.1:
                 break
         if not better:
             break
         x, s = x_try, s_try
         points = trial if together else move_linearisation_points(evidence, parts, x, s, trial)
-        objective = _total_misfit(points, prior, s)
+        objective = _compute_total_misfit(points, prior, s)
         fell = before - objective
         if abs(fell) < 0.3 and foreseen < 0.5:
             break
@@ -157,12 +159,12 @@ def fit(
     covariance = np.asarray(inverse[:k, :k], dtype=np.float64)
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
-        by_run=misfits(points), covariance=covariance,
+        by_run=collect_misfits(points), covariance=covariance,
         residuals=tuple(point.residual for point in points), offsets=tuple(point.offsets for point in points),
     )  # fmt: skip
 
 
-def _slopes(
+def _differentiate_runs(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
@@ -176,20 +178,25 @@ def _slopes(
     times too large.
     """
     slopes = []
-    there = compose(parts, x, s)
-    moved = [compose(parts, x + step * unit, s) for step, unit in zip(steps, np.eye(len(x)), strict=True)]
+    there = compose_parameters(parts, x, s)
+    moved = [
+        compose_parameters(parts, x + step * unit, s)
+        for step, unit in zip(steps, np.eye(len(x)), strict=True)
+    ]
     for run in evidence:
         if not moved:
             slopes.append((run.session, run.session_q))
             continue
-        r = run.residual(*there)
-        a = [(r - run.residual(*far)) / step for far, step in zip(moved, steps, strict=True)]
+        r = run.compute_residual(*there)
+        a = [(r - run.compute_residual(*far)) / step for far, step in zip(moved, steps, strict=True)]
         columns = np.column_stack((*a, run.session))
-        slopes.append((columns, np.column_stack((run.project(columns[:, : len(x)]), run.session_q))))
+        slopes.append(
+            (columns, np.column_stack((run.project_on_nuisances(columns[:, : len(x)]), run.session_q)))
+        )
     return slopes
 
 
-def _gauss_newton_step(
+def _compute_gauss_newton_step(
     normal: NDArray[np.float64],
     right: NDArray[np.float64],
     x: NDArray[np.float64],
@@ -211,12 +218,12 @@ def _gauss_newton_step(
     return move
 
 
-def misfit_by_run(
+def compute_misfit_by_run(
     evidence: tuple[RunEvidence, ...], fitted: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Marginalised misfit of runs under a fit made on other runs, and how far it is from settled; float64 [R]."""
     points = linearise_runs(evidence, fitted.parts, fitted.values, fitted.session)
-    return misfits(points), np.array([point.linearisation_error for point in points])
+    return collect_misfits(points), np.array([point.linearisation_error for point in points])
 
 
 def sum_misfit_falls(
@@ -227,13 +234,13 @@ def sum_misfit_falls(
 
     Parameters
     ----------
-    before, after : of `misfit_by_run`
+    before, after : of `compute_misfit_by_run`
     """
     change = before[0] - after[0]
     return float(np.sum(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0)))
 
 
-def _total_misfit(
+def _compute_total_misfit(
     points: tuple[LinearisedRun, ...], prior: NDArray[np.float64], session: NDArray[np.float64]
 ) -> float:
-    return float(misfits(points).sum() + np.sum(prior * session**2))
+    return float(collect_misfits(points).sum() + np.sum(prior * session**2))

@@ -13,11 +13,11 @@ from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.slots import Slot
-from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, named_values
-from tasks.vehicle.model.brake_input import measured_trace
+from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, unpack_parameter_vector
+from tasks.vehicle.model.brake_input import make_trace_input
 from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import Simulation, simulate
-from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 MASKED_SPEED = 2.0
 """Below it the slip's denominator is not force-consistent: runs end there [m/s]."""
@@ -59,7 +59,7 @@ class RunModel:
         return self.run.response[: self.samples]
 
 
-def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunModel:
+def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunModel:
     """Return a run with its vehicle, its surface by the weather mapping, its road and its discs.
 
     Parameters
@@ -92,11 +92,11 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
         ),
         samples=int(slow[0]) if slow.size else len(speed),
         initial_speed=float(np.polyfit(np.arange(max(lead, 5)), speed[: max(lead, 5)], 1)[1]),
-        climb=_climb(run, vehicle),
+        climb=_compute_grade_force(run, vehicle),
     )
 
 
-def _climb(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
+def _compute_grade_force(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
     """Return the force of the measured slope over time, rearward positive [N]."""
     if run.road_slope is None:
         return ()
@@ -104,7 +104,7 @@ def _climb(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
     return (Slot(port="longitudinal_force", variable="time", origin=0.0, spacing=run.interval, values=force),)
 
 
-def starting_speed(model: RunModel, theta: NDArray[np.float64]) -> float:
+def compute_starting_speed(model: RunModel, theta: NDArray[np.float64]) -> float:
     """Return the speed at the first sample: the reading less its scale error [m/s].
 
     Parameters
@@ -137,18 +137,18 @@ def simulate_run(
     refinement : factor on the integration steps between samples
     keep_states : keep the states, from which other simulations can branch off
     """
-    values = named_values(theta)
+    values = unpack_parameter_vector(theta)
     car = apply_effects(model.vehicle, {n: v for n, v in values.items() if PARAMETERS[n].of_vehicle})
     first = branch[0] if branch else 0
     simulated = simulate(
         car,
-        surface_response(car, model.run.weather, model.surface_friction),
-        measured_trace(model.run.pressure, model.run.interval, model.run.drive_torque),
+        compute_surface_response(car, model.run.weather, model.surface_friction),
+        make_trace_input(model.run.pressure, model.run.interval, model.run.drive_torque),
         replace(model.conditions, grade=values.get("slope", 0.0)),
         samples=model.samples - first,
         substeps=refinement * model.substeps,
         interval=model.run.interval,
-        initial_speed=starting_speed(model, theta) if initial_speed is None else initial_speed,
+        initial_speed=compute_starting_speed(model, theta) if initial_speed is None else initial_speed,
         start=branch[1].states[first] if branch else None,
         slots=(*model.climb, *slots),
         keep_states=keep_states,
@@ -158,7 +158,7 @@ def simulate_run(
     return replace(simulated, history=np.concatenate((branch[1].history[:first], simulated.history)))
 
 
-def instrument_readings(
+def compute_instrument_readings(
     model: RunModel, theta: NDArray[np.float64], simulated: Simulation
 ) -> NDArray[np.float64]:
     """Channels as the instruments give them: gravity along a grade is felt, sensor effects applied.
@@ -218,8 +218,10 @@ def instrument_readings(
     return y
 
 
-def predict(
+def predict_channels(
     model: RunModel, theta: NDArray[np.float64], *, slots: tuple[Slot, ...] = (), refinement: int = 1
 ) -> NDArray[np.float64]:
     """Return the predicted channels of a run, float64 [samples, 7]; arguments as in `simulate_run`."""
-    return instrument_readings(model, theta, simulate_run(model, theta, slots=slots, refinement=refinement))
+    return compute_instrument_readings(
+        model, theta, simulate_run(model, theta, slots=slots, refinement=refinement)
+    )

@@ -41,11 +41,11 @@ class Hypothesis:
     build: Build
 
 
-def library_hypothesis(effect: Effect, start: float | None = None, second: float = np.nan) -> Hypothesis:
+def make_library_hypothesis(effect: Effect, start: float | None = None, second: float = np.nan) -> Hypothesis:
     """A library effect as a hypothesis; ``start`` and ``second`` replace the first values of its parameters."""
     indices = [p.index for p in effect.parameters]
 
-    def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+    def build_theta(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
         theta = np.zeros(len(EFFECT_TABLE))
         theta[indices] = values
         return theta, ()
@@ -66,11 +66,11 @@ def library_hypothesis(effect: Effect, start: float | None = None, second: float
         upper=np.array([p.upper for p in effect.parameters]),
         step=np.array([p.step for p in effect.parameters]),
         start=begin,
-        build=build,
+        build=build_theta,
     )
 
 
-def compose(
+def compose_parameters(
     parts: tuple[Hypothesis, ...], values: NDArray[np.float64], session: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
     """Full theta and slots of all parts together with the session's nuisances."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.hypothesis import Hypothesis, compose
+from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
 from tasks.vehicle.effects.slots import Slot
 
 SETTLING = 4
@@ -75,12 +75,12 @@ def move_linearisation_points(
     s : float64 [7] session nuisances
     points : where they are
     """
-    theta, slots = compose(parts, x, s)
+    theta, slots = compose_parameters(parts, x, s)
     after = list(points)
     for i, (run, point) in enumerate(zip(evidence, points, strict=True)):
         if point.linearisation_error < MISFIT_SETTLED:
             continue
-        move = run.offsets(point.projected) - point.offsets
+        move = run.estimate_offsets(point.projected) - point.offsets
         linearisation_error = np.inf
         for share in (1.0, 0.4):
             trial = _linearise_run(run, theta, slots, point.offsets + share * move)
@@ -110,21 +110,21 @@ def linearise_at(
     s : float64 [7] session nuisances
     offsets : float64 [D] of each run; None is 0 everywhere
     """
-    theta, slots = compose(parts, x, s)
+    theta, slots = compose_parameters(parts, x, s)
     return tuple(_linearise_run(run, theta, slots, d) for run, d in zip(evidence, offsets, strict=True))
 
 
 def _linearise_run(
     run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64] | None
 ) -> LinearisedRun:
-    residual = run.residual(theta, slots, offsets)
-    projected = run.project(residual)
+    residual = run.compute_residual(theta, slots, offsets)
+    projected = run.project_on_nuisances(residual)
     return LinearisedRun(
         offsets=np.zeros(run.nuisance.shape[1]) if offsets is None else offsets, residual=residual,
         projected=projected, misfit=float(residual @ residual - projected @ projected),
     )  # fmt: skip
 
 
-def misfits(points: tuple[LinearisedRun, ...]) -> NDArray[np.float64]:
+def collect_misfits(points: tuple[LinearisedRun, ...]) -> NDArray[np.float64]:
     """Marginalised misfit of each run, float64 [R]."""
     return np.array([point.misfit for point in points])

@@ -17,7 +17,7 @@ BEFORE_BRAKE, ON_HAZARD = 5, 40
 """Samples that the quiet stretch ends before the brake, and that it has at most where the road is not flat."""
 
 
-def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """AR(1) coefficient and standard deviation of every channel.
 
     The half variogram of AR(1) noise under a smooth motion is sigma^2 (1 - rho^k) + a k^2 at lag k; rho is
@@ -39,7 +39,7 @@ def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.f
         If a measured channel never changes, or the training runs are too short.
     """
     sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros(len(LAGS))
-    stretches = [run.response[: _quiet_samples(run)].copy() for run in campaign.train]
+    stretches = [run.response[: _count_quiet_samples(run)].copy() for run in campaign.train]
     if max(len(stretch) for stretch in stretches) <= 3 * LAGS[-1]:
         stretches = [run.response.copy() for run in campaign.train]
     for run, quiet in zip(campaign.train, stretches, strict=True):
@@ -51,8 +51,8 @@ def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.f
                 difference = quiet[lag:] - quiet[:-lag]
                 sums[i] += 0.5 * np.sum((difference - difference.mean(0)) ** 2, axis=0)
                 counts[i] += len(difference) - 1
-    floor = np.where(campaign.is_measured, _rounding_variance(campaign), np.inf)
-    problems = _problems(campaign, floor, max(len(stretch) for stretch in stretches))
+    floor = np.where(campaign.is_measured, _compute_rounding_variance(campaign), np.inf)
+    problems = _find_problems(campaign, floor, max(len(stretch) for stretch in stretches))
     if problems:
         raise InputError(problems)
     variogram = np.maximum(sums / counts[:, None], floor)
@@ -69,7 +69,7 @@ def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.f
     return rho, np.maximum(sigma, np.sqrt(floor))
 
 
-def _quiet_samples(run: Run) -> int:
+def _count_quiet_samples(run: Run) -> int:
     pressed = np.flatnonzero(run.pressure > QUIET_PRESSURE)
     end = int(pressed[0]) - BEFORE_BRAKE if pressed.size else len(run.pressure)
     if run.hazard_length > 0:
@@ -77,7 +77,7 @@ def _quiet_samples(run: Run) -> int:
     return max(end, 0)
 
 
-def _rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
+def _compute_rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
     """Variance of rounding to every channel's smallest step, float64 [7] [unit^2]; NaN where nothing changes."""
     values = np.concatenate([run.response for run in campaign.train])
     gaps = np.diff(np.sort(values, axis=0), axis=0)
@@ -87,7 +87,7 @@ def _rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
     return np.where(np.isfinite(steps), steps, np.nan) ** 2 / 12
 
 
-def _problems(campaign: Campaign, floor: NDArray[np.float64], longest: int) -> list[str]:
+def _find_problems(campaign: Campaign, floor: NDArray[np.float64], longest: int) -> list[str]:
     problems = [
         f"{campaign.name}: channel {CHANNELS[j]} must change; it holds one value in all training runs: record it anew"
         for j in np.flatnonzero(np.isnan(floor))
@@ -100,7 +100,7 @@ def _problems(campaign: Campaign, floor: NDArray[np.float64], longest: int) -> l
     return problems
 
 
-def whiten(
+def whiten_channels(
     x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Make AR(1) noise of unit variance white along the first axis and stack the channels.
@@ -108,7 +108,7 @@ def whiten(
     Parameters
     ----------
     x : float64 [N, 7] or [N, 7, P] residuals or derivatives [unit of the channel]
-    rho, sigma : float64 [7] from `channel_noise`
+    rho, sigma : float64 [7] from `estimate_channel_noise`
 
     Returns
     -------

@@ -7,7 +7,7 @@ from math import exp
 
 from numba import njit
 
-from tasks.vehicle.effects.equations import brake_factor
+from tasks.vehicle.effects.equations import compute_brake_factor
 from tasks.vehicle.effects.table import EffectValues
 
 DISC_CAPACITY_F, DISC_CAPACITY_R = 7400.0, 4600.0
@@ -17,7 +17,9 @@ DISC_COOLING = 30.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def line_after(line: float, before: float, after: float, step: float, effects: EffectValues) -> float:
+def compute_line_pressure(
+    line: float, before: float, after: float, step: float, effects: EffectValues
+) -> float:
     """Pressure at the pads one step on: first-order lag behind the command, exact for a linear one [MPa].
 
     Parameters
@@ -34,7 +36,7 @@ def line_after(line: float, before: float, after: float, step: float, effects: E
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def acting_pressure(line: float, speed: float, disc_rise: float, effects: EffectValues) -> float:
+def compute_acting_pressure(line: float, speed: float, disc_rise: float, effects: EffectValues) -> float:
     """Pressure that would give the same torque under the linear law of the paper [MPa].
 
     Parameters
@@ -44,11 +46,11 @@ def acting_pressure(line: float, speed: float, disc_rise: float, effects: Effect
     disc_rise : temperature of the discs above ambient [K]
     effects : the values
     """
-    return max(line - effects.push_out, 0.0) * brake_factor(effects, line, speed, disc_rise)
+    return max(line - effects.push_out, 0.0) * compute_brake_factor(effects, line, speed, disc_rise)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def disc_rate(disc_rise: float, power: float, capacity: float) -> float:
+def compute_disc_temperature_rate(disc_rise: float, power: float, capacity: float) -> float:
     """Rate of the temperature of an axle's discs above ambient [K/s].
 
     Parameters

@@ -5,15 +5,15 @@ from math import sqrt
 from numba import njit
 
 from tasks.vehicle.effects.table import EffectValues
-from tasks.vehicle.road import RoadFeature, height_at, slope_at
-from tasks.vehicle.tyres.contract import Tyre, tyre_friction, tyre_slope
+from tasks.vehicle.road import RoadFeature, compute_road_height, compute_road_slope
+from tasks.vehicle.tyres.contract import Tyre, compute_tyre_friction, compute_tyre_slope
 
 STICK_SLIP = 0.01
 """Slip over which a sticking tyre builds up its force; any value well below the curve's peak serves [1]."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def stick_share(speed: float, effects: EffectValues) -> float:
+def compute_stick_share(speed: float, effects: EffectValues) -> float:
     """Share of the tyre that sticks and slides instead of rolling: 1 at low speed, smoothly to 0 [1].
 
     Parameters
@@ -30,7 +30,9 @@ def stick_share(speed: float, effects: EffectValues) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def effective_friction(slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues) -> float:
+def compute_effective_friction(
+    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
+) -> float:
     """Friction of a tyre of which a share sticks, for a braking slip [1].
 
     Parameters
@@ -41,7 +43,7 @@ def effective_friction(slip: float, load: float, share: float, tyre: Tyre, effec
     tyre : on the surface
     effects : the values
     """
-    rolling = tyre_friction(slip, load, tyre)
+    rolling = compute_tyre_friction(slip, load, tyre)
     if share == 0.0:
         return rolling
     u = slip / STICK_SLIP
@@ -49,8 +51,10 @@ def effective_friction(slip: float, load: float, share: float, tyre: Tyre, effec
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def effective_slope(slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues) -> float:
-    """Rise of ``effective_friction`` with slip [1].
+def compute_effective_slope(
+    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
+) -> float:
+    """Rise of ``compute_effective_friction`` with slip [1].
 
     Parameters
     ----------
@@ -60,7 +64,7 @@ def effective_slope(slip: float, load: float, share: float, tyre: Tyre, effects:
     tyre : on the surface
     effects : the values
     """
-    rolling = tyre_slope(slip, load, tyre)
+    rolling = compute_tyre_slope(slip, load, tyre)
     if share == 0.0:
         return rolling
     u = slip / STICK_SLIP
@@ -70,7 +74,7 @@ def effective_slope(slip: float, load: float, share: float, tyre: Tyre, effects:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def footprint(station: float, road: RoadFeature, effects: EffectValues) -> tuple[float, float]:
+def average_over_footprint(station: float, road: RoadFeature, effects: EffectValues) -> tuple[float, float]:
     """Road height [m] and slope [m/m] that a tyre feels: their means over its footprint.
 
     The mean of the height is by Gauss's three points, that of the slope is exact.
@@ -83,15 +87,17 @@ def footprint(station: float, road: RoadFeature, effects: EffectValues) -> tuple
     """
     half = 0.5 * effects.enveloping_length
     if half <= 0.0:
-        return height_at(station, road), slope_at(station, road)
+        return compute_road_height(station, road), compute_road_slope(station, road)
     out = 0.7745966692414834 * half
-    ends = height_at(station - out, road) + height_at(station + out, road)
-    height = (5.0 * ends + 8.0 * height_at(station, road)) / 18.0
-    return height, (height_at(station + half, road) - height_at(station - half, road)) / (2.0 * half)
+    ends = compute_road_height(station - out, road) + compute_road_height(station + out, road)
+    height = (5.0 * ends + 8.0 * compute_road_height(station, road)) / 18.0
+    return height, (compute_road_height(station + half, road) - compute_road_height(station - half, road)) / (
+        2.0 * half
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def grip_reserve(friction: float, peak: float) -> float:
+def compute_lateral_reserve(friction: float, peak: float) -> float:
     """Sideways grip that a braking tyre has left, by the friction circle [1].
 
     Parameters
@@ -104,7 +110,9 @@ def grip_reserve(friction: float, peak: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def link_lift(tyre_force: float, transfer: float, anti: float, stick_anti: float, share: float) -> float:
+def compute_link_force(
+    tyre_force: float, transfer: float, anti: float, stick_anti: float, share: float
+) -> float:
     """Vertical force that an axle's links pass between body and wheel while it brakes [N].
 
     Parameters

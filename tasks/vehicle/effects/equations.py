@@ -13,7 +13,7 @@ COULOMB_SPEED = 0.01
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def resistance(effects: EffectValues, speed: float, direction: float, snow_depth_mm: float) -> float:
+def compute_resistance(effects: EffectValues, speed: float, direction: float, snow_depth_mm: float) -> float:
     """Force at the body against the motion [N]: air and ploughing, less the idle creep that drives.
 
     Parameters
@@ -35,7 +35,7 @@ def resistance(effects: EffectValues, speed: float, direction: float, snow_depth
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def brake_factor(effects: EffectValues, pressure: float, speed: float, disc_rise: float) -> float:
+def compute_brake_factor(effects: EffectValues, pressure: float, speed: float, disc_rise: float) -> float:
     """Pad friction and hydraulics as a factor on the linear law from pressure to torque [1].
 
     Parameters
@@ -52,7 +52,7 @@ def brake_factor(effects: EffectValues, pressure: float, speed: float, disc_rise
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def friction_factor(
+def compute_friction_factor(
     effects: EffectValues, speed: float, load_ratio: float, slip_energy: float, wet: float
 ) -> float:
     """Factor on the tyre's friction [1]: load, heat of sliding, water film and speed.
@@ -74,7 +74,9 @@ def friction_factor(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def strut_force(effects: EffectValues, stiffness: float, damping: float, travel: float, rate: float) -> float:
+def compute_strut_force(
+    effects: EffectValues, stiffness: float, damping: float, travel: float, rate: float
+) -> float:
     """Spring and damper force of one axle, positive in extension [N].
 
     Parameters

@@ -54,7 +54,7 @@ class Form:
     @property
     def name(self) -> str:
         """Port, shape and what x is."""
-        return form_name(self.port, self.variable, self.shape, self.scale)
+        return name_form(self.port, self.variable, self.shape, self.scale)
 
     @property
     def slot(self) -> Slot:
@@ -69,7 +69,7 @@ class Form:
         )
 
 
-def coefficient_count(shape: str) -> int:
+def count_coefficients(shape: str) -> int:
     """How many coefficients a shape has.
 
     Parameters
@@ -79,7 +79,7 @@ def coefficient_count(shape: str) -> int:
     return SHAPES[shape](np.zeros(1)).shape[1]
 
 
-def form_name(port: str, variable: str, shape: str, scale: float) -> str:
+def name_form(port: str, variable: str, shape: str, scale: float) -> str:
     """Return the name of a form: its port, its shape, and what x is.
 
     Parameters

@@ -44,7 +44,7 @@ class SlotTables(NamedTuple):
     tables: NDArray[np.float64]
 
 
-def slot_tables(slots: Sequence[Slot]) -> SlotTables:
+def pack_slots(slots: Sequence[Slot]) -> SlotTables:
     """Pack slots for the kernels.
 
     Parameters
@@ -62,7 +62,7 @@ def slot_tables(slots: Sequence[Slot]) -> SlotTables:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def table_value(table: NDArray[np.float64], origin: float, spacing: float, x: float) -> float:
+def interpolate_table(table: NDArray[np.float64], origin: float, spacing: float, x: float) -> float:
     """Value of a piecewise-linear table on a uniform grid, held constant beyond its ends [unit of the port].
 
     Parameters
@@ -82,7 +82,7 @@ def table_value(table: NDArray[np.float64], origin: float, spacing: float, x: fl
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def slot_sum(port: int, variables: tuple[float, ...], slots: SlotTables) -> float:
+def sum_slots(port: int, variables: tuple[float, ...], slots: SlotTables) -> float:
     """Sum of all slots at a port [unit of the port].
 
     Parameters
@@ -94,7 +94,7 @@ def slot_sum(port: int, variables: tuple[float, ...], slots: SlotTables) -> floa
     total = 0.0
     for k in range(slots.keys.shape[0]):
         if slots.keys[k, 0] == port:
-            total += table_value(
+            total += interpolate_table(
                 slots.tables[k], slots.grids[k, 0], slots.grids[k, 1], variables[slots.keys[k, 1]]
             )
     return total

@@ -80,14 +80,14 @@ class EffectParameter:
         return self.port not in ("road", "sensor")
 
 
-def _added(
+def _add_number(
     name: str, effect: str, unit: str, port: str, bounds: tuple[float, float], step: float, source: str,
     start: float = 0.0,
 ) -> EffectParameter:  # fmt: skip
     return EffectParameter(name, effect, unit, port, "added", (name,), bounds, step, source, start)
 
 
-def _changed(
+def _change_field(
     name: str, kind: Kind, fields: tuple[str, ...], bounds: tuple[float, float], step: float, *, unit: str = "1",
     effect: str = "", source: str = PAPER, port: str = "parameter",
 ) -> EffectParameter:  # fmt: skip
@@ -96,91 +96,93 @@ def _changed(
     )
 
 
-def _sensor(name: str, unit: str, bounds: tuple[float, float], step: float) -> EffectParameter:
-    return _added(name, name.replace("_", " "), unit, "sensor", bounds, step, ISO_15037)
+def _add_sensor(name: str, unit: str, bounds: tuple[float, float], step: float) -> EffectParameter:
+    return _add_number(name, name.replace("_", " "), unit, "sensor", bounds, step, ISO_15037)
 
 
 EFFECT_TABLE = (
     # numbers of the vehicle that may be off
-    _changed("pressure_gain", "scaled", ("brake_gain",), (-0.4, 0.4), 0.01),
-    _changed("mass", "scaled", ("sprung_mass",), (-0.3, 0.3), 0.01),
-    _added("pitch_gain", "brake-pitch gain", "1", "parameter", (-0.4, 0.4), 0.01, PAPER),
-    _changed("wheel_radius", "scaled", ("wheel_radius",), (-0.08, 0.08), 0.003),
-    _changed("damping", "scaled", ("suspension_damping_f", "suspension_damping_r"), (-0.6, 1.0), 0.02),
-    _changed("stiffness", "scaled", ("suspension_stiffness_f", "suspension_stiffness_r"), (-0.4, 0.6), 0.01),
-    _changed("friction", "scaled", ("families.efficiency",), (-0.4, 0.4), 0.01),
-    _changed("slip_stiffness", "scaled", ("families.slip_stiffness",), (-0.6, 1.5), 0.03),
-    _changed("front_bias", "shifted", ("front_brake_share",), (-0.2, 0.2), 0.01),
-    _changed(
+    _change_field("pressure_gain", "scaled", ("brake_gain",), (-0.4, 0.4), 0.01),
+    _change_field("mass", "scaled", ("sprung_mass",), (-0.3, 0.3), 0.01),
+    _add_number("pitch_gain", "brake-pitch gain", "1", "parameter", (-0.4, 0.4), 0.01, PAPER),
+    _change_field("wheel_radius", "scaled", ("wheel_radius",), (-0.08, 0.08), 0.003),
+    _change_field("damping", "scaled", ("suspension_damping_f", "suspension_damping_r"), (-0.6, 1.0), 0.02),
+    _change_field("stiffness", "scaled", ("suspension_stiffness_f", "suspension_stiffness_r"), (-0.4, 0.6), 0.01),
+    _change_field("friction", "scaled", ("families.efficiency",), (-0.4, 0.4), 0.01),
+    _change_field("slip_stiffness", "scaled", ("families.slip_stiffness",), (-0.6, 1.5), 0.03),
+    _change_field("front_bias", "shifted", ("front_brake_share",), (-0.2, 0.2), 0.01),
+    _change_field(
         "wheel_inertia", "shifted", ("wheel_inertia_f", "wheel_inertia_r"), (0.0, 20.0), 1.0, unit="kg m2",
         effect="rotating inertia", source=MITSCHKE, port="wheel",
     ),
-    _added("slope", "grade", "1", "road", (-0.08, 0.08), 0.001, PAPER),
+    _add_number("slope", "grade", "1", "road", (-0.08, 0.08), 0.001, PAPER),
     # forces along the road
-    _added("drag_area", "air drag", "m2", "longitudinal_force", (0.0, 3.0), 0.3, GILLESPIE),
-    _added("wind_speed", "wind", "m s-1", "longitudinal_force", (-15.0, 15.0), 2.0, GILLESPIE),
-    _added("rolling_coefficient", "rolling resistance", "1", "longitudinal_force", (0.0, 0.06), 0.004, GILLESPIE),
-    _added("rolling_speed", "rolling resistance by speed", "s m-1", "longitudinal_force", (0.0, 0.003), 0.0002,
-           GILLESPIE),
-    _added("ploughing", "snow ploughing", "N mm-1", "longitudinal_force", (0.0, 100.0), 5.0, SHOOP),
-    _added("creep_force", "idle creep", "N", "longitudinal_force", (0.0, 2500.0), 100.0, MITSCHKE),
-    _added("creep_speed", "idle creep", "m s-1", "longitudinal_force", (1.5, 12.0), 0.5, MITSCHKE, 4.0),
+    _add_number("drag_area", "air drag", "m2", "longitudinal_force", (0.0, 3.0), 0.3, GILLESPIE),
+    _add_number("wind_speed", "wind", "m s-1", "longitudinal_force", (-15.0, 15.0), 2.0, GILLESPIE),
+    _add_number("rolling_coefficient", "rolling resistance", "1", "longitudinal_force", (0.0, 0.06), 0.004, GILLESPIE),
+    _add_number("rolling_speed", "rolling resistance by speed", "s m-1", "longitudinal_force", (0.0, 0.003), 0.0002,
+                GILLESPIE),
+    _add_number("ploughing", "snow ploughing", "N mm-1", "longitudinal_force", (0.0, 100.0), 5.0, SHOOP),
+    _add_number("creep_force", "idle creep", "N", "longitudinal_force", (0.0, 2500.0), 100.0, MITSCHKE),
+    _add_number("creep_speed", "idle creep", "m s-1", "longitudinal_force", (1.5, 12.0), 0.5, MITSCHKE, 4.0),
     # torques on the wheels
-    _added("engine_torque", "engine braking", "N m", "brake_torque", (0.0, 400.0), 20.0, MITSCHKE),
-    _added("engine_viscous", "engine braking", "N m s rad-1", "brake_torque", (0.0, 6.0), 0.4, MITSCHKE),
-    _added("pad_drag", "pad drag", "N m", "brake_torque", (0.0, 250.0), 15.0, LIMPERT),
-    _added("lag", "brake lag", "s", "brake_torque", (0.0, 0.5), 0.03, LIMPERT),
-    _added("dead_time", "brake dead time", "s", "brake_torque", (0.0, 0.4), 0.02, LIMPERT),
-    _added("push_out", "push-out pressure", "MPa", "brake_torque", (0.0, 0.5), 0.02, LIMPERT),
-    _added("pressure_curve", "pressure curve", "MPa-1", "brake_torque", (-0.2, 0.25), 0.01, LIMPERT),
-    _added("fade", "brake fade", "(100 K)-1", "brake_torque", (-0.1, 0.3), 0.01, LIMPERT),
-    _added("pad_speed", "pad friction by speed", "s m-1", "brake_torque", (-0.03, 0.03), 0.001, LIMPERT),
-    _added("pad_speed_reference", "pad friction by speed", "m s-1", "brake_torque", (0.0, 35.0), 2.0, LIMPERT, 15.0),
-    _added("bias_pressure", "bias by pressure", "MPa-1", "brake_torque", (-0.12, 0.12), 0.01, LIMPERT),
-    _added("abs_cutoff", "ABS cut-off", "m s-1", "brake_torque", (0.0, 5.0), 0.2, DECLARED),
-    _added("slope_moment", "slope moment", "1", "brake_torque", (0.0, 10.0), 0.1, ZEGELAAR),
-    _added("radius_by_load", "tyre radius by load", "1", "brake_torque", (0.0, 3.0), 0.1, PACEJKA),
+    _add_number("engine_torque", "engine braking", "N m", "brake_torque", (0.0, 400.0), 20.0, MITSCHKE),
+    _add_number("engine_viscous", "engine braking", "N m s rad-1", "brake_torque", (0.0, 6.0), 0.4, MITSCHKE),
+    _add_number("pad_drag", "pad drag", "N m", "brake_torque", (0.0, 250.0), 15.0, LIMPERT),
+    _add_number("lag", "brake lag", "s", "brake_torque", (0.0, 0.5), 0.03, LIMPERT),
+    _add_number("dead_time", "brake dead time", "s", "brake_torque", (0.0, 0.4), 0.02, LIMPERT),
+    _add_number("push_out", "push-out pressure", "MPa", "brake_torque", (0.0, 0.5), 0.02, LIMPERT),
+    _add_number("pressure_curve", "pressure curve", "MPa-1", "brake_torque", (-0.2, 0.25), 0.01, LIMPERT),
+    _add_number("fade", "brake fade", "(100 K)-1", "brake_torque", (-0.1, 0.3), 0.01, LIMPERT),
+    _add_number("pad_speed", "pad friction by speed", "s m-1", "brake_torque", (-0.03, 0.03), 0.001, LIMPERT),
+    _add_number("pad_speed_reference", "pad friction by speed", "m s-1", "brake_torque", (0.0, 35.0), 2.0, LIMPERT,
+                15.0),
+    _add_number("bias_pressure", "bias by pressure", "MPa-1", "brake_torque", (-0.12, 0.12), 0.01, LIMPERT),
+    _add_number("abs_cutoff", "ABS cut-off", "m s-1", "brake_torque", (0.0, 5.0), 0.2, DECLARED),
+    _add_number("slope_moment", "slope moment", "1", "brake_torque", (0.0, 10.0), 0.1, ZEGELAAR),
+    _add_number("radius_by_load", "tyre radius by load", "1", "brake_torque", (0.0, 3.0), 0.1, PACEJKA),
     # friction of the tyre
-    _added("relaxation_length", "relaxation length", "m", "friction", (0.0, 2.0), 0.1, PACEJKA),
-    _added("load_sensitivity", "load sensitivity", "1", "friction", (-0.2, 0.6), 0.03, PACEJKA),
-    _added("tyre_heating", "tyre heating", "(100 kJ)-1", "friction", (-0.5, 3.0), 0.1, PACEJKA),
-    _added("wet_speed", "wet friction by speed", "s m-1", "friction", (0.0, 0.04), 0.002, HORNE),
-    _added("wet_threshold", "wet friction by speed", "m s-1", "friction", (0.0, 25.0), 2.0, HORNE),
-    _added("friction_speed", "tyre friction by speed", "s m-1", "friction", (-0.02, 0.03), 0.001, PACEJKA),
-    _added("stick_ratio", "sticking tyre", "1", "friction", (0.0, 1.2), 0.05, DECLARED),
-    _added("stick_below", "sticking tyre", "m s-1", "friction", (0.0, 5.0), 0.2, DECLARED),
-    _added("stick_above", "sticking tyre", "m s-1", "friction", (0.0, 10.0), 0.2, DECLARED),
+    _add_number("relaxation_length", "relaxation length", "m", "friction", (0.0, 2.0), 0.1, PACEJKA),
+    _add_number("load_sensitivity", "load sensitivity", "1", "friction", (-0.2, 0.6), 0.03, PACEJKA),
+    _add_number("tyre_heating", "tyre heating", "(100 kJ)-1", "friction", (-0.5, 3.0), 0.1, PACEJKA),
+    _add_number("wet_speed", "wet friction by speed", "s m-1", "friction", (0.0, 0.04), 0.002, HORNE),
+    _add_number("wet_threshold", "wet friction by speed", "m s-1", "friction", (0.0, 25.0), 2.0, HORNE),
+    _add_number("friction_speed", "tyre friction by speed", "s m-1", "friction", (-0.02, 0.03), 0.001, PACEJKA),
+    _add_number("stick_ratio", "sticking tyre", "1", "friction", (0.0, 1.2), 0.05, DECLARED),
+    _add_number("stick_below", "sticking tyre", "m s-1", "friction", (0.0, 5.0), 0.2, DECLARED),
+    _add_number("stick_above", "sticking tyre", "m s-1", "friction", (0.0, 10.0), 0.2, DECLARED),
     # forces between body, axles and road
-    _added("damper_asymmetry", "damper asymmetry", "1", "suspension_force", (-0.8, 0.8), 0.05, DIXON),
-    _added("coulomb_friction", "suspension friction", "N", "suspension_force", (0.0, 500.0), 20.0, MITSCHKE),
-    _added("progressive_rate", "progressive spring", "N m-3", "suspension_force", (0.0, 2e7), 2e5, MITSCHKE),
-    _added("stop_stiffness", "bump stop", "N m-1", "suspension_force", (0.0, 4e5), 1e4, MITSCHKE),
-    _added("stop_clearance", "bump stop", "m", "suspension_force", (0.005, 0.1), 0.005, MITSCHKE, 0.03),
-    _added("anti_dive", "anti-dive and anti-lift", "1", "suspension_force", (-0.5, 1.0), 0.05, GILLESPIE),
-    _added("anti_lift", "anti-dive and anti-lift", "1", "suspension_force", (-0.5, 1.0), 0.05, GILLESPIE),
-    _added("stick_anti_dive", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
-    _added("stick_anti_lift", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
-    _added("scrub_stiffness", "scrub", "1", "suspension_force", (-1.0, 1.0), 0.02, DECLARED),
-    _added("aero_lift", "air's pitch moment and lift", "N s2 m-2", "suspension_force", (-3.0, 3.0), 0.2, GILLESPIE),
-    _added("enveloping_length", "footprint", "m", "tyre_load", (0.0, 0.6), 0.02, ZEGELAAR),
-    _added("tyre_damping", "tyre damping", "N s m-1", "tyre_load", (0.0, 2000.0), 50.0, PACEJKA),
-    _added("aero_pitch", "air's pitch moment and lift", "N s2 m-1", "pitch_moment", (-3.0, 3.0), 0.1, GILLESPIE),
+    _add_number("damper_asymmetry", "damper asymmetry", "1", "suspension_force", (-0.8, 0.8), 0.05, DIXON),
+    _add_number("coulomb_friction", "suspension friction", "N", "suspension_force", (0.0, 500.0), 20.0, MITSCHKE),
+    _add_number("progressive_rate", "progressive spring", "N m-3", "suspension_force", (0.0, 2e7), 2e5, MITSCHKE),
+    _add_number("stop_stiffness", "bump stop", "N m-1", "suspension_force", (0.0, 4e5), 1e4, MITSCHKE),
+    _add_number("stop_clearance", "bump stop", "m", "suspension_force", (0.005, 0.1), 0.005, MITSCHKE, 0.03),
+    _add_number("anti_dive", "anti-dive and anti-lift", "1", "suspension_force", (-0.5, 1.0), 0.05, GILLESPIE),
+    _add_number("anti_lift", "anti-dive and anti-lift", "1", "suspension_force", (-0.5, 1.0), 0.05, GILLESPIE),
+    _add_number("stick_anti_dive", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
+    _add_number("stick_anti_lift", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
+    _add_number("scrub_stiffness", "scrub", "1", "suspension_force", (-1.0, 1.0), 0.02, DECLARED),
+    _add_number("aero_lift", "air's pitch moment and lift", "N s2 m-2", "suspension_force", (-3.0, 3.0), 0.2,
+                GILLESPIE),
+    _add_number("enveloping_length", "footprint", "m", "tyre_load", (0.0, 0.6), 0.02, ZEGELAAR),
+    _add_number("tyre_damping", "tyre damping", "N s m-1", "tyre_load", (0.0, 2000.0), 50.0, PACEJKA),
+    _add_number("aero_pitch", "air's pitch moment and lift", "N s2 m-1", "pitch_moment", (-3.0, 3.0), 0.1, GILLESPIE),
     # errors of the instruments
-    _sensor("wheel_speed_scale", "1", (-0.1, 0.1), 0.003),
-    _sensor("speed_scale", "1", (-0.1, 0.1), 0.003),
-    _sensor("acceleration_scale", "1", (-0.2, 0.2), 0.01),
-    _sensor("pitch_scale", "1", (-0.3, 0.3), 0.01),
-    _sensor("pitch_rate_scale", "1", (-0.3, 0.3), 0.01),
-    _sensor("vertical_scale", "1", (-0.3, 0.3), 0.01),
-    _sensor("gravity_leak", "1", (-1.5, 1.5), 0.1),
-    _sensor("mount_tilt", "rad", (-0.15, 0.15), 0.01),
-    _sensor("acceleration_delay", "s", (0.0, 0.3), 0.01),
-    _sensor("acceleration_lag", "s", (0.0, 0.4), 0.01),
-    _sensor("pitch_delay", "s", (0.0, 0.3), 0.01),
-    _sensor("pitch_lag", "s", (0.0, 0.4), 0.01),
-    _sensor("speed_delay", "s", (0.0, 0.3), 0.01),
-    _sensor("speed_lag", "s", (0.0, 0.4), 0.01),
-    _sensor("wheel_speed_delay", "s", (0.0, 0.3), 0.01),
+    _add_sensor("wheel_speed_scale", "1", (-0.1, 0.1), 0.003),
+    _add_sensor("speed_scale", "1", (-0.1, 0.1), 0.003),
+    _add_sensor("acceleration_scale", "1", (-0.2, 0.2), 0.01),
+    _add_sensor("pitch_scale", "1", (-0.3, 0.3), 0.01),
+    _add_sensor("pitch_rate_scale", "1", (-0.3, 0.3), 0.01),
+    _add_sensor("vertical_scale", "1", (-0.3, 0.3), 0.01),
+    _add_sensor("gravity_leak", "1", (-1.5, 1.5), 0.1),
+    _add_sensor("mount_tilt", "rad", (-0.15, 0.15), 0.01),
+    _add_sensor("acceleration_delay", "s", (0.0, 0.3), 0.01),
+    _add_sensor("acceleration_lag", "s", (0.0, 0.4), 0.01),
+    _add_sensor("pitch_delay", "s", (0.0, 0.3), 0.01),
+    _add_sensor("pitch_lag", "s", (0.0, 0.4), 0.01),
+    _add_sensor("speed_delay", "s", (0.0, 0.3), 0.01),
+    _add_sensor("speed_lag", "s", (0.0, 0.4), 0.01),
+    _add_sensor("wheel_speed_delay", "s", (0.0, 0.3), 0.01),
 )  # fmt: skip
 
 PARAMETERS = {row.name: row for row in EFFECT_TABLE}
@@ -210,7 +212,7 @@ else:
     )
 
 
-def effect_values(values: Mapping[str, float]) -> EffectValues:
+def pack_effect_values(values: Mapping[str, float]) -> EffectValues:
     """Return the effects of a vehicle as the kernels take them; all others 0.
 
     Parameters
@@ -231,7 +233,7 @@ def effect_values(values: Mapping[str, float]) -> EffectValues:
     return EffectValues(*(float(values.get(name, 0.0)) for name in EFFECT_UNITS))
 
 
-def parameter_vector(values: Mapping[str, float]) -> NDArray[np.float64]:
+def build_parameter_vector(values: Mapping[str, float]) -> NDArray[np.float64]:
     """Return the vector of all parameters from named values; all others 0.
 
     Parameters
@@ -253,7 +255,7 @@ def parameter_vector(values: Mapping[str, float]) -> NDArray[np.float64]:
     return theta
 
 
-def named_values(theta: NDArray[np.float64]) -> dict[str, float]:
+def unpack_parameter_vector(theta: NDArray[np.float64]) -> dict[str, float]:
     """Return the parameters of a vector that are not 0, by name.
 
     Parameters

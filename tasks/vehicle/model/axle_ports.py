@@ -4,12 +4,16 @@ from typing import NamedTuple
 
 from numba import njit
 
-from tasks.vehicle.brake import abs_command, abs_update
-from tasks.vehicle.effects.brake_line import acting_pressure
-from tasks.vehicle.effects.chassis import effective_friction, grip_reserve, stick_share
-from tasks.vehicle.effects.equations import friction_factor
+from tasks.vehicle.brake import compute_abs_command, limit_abs_rate
+from tasks.vehicle.effects.brake_line import compute_acting_pressure
+from tasks.vehicle.effects.chassis import (
+    compute_effective_friction,
+    compute_lateral_reserve,
+    compute_stick_share,
+)
+from tasks.vehicle.effects.equations import compute_friction_factor
 from tasks.vehicle.effects.ports import PORTS
-from tasks.vehicle.effects.slots import SlotTables, slot_sum
+from tasks.vehicle.effects.slots import SlotTables, sum_slots
 from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Instant
@@ -54,7 +58,7 @@ class AxlePorts(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
+def compute_signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
     """Braking slip that is negative for a driven wheel, within [-1, 1]; ISO 8855's is its negative [1].
 
     Parameters
@@ -67,7 +71,9 @@ def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def signed_friction(slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues) -> float:
+def compute_signed_friction(
+    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
+) -> float:
     """Friction of the tyre, continued oddly to driving slip [1].
 
     Parameters
@@ -78,12 +84,12 @@ def signed_friction(slip: float, load: float, share: float, tyre: Tyre, effects:
     tyre : on the surface
     effects : the values
     """
-    friction = effective_friction(abs(slip), load, share, tyre, effects)
+    friction = compute_effective_friction(abs(slip), load, share, tyre, effects)
     return friction if slip >= 0.0 else -friction
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def lock_share(omega: float, lock_speed: float) -> float:
+def compute_lock_share(omega: float, lock_speed: float) -> float:
     """Share of the brake torque that friction gives at a wheel speed: all of it, save around standstill [1].
 
     Parameters
@@ -95,7 +101,7 @@ def lock_share(omega: float, lock_speed: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def form_variables(
+def collect_form_variables(
     speed: float, load_ratio: float, strut: Strut, memory: AxleMemory, instant: Instant
 ) -> FormVariables:
     """Return what a form at an axle can depend on, in the order of `VARIABLES`.
@@ -113,7 +119,7 @@ def form_variables(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
+def compute_relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
     """How fast the slip that builds up force follows the slip: v / length; 0 where it does at once [1/s].
 
     Parameters
@@ -126,7 +132,7 @@ def relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def rolling_axle(
+def compute_rolling_axle(
     ground: Ground,
     strut: Strut,
     speed: float,
@@ -161,20 +167,26 @@ def rolling_axle(
     chassis, tyre : the values
     """
     wheels, effects = chassis.wheels, chassis.effects
-    slip = signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
+    slip = compute_signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
     force_slip = memory.slip if effects.relaxation_length > 0.0 else slip
     load_ratio = ground.load / static_load
-    grip = friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet)
-    pressure = acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
+    grip = compute_friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet)
+    pressure = compute_acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
     if forms is not None:
-        variables = form_variables(speed, load_ratio, strut, memory, instant)
-        grip *= max(1.0 + slot_sum(_FRICTION_FORM, variables, forms), 0.0)
-        pressure *= max(1.0 + slot_sum(_BRAKE_FORM, variables, forms), 0.0)
-    sticking = stick_share(speed, effects)
-    tyre_force = signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
-    wanted = abs_command(slip, tyre.target_slip, wheels.release_width) if speed >= effects.abs_cutoff else 1.0
-    abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
-    turning = lock_share(omega, chassis.lock_speed)
+        variables = collect_form_variables(speed, load_ratio, strut, memory, instant)
+        grip *= max(1.0 + sum_slots(_FRICTION_FORM, variables, forms), 0.0)
+        pressure *= max(1.0 + sum_slots(_BRAKE_FORM, variables, forms), 0.0)
+    sticking = compute_stick_share(speed, effects)
+    tyre_force = (
+        compute_signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
+    )
+    wanted = (
+        compute_abs_command(slip, tyre.target_slip, wheels.release_width)
+        if speed >= effects.abs_cutoff
+        else 1.0
+    )
+    abs_scale = limit_abs_rate(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
+    turning = compute_lock_share(omega, chassis.lock_speed)
     rubbing = effects.pad_drag / (wheels.front.brake_gain + wheels.rear.brake_gain)
     brake_torque = gain * (pressure * abs_scale + rubbing) * turning
     lever = wheels.radius - effects.radius_by_load * (ground.load - static_load) / stiffness
@@ -188,7 +200,7 @@ def rolling_axle(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
+def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
     """The ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 
     Parameters
@@ -213,7 +225,7 @@ def standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def with_links(ports: AxlePorts, force: float) -> AxlePorts:
+def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
     """The same ports with a force of the links in parallel to spring and damper.
 
     Parameters
@@ -228,7 +240,7 @@ def with_links(ports: AxlePorts, force: float) -> AxlePorts:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def axle_grip_reserve(ports: AxlePorts, tyre: Tyre) -> float:
+def compute_axle_lateral_reserve(ports: AxlePorts, tyre: Tyre) -> float:
     """Sideways grip that an axle has left; none off the road [1].
 
     Parameters
@@ -238,4 +250,4 @@ def axle_grip_reserve(ports: AxlePorts, tyre: Tyre) -> float:
     """
     if ports.ground.load <= 0.0:
         return 0.0
-    return grip_reserve(ports.tyre_force / ports.ground.load, tyre.peak)
+    return compute_lateral_reserve(ports.tyre_force / ports.ground.load, tyre.peak)

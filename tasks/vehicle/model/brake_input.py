@@ -7,14 +7,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tasks.vehicle.brake import PressureProfile, brake_pressure
+from tasks.vehicle.brake import PressureProfile, compute_brake_pressure
 
 NO_TRACE = np.empty(0)
 NO_COMMAND = PressureProfile(0.0, 0.0, inf, 0.0, inf, inf)
 
 
 class BrakeInput(NamedTuple):
-    """The brake's input as the kernels take it; made by `brake_command` or `measured_trace`.
+    """The brake's input as the kernels take it; made by `make_command_input` or `make_trace_input`.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class BrakeInput(NamedTuple):
     engine: NDArray[np.float64]
 
 
-def brake_command(profile: PressureProfile, *, hold_speed: bool = False) -> BrakeInput:
+def make_command_input(profile: PressureProfile, *, hold_speed: bool = False) -> BrakeInput:
     """Return a brake command as an input.
 
     Parameters
@@ -43,7 +43,7 @@ def brake_command(profile: PressureProfile, *, hold_speed: bool = False) -> Brak
     return BrakeInput(profile, NO_TRACE, 1.0, hold_speed, NO_TRACE)
 
 
-def measured_trace(
+def make_trace_input(
     pressure: NDArray[np.float64], interval: float, engine: NDArray[np.float64] | None = None
 ) -> BrakeInput:
     """Return a measured pressure as an input, with the engine's torque where that was measured.
@@ -58,7 +58,7 @@ def measured_trace(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def pressure_at(time: float, onset: float, delay: float, drive: BrakeInput) -> float:
+def compute_input_pressure(time: float, onset: float, delay: float, drive: BrakeInput) -> float:
     """Pressure that the driver gives, after a delay [MPa].
 
     Parameters
@@ -69,12 +69,12 @@ def pressure_at(time: float, onset: float, delay: float, drive: BrakeInput) -> f
     drive : the input
     """
     if len(drive.trace) == 0:
-        return brake_pressure(time - onset - delay, drive.profile)
-    return value_at(time - delay, drive.trace, drive.interval)
+        return compute_brake_pressure(time - onset - delay, drive.profile)
+    return interpolate_trace(time - delay, drive.trace, drive.interval)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def value_at(time: float, trace: NDArray[np.float64], interval: float) -> float:
+def interpolate_trace(time: float, trace: NDArray[np.float64], interval: float) -> float:
     """Value of a trace, linear between its samples and held beyond both ends.
 
     Parameters

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
-from tasks.vehicle.effects.table import EffectValues, effect_values
-from tasks.vehicle.half_car import HalfCar, half_car
-from tasks.vehicle.paper.wheels import Wheels, wheels_of
+from tasks.vehicle.effects.table import EffectValues, pack_effect_values
+from tasks.vehicle.half_car import HalfCar, build_half_car
+from tasks.vehicle.paper.wheels import Wheels, build_wheels
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 
 
@@ -59,7 +59,7 @@ class Chassis(NamedTuple):
     climb: float
 
 
-def chassis_of(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditions) -> Chassis:
+def build_chassis(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditions) -> Chassis:
     """Return the model's values of a vehicle on a surface.
 
     ``cg_height`` is that of the whole vehicle; the axles' centres of gravity are at wheel height.
@@ -73,12 +73,12 @@ def chassis_of(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditio
     axles = vehicle.unsprung_mass_f + vehicle.unsprung_mass_r
     body_height = (vehicle.mass * vehicle.cg_height - axles * vehicle.wheel_radius) / vehicle.sprung_mass
     return Chassis(
-        body=half_car(vehicle),
-        wheels=wheels_of(vehicle),
+        body=build_half_car(vehicle),
+        wheels=build_wheels(vehicle),
         lever=body_height - vehicle.wheel_radius,
         lock_speed=vehicle.lock_speed,
         transfer=vehicle.cg_height / vehicle.wheelbase,
-        effects=effect_values(vehicle.effects),
+        effects=pack_effect_values(vehicle.effects),
         wet=float(response.wet),
         snow_depth_mm=float(conditions.snow_depth_mm),
         direction=float(conditions.direction),

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from numba import njit
 
-from tasks.vehicle.effects.chassis import effective_slope, stick_share
-from tasks.vehicle.model.axle_ports import AxlePorts, lock_share, relaxation_rate
+from tasks.vehicle.effects.chassis import compute_effective_slope, compute_stick_share
+from tasks.vehicle.model.axle_ports import AxlePorts, compute_lock_share, compute_relaxation_rate
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Memory, Motion
 from tasks.vehicle.paper.wheels import Axle
@@ -43,7 +43,7 @@ class AxleSlope(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def axle_slope(
+def compute_axle_slope(
     ports: AxlePorts,
     motion: Motion,
     omega: float,
@@ -69,14 +69,14 @@ def axle_slope(
     slip_per_speed = (
         (1.0 - ports.slip) / motion.speed if motion.speed > wheels.speed_floor else 1.0 / wheels.speed_floor
     )
-    following = relaxation_rate(motion.speed, wheels.speed_floor, chassis.effects.relaxation_length)
+    following = compute_relaxation_rate(motion.speed, wheels.speed_floor, chassis.effects.relaxation_length)
     force, torque, locking = 0.0, 0.0, 0.0
     if abs(ports.slip) < 1.0:
-        share = stick_share(motion.speed, chassis.effects)
+        share = compute_stick_share(motion.speed, chassis.effects)
         load = ports.ground.load
-        force = effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
+        force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
         if 0.0 < ports.abs_scale < 1.0:
-            turning = lock_share(omega, chassis.lock_speed)
+            turning = compute_lock_share(omega, chassis.lock_speed)
             torque = -ports.full_torque * turning / (wheels.release_width * tyre.target_slip)
     change = step * abs(ports.lever * ports.tyre_force - ports.brake_torque) / axle.inertia
     if abs(omega) < chassis.lock_speed + change:
@@ -102,7 +102,7 @@ def axle_slope(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def without_speed(slope: AxleSlope) -> AxleSlope:
+def drop_speed_coupling(slope: AxleSlope) -> AxleSlope:
     """The same derivatives while the speed is held from outside."""
     return AxleSlope(
         0.0, 0.0, slope.wheel_by_speed, slope.wheel_by_wheel, 0.0, slope.wheel_by_slip, slope.slip_by_speed,
@@ -134,12 +134,12 @@ def solve_slip(
     omega_f = (omega_f + g * front.wheel_by_speed * speed) / pivot_f
     omega_r = (omega_r + g * rear.wheel_by_speed * speed) / pivot_r
     return Motion(rates.station, speed, omega_f, omega_r), Memory(
-        _with_slip(memory.front, front, speed, omega_f), _with_slip(memory.rear, rear, speed, omega_r)
+        _restore_slip(memory.front, front, speed, omega_f), _restore_slip(memory.rear, rear, speed, omega_r)
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _with_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: float) -> AxleMemory:
+def _restore_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: float) -> AxleMemory:
     if slope.slip_share == 0.0:
         return memory
     slip = slope.slip_share * memory.slip + slope.slip_by_speed * speed + slope.slip_by_wheel * omega

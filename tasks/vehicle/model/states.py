@@ -97,8 +97,8 @@ class VehicleState(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def state_row(state: VehicleState) -> tuple[float, ...]:
-    """Return a state as a row of numbers, from which `state_of_row` makes it again."""
+def pack_state(state: VehicleState) -> tuple[float, ...]:
+    """Return a state as a row of numbers, from which `unpack_state` makes it again."""
     motion, front, rear, x = state.motion, state.memory.front, state.memory.rear, state.body
     return (
         state.time, motion.station, motion.speed, motion.omega_f, motion.omega_r, front.slip, front.slip_heat,
@@ -108,8 +108,8 @@ def state_row(state: VehicleState) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-def state_of_row(row: NDArray[np.float64]) -> VehicleState:
-    """Return the state that `state_row` wrote into a row.
+def unpack_state(row: NDArray[np.float64]) -> VehicleState:
+    """Return the state that `pack_state` wrote into a row.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def advance_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemor
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def without_slip(memory: Memory) -> Memory:
+def clear_slip(memory: Memory) -> Memory:
     """Return the same without slip, as at rest; tyres and discs stay warm."""
     front, rear = memory.front, memory.rear
     return Memory(

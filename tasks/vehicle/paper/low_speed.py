@@ -12,7 +12,7 @@ CAP_WINDOW_S = 0.2
 CAP_RATIO = 1.05
 
 
-def brake_pitch_input(
+def compute_brake_pitch_input(
     acceleration: NDArray[np.float64],
     step: float,
     onset: float,
@@ -41,20 +41,20 @@ def brake_pitch_input(
     if stop < 0 or not np.isfinite(onset):
         return d
 
-    def samples(seconds: float) -> int:
+    def count_samples(seconds: float) -> int:
         return round(seconds / step)
 
-    hold = max(min(samples(onset), stop), stop - samples(hold_s))
-    before = d[max(hold - samples(REFERENCE_WINDOW_S), 0) : hold]
+    hold = max(min(count_samples(onset), stop), stop - count_samples(hold_s))
+    before = d[max(hold - count_samples(REFERENCE_WINDOW_S), 0) : hold]
     before = before[before > 0]
     if len(before) == 0:
         return d
     reference = float(np.median(before))
-    tail = d[max(stop - samples(TAIL_WINDOW_S), 0) : stop]
+    tail = d[max(stop - count_samples(TAIL_WINDOW_S), 0) : stop]
     if np.median(tail) < hold_ratio * reference:
         d[hold:stop] = reference
     else:
-        capped = slice(max(stop - samples(CAP_WINDOW_S), 0), stop)
+        capped = slice(max(stop - count_samples(CAP_WINDOW_S), 0), stop)
         d[capped] = np.minimum(d[capped], CAP_RATIO * reference)
     since_stop = np.arange(len(d) - stop) * step
     d[stop:] = d[stop - 1] * np.maximum(1 - since_stop / release_s, 0.0)

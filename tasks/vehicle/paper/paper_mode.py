@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from tasks.surface.road_profile import RoadHazard, road_elevation
 from tasks.vehicle.brake import PressureProfile
-from tasks.vehicle.half_car import half_car, integrate_half_car
+from tasks.vehicle.half_car import build_half_car, integrate_half_car
 from tasks.vehicle.history import History
-from tasks.vehicle.paper.low_speed import brake_pitch_input
-from tasks.vehicle.paper.wheels import DRIVE_COLUMNS, drive, wheels_of
+from tasks.vehicle.paper.low_speed import compute_brake_pitch_input
+from tasks.vehicle.paper.wheels import DRIVE_COLUMNS, build_wheels, simulate_drive
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
-from tasks.vehicle.road import road_feature
+from tasks.vehicle.road import make_road_feature
 
 FIXED_POINT_PASSES = 5
 ANALYTIC_LOADS = np.empty((0, 2))
@@ -76,19 +76,19 @@ def run_paper_mode(
     steps, step : number and length of the internal steps [s]
     passes : fixed-point passes on a road feature
     """
-    wheels, road = wheels_of(vehicle), road_feature(hazard)
-    log, onset, stop = drive(
+    wheels, road = build_wheels(vehicle), make_road_feature(hazard)
+    log, onset, stop = simulate_drive(
         initial_speed, hold_speed, steps, step, profile, road, ANALYTIC_LOADS, wheels, response.tyre
     )
     if hazard.height_m == 0:
-        states, heights, loads = body_response(vehicle, response, hazard, log, onset, stop, step)
+        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, step)
         return PaperRun(
             log=log, states=states, road=heights, loads=loads, onset=onset, stop=stop, last_change=0.0
         )
     for _ in range(passes):
         station = log[:, 0]
-        states, heights, loads = body_response(vehicle, response, hazard, log, onset, stop, step)
-        log, onset, stop = drive(
+        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, step)
+        log, onset, stop = simulate_drive(
             initial_speed, hold_speed, steps, step, profile, road, loads, wheels, response.tyre
         )
     return PaperRun(
@@ -102,7 +102,7 @@ def run_paper_mode(
     )
 
 
-def body_response(
+def simulate_body(
     vehicle: Vehicle,
     response: SurfaceResponse,
     hazard: RoadHazard,
@@ -121,8 +121,8 @@ def body_response(
     stop : sample of the stop
     step : [s]
     """
-    car = half_car(vehicle)
-    d_theta = brake_pitch_input(
+    car = build_half_car(vehicle)
+    d_theta = compute_brake_pitch_input(
         log[:, 2],
         step,
         onset,
@@ -145,7 +145,7 @@ def body_response(
     return states, np.stack([road_f, road_r], axis=1), loads
 
 
-def history_of(run: PaperRun, step: float, per_tick: int) -> History:
+def sample_history(run: PaperRun, step: float, per_tick: int) -> History:
     """The run at every ``per_tick``-th sample.
 
     Parameters

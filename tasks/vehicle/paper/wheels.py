@@ -14,10 +14,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tasks.vehicle.brake import PressureProfile, abs_command, abs_update, brake_pressure, onset_by_position
+from tasks.vehicle.brake import (
+    PressureProfile,
+    compute_abs_command,
+    compute_brake_pressure,
+    find_onset_by_position,
+    limit_abs_rate,
+)
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.road import RoadFeature, slope_at
-from tasks.vehicle.tyres.contract import Tyre, braking_slip, tyre_friction
+from tasks.vehicle.road import RoadFeature, compute_road_slope
+from tasks.vehicle.tyres.contract import Tyre, compute_braking_slip, compute_tyre_friction
 
 
 class Axle(NamedTuple):
@@ -65,7 +71,7 @@ class Wheels(NamedTuple):
     stop_speed: float
 
 
-def wheels_of(vehicle: Vehicle) -> Wheels:
+def build_wheels(vehicle: Vehicle) -> Wheels:
     """The longitudinal values of a vehicle."""
     share = vehicle.front_brake_share
     load_per_lever = vehicle.mass * vehicle.gravity / vehicle.wheelbase
@@ -104,7 +110,7 @@ class AxleStep(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def axle_step(
+def compute_axle_step(
     speed: float,
     omega: float,
     load: float,
@@ -127,16 +133,16 @@ def axle_step(
     step : [s]
     axle, wheels, tyre : the rest of the values
     """
-    slip = braking_slip(speed, wheels.radius * omega, wheels.speed_floor)
-    wanted = abs_command(slip, tyre.target_slip, wheels.release_width)
-    scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
-    force = tyre_friction(slip, load, tyre) * load
+    slip = compute_braking_slip(speed, wheels.radius * omega, wheels.speed_floor)
+    wanted = compute_abs_command(slip, tyre.target_slip, wheels.release_width)
+    scale = limit_abs_rate(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
+    force = compute_tyre_friction(slip, load, tyre) * load
     torque = scale * (axle.brake_gain * pressure)
     return AxleStep(slip, force, torque, scale, (wheels.radius * force - torque) * (1.0 / axle.inertia))
 
 
 @njit(cache=True, nogil=True)
-def transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float]:
+def compute_transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float]:
     """Axle loads by longitudinal load transfer, F_z^long [N] (paper, Appendix B).
 
     Parameters
@@ -149,7 +155,7 @@ def transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float
 
 
 @njit(cache=True, nogil=True)
-def stopping_run(
+def simulate_stop(
     initial_speed: float, step: float, longest: int, profile: PressureProfile, wheels: Wheels, tyre: Tyre
 ) -> tuple[float, float]:
     """Brake on a flat road from t = 0 to the stop, keeping nothing on the way.
@@ -169,10 +175,10 @@ def stopping_run(
     speed, omega_f, omega_r = initial_speed, initial_speed / wheels.radius, initial_speed / wheels.radius
     scale_f, scale_r, acceleration, distance = 1.0, 1.0, 0.0, 0.0
     for n in range(longest):
-        pressure = brake_pressure(n * step, profile)
-        load_f, load_r = transferred_loads(acceleration, wheels)
-        f = axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
-        r = axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
+        pressure = compute_brake_pressure(n * step, profile)
+        load_f, load_r = compute_transferred_loads(acceleration, wheels)
+        f = compute_axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
+        r = compute_axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
         scale_f, scale_r = f.scale, r.scale
         acceleration = -(f.force + r.force) * (1.0 / wheels.mass) - wheels.coast
         after = speed + step * acceleration
@@ -190,11 +196,11 @@ DRIVE_COLUMNS = (
     "wheel_speed_r", "tyre_force_f", "tyre_force_r", "tyre_load_f", "tyre_load_r", "brake_torque_f",
     "brake_torque_r", "abs_scale_f", "abs_scale_r", "brake_pressure_mpa", "road_force",
 )  # fmt: skip
-"""Columns of the log that ``drive`` returns."""
+"""Columns of the log that ``simulate_drive`` returns."""
 
 
 @njit(cache=True, nogil=True)
-def drive(
+def simulate_drive(
     initial_speed: float,
     hold_speed: bool,
     steps: int,
@@ -231,15 +237,17 @@ def drive(
     onset, stop = profile.onset_time, -1
     for n in range(steps + 1):
         if isinf(onset):
-            onset = onset_by_position(n * step, station, speed, profile)
-        pressure = brake_pressure(n * step - onset, profile)
+            onset = find_onset_by_position(n * step, station, speed, profile)
+        pressure = compute_brake_pressure(n * step - onset, profile)
         if len(loads) > 0:
             load_f, load_r = loads[n, 0], loads[n, 1]
         else:
-            load_f, load_r = transferred_loads(acceleration, wheels)
-        f = axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
-        r = axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
-        road_force = -load_f * slope_at(station, road) - load_r * slope_at(station - wheels.wheelbase, road)
+            load_f, load_r = compute_transferred_loads(acceleration, wheels)
+        f = compute_axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
+        r = compute_axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
+        road_force = -load_f * compute_road_slope(station, road) - load_r * compute_road_slope(
+            station - wheels.wheelbase, road
+        )
         acceleration = (road_force - (f.force + r.force)) * (1.0 / wheels.mass) - wheels.coast
         if stop >= 0:
             road_force, acceleration = 0.0, 0.0

@@ -47,7 +47,7 @@ def scale_burckhardt(
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def burckhardt_friction(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
+def compute_burckhardt_friction(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
     """Return braking force over load [1] (paper, Eq. tire_force).
 
     Parameters
@@ -60,8 +60,8 @@ def burckhardt_friction(braking_slip: float, load: float, tyre: BurckhardtTyre) 
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def burckhardt_slope(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
-    """Return the derivative of ``burckhardt_friction`` by slip [1].
+def compute_burckhardt_slope(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
+    """Return the derivative of ``compute_burckhardt_friction`` by slip [1].
 
     Parameters
     ----------

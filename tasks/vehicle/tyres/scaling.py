@@ -76,7 +76,7 @@ def fold_scaling(values: Mapping[str, float], version: str) -> MagicFormula:
 def _fold_longitudinal(v: Mapping[str, float], pressure: float, newer: bool) -> Longitudinal:
     stiffness = v["LKX"] * (1.0 + v["PPX1"] * pressure + v["PPX2"] * pressure**2)
     friction = v["LMUX"] * (1.0 + v["PPX3"] * pressure + v["PPX4"] * pressure**2)
-    shift = v["LVX"] * (_slow_friction(v["LMUX"]) if newer else v["LMUX"])
+    shift = v["LVX"] * (_compute_shift_scale(v["LMUX"]) if newer else v["LMUX"])
     return Longitudinal(
         pcx1=v["PCX1"] * v["LCX"],
         pdx1=v["PDX1"] * friction,
@@ -98,7 +98,7 @@ def _fold_longitudinal(v: Mapping[str, float], pressure: float, newer: bool) -> 
 
 def _fold_lateral(v: Mapping[str, float], pressure: float, newer: bool) -> Lateral:
     friction = v["LMUY"] * (1.0 + v["PPY3"] * pressure + v["PPY4"] * pressure**2)
-    slow = _slow_friction(v["LMUY"]) if newer else v["LMUY"]
+    slow = _compute_shift_scale(v["LMUY"]) if newer else v["LMUY"]
     lean, load = v["LGAY"], 1.0 + v["PPY2"] * pressure
     stiffness = v["LKYC"] * (1.0 + v["PPY5"] * pressure)
     return Lateral(
@@ -137,6 +137,6 @@ def _fold_combined(v: Mapping[str, float]) -> Combined:
     })  # fmt: skip
 
 
-def _slow_friction(friction: float) -> float:
+def _compute_shift_scale(friction: float) -> float:
     """The friction scale of vertical shifts, lambda_mu' [1] (4.E8)."""
     return LOW_FRICTION * friction / (1.0 + (LOW_FRICTION - 1.0) * friction)
