@@ -12,7 +12,7 @@ from tasks.vehicle.parameters import Vehicle
 
 
 def compute_ride_rate(spring: float, tyre: float) -> float:
-    """Stiffness of an axle's suspension and tyres in series [N/m].
+    """Return the ride rate: the stiffness of an axle's suspension and tyres in series [N/m].
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def compute_ride_rate(spring: float, tyre: float) -> float:
 
 
 def compute_ride_damping(damper: float, spring: float, tyre: float) -> float:
-    """Damping that the body feels above its tyres [N s/m].
+    """Return the damping that the body feels above its tyres [N s/m].
 
     The damper sees the share k_t / (k_s + k_t) of the body's motion, and this share of its force reaches the body.
 
@@ -35,7 +35,7 @@ def compute_ride_damping(damper: float, spring: float, tyre: float) -> float:
 
 
 def compute_natural_frequency(stiffness: float, inertia: float) -> float:
-    """Undamped natural frequency of one degree of freedom [Hz].
+    """Return the undamped natural frequency of one degree of freedom [Hz].
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def compute_natural_frequency(stiffness: float, inertia: float) -> float:
 
 
 def compute_damping_ratio(stiffness: float, damping: float, inertia: float) -> float:
-    """Damping of one degree of freedom over its critical damping [1].
+    """Return the damping of one degree of freedom over its critical damping [1].
 
     Parameters
     ----------
@@ -58,17 +58,17 @@ def compute_damping_ratio(stiffness: float, damping: float, inertia: float) -> f
 
 
 def compute_heave_constants(vehicle: Vehicle) -> tuple[float, float]:
-    """Stiffness [N/m] and damping [N s/m] of the body's vertical motion, above both axles."""
+    """Return stiffness [N/m] and damping [N s/m] of the body's vertical motion, both axles together."""
     return _sum_axles(vehicle, 1.0, 1.0)
 
 
 def compute_pitch_constants(vehicle: Vehicle) -> tuple[float, float]:
-    """Stiffness [N m/rad] and damping [N m s/rad] of the body's pitch about its centre of gravity."""
+    """Return stiffness [N m/rad] and damping [N m s/rad] of the body's pitch about its centre of gravity."""
     return _sum_axles(vehicle, vehicle.cg_to_front_axle**2, vehicle.cg_to_rear_axle**2)
 
 
 def _sum_axles(v: Vehicle, front: float, rear: float) -> tuple[float, float]:
-    """Ride rates and ride damping of both axles, each weighted."""
+    """Return the ride rates and the ride damping summed over both axles, each axle with its weight."""
     return (
         front * compute_ride_rate(v.suspension_stiffness_f, v.tyre_stiffness_f)
         + rear * compute_ride_rate(v.suspension_stiffness_r, v.tyre_stiffness_r),
@@ -78,17 +78,17 @@ def _sum_axles(v: Vehicle, front: float, rear: float) -> tuple[float, float]:
 
 
 def compute_dynamic_index(vehicle: Vehicle) -> float:
-    """Pitch inertia over that of two masses above the axles with the same centre, I_y / (m_s l_f l_r) [1]."""
+    """Return the pitch inertia over that of two masses above the axles, same centre, I_y / (m_s l_f l_r) [1]."""
     return vehicle.pitch_inertia / (vehicle.sprung_mass * vehicle.cg_to_front_axle * vehicle.cg_to_rear_axle)
 
 
 def compute_deceleration_per_pressure(vehicle: Vehicle) -> float:
-    """Deceleration that a pressure gives while no wheel slides, K_p / (R m) [m/s2/MPa]."""
+    """Return the deceleration that a pressure gives while no wheel slides, K_p / (R m) [m/s2/MPa]."""
     return vehicle.brake_gain / (vehicle.wheel_radius * vehicle.mass)
 
 
 def compute_peak_deceleration(vehicle: Vehicle) -> float:
-    """Deceleration at the tyres' peak on the best surface that the vehicle has numbers for, mu g [m/s2]."""
+    """Return the deceleration at the tyre's peak on the best surface of the vehicle's tables, mu g [m/s2]."""
     peaks = [
         friction * efficiency
         for family in vehicle.families.values()
@@ -98,7 +98,7 @@ def compute_peak_deceleration(vehicle: Vehicle) -> float:
 
 
 class Figure(NamedTuple):
-    """One figure: its unit, as catalogue files write it, and its value."""
+    """One figure: its unit, as catalogue files write it, and the function that computes it."""
 
     unit: str
     compute: Callable[[Vehicle], float]
@@ -150,7 +150,7 @@ def compute_figures(vehicle: Vehicle) -> dict[str, float]:
 
     Parameters
     ----------
-    vehicle : whose
+    vehicle : the vehicle
     """
     values: dict[str, float] = {}
     for name, figure in FIGURES.items():

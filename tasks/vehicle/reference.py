@@ -1,4 +1,4 @@
-"""The same models in plain NumPy: slow, short, written from the equations. The kernels are tested against them.
+"""The models in plain NumPy: slow, short, written from the equations. Tests compare the kernels with them.
 
 Arrays of two hold the front and the rear axle.
 """
@@ -13,18 +13,18 @@ from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 
 Array = NDArray[np.float64]
 SPEED, STATION, WHEELS, BODY = 0, 1, slice(2, 4), slice(4, 12)
-"""Where the coupled state keeps speed [m/s], station [m], wheel speeds [rad/s] and half-car state."""
+"""Positions of speed [m/s], station [m], wheel speeds [rad/s] and half-car state in the coupled state."""
 
 
 def compute_reference_friction(
     slip: ArrayLike, vehicle: Vehicle, family: str, response: SurfaceResponse
 ) -> Array:
-    """Peak-normalised curve mu_B, odd in slip, its peak found on a fine grid [1] (paper, Appendix B).
+    """Return the peak-normalised curve mu_B, odd in slip, with its peak found on a fine grid [1] (paper, Appendix B).
 
     Parameters
     ----------
     slip : braking slip [1]
-    vehicle, family, response : give the base curve, its peak and slip stiffness
+    vehicle, family, response : vehicle, kind of weather and surface response, which give the curve
     """
     c1, c2, c3 = vehicle.find_tyre_family(family).burckhardt
 
@@ -44,14 +44,14 @@ def compute_reference_friction(
 def compute_abs_scale(
     slip: Array, before: Array, step: float, vehicle: Vehicle, response: SurfaceResponse
 ) -> Array:
-    """ABS torque scale, as the paper writes its rate limit: a clipped change, added [1] (paper, Appendix B).
+    """Return the ABS torque scale as the paper writes its rate limit: a clipped change is added [1] (Appendix B).
 
     Parameters
     ----------
     slip : braking slip of the axles [1]
     before : scale before the step [1]
-    step : [s]
-    vehicle, response : give widths, rates and target slip
+    step : length of the step [s]
+    vehicle, response : vehicle and surface response, which give widths, rates and target slip
     """
     target, width = response.tyre.target_slip, vehicle.abs_release_width
     command = np.clip((target * (1 + width) - slip) / (width * target), 0, 1)
@@ -71,7 +71,7 @@ def simulate_paper_drive(
     steps: int,
     step: float,
 ) -> dict[str, Array]:
-    """Speed, station and wheel speeds of paper mode by Euler steps, to the stop (paper, Appendix B).
+    """Return speed, station and wheel speeds of paper mode by Euler steps, to the stop (paper, Appendix B).
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def simulate_paper_drive(
 
 
 def build_half_car_matrices(vehicle: Vehicle) -> tuple[Array, Array, Array, Array, Array]:
-    """M, C, K, B_r and B_b of the half-car in contact (paper, Eq. half_car).
+    """Return M, C, K, B_r and B_b of the half-car in contact (paper, Eq. half_car).
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def build_half_car_matrices(vehicle: Vehicle) -> tuple[Array, Array, Array, Arra
 
 
 def compute_half_car_rates(x: Array, road: Array, moment: float, vehicle: Vehicle) -> Array:
-    """Rate of the half-car state, with the tyre force that contact leaves it (paper, Appendix B).
+    """Return the rate of the half-car state, with the tyre force that contact leaves it (paper, Appendix B).
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def compute_coupled_rates(
     response: SurfaceResponse,
     hazard: RoadHazard,
 ) -> Array:
-    """Rate of the coupled model's state while it moves, with the algebraic ABS.
+    """Return the rate of the coupled model's state while it moves, with the algebraic ABS.
 
     The pitch moment is written about the body's centre of gravity: the tyre forces at the ground, the slope
     forces at wheel height, less the inertia of axles and wheels.

@@ -1,4 +1,4 @@
-"""Height and slope of the road feature at one station, as the kernels take them."""
+"""Height and slope of the road feature at one station, for the kernels."""
 
 from math import cos, pi, sin
 from typing import NamedTuple
@@ -17,18 +17,18 @@ class RoadFeature(NamedTuple):
 
 
 def make_road_feature(hazard: RoadHazard) -> RoadFeature:
-    """The hazard as numbers; a flat road is a feature of height 0."""
+    """Return the hazard as numbers; a flat road is a feature of height 0."""
     return RoadFeature(float(hazard.center_m), float(hazard.length_m), float(hazard.height_m))
 
 
 @njit(cache=True, nogil=True, forceinline=True)
 def compute_road_height(station: float, road: RoadFeature) -> float:
-    """Road height H_g [m] (paper, Eq. shared_road_profile).
+    """Return the road height H_g [m] (paper, Eq. shared_road_profile).
 
     Parameters
     ----------
-    station : [m]
-    road : the feature
+    station : route position [m]
+    road : road feature
     """
     offset = station - road.center
     if road.height == 0.0 or abs(offset) > 0.5 * road.length:
@@ -38,12 +38,12 @@ def compute_road_height(station: float, road: RoadFeature) -> float:
 
 @njit(cache=True, nogil=True, forceinline=True)
 def compute_road_slope(station: float, road: RoadFeature) -> float:
-    """Road slope dH_g/ds [m/m].
+    """Return the road slope dH_g/ds [m/m] (derivative of the paper's Eq. shared_road_profile).
 
     Parameters
     ----------
-    station : [m]
-    road : the feature
+    station : route position [m]
+    road : road feature
     """
     offset = station - road.center
     if road.height == 0.0 or abs(offset) > 0.5 * road.length:

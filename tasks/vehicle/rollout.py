@@ -56,8 +56,8 @@ class Rollout:
 
     Parameters
     ----------
-    columns : every channel of ``TICK_CHANNELS`` at 1 kHz, from 0 to the duration inclusive; ``pitch`` excludes
-        the static pitch
+    columns : every channel of ``TICK_CHANNELS`` at 1 kHz, from 0 to the duration inclusive [their units];
+        ``pitch`` excludes the static pitch
     mode : paper or coupled
     surface_friction : mu_c [1]
     tyre_peak : mu_eff [1]
@@ -93,12 +93,12 @@ def simulate_scenario(
     duration_s: float,
     step_s: float = INTERNAL_STEP_S,
 ) -> Rollout:
-    """Drive one scenario; after a stop the vehicle rests and its body comes to rest too.
+    """Simulate one scenario; after a stop the vehicle stands and its body comes to rest too.
 
     Parameters
     ----------
     vehicle : the vehicle
-    surface : kind of weather, mu_c, and the snow that wheels plough where the vehicle has that effect
+    surface : kind of weather, mu_c, and the depth of the snow for vehicles with the ploughing effect
     controls : initial speed and brake
     hazard : road feature
     mode : paper follows the publication, coupled is the physical model
@@ -154,6 +154,7 @@ def simulate_scenario(
 
 
 def _collect_history(run: Simulation) -> History:
+    """Return a simulation's columns and events in the form that both modes share."""
     columns = dict(zip(COLUMNS, run.history.T.copy(), strict=True))
     columns |= {f"axle_load_{axle}": columns[f"tyre_load_{axle}"] for axle in "fr"}
     return History(columns=columns, onset=run.onset, onset_station=run.onset_station, stop_time=run.stop)
@@ -162,7 +163,7 @@ def _collect_history(run: Simulation) -> History:
 def _check_arguments(
     vehicle: Vehicle, family: str, surface_friction: float, mode: str, duration_s: float, step_s: float
 ) -> int:
-    """Internal steps per tick, once every argument keeps its rule."""
+    """Return the internal steps per tick; raise where an argument breaks its rule."""
     problems = []
     if mode not in MODES:
         problems.append(f"mode must be one of {', '.join(MODES)}; it is {mode}")

@@ -1,4 +1,4 @@
-"""Residuals of a calibration: model less reference, response by response, in sizes that compare."""
+"""Residuals of a calibration: model less reference for each response, scaled so that responses are comparable."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ WHEELS = {"fl": "f", "fr": "f", "rl": "r", "rr": "r"}
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationCase:
-    """One reference run with its conditions and the samples that count.
+    """One reference run with its conditions and the samples that the calibration uses.
 
     Parameters
     ----------
-    name : of the case
+    name : name of the case
     kind : flat, hump or depression
     family : name of the kind of weather
     surface_friction : mu_c [1]
     controls : initial speed and brake
     hazard : road feature
-    time : of the samples, from the brake onset on, ascending [s]
-    event_start : begin of what the judge scores; samples before it count in the start phase only [s]
-    speed, pitch : there [m/s, deg]; pitch with its static offset
+    time : times of the n samples, from the brake onset on, ascending, shape (n,) [s]
+    event_start : start of the scored event; samples before it count in the start phase only [s]
+    speed, pitch : at the samples, shape (n,) [m/s, deg]; pitch with its static offset
     slip, wheel_load : by wheel fl, fr, rl, rr, shape (4, n) [1, N]
-    stopping_distance : of the reference; None where it is not scored [m]
+    stopping_distance : stopping distance of the reference; None where it is not scored [m]
     """
 
     name: str
@@ -58,13 +58,13 @@ class Yardstick:
 
     Parameters
     ----------
-    scales : size of one unit of each response; speed_drop is the speed less that at first [m/s, m/s,
-        deg, 1, N, m]
+    scales : scale of each response; speed_drop is the fall of speed since its first sample [m/s, m/s, deg, 1, N,
+        m]
     start_s : length of the start of braking [s]
-    settle_s : what speed_drop leaves out of it, until a speed that was held is let go [s]
-    tail_speed : the tail of a stop begins below it [m/s]
-    slip_speed : slip counts above it [m/s]
-    margin_s : how long the model rolls past the last sample [s]
+    settle_s : time at its beginning that speed_drop leaves out, until the driver no longer holds the speed [s]
+    tail_speed : speed below which the tail of a stop begins [m/s]
+    slip_speed : speed above which slip counts [m/s]
+    margin_s : time that the model runs past the last sample [s]
     """
 
     scales: Mapping[str, float]
@@ -76,12 +76,12 @@ class Yardstick:
 
 
 def simulate_case(vehicle: Vehicle, case: CalibrationCase, mode: Mode, margin_s: float) -> Rollout:
-    """The model's run of a case, to a little past its last sample.
+    """Return the model's run of a case, to a little past its last sample.
 
     Parameters
     ----------
     vehicle : the vehicle
-    case : the conditions
+    case : reference run, which gives the conditions
     mode : paper or coupled
     margin_s : time past the last sample [s]
     """
@@ -93,13 +93,13 @@ def simulate_case(vehicle: Vehicle, case: CalibrationCase, mode: Mode, margin_s:
 def compute_residuals(
     ride: Rollout, case: CalibrationCase, responses: Sequence[Response], phase: Phase, yardstick: Yardstick
 ) -> Floats:
-    """Model less reference of some responses, so scaled that its square sum is the sum of (RMSE / scale)^2.
+    """Return model less reference of some responses, scaled: the square sum is the sum of (RMSE / scale)^2 [1].
 
     Parameters
     ----------
     ride : the model's run
-    case : the reference
-    responses : which
+    case : reference run
+    responses : responses that are compared
     phase : the start of braking, braking above the tail speed, tail below it, or the whole event
     yardstick : scales and speeds
     """

@@ -1,4 +1,4 @@
-"""The scalars a calibration may move: each a name, and the places of the vehicle that hold its one value."""
+"""Scalars that a calibration may move: each has a name and the entries of the vehicle that hold its value."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,8 +19,8 @@ class CalibrationScalar:
 
     Parameters
     ----------
-    name : unique; a knot's name holds its family and surface friction
-    group : the name its stage and bounds go by
+    name : unique name; a knot's name holds its family and surface friction
+    group : name of its group, which stages and bounds use
     places : (family, knot) pairs that share the value; empty for a field of the vehicle itself
     """
 
@@ -30,11 +30,11 @@ class CalibrationScalar:
 
 
 def list_calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[CalibrationScalar, ...]:
-    """The scalars of some groups, in their order; all of the paper's groups together hold its 40.
+    """Return the scalars of some groups, in their order; all of the paper's groups together hold its 40.
 
     Parameters
     ----------
-    vehicle : whose families and knots are counted
+    vehicle : vehicle with the families and knots
     groups : `KNOT_GROUPS`, fields of the vehicle that hold a number, or names of its effects' parameters
 
     Raises
@@ -64,7 +64,7 @@ def list_calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[C
 
 
 def read_scalar(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
-    """The scalar's value in a vehicle, in the unit of its field.
+    """Return the scalar's value in a vehicle [unit of its field].
 
     Parameters
     ----------
@@ -80,12 +80,12 @@ def read_scalar(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
 
 
 def set_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> Vehicle:
-    """The vehicle with other values of some scalars; moving its centre of gravity leaves the wheelbase as it is.
+    """Return the vehicle with other values of some scalars; if its centre of gravity moves, the wheelbase stays.
 
     Parameters
     ----------
     vehicle : the vehicle
-    values : by scalar, in the unit of its field
+    values : value of each scalar [unit of its field]
     """
     families = dict(vehicle.families)
     effects = dict(vehicle.effects)
@@ -105,10 +105,12 @@ def set_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> 
 
 
 def _is_field(vehicle: Vehicle, group: str) -> bool:
+    """Return whether a group is a numeric field of the vehicle."""
     return isinstance(vars(vehicle).get(group), float | int)
 
 
 def _list_knots(vehicle: Vehicle, group: str) -> list[CalibrationScalar]:
+    """Return one scalar for each knot of each family; families with a shared hold time have one together."""
     scalars = []
     shared: list[tuple[str, int]] = []
     for family, table in vehicle.families.items():

@@ -1,4 +1,4 @@
-"""The paper's staged calibration: each group of scalars against the response it acts on, then all cases again."""
+"""The paper's staged calibration: each stage fits a group of scalars to the responses that it acts on."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -36,11 +36,11 @@ class Bounds:
 
     Parameters
     ----------
-    unit : of the group's scalars
+    unit : unit of the group's scalars
     lower, upper : limits of every scalar [unit]
-    step : for finite differences [unit]
+    step : step of finite differences [unit]
     smooth : standard deviation of the difference between neighbouring knots of a family; infinite for none [unit]
-    start : where an effect begins that the vehicle does not have yet; None for 0 [unit]
+    start : first value of an effect that the vehicle does not have yet; None for 0 [unit]
     """
 
     unit: str
@@ -57,10 +57,10 @@ class Stage:
 
     Parameters
     ----------
-    name : what it is called
-    groups : whose scalars move together
-    responses : what they are held against
-    kinds : of the cases that are used: flat, hump, depression
+    name : name of the stage
+    groups : groups whose scalars move together
+    responses : responses that they are fitted to
+    kinds : kinds of the cases that are used: flat, hump, depression
     phase : start, braking, tail or event
     """
 
@@ -73,15 +73,15 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True)
 class Procedure:
-    """A whole calibration.
+    """Procedure of a whole calibration.
 
     Parameters
     ----------
     mode : paper or coupled
-    stages : in order
-    passes : how often the stages are gone through
-    evaluations : most Jacobians of one stage
-    bounds : by group
+    stages : stages, in order
+    passes : number of passes through all stages
+    evaluations : largest number of residual evaluations of one stage
+    bounds : bounds by group
     yardstick : scales and speeds
     """
 
@@ -94,7 +94,7 @@ class Procedure:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Every group that some stage moves, in order of first appearance."""
+        """Return every group that some stage moves, in order of first appearance."""
         return tuple(dict.fromkeys(group for stage in self.stages for group in stage.groups))
 
 
@@ -104,10 +104,10 @@ class StageRecord:
 
     Parameters
     ----------
-    stage, turn : its name, and which pass it belongs to, from 1
-    before, after : its own loss, the sum of (RMSE / scale)^2 over its cases [1]
-    moved : largest change of a scalar as a share of its bounds [1]
-    at_bounds : scalars that came to rest on a bound
+    stage, turn : name of the stage, and number of the pass, from 1
+    before, after : loss of the stage, the sum of (RMSE / scale)^2 over its cases [1]
+    moved : largest change of a scalar over the distance between its bounds [1]
+    at_bounds : scalars that ended on a bound
     """
 
     stage: str
@@ -121,12 +121,12 @@ class StageRecord:
 def calibrate_vehicle(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
 ) -> tuple[Vehicle, tuple[StageRecord, ...]]:
-    """Go through the stages; a stage that does not lower its own loss is not accepted.
+    """Calibrate a vehicle stage by stage; a stage that does not lower its own loss is not accepted.
 
     Parameters
     ----------
-    vehicle : where it starts
-    cases : the development cases
+    vehicle : vehicle to start from
+    cases : development cases
     procedure : stages, bounds, scales
 
     Returns
@@ -145,16 +145,16 @@ def calibrate_vehicle(
 def run_stage(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], stage: Stage, procedure: Procedure
 ) -> tuple[Vehicle, StageRecord]:
-    """Bounded nonlinear least squares over one stage's scalars (Branch, Coleman and Li 1999,
-    doi:10.1137/S1064827595289108).
+    """Fit one stage's scalars by bounded nonlinear least squares.
 
-    The bounds act as a weak prior about the start, so that a scalar to which no run answers stays where it was.
+    The method is that of Branch, Coleman and Li (1999, doi:10.1137/S1064827595289108). The bounds act as a weak prior
+    about the start, so that a scalar that no run is sensitive to keeps its value.
 
     Parameters
     ----------
-    vehicle : where it starts
-    cases : the development cases
-    stage : which scalars against which responses
+    vehicle : vehicle to start from
+    cases : development cases
+    stage : scalars and the responses that they are fitted to
     procedure : bounds, scales, number of evaluations
     """
     scalars = list_calibration_scalars(vehicle, stage.groups)
@@ -204,13 +204,15 @@ def compute_stage_jacobian(
     scalars: Sequence[CalibrationScalar],
     x: Floats,
 ) -> Floats:
-    """Derivatives of the stage's residuals by central differences; a case that a scalar cannot reach is not driven.
+    """Return the derivatives of a stage's residuals by central differences.
+
+    A case that a scalar cannot influence is not simulated.
 
     Parameters
     ----------
-    vehicle : gives all that does not move
+    vehicle : vehicle with all values that stay fixed
     cases, stage, procedure : as in ``run_stage``
-    scalars : what moves
+    scalars : scalars that move
     x : their values, shape (n,) [units of the scalars]
 
     Returns
@@ -235,13 +237,14 @@ def compute_stage_jacobian(
 
 
 def build_smoothness_rows(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Floats:
-    """Rows that weigh the difference between neighbouring knots of a family, so that interpolation between them
-    holds where one of them is poorly determined.
+    """Return the rows that penalise differences between neighbouring knots of a family.
+
+    They keep the interpolation between knots sensible where the runs determine one of them poorly.
 
     Parameters
     ----------
-    scalars : n of them
-    procedure : holds the allowed differences
+    scalars : the n scalars
+    procedure : procedure with the standard deviation of these differences
 
     Returns
     -------
@@ -259,7 +262,7 @@ def build_smoothness_rows(scalars: Sequence[CalibrationScalar], procedure: Proce
 
 
 def _add_missing_effects(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
-    """The vehicle with the start values of effects that it does not have yet."""
+    """Return the vehicle with the start values of effects that it does not have yet."""
     missing = [group for group in procedure.groups if group in EFFECT_UNITS and group not in vehicle.effects]
     starts = {group: procedure.bounds[group].start or 0.0 for group in missing}
     return replace(vehicle, effects={**vehicle.effects, **starts})
@@ -268,12 +271,13 @@ def _add_missing_effects(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
 def _compute_case_residual(
     vehicle: Vehicle, case: CalibrationCase, stage: Stage, procedure: Procedure
 ) -> Floats:
+    """Return a stage's residuals of one case [1]."""
     ride = simulate_case(vehicle, case, procedure.mode, procedure.yardstick.margin_s)
     return compute_residuals(ride, case, stage.responses, stage.phase, procedure.yardstick)
 
 
 def _hides_difference(one: Vehicle, other: Vehicle, case: CalibrationCase) -> bool:
-    """Whether a case's conditions hide all that differs between two vehicles."""
+    """Return whether a case's conditions hide all that differs between two vehicles."""
     if replace(one, families={}) != replace(other, families={}):
         return False
     at = (case.family, case.surface_friction)

@@ -1,7 +1,7 @@
-"""Cross-correlation of what a model leaves over with the brake pressure it was given.
+"""Cross-correlation of a model's residual with its input, the brake pressure.
 
-A model that holds all that the input does leaves nothing that goes with it at any lag (Ljung 1999, System
-Identification, section 16.6).
+If a model describes all that the input causes, its residual is uncorrelated with the input at every lag (Ljung 1999,
+System Identification, section 16.6).
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Correlation:
     ----------
     lags : float64 [L] time by which the residual follows the pressure [s]
     frozen, after : float64 [L] correlation coefficients [1]
-    band : half width within which 95 % would lie if they had nothing to do with each other [1]
+    band : half width of the interval that holds 95 % of the coefficients of independent series [1]
     """
 
     lags: NDArray[np.float64]
@@ -38,13 +38,13 @@ class Correlation:
 def correlate_residual_with_pressure(
     runs: tuple[RunEvidence, ...], theta: NDArray[np.float64], slots: tuple[Slot, ...], longest_lag: float
 ) -> dict[str, Correlation]:
-    """Correlation over the held-out runs, residual and pressure whitened by the channel's noise.
+    """Return the correlations over the held-out runs; the channel's noise whitens residual and pressure.
 
     Parameters
     ----------
-    runs : held-out
-    theta, slots : full parameters of the grown model
-    longest_lag : [s]
+    runs : held-out runs
+    theta, slots : full parameter vector and slots of the grown model
+    longest_lag : longest lag [s]
     """
     plain = np.zeros(len(theta))
     residuals = [
@@ -64,6 +64,7 @@ def _correlate_channel(
     channel: int,
     longest_lag: float,
 ) -> Correlation:
+    """Return the correlation of one channel's residual with pressure over all runs."""
     interval = runs[0].model.run.interval
     most = round(longest_lag / interval)
     sums = np.zeros((2, 2 * most + 1))
@@ -90,5 +91,6 @@ def _correlate_channel(
 def _whiten_channel(
     x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
 ) -> NDArray[np.float64]:
+    """Return one channel, whitened and without its mean, float64 [N - 1]."""
     white = whiten_channels(x[:, None], rho, sigma)[1:]
     return np.asarray(white - white.mean(), dtype=np.float64)

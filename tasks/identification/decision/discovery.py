@@ -1,4 +1,4 @@
-"""Everything the engine looks for in one order: the library, wrong numbers, then forms outside the library."""
+"""The search in its order: effects of the library, wrong numbers of the vehicle, then forms outside the library."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ from tasks.identification.inference.linearisation import differentiate_at, resca
 
 
 class ForeignCarError(Exception):
-    """The runs disagree about every direction even beside the best effects: the car's equations are others."""
+    """The runs disagree about every direction even with the best effects: the model's equations do not fit the car."""
 
 
 def search_forms(
@@ -36,18 +36,18 @@ def search_forms(
     reasons: list[str],
     splines: tuple[NDArray[np.float64], ...] | None = None,
 ) -> tuple[SearchState, Candidate | None]:
-    """Look for forms outside the library: alone against all that was named, and in what the named leave over.
+    """Search forms outside the library: alone against all that was named, and in the residual of the named effects.
 
     Parameters
     ----------
-    start : what the library explains
-    null : nothing accepted, same scales
-    reasons : is added to
-    splines : `differentiate_by_splines` of ``start`` where they are known
+    start : state of the search with the effects of the library
+    null : state without any effect, with the same scales
+    reasons : list to which sentences are appended
+    splines : `differentiate_by_splines` of ``start``; None if not computed yet
 
     Returns
     -------
-    The state, and a form alone that cannot be told from the first effect.
+    The state, and a single form that cannot be told from the first effect.
     """
     state, near, rules = start, None, start.evidence.rules
     left = find_best_form(state.evidence, state.base, splines=splines)
@@ -58,14 +58,14 @@ def search_forms(
         alone = find_best_form(null.evidence, null.base, least)
         ahead = -np.inf
         if alone is not None and alone.passes:
-            # a form has no direction of its own to be judged by, so both sides take the larger inflation
+            # a form has no library direction, hence no inflation of its own: both sides take the larger one
             common = max(alone.inflation, *(r.accepted.inflation for r in state.rounds))
             log_n = float(np.log(state.evidence.samples))
             extra = len(alone.hypothesis.names) - sum(len(r.accepted.hypothesis.names) for r in state.rounds)
             ahead = (alone.gain - sum(r.accepted.gain for r in state.rounds)) / common - extra * log_n
         first = state.rounds[0].accepted.hypothesis
-        # a form of the same variable at the same port is the named effect in another dress, not an unknown one
-        dressed = (
+        # a form of the same variable at the same port describes the named effect again, not an unknown one
+        same_effect = (
             alone is not None
             and alone.hypothesis.port == first.port
             and (
@@ -73,7 +73,7 @@ def search_forms(
                 or (first.variable == "constant" and is_constant(alone.hypothesis))
             )
         )
-        if alone is not None and ahead > rules.rival_span and not dressed:
+        if alone is not None and ahead > rules.rival_span and not same_effect:
             reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
             state = SearchState(
                 evidence=null.evidence,
@@ -82,7 +82,7 @@ def search_forms(
             )
         elif alone is not None and ahead > -rules.rival_span:
             elsewhere = alone.hypothesis.port != first.port
-            near = alone if (ahead > rules.rival_span if dressed else elsewhere or disagreeing) else None
+            near = alone if (ahead > rules.rival_span if same_effect else elsewhere or disagreeing) else None
     if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
         reasons.append(f"something is left over: {left.hypothesis.name}")
         state = replace(
@@ -99,14 +99,14 @@ def find_best_form(
     least: float = 0.0,
     splines: tuple[NDArray[np.float64], ...] | None = None,
 ) -> Candidate | None:
-    """The form that explains most of what a fit leaves over, refined and judged; None if nothing real is left.
+    """Return the form that explains most of the residual of a fit, refined and judged; None if no form passes.
 
     Parameters
     ----------
     evidence : the runs
     base : the fit
-    least : gain in log likelihood from which a spline is followed up
-    splines : `differentiate_by_splines` where they are known
+    least : gain in log likelihood from which a spline leads to forms [1]
+    splines : `differentiate_by_splines` at the fit; None if not computed yet
     """
     level = compute_inflation(evidence, base, None)
     enough = max(evidence.rules.accept_score + float(np.log(evidence.samples)), least / level)
@@ -131,16 +131,16 @@ def search_library_and_forms(
     ----------
     evidence : the runs under a first guess of the scales
     null : fit without effects
-    reasons : is added to
+    reasons : list to which sentences are appended
 
     Returns
     -------
-    The start without effects, what was found, and a form alone that cannot be told from the first effect.
+    The state without effects, the state with those found, and a single form that cannot be told from the first effect.
 
     Raises
     ------
     ForeignCarError
-        If the model's own misfit would drown what is looked for.
+        If the model's own misfit exceeds any effect that could be found.
     """
     if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
         evidence = differentiate_at(evidence, null, library=True)

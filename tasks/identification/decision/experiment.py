@@ -1,4 +1,4 @@
-"""The next experiment: which planned run would tell two fitted explanations apart best."""
+"""The next experiment: the planned run that separates two fitted explanations best."""
 
 from dataclasses import dataclass, replace
 
@@ -17,14 +17,14 @@ from tasks.vehicle.parameters import Vehicle
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """A planned run and what it is expected to say.
+    """A planned run and the evidence that it is expected to give.
 
     Parameters
     ----------
-    between : the two explanations
-    plan : in words
-    expected_d2 : squared distance between their predictions, nuisances and noise taken out; each unit is half a
-        unit of log likelihood, so 20 from one run settles it
+    between : names of the two explanations
+    plan : description of the run
+    expected_d2 : squared distance between their whitened predictions with nuisances projected out; each unit is half
+        a unit of log likelihood, so 20 from one run decides [1]
     """
 
     between: tuple[str, str]
@@ -35,13 +35,13 @@ class Experiment:
 def plan_next_experiment(
     evidence: Evidence, first: Fit, second: Fit, vehicle: Vehicle, surface: SurfaceParameters
 ) -> Experiment | None:
-    """The planned run with the largest nuisance-marginalised D2 between two fits; None if none tells them apart.
+    """Return the planned run with the largest nuisance-marginalised D2 between two fits; None if all are alike.
 
     Parameters
     ----------
-    evidence : whose noise and priors hold
+    evidence : the runs, which give noise and priors
     first, second : fitted explanations
-    vehicle, surface : the model
+    vehicle, surface : the judged model
     """
     rho, sigma = evidence.train[0].rho, evidence.train[0].sigma
     best = ("", -1.0)
@@ -49,9 +49,9 @@ def plan_next_experiment(
         theta, slots = compose_parameters(first.parts, first.values, first.session)
         other, other_slots = compose_parameters(second.parts, second.values, second.session)
         model = prepare_run(make_planned_run(drive, plan), vehicle, surface)
-        ridden = predict_channels(model, theta, slots=slots)
-        # planned again with the speed it will have, so that the run ends where the car is slow
-        model = prepare_run(replace(model.run, response=ridden), vehicle, surface)
+        predicted = predict_channels(model, theta, slots=slots)
+        # prepared again with the predicted speed, so that the run ends where the vehicle is slow
+        model = prepare_run(replace(model.run, response=predicted), vehicle, surface)
         expected = differentiate_run(
             model, rho, sigma, theta, (), evidence.tolerances, evidence.disturbance, slots
         )

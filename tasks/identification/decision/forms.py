@@ -1,4 +1,4 @@
-"""Residual left over, as splines over pairs of port and variable, and the simple shape that a spline has."""
+"""Forms outside the library: splines of the residual over pairs of port and variable, and simple shapes for them."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ SCANNED = {
     "pitch_moment": ("speed", "deceleration", "pressure_rate"),
     "suspension_force": ("suspension_travel", "suspension_speed"),
 }
-"""Variables that each port is scanned over."""
+"""Variables over which each port is scanned."""
 RANGE = {
     "speed": (2.0, 34.0), "deceleration": (0.0, 9.0), "pressure": (0.0, 3.6), "disc_temperature": (0.0, 400.0),
     "pressure_rate": (-12.0, 12.0), "load_ratio": (0.4, 1.6), "suspension_travel": (-0.06, 0.06),
@@ -44,16 +44,16 @@ RANGE = {
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualSpline:
-    """A spline of one variable at one port, fitted linearly to what a fit leaves.
+    """A spline of one variable at one port, fitted linearly to the residual of a fit.
 
     Parameters
     ----------
-    port, variable : where
+    port, variable : port and variable of the spline
     grid : float64 [K] knots [unit of the variable]
     values : float64 [K] [unit of the port]
-    covariance : float64 [K, K]
-    gain : log likelihood gained, divided by the inflation
-    score : gain less K log N
+    covariance : float64 [K, K] [unit of the port squared]
+    gain : rise of the log likelihood, divided by the inflation [1]
+    score : gain less K log N [1]
     """
 
     port: str
@@ -78,8 +78,8 @@ def fit_residual_splines(
     Parameters
     ----------
     evidence : the runs
-    at : fit whose residuals are scanned
-    splines : of `differentiate_by_splines` where they are known
+    at : fit whose residuals are used
+    splines : `differentiate_by_splines` at the fit; None if not computed yet
     """
     size, n_session = KNOTS * len(KEYS), len(evidence.session_sigma)
     gram, cross, right = np.zeros((size, size)), np.zeros((size, n_session)), np.zeros(size)
@@ -118,12 +118,12 @@ def fit_residual_splines(
 
 
 def differentiate_by_splines(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], ...]:
-    """Whitened derivatives of every training run by all knots of all scanned splines, float64 [M, K] each.
+    """Return the whitened derivatives of every training run by all knots of all splines, float64 [M, K] each.
 
     Parameters
     ----------
     evidence : the runs
-    at : fit about which
+    at : fit about which the derivatives are taken
     """
     theta, slots = compose_parameters(at.parts, at.values, at.session)
     return tuple(_differentiate_run(run, theta, slots) for run in evidence.train)
@@ -132,6 +132,7 @@ def differentiate_by_splines(evidence: Evidence, at: Fit) -> tuple[NDArray[np.fl
 def _differentiate_run(
     run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...]
 ) -> NDArray[np.float64]:
+    """Return the whitened derivatives of one run by all knots, float64 [M, K]."""
     y = predict_channels(run.model, theta, slots=slots)
     columns = []
     for port, variable in KEYS:
@@ -148,13 +149,13 @@ def _differentiate_run(
 
 
 def make_form_hypotheses(leftover: ResidualSpline, samples: int, count: int = 2) -> list[Hypothesis]:
-    """The grammar's shapes that fit a spline best, as hypotheses for the simulation.
+    """Return the grammar's shapes that fit a spline best, as hypotheses for the simulation.
 
     Parameters
     ----------
-    leftover : the spline
+    leftover : spline of the residual
     samples : N of the score's penalty
-    count : how many shapes to return
+    count : number of shapes to return
     """
     scale = float(np.max(np.abs(leftover.grid)))
     precision = np.linalg.inv(leftover.covariance)
@@ -173,24 +174,24 @@ def make_form_hypotheses(leftover: ResidualSpline, samples: int, count: int = 2)
 
 
 def sample_form(form: Hypothesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A form at its first values: its variable and its value at the port, float64 [TABLE] each.
+    """Return a form at its first values: its variable and its value at the port, float64 [TABLE] each.
 
     Parameters
     ----------
-    form : of `make_form_hypotheses`
+    form : hypothesis of `make_form_hypotheses`
     """
     (slot,) = form.build(form.start)[1]
     return slot.origin + slot.spacing * np.arange(len(slot.values), dtype=np.float64), slot.values
 
 
 def make_form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: float) -> Form:
-    """A form that was found, held constant beyond the range of its variable that the runs reached.
+    """Return a form that was found, constant beyond the range of its variable that the runs reached.
 
     Parameters
     ----------
-    name : of its hypothesis
+    name : name of its hypothesis
     coefficients : a, or a and b [unit of the port]
-    low, high : what the runs reached [unit of the variable]; the scanned range bounds it
+    low, high : range that the runs reached, cut to the scanned range [unit of the variable]
 
     Raises
     ------
@@ -211,11 +212,11 @@ def make_form_in_range(name: str, coefficients: tuple[float, ...], low: float, h
 
 
 def is_constant(form: Hypothesis) -> bool:
-    """Whether a form does not depend on its variable.
+    """Return whether a form does not depend on its variable.
 
     Parameters
     ----------
-    form : of `make_form_hypotheses`
+    form : hypothesis of `make_form_hypotheses`
     """
     return bool(np.ptp(sample_form(form)[1]) == 0.0)
 
@@ -223,6 +224,7 @@ def is_constant(form: Hypothesis) -> bool:
 def _make_form_hypothesis(
     leftover: ResidualSpline, name: str, start: NDArray[np.float64], scale: float
 ) -> Hypothesis:
+    """Return one shape of the grammar as a hypothesis with broad bounds."""
     port, variable = leftover.port, leftover.variable
     low, high = RANGE[variable]
 

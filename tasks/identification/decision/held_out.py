@@ -1,4 +1,4 @@
-"""Error on runs that no fit has seen: as delivered, re-tuned without any new effect, and with the effects."""
+"""Errors on held-out runs: of the model as delivered, re-tuned without any new effect, and with the effects."""
 
 from collections.abc import Mapping
 
@@ -18,12 +18,12 @@ from tasks.vehicle.effects.table import EFFECT_TABLE
 def compute_held_out_errors(
     evidence: Evidence, null: Fit, base: Fit
 ) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
-    """RMSE on held-out runs under the frozen, the re-tuned and the grown model.
+    """Return the RMSE on held-out runs under the frozen, the re-tuned and the grown model.
 
     Parameters
     ----------
     evidence : the runs
-    null : fit without effects, where re-tuning starts
+    null : fit without effects, from which re-tuning starts
     base : fit with the accepted effects
 
     Returns
@@ -65,7 +65,15 @@ def compute_held_out_errors(
 def summarise_errors(
     square: NDArray[np.float64], runs: list[str], units: Mapping[str, str], resamples: int
 ) -> dict[str, ChannelError]:
-    """Root mean squares with bootstrap intervals from mean squares by run and model, float64 [R, 3, C]."""
+    """Return RMSE and bootstrap intervals by channel.
+
+    Parameters
+    ----------
+    square : float64 [R, 3, C] mean squared errors by run, model (frozen, re-tuned, grown) and channel [unit^2]
+    runs : names of the R runs
+    units : unit of each of the C channels, by name
+    resamples : number of bootstrap resamples [1]
+    """
     draws = np.random.Generator(np.random.Philox(0)).integers(0, len(runs), (resamples, len(runs)))
     errors = {}
     for c, (name, unit) in enumerate(units.items()):

@@ -1,4 +1,4 @@
-"""95 % intervals of a hypothesis' parameters, within their bounds and at one with the likelihood."""
+"""95 % intervals of a hypothesis' parameters, by curvature or by profile likelihood, within the bounds."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,21 +19,21 @@ Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
 def refit_named(
     evidence: Evidence, base: Fit, candidates: Sequence[Candidate]
 ) -> tuple[Evidence, Fit, list[Candidate]]:
-    """Return the named effects, fitted with derivatives that are taken at them.
+    """Return the named effects, fitted with derivatives that are taken at their estimates.
 
-    Derivatives of the nuisances that were taken elsewhere take too little from those of an effect: on a road feature
-    that is reached a moment later most of all. The search can live with that; the information that they promise is up
-    to three times too large, and estimates stop short.
+    If the derivatives of the nuisances are those of another linearisation point, too little of an effect's derivative
+    is projected out, most of all where the vehicle reaches a road feature a moment later. That is accurate enough for the
+    search, but the information is up to three times too large, and the estimates stop before the optimum.
 
     Parameters
     ----------
     evidence : the runs
     base : fit of all that is named
-    candidates : each named effect as it was judged, beyond all others
+    candidates : each named effect as it was judged, in addition to all others
 
     Returns
     -------
-    The runs with derivatives at ``base``, the fits again.
+    The runs with derivatives at ``base``, the base fitted again, and the candidates fitted again.
     """
     here = differentiate_at(evidence, base, library=False)
 
@@ -51,16 +51,21 @@ def refit_named(
 
 
 def compute_student_quantile(candidate: Candidate) -> float:
-    """Student's t with as many runs as inform the parameter, less one: the runs' scatter is itself estimated."""
+    """Return Student's t at 97.5 % with the runs that inform the parameter, less one, as degrees of freedom [1].
+
+    Parameters
+    ----------
+    candidate : refined and judged candidate
+    """
     return float(student.ppf(0.975, max(candidate.informed - 1, 1)))
 
 
 def compute_curvature_interval(candidate: Candidate) -> Bounds:
-    """Intervals from the curvature at the estimate, widened by the runs' disagreement, cut at the bounds.
+    """Return intervals from the curvature at the estimate, widened by the runs' disagreement, cut at the bounds.
 
     Parameters
     ----------
-    candidate : refined and judged
+    candidate : refined and judged candidate
 
     Returns
     -------
@@ -70,23 +75,23 @@ def compute_curvature_interval(candidate: Candidate) -> Bounds:
     k = len(h.names)
     values = candidate.fitted.values[-k:]
     variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation
-    # the session's own tolerance of the same number belongs to the car's
+    # the session's tolerance of the same number adds to the uncertainty of the vehicle's
     tolerance = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
     reach = np.sqrt(variance + np.square(tolerance)) * compute_student_quantile(candidate)
     return np.clip(values - reach, h.lower, h.upper), np.clip(values + reach, h.lower, h.upper)
 
 
 def compute_profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
-    """Intervals of an effect of several parameters from its profile likelihood.
+    """Return intervals of an effect of several parameters from its profile likelihood.
 
-    A value belongs to the interval where the best fit that holds it is worse by less than t^2 times the inflation
-    (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter matters only together with another,
-    curvature at the estimate says nothing about 'no effect'; the profile says there what the score says: its deviance
-    at 0 is twice the gain.
+    A value belongs to the interval if the best fit with that value is worse by less than t^2 times the inflation
+    (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter acts only together with another, the
+    curvature at the estimate does not tell whether there is an effect. The profile does, in agreement with the score:
+    its deviance at 0 is twice the gain.
 
     Parameters
     ----------
-    candidate : refined and judged; of one parameter, the curvature is taken
+    candidate : refined and judged candidate; with one parameter, its curvature is used
     evidence : the runs
 
     Returns
@@ -112,7 +117,7 @@ def compute_profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds
 def _find_limit(
     candidate: Candidate, centre: Fit, evidence: Evidence, place: int, guess: float, bound: float
 ) -> float:
-    """Where the profile's root deviance reaches the quantile between the estimate and a bound, by false position."""
+    """Return the value between estimate and bound where the root deviance reaches the quantile, by false position."""
     k = len(candidate.hypothesis.names)
     wanted = compute_student_quantile(candidate)
     inside, outside = float(centre.values[place - k]), float(bound)
@@ -135,14 +140,14 @@ def _find_limit(
             inside, at_inside = x, here
         else:
             outside, at_outside = x, here
-        # away from both ends, so that a bent profile cannot hold one of them for ever
+        # kept away from both ends, so that a curved profile cannot keep one of them for ever
         share = np.clip((wanted - at_inside) / (at_outside - at_inside), 0.1, 0.9)
         x = inside + float(share) * (outside - inside)
     return x
 
 
 def _fit_pinned(centre: Fit, evidence: Evidence, place: int, value: float) -> Fit:
-    """The best fit that holds one parameter of the last hypothesis (``place`` counts from the end)."""
+    """Return the best fit that holds one parameter of the last hypothesis (``place`` counts from the end)."""
     last = centre.parts[-1]
     lower, upper = last.lower.copy(), last.upper.copy()
     lower[place] = upper[place] = value

@@ -1,4 +1,4 @@
-"""Rivals of the named effects, and how large an effect would have to be to be named at all."""
+"""Rivals of the named effects, and the smallest effects that could be named."""
 
 from dataclasses import dataclass, replace
 
@@ -21,14 +21,14 @@ from tasks.identification.inference.fit import Fit, compute_misfit_by_run
 
 @dataclass(frozen=True, kw_only=True)
 class RivalComparison:
-    """An accepted effect beside all else that was tried in its place.
+    """An accepted effect and the alternatives that were tried in its place.
 
     Parameters
     ----------
-    own : the effect, beyond all other accepted ones
-    share : bootstrap win share
-    others : what was tried in its place, with win shares, best first
-    near : those of them that cannot be told from it
+    own : the effect, in addition to all other accepted ones
+    share : bootstrap win share [1]
+    others : alternatives with their win shares, best first
+    near : alternatives that cannot be told from the effect
     """
 
     own: Candidate
@@ -38,19 +38,19 @@ class RivalComparison:
 
 
 def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[RivalComparison]:
-    """Hold every accepted effect against its alternatives, all other accepted ones present.
+    """Compare every accepted effect with its alternatives, with all other accepted effects in the model.
 
     Parameters
     ----------
     evidence : the runs, with derivatives that hold at ``base``
     base : fit of all accepted effects
-    rounds : how they were found
+    rounds : rounds of the search that accepted them
     """
     compared = []
     for i, found in enumerate(rounds):
         rest, own, tried = found.base, found.accepted, found.tried
         if i + 1 < len(rounds):
-            # what was accepted later may change how this effect compares with its rivals
+            # an effect that was accepted later may change the comparison of this effect with its rivals
             rest = refit_without_part(base, i, evidence)
             at = sum(len(p.names) for p in base.parts[:i])
             part = replace(base.parts[i], start=base.values[at : at + len(base.parts[i].names)])
@@ -74,12 +74,12 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
 
 
 def is_close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
-    """Whether another explanation cannot be told from the named one: by score, by gain, or by resamples.
+    """Return whether another explanation cannot be told from the named one: by score, by gain, or by resamples.
 
     Parameters
     ----------
     own, other : the named effect and the other
-    share, wins : their shares of bootstrap resamples
+    share, wins : their shares of bootstrap resamples [1]
     """
     needed = own.rules.win_share
     if other.gain > own.rules.rival_gain_share * own.gain:
@@ -88,15 +88,15 @@ def is_close(own: Candidate, share: float, other: Candidate, wins: float) -> boo
 
 
 def _is_credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
-    """An explanation that still bends the session beyond belief is none, beside one that does not."""
+    """Return whether the other explanation keeps the session within belief, unless the named one does not either."""
     bent, straight = (float(np.max(np.abs(c.fitted.session) / evidence.session_sigma)) for c in (other, own))
     return bent <= evidence.rules.retune_pull or straight > evidence.rules.retune_pull
 
 
 def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:
-    """Smallest first parameter whose linear gain would pass the score gate, at the level of the null's inflation.
+    """Return the smallest first parameter of each effect whose linear gain would pass the score gate.
 
-    Infinite where the library's bounds end before.
+    The gate is taken at the null's inflation [unit of the parameter]; infinite where the bounds exclude that size.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The library held against residuals: gain and estimate of every effect, linearly."""
+"""Linear screening of the library: gain and estimate of every effect, and the inflation of the runs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from tasks.identification.inference.fit import Fit
 def screen_library(
     evidence: Evidence, at: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Gain and estimate of every library effect, linearly, beyond the accepted ones.
+    """Return gain and estimate of every library effect beyond the accepted ones, by linear algebra alone.
 
     Parameters
     ----------
@@ -20,8 +20,8 @@ def screen_library(
 
     Returns
     -------
-    gains float64 [E], estimates float64 [E] of the first parameter, and float64 [E] the value of the second at which
-    the gain is largest (nan where its first value is, or where there is none)
+    Gains float64 [E]; estimates of the first parameter float64 [E] [its unit]; and the value of the second parameter
+    with the largest gain float64 [E] [its unit], NaN if that is its first value or if there is no second parameter.
     """
     effects = evidence.effects
     accepted = [j for j, e in enumerate(effects) if e.name in {p.name for p in at.parts}]
@@ -59,17 +59,17 @@ def screen_library(
 
 
 def compute_inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> float:
-    """How much the runs disagree beyond their noise about one direction and about the library's in general.
+    """Return the factor by which the runs disagree beyond their noise [1].
 
-    Under a right model every run's score z in any direction is standard normal. Q is the sum of z^2 over runs
-    (Cochran 1954, doi:10.2307/3001666); the null's level is the median over the library's directions, and the
-    direction's own Q counts beside it.
+    Under a correct model every run's score z in any direction is standard normal, and Q, the sum of z^2 over runs,
+    equals their number on average (Cochran 1954, doi:10.2307/3001666). The null's level is the median over the
+    library's directions; the direction's own Q is combined with it.
 
     Parameters
     ----------
     evidence : the runs
-    at : fit whose residuals are looked at
-    own : float64 [R] z of the direction itself, or None
+    at : fit whose residuals are used
+    own : float64 [R] z of the direction itself, or None for the null's level alone
     """
     z = np.full((len(evidence.train), len(evidence.effects)), np.nan)
     for i, (run, r) in enumerate(zip(evidence.train, at.residuals, strict=True)):
@@ -86,12 +86,12 @@ def compute_inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | No
 
 
 def find_look_alikes(evidence: Evidence, index: int) -> list[int]:
-    """Library effects that the runs can hardly tell from one of them, the most alike first.
+    """Return the library effects that the runs can hardly tell from one of them, the most alike first.
 
     Parameters
     ----------
     evidence : the runs
-    index : of the effect in the library
+    index : position of the effect in the library
     """
     size, n_session = len(evidence.effects), len(evidence.session_sigma)
     gram, cross = np.zeros((size, size)), np.zeros((size, n_session))

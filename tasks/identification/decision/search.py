@@ -1,4 +1,4 @@
-"""The search: what is added to the model, round by round, and where derivatives must be taken anew."""
+"""The search: effects are added to the model round by round, and the runs are linearised anew where needed."""
 
 from dataclasses import dataclass, replace
 
@@ -27,9 +27,14 @@ from tasks.identification.inference.linearisation import (
 
 @dataclass(frozen=True, kw_only=True)
 class Round:
-    """One round of the search: what was tried on top of ``base`` and which candidate was accepted.
+    """One round of the search.
 
-    ``evidence`` has its derivatives at the accepted one.
+    Parameters
+    ----------
+    base : fit before the round
+    tried : candidates that were tried in addition to ``base``
+    accepted : candidate that was accepted
+    evidence : the runs, with derivatives at the accepted candidate
     """
 
     base: Fit
@@ -45,8 +50,8 @@ class SearchState:
     Parameters
     ----------
     evidence : the runs, with derivatives that hold at ``base``
-    base : fit of what is accepted
-    rounds : how it came about
+    base : fit of the accepted hypotheses
+    rounds : rounds of the search so far
     tried : candidates of the last round, none of which was accepted
     """
 
@@ -59,15 +64,15 @@ class SearchState:
 def relinearise_candidate(
     evidence: Evidence, base: Fit, candidate: Candidate, *, gated: bool = True, known: Evidence | None = None
 ) -> tuple[Evidence, Candidate]:
-    """Take derivatives anew at a candidate whose gain is large, refit it and judge it there.
+    """Linearise the runs anew at a candidate with a large gain, refit it and judge it there.
 
     Parameters
     ----------
     evidence : the runs as differentiated for ``base``
-    base : fit of what is accepted so far
-    candidate : judged with them
-    gated : judge it on held-out runs as well
-    known : derivatives that were taken at the candidate before
+    base : fit of the hypotheses accepted so far
+    candidate : candidate judged with these derivatives
+    gated : judge it on held-out runs too
+    known : derivatives at the candidate, if an earlier search took them
 
     Returns
     -------
@@ -95,9 +100,9 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
 
     Parameters
     ----------
-    start : what is accepted already
-    gated : accept only what passes every gate; else whatever explains most, to learn what is left beside it
-    explored : an earlier search whose first effect, where it is met again, need not be looked for anew
+    start : state of the search with the hypotheses accepted already
+    gated : accept only candidates that pass every gate; else the one with the largest gain, to see the residual with it
+    explored : earlier search; where its effects appear again, its derivatives are used
     """
     state, rules = start, start.evidence.rules
     met = frozenset(r.accepted.hypothesis.name for r in explored.rounds) if explored else frozenset()
@@ -141,7 +146,7 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
 
 
 def _recall_candidate(explored: SearchState, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
-    """The candidate at the values that an earlier search settled it at, and its derivatives there."""
+    """Return the candidate at the values to which an earlier search fitted it, and the derivatives taken there."""
     k = len(candidate.hypothesis.names)
     for earlier in explored.rounds:
         known = earlier.accepted
@@ -156,14 +161,14 @@ def _recall_candidate(explored: SearchState, candidate: Candidate) -> tuple[Cand
 
 
 def scale_disturbances(explored: SearchState, splines: tuple[NDArray[np.float64], ...]) -> Disturbance:
-    """Scales of the disturbances beside whatever explains the runs best.
+    """Return the scales of the disturbances, fitted beside the effect that explains the runs best.
 
-    A large effect that is not yet named would otherwise pass for a disturbance, which then hides it.
+    Otherwise a large effect that is not named yet would be taken for a disturbance, which then hides it.
 
     Parameters
     ----------
-    explored : an ungated search under a first guess of the scales
-    splines : `differentiate_by_splines` there
+    explored : ungated search under a first guess of the scales
+    splines : `differentiate_by_splines` at its fit
     """
     residuals = compute_whitened_residuals(explored.evidence, explored.base)
     here = explored.evidence
@@ -173,12 +178,12 @@ def scale_disturbances(explored: SearchState, splines: tuple[NDArray[np.float64]
 
 
 def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
-    """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session.
+    """Return the search state with a wrong number of the vehicle named, where a session nuisance is pulled too far.
 
     Parameters
     ----------
-    start : nothing accepted
-    reasons : is added to
+    start : state without effects
+    reasons : list to which sentences are appended
     """
     evidence, null = start.evidence, start.base
     pulls = np.abs(null.session / evidence.session_sigma)

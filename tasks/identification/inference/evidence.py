@@ -1,8 +1,8 @@
-"""One run as evidence: derivatives, nuisances and smooth disturbances, marginalised linearly.
+"""One run as evidence: derivatives by effects and nuisances, with offsets and disturbances marginalised linearly.
 
 residual = A theta + S session + J d + noise, with d the run's own offsets and disturbances under a Gaussian
-prior. Integrating d out leaves inner products x' L y with L = I - J (J'J + P)^-1 J', one small Gram matrix a
-run, so that screening, bootstrap and leave-one-run-out are sums of small matrices (Woodbury, Schur).
+prior. Integrating d out leaves inner products x' L y with L = I - J (J'J + P)^-1 J' (Woodbury), which are one small
+Gram matrix per run. Screening, bootstrap and leave-one-run-out are therefore sums of small matrices.
 """
 
 from dataclasses import dataclass, replace
@@ -34,20 +34,20 @@ from tasks.vehicle.effects.table import PARAMETER_INDEX
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
 BROKEN = 1e4
-"""Whitened residual of a trial that the integration does not survive: no fit goes there."""
+"""Whitened residual of a trial whose simulation diverges, so large that no fit accepts the trial."""
 SECOND_SHARES = (0.3, 0.6)
-"""Where in its range an effect's second parameter is tried by the screen, besides its first value."""
+"""Shares of the range of an effect's second parameter at which the screen tries it, besides its first value."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunEvidence:
-    """Whitened derivatives of one run about a base point.
+    """Whitened derivatives of one run about a linearisation point.
 
     Parameters
     ----------
     model : the run
-    rho, sigma : noise of its channels
+    rho, sigma : float64 [7] AR(1) coefficient and standard deviation of the channels' noise [1, unit of the channel]
     nuisance : float64 [M, D] derivatives by the run's offsets and disturbance knots
     knots : number of knots at each disturbed port
     information : float64 [D, D] nuisance' nuisance
@@ -79,11 +79,17 @@ class RunEvidence:
         slots: tuple[Slot, ...] = (),
         offsets: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Whitened measured-minus-model at ``theta`` (full vector), float64 [M].
+        """Return the whitened residual, measured less model, at ``theta`` (full vector), float64 [M].
 
-        With ``offsets`` (float64 [D]) the model is simulated with this run's own offsets and disturbances and
-        their linear part is put back: the same residual to first order, but right where the run is not linear
-        in them, as on a road feature that is reached a moment later.
+        With ``offsets`` the model is simulated with this run's own offsets and disturbances, and their linear part is
+        added again. To first order this is the same residual, but it is also correct where the run is not linear in
+        them, as on a road feature that the vehicle reaches a moment later.
+
+        Parameters
+        ----------
+        theta : float64 [len(EFFECT_TABLE)] all parameters [units of the table]
+        slots : forms
+        offsets : float64 [D] the run's offsets and disturbance knots; None for 0
         """
         if offsets is None:
             y = predict_channels(self.model, theta, slots=slots)
@@ -119,7 +125,12 @@ class RunEvidence:
         return solve_triangular(self.factor, projected, lower=True, trans="T", check_finite=False)
 
     def project_on_nuisances(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """factor^-1 nuisance' x: what the nuisances can take from x."""
+        """Return factor^-1 nuisance' x, the part of x that the nuisances can explain, float64 [D] or [D, P].
+
+        Parameters
+        ----------
+        x : float64 [M] or [M, P] whitened residuals or derivatives
+        """
         return solve_triangular(self.factor, self.nuisance.T @ x, lower=True, check_finite=False)
 
 
@@ -133,17 +144,17 @@ def differentiate_run(
     disturbance: Disturbance,
     slots: tuple[Slot, ...] = (),
 ) -> RunEvidence:
-    """Simulate a run and its derivatives.
+    """Simulate a run and its derivatives about a linearisation point.
 
     Parameters
     ----------
     model : the run
     rho, sigma : channel noise
-    base : float64 full parameter vector to differentiate at
-    effects : the library; may be empty for runs that only judge
+    base : float64 [len(EFFECT_TABLE)] parameters at which derivatives are taken
+    effects : library of effects; empty for held-out runs
     tolerances : priors of the run's offsets
     disturbance : prior of the disturbances
-    slots : forms that belong to the base point
+    slots : forms that belong to that point
     """
     simulated = simulate_run(model, base, slots=slots, keep_states=True)
     y = compute_instrument_readings(model, base, simulated)
@@ -151,6 +162,7 @@ def differentiate_run(
     def differentiate(
         theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
     ) -> NDArray[np.float64]:
+        """Return the difference quotient of the readings."""
         moved = simulate_run(model, theta, slots=(*slots, *extra), **options)
         return (compute_instrument_readings(model, theta, moved) - y) / step
 
@@ -193,7 +205,7 @@ def differentiate_run(
         leading, second = effects[place].parameters
         theta = base.copy()
         theta[second.index] = value
-        # an effect that is there already is not looked for
+        # an effect that the model has already is not screened
         there = base[leading.index] != 0.0
         others.append(
             np.zeros_like(y)
@@ -223,7 +235,13 @@ def differentiate_run(
 def set_disturbance_prior(
     evidence: RunEvidence, tolerances: Tolerances, disturbance: Disturbance
 ) -> RunEvidence:
-    """The same run under another prior of the disturbances."""
+    """Return the same run under another prior of the disturbances.
+
+    Parameters
+    ----------
+    evidence : the run
+    tolerances, disturbance : prior of its offsets and disturbances
+    """
     precision = compute_prior_precision(evidence.knots, tolerances, disturbance)[0]
     factor = cholesky(evidence.information + precision, lower=True, check_finite=False)
     changed = replace(evidence, factor=factor)
@@ -236,11 +254,11 @@ def set_disturbance_prior(
 
 
 def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
-    """Places of the effects with a second parameter, and the values at which the screen tries it.
+    """Return positions of the effects with a second parameter, and the values at which the screen tries it.
 
     Parameters
     ----------
-    effects : the library
+    effects : library of effects
     """
     return [
         (place, second.lower + share * (second.upper - second.lower))
@@ -251,6 +269,7 @@ def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
 
 
 def _shift_parameter(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
+    """Return a copy of the vector with one parameter moved by a step."""
     moved = theta.copy()
     moved[index] += step
     return moved

@@ -1,4 +1,4 @@
-"""Derivatives of all runs about a point, the scales of their disturbances, and both again about another point."""
+"""Linearisation of all runs about a fit, and the scales of their disturbances."""
 
 from dataclasses import replace
 
@@ -23,11 +23,11 @@ from tasks.vehicle.parameters import Vehicle
 
 BODY_CHANNELS = ("pitch", "pitch_rate", "vertical_acceleration")
 SUSPENSION = ("pitch_gain", "damping", "stiffness")
-"""Session nuisances that only the body's motion shows."""
+"""Session nuisances that act on the body's motion only."""
 UNSEEN = 1e-3
-"""Factor on the tolerance of a nuisance that no channel shows: it stays where it is."""
+"""Factor on the tolerance of a nuisance that no channel depends on, which keeps it at 0."""
 FREED = 20.0
-"""Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
+"""Factor on the session's tolerances while the disturbances are scaled, so that they do not absorb a wrong number."""
 
 
 def prepare_evidence(
@@ -37,14 +37,14 @@ def prepare_evidence(
     effects: tuple[Effect, ...],
     rules: DecisionRules,
 ) -> Evidence:
-    """Noise and derivatives about the model as it stands, under the first guess of the disturbances.
+    """Return noise and derivatives about the model as it stands, under the first guess of the disturbances.
 
     Parameters
     ----------
     campaign : measured runs with their split
-    vehicle, surface : the model that is judged
-    effects : the library of candidates
-    rules : which runs are left out, and by which all is decided
+    vehicle, surface : judged model
+    effects : library of candidates
+    rules : decision rules; they say which runs are left out
     """
     rho, sigma = estimate_channel_noise(campaign)
     tolerances = _without_unseen(campaign)
@@ -55,10 +55,11 @@ def prepare_evidence(
     used: list[str] = []
 
     def differentiate_runs(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
+        """Return the training or the held-out runs with their derivatives."""
         own = [m for m in models if m.run.held_out == held_out]
-        sound = [m for m in own if compute_step_misfit(m, rho, sigma) <= rules.forked_misfit]
-        # too few sound runs to do without the others
-        kept = sound if len(sound) >= rules.fewest_runs else own
+        insensitive = [m for m in own if compute_step_misfit(m, rho, sigma) <= rules.forked_misfit]
+        # with too few runs that are insensitive to the step, the others are used too
+        kept = insensitive if len(insensitive) >= rules.fewest_runs else own
         used.extend(m.run.name for m in kept)
         return tuple(
             differentiate_run(model, rho, sigma, plain, library, tolerances, guess) for model in kept
@@ -73,7 +74,7 @@ def prepare_evidence(
 
 
 def _without_unseen(campaign: Campaign) -> Tolerances:
-    """Return the tolerances with the suspension held where no channel shows the body's motion."""
+    """Return the tolerances, with the suspension fixed where no channel depends on the body's motion."""
     if any(name in campaign.channels for name in BODY_CHANNELS):
         return campaign.tolerances
     session = (
@@ -84,7 +85,9 @@ def _without_unseen(campaign: Campaign) -> Tolerances:
 
 
 def compute_step_misfit(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.float64]) -> float:
-    """Misfit that halving the integration step alone makes: a run that forks, as at the ABS threshold, has much.
+    """Return the misfit that halving the integration step alone makes [1].
+
+    Runs that are sensitive to the step, such as those that stay near the threshold of the ABS, have a large one.
 
     Parameters
     ----------
@@ -97,13 +100,13 @@ def compute_step_misfit(model: RunModel, rho: NDArray[np.float64], sigma: NDArra
 
 
 def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
-    """The same runs with derivatives taken about a fit.
+    """Return the same runs with derivatives taken about a fit.
 
     Parameters
     ----------
     evidence : the runs
-    at : where to
-    library : also the library's derivatives; else the old ones are kept
+    at : fit, the new linearisation point
+    library : take the library's derivatives anew too; else the old ones are kept
     """
     theta, slots = compose_parameters(at.parts, at.values, at.session)
 
@@ -124,12 +127,12 @@ def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
 
 
 def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Evidence:
-    """The same runs under other scales of the disturbances.
+    """Return the same runs under other scales of the disturbances.
 
     Parameters
     ----------
     evidence : the runs
-    disturbance : the scales
+    disturbance : scales and correlation times
     """
     return replace(
         evidence,
@@ -142,7 +145,13 @@ def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Eviden
 
 
 def compute_whitened_residuals(evidence: Evidence, at: Fit) -> list[NDArray[np.float64]]:
-    """Whitened measured-minus-model of every training run at a fit, its own offsets at 0; float64 [M] each."""
+    """Return the whitened residual of every training run at a fit, with its own offsets at 0; float64 [M] each.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit
+    """
     theta, slots = compose_parameters(at.parts, at.values, at.session)
     return [run.compute_residual(theta, slots) for run in evidence.train]
 
@@ -156,16 +165,16 @@ def fit_disturbance(
     splines: tuple[NDArray[np.float64], ...],
     ridge: NDArray[np.float64],
 ) -> Disturbance:
-    """Scales and times by marginal likelihood, every library direction, every spline and the session free.
+    """Return scales and times by marginal likelihood, with every library direction, every spline and the session free.
 
-    With the directions fixed at 0 an effect or a form would inflate the disturbance that then hides it.
+    With these directions fixed at 0, an effect or a form would inflate the disturbance, which would then hide it.
 
     Parameters
     ----------
     evidence : training runs
-    residuals : whitened residual of each run at the base point, float64 [M]
+    residuals : whitened residual of each run at the linearisation point, float64 [M]
     tolerances : session priors
-    effects : the library, whose steps set broad priors
+    effects : library, whose steps set broad priors
     start : first guess
     splines : derivatives of each run by the knots of the splines, float64 [M, K]
     ridge : float64 [K] precision of their priors

@@ -1,4 +1,4 @@
-"""Sticking tyre, footprint and links: with every value 0 each function returns what the plain model has there."""
+"""Equations of the sticking tyre, the footprint and the links; with every value 0 they return the plain model."""
 
 from math import sqrt
 
@@ -14,12 +14,12 @@ STICK_SLIP = 0.01
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_stick_share(speed: float, effects: EffectValues) -> float:
-    """Share of the tyre that sticks and slides instead of rolling: 1 at low speed, smoothly to 0 [1].
+    """Return the share of the tyre that sticks and slides instead of rolling [1]: 1 at low speed, smoothly down to 0.
 
     Parameters
     ----------
-    speed : [m/s]
-    effects : the values
+    speed : speed of the vehicle [m/s]
+    effects : numbers of the vehicle's effects
     """
     if speed >= effects.stick_above:
         return 0.0
@@ -33,15 +33,15 @@ def compute_stick_share(speed: float, effects: EffectValues) -> float:
 def compute_effective_friction(
     slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
-    """Friction of a tyre of which a share sticks, for a braking slip [1].
+    """Return the friction of a tyre of which a share sticks, at a braking slip [1].
 
     Parameters
     ----------
     slip : braking slip, 0 or more [1]
-    load : of the axle [N]
-    share : that sticks [1]
-    tyre : on the surface
-    effects : the values
+    load : load of the axle [N]
+    share : share of the tyre that sticks [1]
+    tyre : the tyre on the surface
+    effects : numbers of the vehicle's effects
     """
     rolling = compute_tyre_friction(slip, load, tyre)
     if share == 0.0:
@@ -54,15 +54,15 @@ def compute_effective_friction(
 def compute_effective_slope(
     slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
-    """Rise of ``compute_effective_friction`` with slip [1].
+    """Return the derivative of ``compute_effective_friction`` by slip [1].
 
     Parameters
     ----------
     slip : braking slip, 0 or more [1]
-    load : of the axle [N]
-    share : that sticks [1]
-    tyre : on the surface
-    effects : the values
+    load : load of the axle [N]
+    share : share of the tyre that sticks [1]
+    tyre : the tyre on the surface
+    effects : numbers of the vehicle's effects
     """
     rolling = compute_tyre_slope(slip, load, tyre)
     if share == 0.0:
@@ -75,15 +75,15 @@ def compute_effective_slope(
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def average_over_footprint(station: float, road: RoadFeature, effects: EffectValues) -> tuple[float, float]:
-    """Road height [m] and slope [m/m] that a tyre feels: their means over its footprint.
+    """Return road height [m] and slope [m/m] averaged over the tyre's footprint.
 
-    The mean of the height is by Gauss's three points, that of the slope is exact.
+    Gauss's three-point rule averages the height; the mean of the slope is exact.
 
     Parameters
     ----------
-    station : of the axle [m]
-    road : the feature
-    effects : the values
+    station : route position of the axle [m]
+    road : road feature
+    effects : numbers of the vehicle's effects
     """
     half = 0.5 * effects.enveloping_length
     if half <= 0.0:
@@ -98,12 +98,12 @@ def average_over_footprint(station: float, road: RoadFeature, effects: EffectVal
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_lateral_reserve(friction: float, peak: float) -> float:
-    """Sideways grip that a braking tyre has left, by the friction circle [1].
+    """Return the lateral friction that a braking tyre has left, by the friction circle [1].
 
     Parameters
     ----------
-    friction : of braking in use [1]
-    peak : of the curve [1]
+    friction : friction that braking uses [1]
+    peak : friction at the top of the curve [1]
     """
     used = friction / peak
     return sqrt(max(1.0 - used * used, 0.0))
@@ -113,13 +113,13 @@ def compute_lateral_reserve(friction: float, peak: float) -> float:
 def compute_link_force(
     tyre_force: float, transfer: float, anti: float, stick_anti: float, share: float
 ) -> float:
-    """Vertical force that an axle's links pass between body and wheel while it brakes [N].
+    """Return the vertical force that an axle's links pass between body and wheel while it brakes [N].
 
     Parameters
     ----------
     tyre_force : braking force of the axle [N]
     transfer : height of the centre of gravity over the wheelbase [1]
     anti, stick_anti : share of the load transfer, always and in addition where the tyre sticks [1]
-    share : that sticks [1]
+    share : share of the tyre that sticks [1]
     """
     return (anti + share * stick_anti) * tyre_force * transfer

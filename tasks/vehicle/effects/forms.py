@@ -1,4 +1,4 @@
-"""Forms that no effect of the library has: a simple shape of one variable at one port."""
+"""Forms outside the library of effects: a simple shape of one variable at one port."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -53,12 +53,12 @@ class Form:
 
     @property
     def name(self) -> str:
-        """Port, shape and what x is."""
+        """Return the form's name: its port, its shape and the definition of x."""
         return name_form(self.port, self.variable, self.shape, self.scale)
 
     @property
     def slot(self) -> Slot:
-        """The form as a table."""
+        """Return the form as a piecewise-linear table."""
         grid = np.linspace(self.low, self.high, TABLE)
         return Slot(
             port=self.port,
@@ -70,7 +70,7 @@ class Form:
 
 
 def count_coefficients(shape: str) -> int:
-    """How many coefficients a shape has.
+    """Return the number of coefficients of a shape.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def count_coefficients(shape: str) -> int:
 
 
 def name_form(port: str, variable: str, shape: str, scale: float) -> str:
-    """Return the name of a form: its port, its shape, and what x is.
+    """Return the name of a form: its port, its shape and the definition of x.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where forms enter the equations of motion, and what they can depend on."""
+"""Ports where a form can enter the equations of motion, and variables that it can depend on, with their units."""
 
 PORTS = ("longitudinal_force", "brake_torque", "friction", "pitch_moment", "suspension_force")
 PORT_UNITS = ("N", "1", "1", "N m", "N")

@@ -18,7 +18,7 @@ class Slot:
     Parameters
     ----------
     port, variable : one of `PORTS` and `VARIABLES`
-    origin, spacing : of the grid [unit of the variable]
+    origin, spacing : first point and spacing of the grid [unit of the variable]
     values : float64 [K] at the grid points [unit of the port]
     """
 
@@ -30,7 +30,7 @@ class Slot:
 
 
 class SlotTables(NamedTuple):
-    """Slots as the kernels take them.
+    """Slots in the form that the kernels take.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class SlotTables(NamedTuple):
 
 
 def pack_slots(slots: Sequence[Slot]) -> SlotTables:
-    """Pack slots for the kernels.
+    """Return slots in the form that the kernels take.
 
     Parameters
     ----------
@@ -63,13 +63,13 @@ def pack_slots(slots: Sequence[Slot]) -> SlotTables:
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def interpolate_table(table: NDArray[np.float64], origin: float, spacing: float, x: float) -> float:
-    """Value of a piecewise-linear table on a uniform grid, held constant beyond its ends [unit of the port].
+    """Return the value of a piecewise-linear table on a uniform grid, constant beyond its ends [unit of the port].
 
     Parameters
     ----------
     table : float64 [K] values
-    origin, spacing : of the grid [unit of the variable]
-    x : the variable
+    origin, spacing : first point and spacing of the grid [unit of the variable]
+    x : value of the variable [unit of the variable]
     """
     last = table.shape[0] - 1
     u = (x - origin) / spacing
@@ -83,12 +83,12 @@ def interpolate_table(table: NDArray[np.float64], origin: float, spacing: float,
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def sum_slots(port: int, variables: tuple[float, ...], slots: SlotTables) -> float:
-    """Sum of all slots at a port [unit of the port].
+    """Return the sum of all slots at a port [unit of the port].
 
     Parameters
     ----------
     port : position in `PORTS`
-    variables : what slots can depend on, in the order of `VARIABLES`
+    variables : values of the variables, in the order of `VARIABLES` [their units]
     slots : the tables
     """
     total = 0.0

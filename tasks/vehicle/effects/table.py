@@ -1,7 +1,7 @@
 """The table of effects: every number that a fit may give a vehicle, its road or its instruments.
 
 Units, bounds, the order of a parameter vector, the values that the kernels take, the checks of catalogue files and
-what a grown vehicle carries all derive from these rows. A new effect is one row here and one equation at its port.
+the numbers of a grown vehicle all derive from these rows. A new effect is one row here and one equation at its port.
 """
 
 from collections import namedtuple
@@ -31,20 +31,20 @@ DECLARED = "declared, from the residuals of the multibody reference"
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One number that a fit may move; 0 is the plain model, but for thresholds, which act with their effect only.
+    """One number that a fit may move; 0 is the plain model, except for thresholds, which act with their effect only.
 
     Parameters
     ----------
     name : unique
-    effect : what a table calls the effect that the number belongs to
-    unit : as catalogue files write it
-    port : where it enters
+    effect : name of the effect that the number belongs to, as tables print it
+    unit : unit, as catalogue files write it
+    port : port where it enters the equations of motion
     kind : added is a number of its own in the equations, scaled is a relative change of fields of the vehicle, shifted
         is added to them
     fields : of ``EffectValues``, or of the vehicle (``families.`` stands for all its tyre families)
     bounds : lowest and highest value that a fit may take [unit]
     step : for finite differences [unit]
-    source : reference
+    source : reference for the equation
     start : value from which a fit starts, and at which the effect's other number is screened [unit]
     """
 
@@ -61,22 +61,22 @@ class EffectParameter:
 
     @property
     def lower(self) -> float:
-        """Lower bound [unit]."""
+        """Return the lower bound [unit]."""
         return self.bounds[0]
 
     @property
     def upper(self) -> float:
-        """Upper bound [unit]."""
+        """Return the upper bound [unit]."""
         return self.bounds[1]
 
     @property
     def index(self) -> int:
-        """Position in a parameter vector."""
+        """Return the position in a parameter vector."""
         return PARAMETER_INDEX[self.name]
 
     @property
     def of_vehicle(self) -> bool:
-        """Whether a vehicle can carry it: the road's grade and the errors of instruments it cannot."""
+        """Return whether a vehicle can carry the number; the road's grade and the errors of instruments it cannot."""
         return self.port not in ("road", "sensor")
 
 
@@ -84,6 +84,7 @@ def _add_number(
     name: str, effect: str, unit: str, port: str, bounds: tuple[float, float], step: float, source: str,
     start: float = 0.0,
 ) -> EffectParameter:  # fmt: skip
+    """Return a row whose number stands in the equations itself."""
     return EffectParameter(name, effect, unit, port, "added", (name,), bounds, step, source, start)
 
 
@@ -91,12 +92,14 @@ def _change_field(
     name: str, kind: Kind, fields: tuple[str, ...], bounds: tuple[float, float], step: float, *, unit: str = "1",
     effect: str = "", source: str = PAPER, port: str = "parameter",
 ) -> EffectParameter:  # fmt: skip
+    """Return a row that scales or shifts fields of the vehicle."""
     return EffectParameter(
         name, effect or name.replace("_", " "), unit, port, kind, fields, bounds, step, source
     )
 
 
 def _add_sensor(name: str, unit: str, bounds: tuple[float, float], step: float) -> EffectParameter:
+    """Return a row for an error of an instrument."""
     return _add_number(name, name.replace("_", " "), unit, "sensor", bounds, step, ISO_15037)
 
 
@@ -195,7 +198,7 @@ NUMBERS_OF_EFFECTS = {
     effect: tuple(name for name in EFFECT_UNITS if PARAMETERS[name].effect == effect)
     for effect in dict.fromkeys(PARAMETERS[name].effect for name in EFFECT_UNITS)
 }
-"""The numbers of each effect that a vehicle may hold, by what a table calls it."""
+"""The numbers of each effect that a vehicle may hold, by the name that tables print."""
 
 if TYPE_CHECKING:
 
@@ -213,11 +216,11 @@ else:
 
 
 def pack_effect_values(values: Mapping[str, float]) -> EffectValues:
-    """Return the effects of a vehicle as the kernels take them; all others 0.
+    """Return the effects of a vehicle in the form that the kernels take; all others are 0.
 
     Parameters
     ----------
-    values : by name, in the units of `EFFECT_UNITS`
+    values : numbers by name [units of `EFFECT_UNITS`]
 
     Raises
     ------
@@ -234,11 +237,11 @@ def pack_effect_values(values: Mapping[str, float]) -> EffectValues:
 
 
 def build_parameter_vector(values: Mapping[str, float]) -> NDArray[np.float64]:
-    """Return the vector of all parameters from named values; all others 0.
+    """Return the vector of all parameters from named values; all others are 0.
 
     Parameters
     ----------
-    values : by parameter name, in the units of the table
+    values : numbers by parameter name [units of the table]
 
     Raises
     ------
@@ -260,6 +263,6 @@ def unpack_parameter_vector(theta: NDArray[np.float64]) -> dict[str, float]:
 
     Parameters
     ----------
-    theta : float64 [len(EFFECT_TABLE)]
+    theta : float64 [len(EFFECT_TABLE)] vector of all parameters [units of the table]
     """
     return {EFFECT_TABLE[i].name: float(theta[i]) for i in np.flatnonzero(theta)}

@@ -1,4 +1,4 @@
-"""One axle at one instant: slip, tyre force and torques, each with its own function."""
+"""Slip, tyre force and torques of one axle at one instant, each by its own function."""
 
 from typing import NamedTuple
 
@@ -31,17 +31,17 @@ class AxlePorts(NamedTuple):
 
     Parameters
     ----------
-    ground : road and load
+    ground : road height, slope and contact load
     slip : signed braking slip; negative where the tyre drives the vehicle [1]
     force_slip : slip that builds up the tyre's force; another one where the tyre has a relaxation length [1]
     tyre_force : braking force at the contact, rearward positive [N]
     abs_scale : share of the brake torque let through [1]
     full_torque : brake torque that the pressure gives to a turning wheel without ABS [N m]
     brake_torque : against the wheel's rotation [N m]
-    shaft_torque : of the engine, against the wheel's rotation [N m]
-    suspension_force : spring, damper and what the links pass on [N]
-    lever : of the tyre force about the wheel centre [m]
-    ground_moment : of the ground's load, against the wheel's rotation [N m]
+    shaft_torque : torque of the engine, against the wheel's rotation [N m]
+    suspension_force : force of spring, damper and links [N]
+    lever : lever of the tyre force about the wheel centre [m]
+    ground_moment : moment of the contact load, against the wheel's rotation [N m]
     """
 
     ground: Ground
@@ -59,7 +59,7 @@ class AxlePorts(NamedTuple):
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
-    """Braking slip that is negative for a driven wheel, within [-1, 1]; ISO 8855's is its negative [1].
+    """Return the braking slip, negative for a driven wheel, within [-1, 1]; ISO 8855's slip is its negative [1].
 
     Parameters
     ----------
@@ -74,15 +74,15 @@ def compute_signed_slip(speed: float, rim_speed: float, speed_floor: float) -> f
 def compute_signed_friction(
     slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
-    """Friction of the tyre, continued oddly to driving slip [1].
+    """Return the friction of the tyre, continued as an odd function to driving slip [1].
 
     Parameters
     ----------
     slip : signed braking slip [1]
-    load : of the axle [N]
-    share : of the tyre that sticks [1]
-    tyre : on the surface
-    effects : the values
+    load : load of the axle [N]
+    share : share of the tyre that sticks [1]
+    tyre : the tyre on the surface
+    effects : numbers of the vehicle's effects
     """
     friction = compute_effective_friction(abs(slip), load, share, tyre, effects)
     return friction if slip >= 0.0 else -friction
@@ -90,12 +90,12 @@ def compute_signed_friction(
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_lock_share(omega: float, lock_speed: float) -> float:
-    """Share of the brake torque that friction gives at a wheel speed: all of it, save around standstill [1].
+    """Return the share of the brake torque that pad friction gives at a wheel speed: 1, but near standstill [1].
 
     Parameters
     ----------
-    omega : [rad/s]
-    lock_speed : [rad/s]
+    omega : wheel speed [rad/s]
+    lock_speed : wheel speed below which pad friction is proportional to it [rad/s]
     """
     return min(max(omega / lock_speed, -1.0), 1.0)
 
@@ -104,13 +104,13 @@ def compute_lock_share(omega: float, lock_speed: float) -> float:
 def collect_form_variables(
     speed: float, load_ratio: float, strut: Strut, memory: AxleMemory, instant: Instant
 ) -> FormVariables:
-    """Return what a form at an axle can depend on, in the order of `VARIABLES`.
+    """Return the variables that a form at an axle can depend on, in the order of `VARIABLES`.
 
     Parameters
     ----------
-    speed : [m/s]
+    speed : speed of the vehicle [m/s]
     load_ratio : contact load over that at rest [1]
-    strut, memory, instant : of the axle, and what acts from outside
+    strut, memory, instant : strut and memory of the axle, and inputs at this instant
     """
     return (
         instant.time, speed, instant.pressure, memory.disc_rise, instant.pressure_rate, load_ratio, strut.travel,
@@ -120,12 +120,12 @@ def collect_form_variables(
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
-    """How fast the slip that builds up force follows the slip: v / length; 0 where it does at once [1/s].
+    """Return the rate at which the slip that builds up force follows the slip, v / length; 0 without relaxation [1/s].
 
     Parameters
     ----------
-    speed : [m/s]
-    speed_floor : v_epsilon, the least speed of following [m/s]
+    speed : speed of the vehicle [m/s]
+    speed_floor : v_epsilon, the lowest speed that counts [m/s]
     length : relaxation length (Pacejka 2012, doi:10.1016/C2010-0-68548-8); 0 for none [m]
     """
     return max(speed, speed_floor) / length if length > 0.0 else 0.0
@@ -149,22 +149,22 @@ def compute_rolling_axle(
     chassis: Chassis,
     tyre: Tyre,
 ) -> AxlePorts:
-    """Slip, tyre force and torques of one axle.
+    """Return slip, tyre force and torques of one axle of a moving vehicle.
 
     Parameters
     ----------
-    ground, strut : what carries it
-    speed : [m/s]
+    ground, strut : ground under the axle and strut above it
+    speed : speed of the vehicle [m/s]
     omega : wheel speed [rad/s]
-    memory : what it carries on
+    memory : slip state, sliding energy and disc temperature of the axle
     scale : ABS scale one step before, from which its rate is limited [1]
     gain : brake torque per pressure [N m/MPa]
-    shaft_torque : of the engine on turning wheels [N m]
-    static_load, stiffness : of the tyre [N, N/m]
-    step : [s]
-    instant : what acts from outside
-    forms : what no effect of the library has
-    chassis, tyre : the values
+    shaft_torque : torque of the engine on turning wheels [N m]
+    static_load, stiffness : load at rest and vertical stiffness of the tyre [N, N/m]
+    step : length of the step [s]
+    instant : inputs at this instant
+    forms : forms outside the library of effects, or None
+    chassis, tyre : the vehicle on its surface
     """
     wheels, effects = chassis.wheels, chassis.effects
     slip = compute_signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
@@ -201,12 +201,12 @@ def compute_rolling_axle(
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
-    """The ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
+    """Return the ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 
     Parameters
     ----------
-    ground, strut : what carries it
-    wheels : the values
+    ground, strut : ground under the axle and strut above it
+    wheels : wheels, brakes and longitudinal values
     """
     tyre_force = -ground.load * ground.slope
     return AxlePorts(
@@ -226,12 +226,12 @@ def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxleP
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
-    """The same ports with a force of the links in parallel to spring and damper.
+    """Return the ports with a force of the links in parallel to spring and damper.
 
     Parameters
     ----------
-    ports : of the axle
-    force : pulls body and wheel together where positive [N]
+    ports : ports of the axle
+    force : force of the links; it pulls body and wheel together where positive [N]
     """
     return AxlePorts(
         ports.ground, ports.slip, ports.force_slip, ports.tyre_force, ports.abs_scale, ports.full_torque,
@@ -241,12 +241,12 @@ def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_axle_lateral_reserve(ports: AxlePorts, tyre: Tyre) -> float:
-    """Sideways grip that an axle has left; none off the road [1].
+    """Return the lateral friction that an axle has left; 0 off the road [1].
 
     Parameters
     ----------
-    ports : of the axle
-    tyre : on the surface
+    ports : ports of the axle
+    tyre : the tyre on the surface
     """
     if ports.ground.load <= 0.0:
         return 0.0

@@ -1,7 +1,8 @@
-"""Coupled mode's physics at one instant: every force where it meets the vehicle, each with its own function.
+"""Forces and moments of the coupled model at one instant, each computed by its own function.
 
-The ports are, in the order they are worked out: road, load, suspension force, slip, friction, tyre force, brake
-torque, drag, pitch moment, lift. An effect that the model lacks acts on exactly one of them.
+A port is a place where a force or moment enters the equations of motion. The ports are, in the order of computation:
+road, load, suspension force, slip, friction, tyre force, brake torque, drag, pitch moment, lift. An effect that the
+model lacks acts on exactly one of them.
 """
 
 from typing import NamedTuple
@@ -39,10 +40,10 @@ class Ports(NamedTuple):
     ----------
     front, rear : the axles
     road_force : horizontal part of the contact loads on the slope, forward positive [N]
-    drag : of coasting, the air and the snow, rearward positive [N]
+    drag : force of coasting, air, snow and grade, rearward positive [N]
     acceleration : dv/dt [m/s2]
-    pitch_moment : on the body, nose-down positive [N m]
-    lift : of the air, on the body's centre of gravity [N]
+    pitch_moment : pitch moment on the body, nose-down positive [N m]
+    lift : aerodynamic lift on the body's centre of gravity [N]
     """
 
     front: AxlePorts
@@ -56,12 +57,12 @@ class Ports(NamedTuple):
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float]:
-    """Brake torque per pressure of the front and the rear axle, of which neither is negative [N m/MPa].
+    """Return the brake torque per pressure of the front and the rear axle, never negative [N m/MPa].
 
     Parameters
     ----------
-    pressure : at the pads, with which the front's share changes [MPa]
-    chassis : the values
+    pressure : pressure at the pads, which changes the front axle's share [MPa]
+    chassis : the vehicle on its surface
     """
     front, rear = chassis.wheels.front.brake_gain, chassis.wheels.rear.brake_gain
     moved = min(max(chassis.effects.bias_pressure * pressure * (front + rear), -front), rear)
@@ -82,21 +83,21 @@ def compute_ports(
     tyre: Tyre,
     road: RoadFeature,
 ) -> Ports:
-    """All that acts on the vehicle in one state.
+    """Return all forces and moments that act on the vehicle in one state.
 
     The body's pitch moment follows from the forces at the ground: each axle passes its longitudinal link force
-    on at wheel height, and its brake and shaft torques. With F_x at the ground this is the same as F_x on the
-    height of the body's centre of gravity less the inertia of axles and wheels. What the engine was measured to give
-    goes to the axles as the brake's torque does: no vehicle file says which it drives.
+    on at wheel height, and its brake and shaft torques. This equals F_x at the ground times the height of the body's
+    centre of gravity, less the inertia of axles and wheels. A measured engine torque is divided between the axles as
+    the brake torque is, because no vehicle file names the driven axle.
 
     Parameters
     ----------
-    motion, memory, x : longitudinal state, what tyres and discs carry on, half-car state
-    instant : what acts from outside
+    motion, memory, x : longitudinal state, memory of tyres and discs, half-car state
+    instant : inputs at this instant
     scale_f, scale_r : ABS scales one step before [1]
-    step : [s]
-    forms : what no effect of the library has
-    chassis, tyre, road : the values
+    step : length of the step [s]
+    forms : forms outside the library of effects, or None
+    chassis, tyre, road : the vehicle on its surface, and the road feature
     """
     body, wheels, effects = chassis.body, chassis.wheels, chassis.effects
     speed, standing = motion.speed, instant.standing

@@ -1,7 +1,7 @@
-"""One time loop over speed, wheels, body, contact, and the heat of tyres and discs: the vehicle model.
+"""The vehicle model: one time loop over speed, wheels, body, contact, and the heat of tyres and discs.
 
-Generated datasets, calibration and the closing of the loop all drive it; what differs is the input (a brake command,
-or a pressure trace as it was measured), the step, and how often the motion is kept.
+Generated datasets, calibration and the closing of the loop all use it. They differ in the input (a brake command or a
+measured pressure trace), in the step, and in how often they keep the motion.
 """
 
 from collections.abc import Sequence
@@ -54,10 +54,10 @@ class Simulation:
     Parameters
     ----------
     history : float64 [N, len(COLUMNS)]
-    states : float64 [N, S] the state at each row, from which a run can be branched off; empty unless asked for
+    states : float64 [N, S] state at each row, from which another run can start; empty unless asked for
     onset : brake onset of a brake command [s]
-    onset_station : front axle at the onset [m]
-    stop : when the vehicle comes to rest [s]
+    onset_station : route position of the front axle at the onset [m]
+    stop : time when the vehicle comes to rest [s]
     """
 
     history: NDArray[np.float64]
@@ -67,7 +67,7 @@ class Simulation:
     stop: float
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """One column of the history, float64 [N]; ``name`` is one of `COLUMNS`."""
+        """Return one column of the history, float64 [N] [its unit]; ``name`` is one of `COLUMNS`."""
         return self.history[:, COLUMN[name]]
 
 
@@ -93,14 +93,14 @@ def simulate(
     ----------
     vehicle : the vehicle
     surface : its tyres on the surface
-    drive : what the driver does
+    drive : input of the driver
     conditions : road feature, snow, grade, direction, disc temperature
     samples : number of samples, the one at the start included
     substeps : internal steps between samples
-    interval : between samples [s]
-    initial_speed : with which the run begins, the body at rest [m/s]
-    start : a row of an earlier run's states with the same step, to branch off from; replaces ``initial_speed``
-    slots : what acts in this run alone, on top of the vehicle's forms
+    interval : time between samples [s]
+    initial_speed : speed at the start of the run, with the body at rest [m/s]
+    start : row of an earlier run's states with the same step, to start from; replaces ``initial_speed``
+    slots : tables that act in this run only, added to the vehicle's forms
     keep_states : return the state at each sample
     """
     tables = [form.slot for form in vehicle.forms] + list(slots)
@@ -145,7 +145,7 @@ def integrate_motion(
     history: NDArray[np.float64],
     states: NDArray[np.float64],
 ) -> tuple[float, float, float]:
-    """Drive, brake and stand; fill ``history``, and ``states`` unless it is empty.
+    """Integrate driving, braking and standing; fill ``history``, and ``states`` unless it is empty.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ def integrate_motion(
     samples : rows to fill
     substeps : internal steps between them
     step : internal step [s]
-    drive : what the driver does
+    drive : input of the driver
     road : road feature
-    slots : forms and disturbances; None compiles to a loop that knows none
+    slots : forms and disturbances; with None the compiled loop leaves them out
     chassis, tyre : the vehicle on its surface
     history : float64 [samples, len(COLUMNS)]
     states : float64 [samples or 0, S]

@@ -1,8 +1,8 @@
 """One step of the model, by a W-method of second order.
 
 The method is ROS2 (Verwer et al. 1999, doi:10.1137/S1064827597326651), which keeps its order for any matrix in
-the place of the Jacobian. Here that matrix holds only the stiff slip that ties speed and wheels: with it the
-wheels stay quiet to standstill; everywhere else (body, axles, road, heat) the method is Heun's.
+the place of the Jacobian. Here that matrix holds only the stiff coupling of speed and wheel speeds through slip, so
+that wheel speeds do not oscillate near standstill. For all other states (body, axles, road, heat) the method is Heun's.
 """
 
 from numba import njit
@@ -22,12 +22,12 @@ from tasks.vehicle.tyres.contract import Tyre
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_wheel_rate(ports: AxlePorts, axle: Axle) -> float:
-    """Angular acceleration of an axle's wheels [rad/s2].
+    """Return the angular acceleration of an axle's wheels [rad/s2].
 
     Parameters
     ----------
-    ports : of the axle
-    axle : its wheels
+    ports : ports of the axle
+    axle : wheels of the axle
     """
     torque = ports.lever * ports.tyre_force - ports.brake_torque - ports.ground_moment - ports.shaft_torque
     return torque / axle.inertia
@@ -37,15 +37,15 @@ def compute_wheel_rate(ports: AxlePorts, axle: Axle) -> float:
 def compute_axle_memory_rate(
     memory: AxleMemory, ports: AxlePorts, speed: float, omega: float, disc_capacity: float, chassis: Chassis
 ) -> AxleMemory:
-    """Rates of what an axle carries on: slip behind its relaxation length, heat of sliding, discs.
+    """Return the rates of an axle's slip state, sliding energy and disc temperature.
 
     Parameters
     ----------
-    memory, ports : of the axle
-    speed : [m/s]
+    memory, ports : memory and ports of the axle
+    speed : speed of the vehicle [m/s]
     omega : wheel speed [rad/s]
-    disc_capacity : heat capacity of its discs [J/K]
-    chassis : the values
+    disc_capacity : heat capacity of the axle's discs [J/K]
+    chassis : the vehicle on its surface
     """
     following = compute_relaxation_rate(speed, chassis.wheels.speed_floor, chassis.effects.relaxation_length)
     return AxleMemory(
@@ -57,14 +57,14 @@ def compute_axle_memory_rate(
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis) -> Motion:
-    """Rates of station, speed and wheel speeds (paper, Eq. app_longitudinal_complete).
+    """Return the rates of station, speed and wheel speeds (paper, Eq. app_longitudinal_complete).
 
     Parameters
     ----------
-    motion : the state
-    ports : what acts in it
+    motion : longitudinal state
+    ports : forces and moments in that state
     standing : the vehicle has come to rest
-    chassis : the values
+    chassis : the vehicle on its surface
     """
     if standing:
         return Motion(0.0, 0.0, 0.0, 0.0)
@@ -79,13 +79,13 @@ def compute_motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: Chassis) -> Memory:
-    """Rates of what tyres and discs carry on.
+    """Return the rates of both axles' slip states, sliding energies and disc temperatures.
 
     Parameters
     ----------
-    memory, motion : the state
-    ports : what acts in it
-    chassis : the values
+    memory, motion : memory of the axles and longitudinal state
+    ports : forces and moments in that state
+    chassis : the vehicle on its surface
     """
     front, rear, speed = ports.front, ports.rear, motion.speed
     return Memory(
@@ -96,12 +96,12 @@ def compute_memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_body_rates(x: HalfCarState, ports: Ports, body: HalfCar) -> HalfCarState:
-    """Rate of the half-car state under the ports (paper, Eq. app_half_car_complete).
+    """Return the rate of the half-car state under the forces of the ports (paper, Eq. app_half_car_complete).
 
     Parameters
     ----------
     x : half-car state [m, rad, m/s, rad/s]
-    ports : what acts in it
+    ports : forces and moments in that state
     body : the half-car
     """
     return compute_half_car_rates(
@@ -130,16 +130,16 @@ def take_step(
     tyre: Tyre,
     road: RoadFeature,
 ) -> tuple[Motion, Memory, HalfCarState]:
-    """One ROS2 step from a state whose ports are known.
+    """Take one ROS2 step from a state whose ports are known.
 
     Parameters
     ----------
-    motion, memory, x : longitudinal state, what tyres and discs carry on, half-car state
-    ports : what acts in it
-    instant, next_instant : what acts from outside now and after the step
-    step : [s]
-    forms : what no effect of the library has
-    chassis, tyre, road : the values
+    motion, memory, x : longitudinal state, memory of tyres and discs, half-car state
+    ports : forces and moments in that state
+    instant, next_instant : inputs before and after the step
+    step : length of the step [s]
+    forms : forms outside the library of effects, or None
+    chassis, tyre, road : the vehicle on its surface, and the road feature
 
     Returns
     -------
@@ -186,4 +186,5 @@ def take_step(
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _advance_axle_twice(memory: AxleMemory, k1: AxleMemory, k2: AxleMemory, step: float) -> AxleMemory:
+    """Return the memory after both stages of ROS2, with their weights 3/2 and 1/2."""
     return advance_axle(advance_axle(memory, k1, 1.5 * step), k2, 0.5 * step)

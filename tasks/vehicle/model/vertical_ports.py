@@ -1,4 +1,4 @@
-"""Road under an axle, its load, and the strut above it, at one instant."""
+"""Ground under an axle and strut above it at one instant."""
 
 from typing import NamedTuple
 
@@ -39,17 +39,17 @@ def compute_ground(
     road: RoadFeature,
     effects: EffectValues,
 ) -> Ground:
-    """Road and load under one axle.
+    """Return road height, slope and contact load under one axle.
 
     Parameters
     ----------
-    station : of the axle [m]
-    speed : of the vehicle [m/s]
-    unsprung_height, unsprung_rate : of the axle [m, m/s]
-    stiffness : of the tyre [N/m]
-    static_load : half-car's load at rest [N]
-    road : the feature
-    effects : the values
+    station : route position of the axle [m]
+    speed : speed of the vehicle [m/s]
+    unsprung_height, unsprung_rate : height of the axle and its rate, about static equilibrium [m, m/s]
+    stiffness : vertical stiffness of the tyre, k_t [N/m]
+    static_load : contact load of the half-car at rest [N]
+    road : road feature
+    effects : numbers of the vehicle's effects
     """
     height, slope = average_over_footprint(station, road, effects)
     load = compute_contact_load(height, unsprung_height, stiffness, static_load)
@@ -60,12 +60,12 @@ def compute_ground(
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_struts(x: HalfCarState, chassis: Chassis) -> tuple[Strut, Strut]:
-    """The struts of the front and the rear axle.
+    """Return travel, rate and force of the struts of the front and the rear axle.
 
     Parameters
     ----------
     x : half-car state [m, rad, m/s, rad/s]
-    chassis : the values
+    chassis : the vehicle on its surface
     """
     body, effects = chassis.body, chassis.effects
     travel_f, rate_f = x[0] - x[2] - body.to_front * x[1], x[4] - x[6] - body.to_front * x[5]

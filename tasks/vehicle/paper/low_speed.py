@@ -1,6 +1,6 @@
 """The low-speed pitch rule of paper mode: a steady brake-pitch input to the stop, and its release.
 
-It needs the time of the stop, so it runs after the drive; it does not change speed or distance.
+The rule needs the time of the stop, so it is applied after the drive; it changes neither speed nor distance.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ def compute_brake_pitch_input(
     release_s: float,
     hold_ratio: float,
 ) -> NDArray[np.float64]:
-    """Deceleration d_theta that drives the body's pitch [m/s2] (paper, Appendix B, low-speed pitch rule).
+    """Return the deceleration d_theta that drives the body's pitch [m/s2] (paper, Appendix B, low-speed pitch rule).
 
     The reference is the median of the positive decelerations over the 0.6 s before the hold; without any the
     input stays as it is.

@@ -1,7 +1,8 @@
 """Paper mode: the published update order, from Appendix B line by line.
 
-A flat road feeds the tyres with analytic load transfer; the half-car follows. On a road feature half-car and
-wheels are passed over the whole time grid in turn. Road and brake response are integrated apart and added.
+On a flat road the tyres take the loads of the analytic load transfer, and the half-car is integrated afterwards. On a
+road feature, half-car and wheels are integrated over the whole time grid in turn. The responses to the road and to the
+brake are integrated separately and added.
 """
 
 from dataclasses import dataclass
@@ -69,7 +70,7 @@ def run_paper_mode(
     ----------
     vehicle : the vehicle
     response : its tyres and pitch calibration on the surface
-    initial_speed : [m/s]
+    initial_speed : speed at the start [m/s]
     hold_speed : keep the speed until the brake onset
     profile : brake command
     hazard : road feature
@@ -111,15 +112,15 @@ def simulate_body(
     stop: int,
     step: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Half-car states, road heights and contact loads along a drive (paper, Eqs. half_car and app_brake_pitch).
+    """Return half-car states, road heights and contact loads along a drive (paper, Eqs. half_car and app_brake_pitch).
 
     Parameters
     ----------
     vehicle, response, hazard : as in ``run_paper_mode``
-    log : a drive
+    log : log of `simulate_drive`, shape (n, 17)
     onset : brake onset [s]
-    stop : sample of the stop
-    step : [s]
+    stop : sample of the stop; -1 if there is none
+    step : step of the grid [s]
     """
     car = build_half_car(vehicle)
     d_theta = compute_brake_pitch_input(
@@ -146,12 +147,12 @@ def simulate_body(
 
 
 def sample_history(run: PaperRun, step: float, per_tick: int) -> History:
-    """The run at every ``per_tick``-th sample.
+    """Return every ``per_tick``-th sample of a run, with its events.
 
     Parameters
     ----------
-    run : on the internal grid
-    step : of that grid [s]
+    run : run on the internal grid
+    step : step of that grid [s]
     per_tick : samples per tick
     """
     station = run.log[:, 0]

@@ -33,7 +33,7 @@ class Axle(NamedTuple):
     ----------
     inertia : I_w [kg m2]
     brake_gain : brake torque per pressure, b_a K_p [N m/MPa]
-    static_load : without acceleration, as the analytic load transfer has it [N]
+    static_load : load without acceleration, by the analytic load transfer [N]
     """
 
     inertia: float
@@ -42,7 +42,7 @@ class Axle(NamedTuple):
 
 
 class Wheels(NamedTuple):
-    """Longitudinal values as the kernels take them.
+    """Longitudinal values of a vehicle in the form that the kernels take.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ class Wheels(NamedTuple):
     radius : R [m]
     wheelbase : L_w [m]
     transfer : load moved to the front per deceleration, m h_cg / L_w [N s2/m]
-    release_width : delta_a of the ABS [1]
-    build_rate, release_rate : of the ABS torque scale [1/s]
+    release_width : delta_a of the ABS, relative to the target slip [1]
+    build_rate, release_rate : largest rates of the ABS torque scale [1/s]
     coast : a_coast [m/s2]
-    speed_floor, stop_speed : [m/s]
+    speed_floor, stop_speed : v_epsilon, and speed at or below which the vehicle stands [m/s]
     """
 
     front: Axle
@@ -72,7 +72,7 @@ class Wheels(NamedTuple):
 
 
 def build_wheels(vehicle: Vehicle) -> Wheels:
-    """The longitudinal values of a vehicle."""
+    """Return the longitudinal values of a vehicle."""
     share = vehicle.front_brake_share
     load_per_lever = vehicle.mass * vehicle.gravity / vehicle.wheelbase
     return Wheels(
@@ -121,17 +121,17 @@ def compute_axle_step(
     wheels: Wheels,
     tyre: Tyre,
 ) -> AxleStep:
-    """Slip, ABS, tyre force and wheel acceleration of one axle (paper, Eqs. app_abs_command and on).
+    """Return slip, ABS scale, tyre force and wheel acceleration of one axle (paper, from Eq. app_abs_command on).
 
     Parameters
     ----------
     speed : v [m/s]
     omega : wheel speed [rad/s]
-    load : on the tyre [N]
+    load : load of the axle [N]
     pressure : brake pressure [MPa]
     scale : ABS scale before the step [1]
-    step : [s]
-    axle, wheels, tyre : the rest of the values
+    step : Euler step [s]
+    axle, wheels, tyre : the axle's wheels, the vehicle's longitudinal values, its tyre on the surface
     """
     slip = compute_braking_slip(speed, wheels.radius * omega, wheels.speed_floor)
     wanted = compute_abs_command(slip, tyre.target_slip, wheels.release_width)
@@ -143,7 +143,7 @@ def compute_axle_step(
 
 @njit(cache=True, nogil=True)
 def compute_transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float]:
-    """Axle loads by longitudinal load transfer, F_z^long [N] (paper, Appendix B).
+    """Return the axle loads by longitudinal load transfer, F_z^long [N] (paper, Appendix B).
 
     Parameters
     ----------
@@ -158,13 +158,13 @@ def compute_transferred_loads(acceleration: float, wheels: Wheels) -> tuple[floa
 def simulate_stop(
     initial_speed: float, step: float, longest: int, profile: PressureProfile, wheels: Wheels, tyre: Tyre
 ) -> tuple[float, float]:
-    """Brake on a flat road from t = 0 to the stop, keeping nothing on the way.
+    """Brake on a flat road from t = 0 to the stop, without a log.
 
     Parameters
     ----------
-    initial_speed : at the brake onset [m/s]
+    initial_speed : speed at the brake onset [m/s]
     step : Euler step [s]
-    longest : give up after this many steps
+    longest : largest number of steps [1]
     profile : brake command with its onset at 0
     wheels, tyre : the vehicle on its surface
 
@@ -211,11 +211,11 @@ def simulate_drive(
     wheels: Wheels,
     tyre: Tyre,
 ) -> tuple[NDArray[np.float64], float, int]:
-    """Drive, brake and stand, with every sample logged.
+    """Drive, brake and stand on a road, and log every sample.
 
     Parameters
     ----------
-    initial_speed : [m/s]
+    initial_speed : speed at the start [m/s]
     hold_speed : keep the speed until the brake onset
     steps : number of Euler steps
     step : Euler step [s]

@@ -53,8 +53,8 @@ def compute_burckhardt_friction(braking_slip: float, load: float, tyre: Burckhar
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle; without influence [N]
-    tyre : the scaled curve
+    load : load of the axle; without influence [N]
+    tyre : scaled curve
     """
     return tyre.rise * (1.0 - exp(-tyre.decay * braking_slip)) - tyre.fall * braking_slip
 
@@ -66,7 +66,7 @@ def compute_burckhardt_slope(braking_slip: float, load: float, tyre: BurckhardtT
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle; without influence [N]
-    tyre : the scaled curve
+    load : load of the axle; without influence [N]
+    tyre : scaled curve
     """
     return tyre.rise * tyre.decay * exp(-tyre.decay * braking_slip) - tyre.fall

@@ -52,8 +52,8 @@ def compute_tyre_friction(braking_slip: float, load: float, tyre: Tyre) -> float
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle, that is of two tyres [N]
-    tyre : on the surface
+    load : load of the axle, that is of two tyres [N]
+    tyre : the tyre on the surface
     """
     return LAWS[type(tyre)].friction(braking_slip, load, tyre)
 
@@ -64,14 +64,15 @@ def compute_tyre_slope(braking_slip: float, load: float, tyre: Tyre) -> float:
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle, that is of two tyres [N]
-    tyre : on the surface
+    load : load of the axle, that is of two tyres [N]
+    tyre : the tyre on the surface
     """
     return LAWS[type(tyre)].slope(braking_slip, load, tyre)
 
 
 @overload(compute_tyre_friction)
 def _compile_friction(braking_slip: Any, load: Any, tyre: Any) -> Callable[..., float]:
+    """Return the implementation of ``compute_tyre_friction`` that Numba compiles for a kind of tyre."""
     law = LAWS[tyre.instance_class].friction
 
     def evaluate_friction(braking_slip: Any, load: Any, tyre: Any) -> float:
@@ -82,6 +83,7 @@ def _compile_friction(braking_slip: Any, load: Any, tyre: Any) -> Callable[..., 
 
 @overload(compute_tyre_slope)
 def _compile_slope(braking_slip: Any, load: Any, tyre: Any) -> Callable[..., float]:
+    """Return the implementation of ``compute_tyre_slope`` that Numba compiles for a kind of tyre."""
     law = LAWS[tyre.instance_class].slope
 
     def evaluate_slope(braking_slip: Any, load: Any, tyre: Any) -> float:

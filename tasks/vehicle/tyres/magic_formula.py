@@ -93,7 +93,7 @@ class Combined(NamedTuple):
 
 
 class MagicFormula(NamedTuple):
-    """One tyre.
+    """Coefficients of one tyre.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def compute_load_change(load: float, nominal_load: float) -> float:
 
     Parameters
     ----------
-    load, nominal_load : of one tyre, or both of an axle [N]
+    load, nominal_load : both of one tyre, or both of an axle [N]
     """
     return (load - nominal_load) / nominal_load
 
@@ -265,8 +265,8 @@ def compute_tyre_forces(
     slip : kappa, positive where the wheel drives [1]
     slip_angle : alpha [rad]
     camber : gamma [rad]
-    load : on the tyre; without it there is no force [N]
-    tyre : the coefficients
+    load : load on the tyre; without load there is no force [N]
+    tyre : coefficients of the tyre
     """
     if load <= 0.0:
         return 0.0, 0.0

@@ -1,4 +1,4 @@
-"""The Magic Formula as the vehicle takes it: pure longitudinal slip on one surface, for the two tyres of an axle."""
+"""The Magic Formula in the form that the vehicle takes: longitudinal slip on one surface, for two tyres of an axle."""
 
 from math import atan, cos, inf, pi, tan
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from tasks.vehicle.tyres.magic_formula import (
 )
 
 MOST_LOAD_CHANGE = 2.0
-"""df_z from which friction over load stays as it is: no tyre is measured at over three times its nominal load [1]."""
+"""df_z above which friction stays constant: no tyre is measured at over three times its nominal load [1]."""
 
 
 class MagicFormulaTyre(NamedTuple):
@@ -25,7 +25,7 @@ class MagicFormulaTyre(NamedTuple):
 
     Parameters
     ----------
-    nominal_load : of both tyres of an axle [N]
+    nominal_load : nominal load of both tyres of an axle [N]
     longitudinal : coefficients, scaled to the surface and without shifts
     peak : friction at the top of the curve under the nominal load, mu_eff [1]
     target_slip : braking slip there, kappa* [1]
@@ -46,7 +46,7 @@ def scale_magic_formula(tyre: MagicFormula, peak: float, slip_stiffness: float) 
 
     Parameters
     ----------
-    tyre : the file's
+    tyre : tyre of the property file
     peak : mu_eff [1]
     slip_stiffness : beta [1]
     """
@@ -95,8 +95,8 @@ def compute_magic_formula_friction(braking_slip: float, load: float, tyre: Magic
     Parameters
     ----------
     braking_slip : kappa, 0 or more; the book's is its negative [1]
-    load : of the axle [N]
-    tyre : on the surface
+    load : load of the axle [N]
+    tyre : the tyre on the surface
     """
     load_change = min(compute_load_change(load, tyre.nominal_load), MOST_LOAD_CHANGE)
     return -compute_longitudinal_friction(-braking_slip, load_change, 0.0, tyre.longitudinal)
@@ -109,8 +109,8 @@ def compute_magic_formula_slope(braking_slip: float, load: float, tyre: MagicFor
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle [N]
-    tyre : on the surface
+    load : load of the axle [N]
+    tyre : the tyre on the surface
     """
     c = tyre.longitudinal
     load_change = min(compute_load_change(load, tyre.nominal_load), MOST_LOAD_CHANGE)
