@@ -8,13 +8,8 @@ from pydantic import model_validator
 from catalogs.quantities import CatalogueEntry, Scalar, Table, Text
 from catalogs.vehicles.frozen import Limits
 from tasks.vehicle.effects.forms import SHAPES, Form, count_coefficients
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLES
+from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
-
-VARIABLE_UNITS = dict(
-    zip(VARIABLES, ("s", "m s-1", "MPa", "K", "MPa s-1", "1", "m", "m s-1", "m s-2"), strict=True)
-)
-"""Unit of each variable, as catalogue files write it."""
 
 
 class FormEntry(CatalogueEntry):
@@ -40,7 +35,7 @@ class FormEntry(CatalogueEntry):
         ]
         if problems:
             raise ValueError("; ".join(problems))
-        of_port, of_variable = PORT_UNITS[PORTS.index(self.port)], VARIABLE_UNITS[self.variable]
+        of_port, of_variable = PORT_UNITS[self.port], VARIABLE_UNITS[self.variable]
         problems += [
             f"unit of {key} must be {unit}; it is {entry.unit}"
             for key, entry, unit in (
@@ -65,7 +60,7 @@ class FormEntry(CatalogueEntry):
 
     @property
     def form(self) -> Form:
-        """The form itself."""
+        """Return the form itself."""
         low, high = self.range.value
         return Form(
             port=self.port, variable=self.variable, shape=self.shape, coefficients=self.coefficients.value,

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from catalogs.calibration import load_procedure
+from catalogs.documents import parse_yaml
 from catalogs.entries import find_entry
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
 from catalogs.vehicles import load_vehicle, vehicle_content
@@ -166,7 +166,7 @@ def _frozen(
 ) -> str:
     """The frozen file: the base's entry with the calibrated values in it, and where they come from."""
     source, content = find_entry("vehicle", base), vehicle_content(base)
-    entry = yaml.safe_load(content)
+    entry = parse_yaml(content, source, "vehicle")
     before = entry.pop("provenance", None) or {"bounds": {}}
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
     for group in procedure.groups:

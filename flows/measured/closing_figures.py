@@ -22,7 +22,7 @@ from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.forward import RunModel, predict_channels, simulate_run
 from tasks.identification.inference.hypothesis import compose_parameters
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
+from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS, format_unit
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 FROZEN, AFTER, MEASURED = "#c0392b", "#1f6fb2", "#222222"
@@ -51,7 +51,7 @@ def residual_force(trace: Trace) -> str:
             axis.plot(x, force, ".", ms=2.5, color=colour, label=escape_formulas(run.model.run.name))
         axis.axhline(0.0, color="#888888", lw=0.8)
         axis.set_title(title)
-        axis.set_xlabel(f"{variable} [{VARIABLE_UNITS[VARIABLES.index(variable)]}]")
+        axis.set_xlabel(f"{variable} [{format_unit(VARIABLE_UNITS[variable])}]")
     axes[0].set_ylabel("measured - model [N]")
     axes[1].legend(fontsize=6, ncol=2, loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=3)
     return picture(figure)
@@ -101,8 +101,8 @@ def spline(trace: Trace) -> str:
     x, y = sample_form(form)
     axis.plot(x, y, "--", color=FROZEN, label=form.name.partition(", x")[0])
     axis.axhline(0.0, color="#888888", lw=0.8)
-    axis.set_xlabel(f"{left.variable} [{VARIABLE_UNITS[VARIABLES.index(left.variable)]}]")
-    axis.set_ylabel(f"{left.port} [{PORT_UNITS[PORTS.index(left.port)]}]")
+    axis.set_xlabel(f"{left.variable} [{format_unit(VARIABLE_UNITS[left.variable])}]")
+    axis.set_ylabel(f"{left.port} [{PORT_UNITS[left.port]}]")
     axis.legend(fontsize=7)
     return picture(figure)
 

@@ -3,12 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
-
+from catalogs.documents import parse_yaml
 from catalogs.effects import LIBRARY_FILE
 from catalogs.entries import entry_folder, find_entry
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
-from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
@@ -16,7 +14,7 @@ from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
 from tasks.identification.decision.forms import make_form_in_range
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.grown import FAMILY, apply_effects
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
+from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS
 from tasks.vehicle.effects.table import PARAMETERS, EffectParameter
 from tasks.vehicle.parameters import Vehicle
 
@@ -58,7 +56,7 @@ def grown_vehicle(
     The text, or None where nothing was added; and the parameters that could not be.
     """
     source, content = find_entry("vehicle", name), vehicle_content(name)
-    entry: dict[str, Any] = yaml.safe_load(content)
+    entry: dict[str, Any] = parse_yaml(content, source, "vehicle")
     before = entry.pop("provenance", None) or {"bounds": {}}
     base = load_vehicle(name)
     bounds: dict[str, dict[str, Any]] = {}
@@ -123,7 +121,7 @@ def _form_entry(form: Form, source: str, campaign: str) -> dict[str, Any]:
         "shape": form.shape,
         "coefficients": {
             "value": list(form.coefficients),
-            "unit": PORT_UNITS[PORTS.index(form.port)],
+            "unit": PORT_UNITS[form.port],
             "source": source,
         },
         "scale": {"value": form.scale, "unit": unit, "source": "where x of the shape is 1: by the grammar"},

@@ -14,7 +14,7 @@ from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
 from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.forms import SHAPES, Form, name_form
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
+from tasks.vehicle.effects.ports import PORT_UNITS
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
@@ -239,6 +239,6 @@ def _make_form_hypothesis(
     step = np.full(k, PORT_STEP[port])
     return Hypothesis(
         name=name_form(port, variable, name, scale), effect_class="form", port=port, variable=variable,
-        names=("a", "b")[:k], units=(PORT_UNITS[PORTS.index(port)],) * k, lower=-100.0 * step, upper=100.0 * step,
+        names=("a", "b")[:k], units=(PORT_UNITS[port],) * k, lower=-100.0 * step, upper=100.0 * step,
         step=step, start=start.copy(), build=build_slots,
     )  # fmt: skip

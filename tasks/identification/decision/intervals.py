@@ -22,8 +22,8 @@ def refit_named(
     """Return the named effects, fitted with derivatives that are taken at their estimates.
 
     If the derivatives of the nuisances are those of another linearisation point, too little of an effect's derivative
-    is projected out, most of all where the vehicle reaches a road feature a moment later. That is accurate enough for the
-    search, but the information is up to three times too large, and the estimates stop before the optimum.
+    is projected out, most of all where the vehicle reaches a road feature a moment later. That is accurate enough for
+    the search, but the information is up to three times too large, and the estimates stop before the optimum.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.vehicle.effects.ports import VARIABLE_UNITS, VARIABLES
+from tasks.vehicle.effects.ports import VARIABLE_UNITS, format_unit
 from tasks.vehicle.effects.slots import Slot
 
 TABLE = 65
@@ -88,4 +88,4 @@ def name_form(port: str, variable: str, shape: str, scale: float) -> str:
     shape : one of `SHAPES`
     scale : magnitude of the variable at which x is 1 [unit of the variable]
     """
-    return f"{port} ~ {shape}, x = {variable}/{scale:g} {VARIABLE_UNITS[VARIABLES.index(variable)]}"
+    return f"{port} ~ {shape}, x = {variable}/{scale:g} {format_unit(VARIABLE_UNITS[variable])}"

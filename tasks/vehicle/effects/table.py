@@ -89,13 +89,10 @@ def _add_number(
 
 
 def _change_field(
-    name: str, kind: Kind, fields: tuple[str, ...], bounds: tuple[float, float], step: float, *, unit: str = "1",
-    effect: str = "", source: str = PAPER, port: str = "parameter",
-) -> EffectParameter:  # fmt: skip
-    """Return a row that scales or shifts fields of the vehicle."""
-    return EffectParameter(
-        name, effect or name.replace("_", " "), unit, port, kind, fields, bounds, step, source
-    )
+    name: str, kind: Kind, fields: tuple[str, ...], bounds: tuple[float, float], step: float
+) -> EffectParameter:
+    """Return a row that scales or shifts fields of the vehicle, without a unit."""
+    return EffectParameter(name, name.replace("_", " "), "1", "parameter", kind, fields, bounds, step, PAPER)
 
 
 def _add_sensor(name: str, unit: str, bounds: tuple[float, float], step: float) -> EffectParameter:
@@ -114,9 +111,9 @@ EFFECT_TABLE = (
     _change_field("friction", "scaled", ("families.efficiency",), (-0.4, 0.4), 0.01),
     _change_field("slip_stiffness", "scaled", ("families.slip_stiffness",), (-0.6, 1.5), 0.03),
     _change_field("front_bias", "shifted", ("front_brake_share",), (-0.2, 0.2), 0.01),
-    _change_field(
-        "wheel_inertia", "shifted", ("wheel_inertia_f", "wheel_inertia_r"), (0.0, 20.0), 1.0, unit="kg m2",
-        effect="rotating inertia", source=MITSCHKE, port="wheel",
+    EffectParameter(
+        "wheel_inertia", "rotating inertia", "kg m2", "wheel", "shifted", ("wheel_inertia_f", "wheel_inertia_r"),
+        (0.0, 20.0), 1.0, MITSCHKE,
     ),
     _add_number("slope", "grade", "1", "road", (-0.08, 0.08), 0.001, PAPER),
     # forces along the road
