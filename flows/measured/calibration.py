@@ -33,7 +33,7 @@ DIGITS = 6
 """Significant digits that a frozen file keeps of a calibrated scalar."""
 
 
-def calibrate(
+def calibrate_on_traces(
     traces: str,
     *,
     out: str,

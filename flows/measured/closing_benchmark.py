@@ -11,7 +11,7 @@ from catalogs.effects.truths import Truth, load_sizes, load_truths
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.measured.closing_benchmark_summary import pair_outcome, summary
+from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from flows.measured.closing_benchmark_tables import benchmark_tables
 from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
@@ -127,7 +127,11 @@ def close_loop_benchmark(
         }
         rows.append(row)
         append_line(log, row)
-    result = summary(rows) | {"campaigns": rows, "engine_sha256": engine, "made_with": code_version()}
+    result = summarise_benchmark(rows) | {
+        "campaigns": rows,
+        "engine_sha256": engine,
+        "made_with": code_version(),
+    }
     results.write_json(FILE, result)
     results.write_json(RATES, {key: value for key, value in result.items() if key != "campaigns"})
     results.write(TABLES, benchmark_tables(result))

@@ -39,7 +39,7 @@ def pair_outcome(
     return "both" if len(set(named)) == len(set(truths)) else "one"
 
 
-def summary(rows: Rows) -> dict[str, Any]:
+def summarise_benchmark(rows: Rows) -> dict[str, Any]:
     """Confusion by truth and shares with exact 95 % intervals.
 
     Parameters

@@ -31,7 +31,7 @@ MEAN_OVER = 20
 """Samples averaged into one point of the residual force: its noise falls below what is looked for."""
 
 
-def picture(figure: Figure) -> str:
+def render_figure(figure: Figure) -> str:
     """A figure as base64 PNG, without any date in it."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight", metadata={"Software": None})
@@ -54,7 +54,7 @@ def residual_force(trace: Trace) -> str:
         axis.set_xlabel(f"{variable} [{format_unit(VARIABLE_UNITS[variable])}]")
     axes[0].set_ylabel("measured - model [N]")
     axes[1].legend(fontsize=6, ncol=2, loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=3)
-    return picture(figure)
+    return render_figure(figure)
 
 
 def _state_to_show(trace: Trace) -> str:
@@ -87,7 +87,7 @@ def _force_points(
     return tuple(v[: count * MEAN_OVER].reshape(count, MEAN_OVER).mean(axis=1) for v in (x, force))
 
 
-def spline(trace: Trace) -> str:
+def draw_residual_spline(trace: Trace) -> str:
     """Shape of what the frozen model leaves over at the port of what is named, with its band and best form."""
     found = fit_residual_splines(trace.start.evidence, trace.start.base)
     ports = [effect.port for effect in trace.verdict.effects]
@@ -104,10 +104,10 @@ def spline(trace: Trace) -> str:
     axis.set_xlabel(f"{left.variable} [{format_unit(VARIABLE_UNITS[left.variable])}]")
     axis.set_ylabel(f"{left.port} [{PORT_UNITS[left.port]}]")
     axis.legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
-def leftovers(trace: Trace) -> str:
+def draw_spline_gains(trace: Trace) -> str:
     """Return the gain of a spline at every scanned port and variable, before and after."""
     before = fit_residual_splines(trace.start.evidence, trace.start.base)
     after = fit_residual_splines(trace.end.evidence, trace.end.base)
@@ -127,10 +127,10 @@ def leftovers(trace: Trace) -> str:
     axis.set_xscale("log")
     axis.set_xlabel("gain of a spline / inflation")
     axis.legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
-def correlations(trace: Trace) -> str:
+def draw_correlations(trace: Trace) -> str:
     """Correlation of residual and brake pressure on the held-out runs, with the band of independence."""
     items = trace.verdict.correlation
     figure = Figure(figsize=(10, 2.8))
@@ -143,10 +143,10 @@ def correlations(trace: Trace) -> str:
         axis.set_xlabel("lag [s]")
     axes[0].set_ylabel("correlation [1]")
     axes[0].legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
-def pulls(trace: Trace) -> str:
+def draw_session_pulls(trace: Trace) -> str:
     """Pulls of the session's nuisances, before and after."""
     items = trace.verdict.session_pulls
     figure = Figure(figsize=(5.2, 2.6))
@@ -160,10 +160,10 @@ def pulls(trace: Trace) -> str:
         axis.axvline(limit, color="#888888", lw=0.8, ls=":")
     axis.set_xlabel("pull [prior sigma]; beyond 4 a number of the vehicle is wrong")
     axis.legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
-def traces(trace: Trace) -> str:
+def draw_traces(trace: Trace) -> str:
     """Measured, frozen and after on the held-out runs that gained most and least."""
     runs = trace.start.evidence.held_out
     theta, slots = compose_parameters(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
@@ -191,7 +191,7 @@ def traces(trace: Trace) -> str:
         axes[0, column].set_title(escape_formulas(f"{title}: {run.model.run.name} ({run.model.run.weather})"))
         axes[-1, column].set_xlabel("time [s]")
     axes[0, 0].legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
 def _trace(

@@ -53,15 +53,16 @@ def report_html(trace: Trace, result: Mapping[str, Any], campaign: Campaign) -> 
         _section("Residual force of the training runs", _image(figures.residual_force(trace))),
         _section(
             "What the frozen model leaves over, and what is left after",
-            f'<div class="pair">{_image(figures.spline(trace))}{_image(figures.leftovers(trace))}</div>',
+            f'<div class="pair">{_image(figures.draw_residual_spline(trace))}'
+            f"{_image(figures.draw_spline_gains(trace))}</div>",
         ),
         _section(
             "What is left that goes with the brake pressure",
-            _image(figures.correlations(trace)) + CORRELATION,
+            _image(figures.draw_correlations(trace)) + CORRELATION,
         ),
         _section("Residual of the training runs over time", _image(residuals_over_time(trace))),
-        _section("Held-out runs", _image(figures.traces(trace))),
-        _section("Pulls of the session", _image(figures.pulls(trace))),
+        _section("Held-out runs", _image(figures.draw_traces(trace))),
+        _section("Pulls of the session", _image(figures.draw_session_pulls(trace))),
         _section("Next experiment", _experiment(result["discriminating_experiment"])),
         _section(
             "What this campaign could show at all",

@@ -72,7 +72,7 @@ class RungResult:
     predicted: dict[str, NDArray[np.float64]]
 
 
-def climb(
+def fit_ladder(
     train: Stop, held_out: Stop, ladder: Sequence[Rung], vehicle: Vehicle, surface: SurfaceParameters
 ) -> tuple[RungResult, ...]:
     """Fit every rung on the training stop alone and judge it on the other.
@@ -86,7 +86,7 @@ def climb(
     return tuple(_step(train, held_out, rung, vehicle, surface) for rung in ladder)
 
 
-def uncalibrated(stop: Stop, vehicle: Vehicle, surface: SurfaceParameters) -> StopErrors:
+def compute_uncalibrated_errors(stop: Stop, vehicle: Vehicle, surface: SurfaceParameters) -> StopErrors:
     """Errors of the model as its data sheet has it.
 
     Parameters

@@ -11,7 +11,7 @@ from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.measured import closing_benchmark
-from flows.measured.closing_benchmark_summary import pair_outcome, summary
+from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from tasks.campaign.planned_runs import TRAINING
 from tasks.identification.benchmark import compute_exact_interval, make_synthetic_campaign
 
@@ -132,7 +132,7 @@ def test_the_summary_counts_each_kind_once() -> None:
         row("brake_lag", "refused") | {"kind": "size"}, row("brake_lag", "refused") | {"kind": "poor"},
         row("brake_lag + brake_fade", "one") | {"kind": "pair"},
     ]  # fmt: skip
-    result = summary(rows)
+    result = summarise_benchmark(rows)
     assert (result["false_discoveries"]["hits"], result["false_discoveries"]["of"]) == (1, 2)
     shares = {entry["figure"]: (entry["hits"], entry["of"]) for entry in result["summary"]}
     assert shares["library effect named exactly"] == (1, 3) and shares["wrong single label"] == (1, 3)

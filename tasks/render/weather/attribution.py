@@ -9,7 +9,7 @@ from tasks.conventions import ROAD_CLASSES
 from tasks.render.composition import encode_8bit, to_display
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.particles import Shutter
-from tasks.render.weather.layer import Layer, recompose
+from tasks.render.weather.layer import Layer, recompose_layers
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
 from tasks.render.weather.snow.field import coverage_rank, tracks_at
 from tasks.render.weather.snow.layer import GROUND_CLASSES, steepest_bearing
@@ -18,7 +18,7 @@ LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
 """Bit of each layer in an attribution picture."""
 
 
-def attribution(
+def attribute_pixels(
     weather: ClipWeather, frame: WeatherFrame, gbuffer: GBuffer, shutter: Shutter
 ) -> NDArray[np.uint8]:
     """Layers that changed each pixel by at least half an 8-bit step, as `LAYER_BITS` added up.
@@ -39,13 +39,15 @@ def attribution(
     )
     picture = frame.base
     for layer in frame.layers:
-        after = recompose(picture, (layer,))
-        bits |= changed(picture, after, layer)
+        after = recompose_layers(picture, (layer,))
+        bits |= mark_changed_pixels(picture, after, layer)
         picture = after
     return bits
 
 
-def changed(before: NDArray[np.float32], after: NDArray[np.float32], layer: Layer) -> NDArray[np.uint8]:
+def mark_changed_pixels(
+    before: NDArray[np.float32], after: NDArray[np.float32], layer: Layer
+) -> NDArray[np.uint8]:
     """The layer's bit where it changed a pixel by at least half an 8-bit step, uint8 [H, W] [1].
 
     Parameters
@@ -103,9 +105,9 @@ def paper_picture(frame: WeatherFrame) -> NDArray[np.uint8]:
     """
     still = [layer for layer in frame.layers if layer.name != "particles"]
     falling = [layer for layer in frame.layers if layer.name == "particles"]
-    without = recompose(frame.base, [layer for layer in still if layer.name != "wet"])
-    residual = _codes(recompose(without, falling)) - _codes(without)
-    return np.clip(_codes(recompose(frame.base, still)) + residual, 0, 255).astype(np.uint8)
+    without = recompose_layers(frame.base, [layer for layer in still if layer.name != "wet"])
+    residual = _codes(recompose_layers(without, falling)) - _codes(without)
+    return np.clip(_codes(recompose_layers(frame.base, still)) + residual, 0, 255).astype(np.uint8)
 
 
 def _codes(picture: NDArray[np.float32]) -> NDArray[np.int16]:

@@ -21,11 +21,11 @@ from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.road_edit import RoadRelief, measure_road_lift
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
 from tasks.render.weather.falling.particles import Shutter, visible_streaks
-from tasks.render.weather.falling.precipitation import Population, population
+from tasks.render.weather.falling.precipitation import Population, make_population
 from tasks.render.weather.falling.streaks import draw_streaks
-from tasks.render.weather.layer import Layer, recompose
+from tasks.render.weather.layer import Layer, recompose_layers
 from tasks.render.weather.parameters import KindLook, WeatherParameters
-from tasks.render.weather.relief import clear_light, overcast_light, relit
+from tasks.render.weather.relief import clear_light, overcast_light, relight_gaussians
 from tasks.render.weather.scene_light import ground_light, without_sun
 from tasks.render.weather.sky import (
     SkyLight,
@@ -35,7 +35,7 @@ from tasks.render.weather.sky import (
     sky_light,
 )
 from tasks.render.weather.snow.field import SnowField, snow_field
-from tasks.render.weather.snow.layer import snow_layer, snowed_over, whitened
+from tasks.render.weather.snow.layer import snow_layer, snowed_over, whiten_gaussians
 from tasks.render.weather.wet.wet_road import wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
@@ -87,7 +87,7 @@ class ClipWeather:
 
 @dataclass(frozen=True, kw_only=True)
 class WeatherFrame:
-    """One frame and what it is made of: ``picture`` is ``recompose(base, layers)``, bit for bit.
+    """One frame and what it is made of: ``picture`` is ``recompose_layers(base, layers)``, bit for bit.
 
     Parameters
     ----------
@@ -143,10 +143,12 @@ def weather_scene(
         )
         if relief is None:
             return gaussians, dry
-        return relit(gaussians, relief, clear_light(gaussians, environment, parameters.sky, to_sun)), dry
+        return relight_gaussians(
+            gaussians, relief, clear_light(gaussians, environment, parameters.sky, to_sun)
+        ), dry
     if look.particles is not None and state.precipitation_mm_h == 0:
         raise InputError(f"weather: {state.kind} needs precipitation_mm_h above 0; it is 0: use {DRY}")
-    falls = None if look.particles is None else population(look.particles, state.precipitation_mm_h)
+    falls = None if look.particles is None else make_population(look.particles, state.precipitation_mm_h)
     air = precipitating_air(falls, p.air.near, focal_px, p.air.haze_visual_range_m)
     white = ground_light(gaussians, SemanticClass.ROAD).lit / p.sky.asphalt_albedo
     cover = look.snow_cover
@@ -163,7 +165,7 @@ def weather_scene(
         amount = (state.snow_coverage, state.snow_depth_mm, cover)
         lift = None if relief is None else measure_road_lift(scene, relief)
         snow = snow_layer(scene, field, white, *amount, lift)
-        scene = snowed_over(whitened(scene, field, white, *amount), snow)
+        scene = snowed_over(whiten_gaussians(scene, field, white, *amount), snow)
     overcast = Overcast(
         look=look,
         population=falls,
@@ -173,7 +175,7 @@ def weather_scene(
         snow=field,
     )
     if relief is not None:
-        scene = relit(scene, relief, overcast_light(overcast.environment, sky))
+        scene = relight_gaussians(scene, relief, overcast_light(overcast.environment, sky))
     return scene, ClipWeather(
         state=state, parameters=p, seed=seed, clear_environment=environment, overcast=overcast
     )
@@ -209,7 +211,7 @@ def apply_weather(
     rays = pixel_rays(shutter)
     layers = [light_layer(picture, gbuffer, weather.clear_environment, overcast.environment, sky, rays)]
     if film is not None:
-        dry = recompose(picture, layers)
+        dry = recompose_layers(picture, layers)
         layers.append(
             wet_layer(
                 dry, gbuffer, overcast.environment, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
@@ -219,7 +221,7 @@ def apply_weather(
     layers.append(air_layer(gbuffer, overcast.environment, air, sky, rays))
     if particles and overcast.population is not None:
         layers.append(particle_layer(weather, overcast.population, overcast.sky, gbuffer.depth, shutter))
-    return WeatherFrame(base=picture, layers=tuple(layers), picture=recompose(picture, layers))
+    return WeatherFrame(base=picture, layers=tuple(layers), picture=recompose_layers(picture, layers))
 
 
 def particle_layer(

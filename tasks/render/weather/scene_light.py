@@ -60,7 +60,9 @@ def mean_colours(gaussians: Gaussians) -> NDArray[np.float64]:
     return to_linear(colours).astype(np.float64) if gaussians.display_encoded else colours
 
 
-def recoloured(gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np.floating]) -> Gaussians:
+def recolour_gaussians(
+    gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np.floating]
+) -> Gaussians:
     """The cloud with every colour c turned into ``gain c + add`` in linear light.
 
     Parameters
@@ -201,10 +203,10 @@ def without_sun(gaussians: Gaussians, shadow_kept: float) -> Gaussians:
         members = np.isin(gaussians.class_id, alike)
         relative = read_between(light.grid, light.illumination, gaussians.means[members, :2])
         gain[members] = relative ** (shadow_kept - 1)
-    return recoloured(gaussians, gain, np.zeros((len(gaussians), 3)))
+    return recolour_gaussians(gaussians, gain, np.zeros((len(gaussians), 3)))
 
 
-def appended(gaussians: Gaussians, layer: Gaussians) -> Gaussians:
+def append_gaussians(gaussians: Gaussians, layer: Gaussians) -> Gaussians:
     """Two clouds of one colour space as one.
 
     Parameters
@@ -221,7 +223,7 @@ def appended(gaussians: Gaussians, layer: Gaussians) -> Gaussians:
     return replace(gaussians, **joined)
 
 
-def without(gaussians: Gaussians, index: NDArray[np.int64]) -> Gaussians:
+def remove_gaussians(gaussians: Gaussians, index: NDArray[np.int64]) -> Gaussians:
     """The cloud less some of its Gaussians.
 
     Parameters

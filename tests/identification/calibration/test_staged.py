@@ -8,7 +8,7 @@ import yaml
 from catalogs.calibration import load_procedure
 from catalogs.entries import find_entry
 from catalogs.references import read_reference
-from flows.measured.calibration import calibrate, calibration_case
+from flows.measured.calibration import calibrate_on_traces, calibration_case
 from flows.studies.vehicle_model import agreement_of
 from tasks.identification.calibration.identifiability import summarise_jacobian
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
@@ -161,7 +161,7 @@ def test_the_same_traces_give_the_same_bytes(vehicle, make_traces, tmp_path):
     name = procedure_file(tmp_path, "paper-staged", [stage(["efficiency"], ["speed"])], passes=1)
     files = []
     for run in ("one", "two"):
-        calibrate(str(folder), out=str(tmp_path / run), procedure=name, name="car")
+        calibrate_on_traces(str(folder), out=str(tmp_path / run), procedure=name, name="car")
         files.append([(tmp_path / run / file).read_bytes() for file in ("car.yaml", "calibration.json")])
     assert files[0][0] == files[1][0]
     assert files[0][1].replace(b"/one/", b"/two/") == files[1][1]

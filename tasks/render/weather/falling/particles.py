@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tasks.render.lens import Lens, distort_rays, undistort_points
 from tasks.render.weather.falling.precipitation import NearField, Population, drawn_reach
-from tasks.render.weather.random_streams import philox, stream_key, unit
+from tasks.render.weather.random_streams import philox, scale_to_unit, stream_key
 
 STREAK = np.dtype(
     [
@@ -240,14 +240,14 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
                     continue
                 cx, cy, cz = np.uint64(kx) & word32, np.uint64(ky) & word32, np.uint64(kz) & word32
                 first, _, _, _ = philox(cx, cy, cz, index, key)
-                for j in range(_poisson(unit(first), mean)):
+                for j in range(_poisson(scale_to_unit(first), mean)):
                     block = index + np.uint64(256 * (2 * j + 1))
                     w0, w1, w2, w3 = philox(cx, cy, cz, block, key)
-                    offset[0], offset[1], offset[2] = unit(w0), unit(w1), unit(w2)
+                    offset[0], offset[1], offset[2] = scale_to_unit(w0), scale_to_unit(w1), scale_to_unit(w2)
                     for i in range(3):
                         offset[i] = corner[i] + cell * offset[i]
                         moving[i] = velocity[i] - camera_velocity[i]
-                    diameter = size_scale * log(sizes[0] - unit(w3) * (sizes[0] - sizes[1]))
+                    diameter = size_scale * log(sizes[0] - scale_to_unit(w3) * (sizes[0] - sizes[1]))
                     if flutter > 0:
                         w0, w1, w2, w3 = philox(cx, cy, cz, block + np.uint64(256), key)
                         _sway(
@@ -256,10 +256,10 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
                             flutter,
                             flutter_rate,
                             time,
-                            unit(w0),
-                            unit(w1),
-                            unit(w2),
-                            unit(w3),
+                            scale_to_unit(w0),
+                            scale_to_unit(w1),
+                            scale_to_unit(w2),
+                            scale_to_unit(w3),
                         )
                     distance = sqrt(offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2)
                     if distance < nearest or distance > reach:

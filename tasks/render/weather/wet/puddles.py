@@ -35,7 +35,7 @@ class RoadWaterParameters:
     ripple_m: float
 
 
-def wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> float:
+def compute_wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> float:
     """Share of the road surface that is wet, 0 on a dry road and rising with the film.
 
     Parameters
@@ -107,7 +107,7 @@ def water_surface(
     )
     _water(
         depth, rays, normal, road, np.asarray(eye, dtype=np.float64), focal_px,
-        film_depth_mm, wetness(film_depth_mm, p), p.texture_depth_mm, p.texture_spread_mm,
+        film_depth_mm, compute_wetness(film_depth_mm, p), p.texture_depth_mm, p.texture_spread_mm,
         p.unevenness_mm, p.unevenness.coarsest_m, p.unevenness.octaves, p.unevenness.roughness,
         p.ripple_slope, p.ripple_m, np.uint64(stream_key(seed, "puddles")),
         surface.smooth, surface.normal, surface.cosine,
