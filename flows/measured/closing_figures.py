@@ -1,4 +1,4 @@
-"""Figures of a close-loop report, each a PNG in base64: what an engineer looks at before believing a verdict."""
+"""Figures of a close-loop report, each a PNG in base64, with which an engineer checks a verdict."""
 
 import base64
 from io import BytesIO
@@ -28,18 +28,18 @@ from tasks.vehicle.effects.table import EFFECT_TABLE
 FROZEN, AFTER, MEASURED = "#c0392b", "#1f6fb2", "#222222"
 SHOWN = ("speed", "longitudinal_acceleration", "pitch")
 MEAN_OVER = 20
-"""Samples averaged into one point of the residual force: its noise falls below what is looked for."""
+"""Samples averaged into one point of the residual force, so that its noise is below the effects in question."""
 
 
 def render_figure(figure: Figure) -> str:
-    """A figure as base64 PNG, without any date in it."""
+    """Return a figure as base64 PNG, without a date in it."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight", metadata={"Software": None})
     return base64.b64encode(buffer.getvalue()).decode()
 
 
 def residual_force(trace: Trace) -> str:
-    """Residual longitudinal force of the training runs against a state, frozen and after, coloured by run."""
+    """Draw the residual longitudinal force of the training runs over a state, frozen and after, coloured by run."""
     variable = _state_to_show(trace)
     figure = Figure(figsize=(10, 3.6))
     axes = figure.subplots(1, 2, sharey=True)
@@ -88,7 +88,7 @@ def _force_points(
 
 
 def draw_residual_spline(trace: Trace) -> str:
-    """Shape of what the frozen model leaves over at the port of what is named, with its band and best form."""
+    """Draw the spline of the frozen model's residual at the port of the named effect, with its band and best form."""
     found = fit_residual_splines(trace.start.evidence, trace.start.base)
     ports = [effect.port for effect in trace.verdict.effects]
     left = next((x for x in found if x.port in ports), found[0])
@@ -108,7 +108,7 @@ def draw_residual_spline(trace: Trace) -> str:
 
 
 def draw_spline_gains(trace: Trace) -> str:
-    """Return the gain of a spline at every scanned port and variable, before and after."""
+    """Draw the gain of a spline at every scanned port and variable, before and after."""
     before = fit_residual_splines(trace.start.evidence, trace.start.base)
     after = fit_residual_splines(trace.end.evidence, trace.end.base)
     keys = [(x.port, x.variable) for x in sorted(before, key=lambda x: (x.port, x.variable))]
@@ -131,7 +131,7 @@ def draw_spline_gains(trace: Trace) -> str:
 
 
 def draw_correlations(trace: Trace) -> str:
-    """Correlation of residual and brake pressure on the held-out runs, with the band of independence."""
+    """Draw the correlation of residual and brake pressure on the held-out runs, with the band of independence."""
     items = trace.verdict.correlation
     figure = Figure(figsize=(10, 2.8))
     axes = figure.subplots(1, len(items), sharey=True)
@@ -147,7 +147,7 @@ def draw_correlations(trace: Trace) -> str:
 
 
 def draw_session_pulls(trace: Trace) -> str:
-    """Pulls of the session's nuisances, before and after."""
+    """Draw the pulls of the session's nuisances, before and after."""
     items = trace.verdict.session_pulls
     figure = Figure(figsize=(5.2, 2.6))
     axis = figure.subplots()
@@ -164,7 +164,7 @@ def draw_session_pulls(trace: Trace) -> str:
 
 
 def draw_traces(trace: Trace) -> str:
-    """Measured, frozen and after on the held-out runs that gained most and least."""
+    """Draw measured channels, frozen and after, of the held-out runs with the largest and the smallest improvement."""
     runs = trace.start.evidence.held_out
     theta, slots = compose_parameters(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
     plain = np.zeros(len(EFFECT_TABLE))

@@ -1,4 +1,4 @@
-"""The vehicle with what a verdict adds, as a catalogue entry that names where it comes from."""
+"""The vehicle with the additions of a verdict, as a catalogue entry with provenance."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,8 +20,9 @@ from tasks.vehicle.parameters import Vehicle
 
 
 def tyre_beside(name: str) -> dict[str, bytes]:
-    """Return the property file that lies beside a vehicle's file, or beside one that it extends: what grows from it
-    needs that too.
+    """Return the tyre's property file beside a vehicle's file, or beside one that it extends.
+
+    A vehicle that is grown from it needs this file too.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ def tyre_beside(name: str) -> dict[str, bytes]:
 
     Returns
     -------
-    One file by its name, or none where the vehicle names no tyre or one of the catalogue.
+    One file by its name; none if the vehicle names no tyre, or one of the catalogue.
     """
     tyre = vehicle_tyre_source(name)
     if tyre is None or tyre.parent == entry_folder("tyre"):
@@ -40,20 +41,20 @@ def tyre_beside(name: str) -> dict[str, bytes]:
 def grown_vehicle(
     name: str, verdict: Verdict, reached: Mapping[str, tuple[float, float]]
 ) -> tuple[str | None, list[str]]:
-    """Return the text of the grown vehicle's file: what was found on top of what the vehicle has.
+    """Return the text of the grown vehicle's file: the vehicle with the effects that were found.
 
-    Errors of instruments are no part of the car. Neither is the grade of the proving ground, which is left out and
+    Errors of instruments are no part of the car. Neither is the grade of the proving ground, which is omitted and
     named.
 
     Parameters
     ----------
-    name : catalogue name or file of the vehicle that was judged
-    verdict : what was found
-    reached : of the variable of each form, the range that the runs reached [unit of the variable]
+    name : catalogue name or file of the judged vehicle
+    verdict : the verdict
+    reached : range of the variable of each form that the runs reached [unit of the variable]
 
     Returns
     -------
-    The text, or None where nothing was added; and the parameters that could not be.
+    The text, or None if nothing was added; and the parameters that no vehicle can carry.
     """
     source, content = find_entry("vehicle", name), vehicle_content(name)
     entry: dict[str, Any] = parse_yaml(content, source, "vehicle")
@@ -78,7 +79,7 @@ def grown_vehicle(
             missing += [f"{effect.name}: {p.name}" for p in effect.parameters]
             continue
         for p in effect.parameters:
-            # two effects that share a number, as air drag and headwind do, add up
+            # effects that share a number, such as air drag and headwind, are added
             values[p.name] = values.get(p.name, 0.0) + p.value
             sources.setdefault(p.name, []).append(_source(effect, p, verdict))
             own = base.effects.get(p.name, 0.0)
@@ -141,7 +142,7 @@ def _source(effect: NamedEffect, p: Parameter, verdict: Verdict) -> str:
 
 
 def _write(entry: dict[str, Any], grown: Vehicle, row: EffectParameter, field: str, source: str) -> None:
-    """Write one field of the grown vehicle into its file, with where it comes from."""
+    """Write one field of the grown vehicle into its file, with its source."""
     if row.kind == "added":
         old = entry.setdefault("effects", {}).get(field, {"source": ""})
         entry["effects"][field] = {
@@ -150,7 +151,7 @@ def _write(entry: dict[str, Any], grown: Vehicle, row: EffectParameter, field: s
         return
     if field.startswith(FAMILY):
         table = field.removeprefix(FAMILY)
-        # families that the weather lends a vehicle are no part of its file
+        # tyre families of the weather catalogue are no part of the vehicle's file
         for weather, tables in entry["families"].items():
             old = tables[table]
             tables[table] = {

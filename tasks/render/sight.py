@@ -1,4 +1,4 @@
-"""One frame of the sensor and the ground truth of its pixels: as drawn, or read out row by row."""
+"""One frame of the sensor with the ground truth of its pixels, by a global or a rolling shutter."""
 
 from dataclasses import dataclass
 

@@ -1,13 +1,13 @@
 """Weather over a clear clip. Call order, once for the clip and then for every frame:
 
 1. ``gaussians, weather = weather_scene(gaussians, environment, state, parameters, focal_px, seed, route,
-   relief, to_sun)`` with the clip's road edit already in the Gaussians' shape; rasterise the Gaussians that come back;
+   relief, to_sun)``, where the Gaussians have the clip's road edit; rasterise the returned Gaussians;
 2. ``picture = compose(gbuffer, clear sky)``: the clear linear picture, sky included, as in dry weather;
 3. ``frame = apply_weather(weather, picture, gbuffer, shutter)``, then encode ``frame.picture``.
 
 From the scene to the lens the layers are: light (cloud in place of the sun), wet (water on the road), air (veil
 over distance), particles (drops and flakes near the camera). Snow on the ground is part of the scene. In dry
-weather the scene and the picture come back as they are.
+weather the scene and the picture are returned unchanged.
 """
 
 from dataclasses import dataclass
@@ -49,10 +49,10 @@ class Overcast:
 
     Parameters
     ----------
-    look : how its kind of weather looks
-    population : what falls; None where nothing does
-    air : what it does to the light on its way
-    sky : the light
+    look : appearance of its kind of weather
+    population : falling particles; None without precipitation
+    air : extinction and veil
+    sky : light of the sky
     environment : float32 [h, w, 3] environment under cloud [1]
     snow : coverage field of the scene; None where no snow lies
     """
@@ -67,12 +67,12 @@ class Overcast:
 
 @dataclass(frozen=True, kw_only=True)
 class ClipWeather:
-    """Everything about a clip's weather that its frames share.
+    """Weather of a clip that all its frames share.
 
     Parameters
     ----------
-    state : what lies on the road
-    parameters : the catalogue
+    state : surface state
+    parameters : numbers of the catalogue
     seed : visual seed of the clip [1]
     clear_environment : float32 [h, w, 3] environment in clear weather [1]
     overcast : None under a clear sky
@@ -87,7 +87,7 @@ class ClipWeather:
 
 @dataclass(frozen=True, kw_only=True)
 class WeatherFrame:
-    """One frame and what it is made of: ``picture`` is ``recompose_layers(base, layers)``, bit for bit.
+    """One frame and its parts: ``picture`` is ``recompose_layers(base, layers)``, bit for bit.
 
     Parameters
     ----------
@@ -118,12 +118,12 @@ def weather_scene(
     ----------
     gaussians : the clear scene with the clip's road edit
     environment : float32 [h, w, 3] its clear environment, as in `Scene.environment` [1]
-    state : the weather, and what it leaves on the road
-    parameters : the catalogue
+    state : kind of weather and surface state
+    parameters : numbers of the catalogue
     focal_px : focal length of the camera [px]
     seed : visual seed of the clip [1]
-    route : where wheels have left tracks in the snow; None leaves it untouched
-    relief : the clip's road feature, lit by the weather's light as it is turned to it; None for a flat road
+    route : path of the wheels that left tracks in the snow; None for snow without tracks
+    relief : road feature of the clip, which is relit by the weather's light; None for a flat road
     to_sun : [3] unit vector to the clear sky's sun, as in `Scene.to_sun` [1]
 
     Returns
@@ -134,7 +134,7 @@ def weather_scene(
     Raises
     ------
     InputError
-        There is no such kind of weather, it has precipitation without a rate, or the scene has no road.
+        If there is no such kind of weather, it has precipitation without a rate, or the scene has no road.
     """
     p, look = parameters, parameters.find_look(state.kind)
     if look is None:
@@ -189,7 +189,7 @@ def apply_weather(
     *,
     particles: bool = True,
 ) -> WeatherFrame:
-    """The picture of one frame in its weather.
+    """Return the picture of one frame in its weather.
 
     Parameters
     ----------
@@ -197,8 +197,8 @@ def apply_weather(
     picture : float32 [H, W, 3] linear picture of its scene before the clear environment [1]
     gbuffer : the rasterisation it was made from
     shutter : pose, motion, time and exposure of the frame
-    particles : False leaves them to `particle_layer`, for a sensor that sees the rest of the scene through a lens
-        or row by row: streaks are drawn as it sees them, with their own way during the exposure
+    particles : False if `particle_layer` draws them afterwards, for a sensor with a lens or a rolling shutter, whose
+        streaks are drawn with the motion that this sensor sees during the exposure
 
     Returns
     -------
@@ -227,7 +227,7 @@ def apply_weather(
 def particle_layer(
     weather: ClipWeather, falling: Population, sky: SkyLight, depth: NDArray[np.float32], shutter: Shutter
 ) -> Layer:
-    """The drops or flakes near the camera, lit by the sky and the ground about them.
+    """Return the layer of drops or flakes near the camera, lit by sky and ground.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def particle_layer(
 
 
 def pixel_rays(shutter: Shutter) -> NDArray[np.float32]:
-    """World directions through the pixels' centres, of camera z 1.
+    """Return world directions through the pixels' centres, of camera z 1.
 
     Parameters
     ----------
