@@ -74,7 +74,7 @@ def search_forms(
             )
         )
         if alone is not None and ahead > rules.rival_span and not same_effect:
-            reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
+            reasons.append(f"a single form explains more than the library: {alone.hypothesis.name}")
             state = SearchState(
                 evidence=null.evidence,
                 base=alone.fitted,
@@ -84,7 +84,7 @@ def search_forms(
             elsewhere = alone.hypothesis.port != first.port
             near = alone if (ahead > rules.rival_span if same_effect else elsewhere or disagreeing) else None
     if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
-        reasons.append(f"something is left over: {left.hypothesis.name}")
+        reasons.append(f"a form explains a part of the residual: {left.hypothesis.name}")
         state = replace(
             state,
             base=left.fitted,
