@@ -20,8 +20,8 @@ from tasks.studies.sensitivity import sensitivity_study
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.vehicle import reference
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.paper.wheels import stopping_run, wheels_of
-from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.paper.wheels import build_wheels, simulate_stop
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
 from tasks.vehicle.rollout import INTERNAL_STEP_S
 
 STOPS_PER_CPU_S = 3000.0
@@ -63,14 +63,14 @@ def _stop_rows(vehicle: Vehicle) -> list[dict[str, Any]]:
     brake = BrakeCommand(
         peak_pressure_mpa=2.3, ramp_s=0.5, onset_s=0.0, onset_station_m=None, hold_s=None, release_s=0.0
     ).profile
-    wheels = wheels_of(vehicle)
-    tyres = {surface: surface_response(vehicle, *surface).tyre for surface in FLAT_SURFACES}
+    wheels = build_wheels(vehicle)
+    tyres = {surface: compute_surface_response(vehicle, *surface).tyre for surface in FLAT_SURFACES}
 
     def stop_s(*surfaces: tuple[str, float]) -> float:
         def work() -> None:
             for _ in range(20):
                 for surface in surfaces:
-                    stopping_run(SPEED, INTERNAL_STEP_S, LONGEST, brake, wheels, tyres[surface])
+                    simulate_stop(SPEED, INTERNAL_STEP_S, LONGEST, brake, wheels, tyres[surface])
 
         return _cpu_s(work) / 20 / len(surfaces)
 
@@ -82,7 +82,7 @@ def _stop_rows(vehicle: Vehicle) -> list[dict[str, Any]]:
         result.append(
             _make_row("stops, paper mode, {} {:g}".format(*surface), rate, "1/CPU-s", asked, STOPS_PER_CPU_S)
         )
-    seconds = stopping_run(SPEED, INTERNAL_STEP_S, LONGEST, brake, wheels, tyres[LONGEST_STOP])[1]
+    seconds = simulate_stop(SPEED, INTERNAL_STEP_S, LONGEST, brake, wheels, tyres[LONGEST_STOP])[1]
     twin_s = _twin_step_s(vehicle) * ceil(seconds / INTERNAL_STEP_S)
     name = "stops, paper mode, {} {:g}".format(*LONGEST_STOP)
     return [*result, _make_row(name, rate, "1/CPU-s", "NumPy twin", 1 / twin_s)]
@@ -91,11 +91,11 @@ def _stop_rows(vehicle: Vehicle) -> list[dict[str, Any]]:
 def _twin_step_s(vehicle: Vehicle) -> float:
     """CPU time of one step of the NumPy twin [CPU-s]."""
     still = replace(vehicle, coast_deceleration=0.0)
-    response = surface_response(still, *LONGEST_STOP)
+    response = compute_surface_response(still, *LONGEST_STOP)
     loads = np.array(still.static_axle_loads)
 
     def run() -> None:
-        reference.paper_drive(
+        reference.simulate_paper_drive(
             still, LONGEST_STOP[0], response, SPEED, lambda t: 2.3 * min(t / 0.5, 1.0), lambda n, a: loads,
             FLAT_ROAD, steps=TWIN_STEPS, step=INTERNAL_STEP_S,
         )  # fmt: skip

@@ -15,7 +15,7 @@ from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
+from tasks.vehicle.rollout import Controls, Mode, Rollout, simulate_scenario
 
 DURATION_S = 10.0
 HEADER = (
@@ -53,7 +53,7 @@ def simulate_condition(
         hold_s=scenario.hold_s,
         release_s=scenario.release_s,
     )
-    return rollout(
+    return simulate_scenario(
         vehicle,
         surface_state(weather, surface),
         Controls(

@@ -16,7 +16,7 @@ from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.atmosphere import air_layer, light_layer
 from tasks.render.weather.falling.particles import Shutter
-from tasks.render.weather.layer import recompose
+from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import ClipWeather, apply_weather, particle_layer, pixel_rays, weather_scene
 from tasks.render.weather.wet.wet_road import wet_layer
 from tasks.surface.state import SurfaceState
@@ -95,7 +95,9 @@ def _list_stages(
     film, falling = overcast.look.film, overcast.population
     rays = pixel_rays(shutter)
     cloudy, sky, air = overcast.environment, overcast.sky, overcast.air
-    lit = recompose(picture, [light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays)])
+    lit = recompose_layers(
+        picture, [light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays)]
+    )
     stages: dict[str, Callable[[], object]] = {
         "light": lambda: light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays),
         "air": lambda: air_layer(gbuffer, cloudy, air, sky, rays),

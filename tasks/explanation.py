@@ -17,9 +17,9 @@ from tasks.scene.route import Route
 from tasks.surface.road_profile import RoadHazard, road_slope
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, find_weather, surface_state
-from tasks.vehicle.model.axle_ports import signed_slip
-from tasks.vehicle.parameters import SurfaceResponse, Vehicle, surface_response
-from tasks.vehicle.tyres.contract import braking_slip, tyre_friction
+from tasks.vehicle.model.axle_ports import compute_signed_slip
+from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
+from tasks.vehicle.tyres.contract import compute_braking_slip, compute_tyre_friction
 
 TOLERANCE = 1e-9
 """Largest difference from the stored number, relative to it, that rounding explains [1]."""
@@ -73,7 +73,7 @@ def surface_steps(
     row : the stored frame
     """
     state = surface_state(weather, surface)
-    response = surface_response(vehicle, state.kind, state.friction)
+    response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = []
     for one in find_weather(state.kind).derive(weather, state, surface):
         column = "surface_friction" if one.field == "friction" else one.field
@@ -102,7 +102,7 @@ def force_steps(
     mode : paper or coupled, which lets a wheel slip the other way too
     row : the stored frame
     """
-    slip_of, lowest = (signed_slip, -1) if mode == "coupled" else (braking_slip, 0)
+    slip_of, lowest = (compute_signed_slip, -1) if mode == "coupled" else (compute_braking_slip, 0)
     steps, forces = [], []
     speed, radius = float(row["speed"]), vehicle.wheel_radius
     standing = speed <= 0
@@ -112,7 +112,7 @@ def force_steps(
     for axle, name in (("f", "front"), ("r", "rear")):
         omega, load = float(row[f"wheel_speed_{axle}"]), float(row[f"tyre_load_{axle}"])
         kappa = slip_of(speed, radius * omega, vehicle.slip_speed_floor)
-        mu = copysign(tyre_friction(abs(kappa), load, response.tyre), kappa)
+        mu = copysign(compute_tyre_friction(abs(kappa), load, response.tyre), kappa)
         forces.append(mu * load)
         steps += [
             Step(quantity=f"{name} braking slip", symbol=f"kappa_{axle}", equation="8", unit="1",

@@ -12,9 +12,9 @@ from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.errors import InputError
 from tasks.vehicle.tyres.magic_formula import (
     MagicFormula,
-    longitudinal_peak,
-    longitudinal_stiffness,
-    tyre_forces,
+    compute_longitudinal_peak,
+    compute_longitudinal_stiffness,
+    compute_tyre_forces,
 )
 from tasks.vehicle.tyres.magic_formula_tyre import MOST_LOAD_CHANGE
 from tasks.vehicle.tyres.scaling import NAMES, fold_scaling
@@ -154,7 +154,10 @@ def _shape_problems(values: Mapping[str, float], version: str) -> list[str]:
     if not 0.0 < tyre.lateral.pcy1 <= 2.0:
         problems.append(f"PCY1 LCY must be above 0 and at most 2; it is {tyre.lateral.pcy1:g}")
     for load in (0.0, 1.0, 1.0 + MOST_LOAD_CHANGE):
-        peak, stiffness = longitudinal_peak(load - 1.0, 0.0, c), longitudinal_stiffness(load - 1.0, c)
+        peak, stiffness = (
+            compute_longitudinal_peak(load - 1.0, 0.0, c),
+            compute_longitudinal_stiffness(load - 1.0, c),
+        )
         if not (0 < peak < 10 and 0 < stiffness < 1e4):
             problems.append(
                 "peak friction and slip stiffness must be above 0, below 10 and 10,000 of the load; under"
@@ -162,7 +165,8 @@ def _shape_problems(values: Mapping[str, float], version: str) -> list[str]:
             )
     grid = product((-1.0, -0.05, 0.0, 0.5), (-0.5, 0.0, 0.1), (-0.1, 0.0), (0.1, 1.0, 1.0 + MOST_LOAD_CHANGE))
     forces = [
-        tyre_forces(slip, angle, lean, load * tyre.nominal_load, tyre) for slip, angle, lean, load in grid
+        compute_tyre_forces(slip, angle, lean, load * tyre.nominal_load, tyre)
+        for slip, angle, lean, load in grid
     ]
     if not all(isfinite(force) for pair in forces for force in pair):
         problems.append("the coefficients must give finite forces in combined slip; some are not")

@@ -7,14 +7,9 @@ from pydantic import model_validator
 
 from catalogs.quantities import CatalogueEntry, Scalar, Table, Text
 from catalogs.vehicles.frozen import Limits
-from tasks.vehicle.effects.forms import SHAPES, Form, coefficient_count
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLES
+from tasks.vehicle.effects.forms import SHAPES, Form, count_coefficients
+from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
-
-VARIABLE_UNITS = dict(
-    zip(VARIABLES, ("s", "m s-1", "MPa", "K", "MPa s-1", "1", "m", "m s-1", "m s-2"), strict=True)
-)
-"""Unit of each variable, as catalogue files write it."""
 
 
 class FormEntry(CatalogueEntry):
@@ -40,7 +35,7 @@ class FormEntry(CatalogueEntry):
         ]
         if problems:
             raise ValueError("; ".join(problems))
-        of_port, of_variable = PORT_UNITS[PORTS.index(self.port)], VARIABLE_UNITS[self.variable]
+        of_port, of_variable = PORT_UNITS[self.port], VARIABLE_UNITS[self.variable]
         problems += [
             f"unit of {key} must be {unit}; it is {entry.unit}"
             for key, entry, unit in (
@@ -50,8 +45,8 @@ class FormEntry(CatalogueEntry):
             )
             if entry.unit != unit
         ]
-        if len(self.coefficients.value) != coefficient_count(self.shape):
-            count = coefficient_count(self.shape)
+        if len(self.coefficients.value) != count_coefficients(self.shape):
+            count = count_coefficients(self.shape)
             problems.append(
                 f"the shape {self.shape} has {count} coefficient(s); there are {len(self.coefficients.value)}"
             )
@@ -65,7 +60,7 @@ class FormEntry(CatalogueEntry):
 
     @property
     def form(self) -> Form:
-        """The form itself."""
+        """Return the form itself."""
         low, high = self.range.value
         return Form(
             port=self.port, variable=self.variable, shape=self.shape, coefficients=self.coefficients.value,

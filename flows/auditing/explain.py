@@ -25,8 +25,8 @@ from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, surface_steps
 from tasks.scene.route import Route
 from tasks.surface.state import SurfaceState
-from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.rollout import rollout
+from tasks.vehicle.parameters import compute_surface_response
+from tasks.vehicle.rollout import simulate_scenario
 
 
 def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None) -> dict[str, Any]:
@@ -87,8 +87,10 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         friction=float(row["surface_friction"]),
         snow_depth_mm=float(row["snow_depth_mm"]),
     )
-    ride = rollout(vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s)
-    response = surface_response(vehicle, state.kind, state.friction)
+    ride = simulate_scenario(
+        vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s
+    )
+    response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(scenario), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row),

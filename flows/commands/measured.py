@@ -211,7 +211,7 @@ COMMANDS = (
         name="calibrate",
         group=GROUP,
         sentence="Calibrate a vehicle in stages on reference traces, freeze it, and say how well each scalar is known.",
-        function="flows.measured.calibration:calibrate",
+        function="flows.measured.calibration:calibrate_on_traces",
         options=(
             TRACES,
             define_option("out", str, "Folder for the frozen vehicle and calibration.json."),

@@ -10,7 +10,7 @@ from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Controls, Mode, Rollout, rollout
+from tasks.vehicle.rollout import Controls, Mode, Rollout, simulate_scenario
 
 
 def simulate_drive(
@@ -57,7 +57,7 @@ def ranges_of(
 def _simulate_vehicle(
     scenario: Scenario, vehicle: Vehicle, state: SurfaceState, mode: Mode, duration_s: float
 ) -> Rollout:
-    return rollout(
+    return simulate_scenario(
         vehicle, state, controls_of(scenario), hazard_of(scenario), mode=mode, duration_s=duration_s
     )  # fmt: skip
 

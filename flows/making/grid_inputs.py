@@ -133,7 +133,7 @@ def _weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
     problems: list[str] = []
     for kind in sorted(weathers & WEATHERS.keys()):
         try:
-            vehicle.tyre_family(kind)
+            vehicle.find_tyre_family(kind)
         except InputError as error:
             problems += error.problems
     return problems

@@ -1,4 +1,4 @@
-"""Calibration of what is known: fit a vehicle's scalars to reference traces, freeze it, say how well it is known."""
+"""Calibration of known parameters: fit a vehicle's scalars to reference traces, freeze it, and report uncertainties."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from catalogs.calibration import load_procedure
+from catalogs.documents import parse_yaml
 from catalogs.entries import find_entry
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
 from catalogs.vehicles import load_vehicle, vehicle_content
@@ -20,11 +20,11 @@ from flows.studies.vehicle_model import agreement_of
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.errors import InputError
-from tasks.identification.calibration.identifiability import identifiability
+from tasks.identification.calibration.identifiability import compute_identifiability
 from tasks.identification.calibration.residual import WHEELS, CalibrationCase
-from tasks.identification.calibration.scalars import calibration_scalars, scalar_value, with_scalars
+from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
 from tasks.identification.calibration.staged import Procedure
-from tasks.identification.calibration.staged import calibrate as run_stages
+from tasks.identification.calibration.staged import calibrate_vehicle as run_stages
 from tasks.vehicle.effects.table import EFFECT_UNITS, NUMBERS_OF_EFFECTS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode
@@ -33,7 +33,7 @@ DIGITS = 6
 """Significant digits that a frozen file keeps of a calibrated scalar."""
 
 
-def calibrate(
+def calibrate_on_traces(
     traces: str,
     *,
     out: str,
@@ -50,8 +50,8 @@ def calibrate(
     out : folder for ``NAME.yaml`` and ``calibration.json``
     vehicle : catalogue name or file to start from
     procedure : catalogue name or file of the stages
-    split : which cases are fitted; the others are never looked at
-    name : of the frozen vehicle
+    split : cases that are fitted; the others are not used
+    name : name of the frozen vehicle
 
     Raises
     ------
@@ -90,7 +90,7 @@ def calibrate(
         "before": before["groups"],
         "after": after["groups"],
         "without": _without(frozen, reference, steps.mode),
-        "identifiability": asdict(identifiability(frozen, cases, steps)),
+        "identifiability": asdict(compute_identifiability(frozen, cases, steps)),
     }
     results.write_json("calibration.json", result)
     return result
@@ -104,16 +104,16 @@ def calibration_case(
     head_s: float,
     wheelbase: float,
 ) -> CalibrationCase:
-    """One trace as the fit takes it: the judge's event window and what leads from the brake onset to it.
+    """Return one trace for the fit: the judge's event window and the samples from the brake onset to it.
 
     Parameters
     ----------
-    case : its conditions
-    columns : the trace
-    window : begin and end of what counts [s]
+    case : conditions of the trace
+    columns : columns of the trace
+    window : start and end of the event [s]
     interval : spacing of the samples [s]
-    head_s : how long every sample counts at first [s]
-    wheelbase : of the model [m]
+    head_s : time from the brake onset in which every sample counts [s]
+    wheelbase : wheelbase of the model [m]
     """
     time = columns["time"]
     onset = case.brake_onset_s if case.braked and case.brake_onset_s is not None else window[0]
@@ -141,9 +141,9 @@ def calibration_case(
 def _without(
     vehicle: Vehicle, reference: list[tuple[ReferenceCase, Traces]], mode: Mode
 ) -> list[dict[str, Any]]:
-    """Mean agreement with each effect of the vehicle switched off and nothing fitted again: what it is worth.
+    """Return the mean agreement with each effect of the vehicle switched off and nothing fitted again.
 
-    A vehicle that no longer stops without an effect has no figures, and a sentence instead.
+    If the vehicle does not stop without an effect, a sentence replaces the figures.
     """
     rows: list[dict[str, Any]] = []
     for effect, numbers in NUMBERS_OF_EFFECTS.items():
@@ -157,16 +157,16 @@ def _without(
 
 
 def _rounded(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
-    scalars = calibration_scalars(vehicle, procedure.groups)
-    return with_scalars(vehicle, {s: float(f"{scalar_value(vehicle, s):.{DIGITS}g}") for s in scalars})
+    scalars = list_calibration_scalars(vehicle, procedure.groups)
+    return set_scalars(vehicle, {s: float(f"{read_scalar(vehicle, s):.{DIGITS}g}") for s in scalars})
 
 
 def _frozen(
     fitted: Vehicle, base: str, procedure_name: str, procedure: Procedure, split: str, data: dict[str, str]
 ) -> str:
-    """The frozen file: the base's entry with the calibrated values in it, and where they come from."""
+    """Return the frozen file: the base's entry with the calibrated values and their provenance."""
     source, content = find_entry("vehicle", base), vehicle_content(base)
-    entry = yaml.safe_load(content)
+    entry = parse_yaml(content, source, "vehicle")
     before = entry.pop("provenance", None) or {"bounds": {}}
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
     for group in procedure.groups:
@@ -196,7 +196,7 @@ def _frozen(
             {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(stage).items()}
             for stage in procedure.stages
         ],
-        # what the base brought along keeps the bounds that it was found in
+        # effects of the base keep the bounds of their own fit
         "bounds": {effect: limits for effect, limits in before["bounds"].items() if effect in fitted.effects}
         | {
             group: {"unit": bounds.unit, "lower": bounds.lower, "upper": bounds.upper}

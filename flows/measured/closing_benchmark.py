@@ -11,14 +11,14 @@ from catalogs.effects.truths import Truth, load_sizes, load_truths
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.measured.closing_benchmark_summary import pair_outcome, summary
+from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from flows.measured.closing_benchmark_tables import benchmark_tables
 from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
 from tasks.campaign.planned_runs import RICH, RunPlan
-from tasks.identification.benchmark import classify_outcome, interval_holds_truth, synthetic_campaign
+from tasks.identification.benchmark import classify_outcome, interval_holds_truth, make_synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import find_missing_effects
 
@@ -100,7 +100,7 @@ def close_loop_benchmark(
             break
         left_out = {name for truth in planned.truths for name in truth.left_out}
         before = time.process_time()
-        campaign = synthetic_campaign(
+        campaign = make_synthetic_campaign(
             model, surface, planned.values, planned.seed,
             slots=tuple(slot for truth in planned.truths for slot in truth.slots), design=planned.design,
         )  # fmt: skip
@@ -127,7 +127,11 @@ def close_loop_benchmark(
         }
         rows.append(row)
         append_line(log, row)
-    result = summary(rows) | {"campaigns": rows, "engine_sha256": engine, "made_with": code_version()}
+    result = summarise_benchmark(rows) | {
+        "campaigns": rows,
+        "engine_sha256": engine,
+        "made_with": code_version(),
+    }
     results.write_json(FILE, result)
     results.write_json(RATES, {key: value for key, value in result.items() if key != "campaigns"})
     results.write(TABLES, benchmark_tables(result))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tasks.identification.benchmark import exact_interval
+from tasks.identification.benchmark import compute_exact_interval
 
 Rows = list[dict[str, Any]]
 KINDS = {"null", "library", "outside", "size", "pair", "poor", "poor null"}
@@ -39,7 +39,7 @@ def pair_outcome(
     return "both" if len(set(named)) == len(set(truths)) else "one"
 
 
-def summary(rows: Rows) -> dict[str, Any]:
+def summarise_benchmark(rows: Rows) -> dict[str, Any]:
     """Confusion by truth and shares with exact 95 % intervals.
 
     Parameters
@@ -107,7 +107,7 @@ def summary(rows: Rows) -> dict[str, Any]:
 
 
 def _share(hits: int, of: int) -> dict[str, Any]:
-    low, high = exact_interval(hits, of) if of else (0.0, 1.0)
+    low, high = compute_exact_interval(hits, of) if of else (0.0, 1.0)
     return {"hits": hits, "of": of, "share": hits / of if of else None, "low": low, "high": high}
 
 

@@ -1,4 +1,4 @@
-"""Figures of a close-loop report, each a PNG in base64: what an engineer looks at before believing a verdict."""
+"""Figures of a close-loop report, each a PNG in base64, with which an engineer checks a verdict."""
 
 import base64
 from io import BytesIO
@@ -11,30 +11,35 @@ from numpy.typing import NDArray
 
 from flows.drawing import escape_formulas
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.identification.decision.forms import Leftover, curve, form_hypotheses, scan_leftovers
-from tasks.identification.decision.search import Found
+from tasks.identification.decision.forms import (
+    ResidualSpline,
+    fit_residual_splines,
+    make_form_hypotheses,
+    sample_form,
+)
+from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import RunModel, predict, simulate_run
-from tasks.identification.inference.hypothesis import compose
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS, VARIABLE_UNITS, VARIABLES
+from tasks.identification.inference.forward import RunModel, predict_channels, simulate_run
+from tasks.identification.inference.hypothesis import compose_parameters
+from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS, format_unit
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 FROZEN, AFTER, MEASURED = "#c0392b", "#1f6fb2", "#222222"
 SHOWN = ("speed", "longitudinal_acceleration", "pitch")
 MEAN_OVER = 20
-"""Samples averaged into one point of the residual force: its noise falls below what is looked for."""
+"""Samples averaged into one point of the residual force, so that its noise is below the effects in question."""
 
 
-def picture(figure: Figure) -> str:
-    """A figure as base64 PNG, without any date in it."""
+def render_figure(figure: Figure) -> str:
+    """Return a figure as base64 PNG, without a date in it."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight", metadata={"Software": None})
     return base64.b64encode(buffer.getvalue()).decode()
 
 
 def residual_force(trace: Trace) -> str:
-    """Residual longitudinal force of the training runs against a state, frozen and after, coloured by run."""
+    """Draw the residual longitudinal force of the training runs over a state, frozen and after, coloured by run."""
     variable = _state_to_show(trace)
     figure = Figure(figsize=(10, 3.6))
     axes = figure.subplots(1, 2, sharey=True)
@@ -46,10 +51,10 @@ def residual_force(trace: Trace) -> str:
             axis.plot(x, force, ".", ms=2.5, color=colour, label=escape_formulas(run.model.run.name))
         axis.axhline(0.0, color="#888888", lw=0.8)
         axis.set_title(title)
-        axis.set_xlabel(f"{variable} [{VARIABLE_UNITS[VARIABLES.index(variable)]}]")
+        axis.set_xlabel(f"{variable} [{format_unit(VARIABLE_UNITS[variable])}]")
     axes[0].set_ylabel("measured - model [N]")
     axes[1].legend(fontsize=6, ncol=2, loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=3)
-    return picture(figure)
+    return render_figure(figure)
 
 
 def _state_to_show(trace: Trace) -> str:
@@ -59,15 +64,15 @@ def _state_to_show(trace: Trace) -> str:
 
 
 def _force_points(
-    model: RunModel, state: Found, variable: str, grown: bool
+    model: RunModel, state: SearchState, variable: str, grown: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     theta, slots = (
-        compose(state.base.parts, state.base.values, state.base.session)
+        compose_parameters(state.base.parts, state.base.values, state.base.session)
         if grown
         else (np.zeros(len(EFFECT_TABLE)), ())
     )
     channel = CHANNELS.index("longitudinal_acceleration")
-    y = predict(model, theta, slots=slots)
+    y = predict_channels(model, theta, slots=slots)
     left = (model.measured - y)[:, channel]
     if not model.measured[:, channel].any():  # no accelerometer
         left = np.gradient((model.measured - y)[:, CHANNELS.index("speed")], model.run.interval)
@@ -82,9 +87,9 @@ def _force_points(
     return tuple(v[: count * MEAN_OVER].reshape(count, MEAN_OVER).mean(axis=1) for v in (x, force))
 
 
-def spline(trace: Trace) -> str:
-    """Shape of what the frozen model leaves over at the port of what is named, with its band and best form."""
-    found = scan_leftovers(trace.start.evidence, trace.start.base)
+def draw_residual_spline(trace: Trace) -> str:
+    """Draw the spline of the frozen model's residual at the port of the named effect, with its band and best form."""
+    found = fit_residual_splines(trace.start.evidence, trace.start.base)
     ports = [effect.port for effect in trace.verdict.effects]
     left = next((x for x in found if x.port in ports), found[0])
     figure = Figure(figsize=(5.2, 3.4))
@@ -92,23 +97,23 @@ def spline(trace: Trace) -> str:
     band = 1.96 * np.sqrt(np.maximum(np.diag(left.covariance), 0.0))
     axis.fill_between(left.grid, left.values - band, left.values + band, color="#c9dff2", label="95 % band")
     axis.plot(left.grid, left.values, "o-", color=AFTER, label="spline")
-    form = form_hypotheses(left, trace.start.evidence.samples, count=1)[0]
-    x, y = curve(form)
+    form = make_form_hypotheses(left, trace.start.evidence.samples, count=1)[0]
+    x, y = sample_form(form)
     axis.plot(x, y, "--", color=FROZEN, label=form.name.partition(", x")[0])
     axis.axhline(0.0, color="#888888", lw=0.8)
-    axis.set_xlabel(f"{left.variable} [{VARIABLE_UNITS[VARIABLES.index(left.variable)]}]")
-    axis.set_ylabel(f"{left.port} [{PORT_UNITS[PORTS.index(left.port)]}]")
+    axis.set_xlabel(f"{left.variable} [{format_unit(VARIABLE_UNITS[left.variable])}]")
+    axis.set_ylabel(f"{left.port} [{PORT_UNITS[left.port]}]")
     axis.legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
-def leftovers(trace: Trace) -> str:
-    """Return the gain of a spline at every scanned port and variable, before and after."""
-    before = scan_leftovers(trace.start.evidence, trace.start.base)
-    after = scan_leftovers(trace.end.evidence, trace.end.base)
+def draw_spline_gains(trace: Trace) -> str:
+    """Draw the gain of a spline at every scanned port and variable, before and after."""
+    before = fit_residual_splines(trace.start.evidence, trace.start.base)
+    after = fit_residual_splines(trace.end.evidence, trace.end.base)
     keys = [(x.port, x.variable) for x in sorted(before, key=lambda x: (x.port, x.variable))]
 
-    def gains(found: list[Leftover]) -> list[float]:
+    def gains(found: list[ResidualSpline]) -> list[float]:
         known = {(x.port, x.variable): max(x.gain, 0.1) for x in found}
         return [known[key] for key in keys]
 
@@ -122,11 +127,11 @@ def leftovers(trace: Trace) -> str:
     axis.set_xscale("log")
     axis.set_xlabel("gain of a spline / inflation")
     axis.legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
-def correlations(trace: Trace) -> str:
-    """Correlation of residual and brake pressure on the held-out runs, with the band of independence."""
+def draw_correlations(trace: Trace) -> str:
+    """Draw the correlation of residual and brake pressure on the held-out runs, with the band of independence."""
     items = trace.verdict.correlation
     figure = Figure(figsize=(10, 2.8))
     axes = figure.subplots(1, len(items), sharey=True)
@@ -138,11 +143,11 @@ def correlations(trace: Trace) -> str:
         axis.set_xlabel("lag [s]")
     axes[0].set_ylabel("correlation [1]")
     axes[0].legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
-def pulls(trace: Trace) -> str:
-    """Pulls of the session's nuisances, before and after."""
+def draw_session_pulls(trace: Trace) -> str:
+    """Draw the pulls of the session's nuisances, before and after."""
     items = trace.verdict.session_pulls
     figure = Figure(figsize=(5.2, 2.6))
     axis = figure.subplots()
@@ -155,20 +160,20 @@ def pulls(trace: Trace) -> str:
         axis.axvline(limit, color="#888888", lw=0.8, ls=":")
     axis.set_xlabel("pull [prior sigma]; beyond 4 a number of the vehicle is wrong")
     axis.legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
-def traces(trace: Trace) -> str:
-    """Measured, frozen and after on the held-out runs that gained most and least."""
+def draw_traces(trace: Trace) -> str:
+    """Draw measured channels, frozen and after, of the held-out runs with the largest and the smallest improvement."""
     runs = trace.start.evidence.held_out
-    theta, slots = compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
+    theta, slots = compose_parameters(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
     plain = np.zeros(len(EFFECT_TABLE))
 
     def gain(run: RunEvidence) -> float:
         sigma = run.sigma
         frozen, after = (
             np.mean(((run.model.measured - y) / sigma) ** 2)
-            for y in (predict(run.model, plain), predict(run.model, theta, slots=slots))
+            for y in (predict_channels(run.model, plain), predict_channels(run.model, theta, slots=slots))
         )
         return float(np.log(frozen / after))
 
@@ -177,7 +182,7 @@ def traces(trace: Trace) -> str:
     figure = Figure(figsize=(11, 6.4), layout="constrained")
     axes = figure.subplots(len(shown), 2, sharex="col", squeeze=False)
     for column, (run, title) in enumerate(((ranked[-1], "gained most"), (ranked[0], "gained least"))):
-        frozen, after = predict(run.model, plain), predict(run.model, theta, slots=slots)
+        frozen, after = predict_channels(run.model, plain), predict_channels(run.model, theta, slots=slots)
         time = np.arange(run.model.samples, dtype=np.float64) * run.model.run.interval
         for row, channel in enumerate(shown):
             c = CHANNELS.index(channel)
@@ -186,7 +191,7 @@ def traces(trace: Trace) -> str:
         axes[0, column].set_title(escape_formulas(f"{title}: {run.model.run.name} ({run.model.run.weather})"))
         axes[-1, column].set_xlabel("time [s]")
     axes[0, 0].legend(fontsize=7)
-    return picture(figure)
+    return render_figure(figure)
 
 
 def _trace(

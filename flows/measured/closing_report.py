@@ -1,4 +1,4 @@
-"""The close-loop report: one HTML page that needs no other file."""
+"""The close-loop report: one self-contained HTML page."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -23,51 +23,52 @@ img { max-width: 100%; } code { font-size: 12px; overflow-wrap: anywhere; }
 .pair { display: flex; flex-wrap: wrap; gap: 1rem; }
 """
 CORRELATION = (
-    "<p>Correlation of the held-out residual with brake pressure, both whitened by the channel's noise, by the time"
-    " that the residual follows the pressure. Inside the band they have nothing to do with each other. The runs'"
-    " offsets and smooth disturbances are not taken out, so that a right model, too, can leave the band a little.</p>"
+    "<p>Correlation of the held-out residual with brake pressure, both whitened by the channel's noise, over the delay"
+    " of the residual. Inside the band the two are compatible with independence. The runs' offsets and smooth"
+    " disturbances are not removed, so the correlation of a correct model can leave the band slightly.</p>"
 )
 MEANING = {
     "FOUND": "the model lacks this",
     "SET": "one of several explanations that these runs cannot tell apart",
-    "UNKNOWN_FORM": "the model lacks something that is not in the library: this port, this variable, this shape",
+    "UNKNOWN_FORM": "the model lacks a term outside the library: this port, this variable, this shape",
     "RETUNE": "no physics is missing; a number of the vehicle is wrong",
-    "SENSOR": "the model is right; an instrument is not",
+    "SENSOR": "no physics is missing; an instrument has an error",
     "NOTHING": "these runs show nothing that the model lacks",
 }
 
 
 def report_html(trace: Trace, result: Mapping[str, Any], campaign: Campaign) -> str:
-    """The page.
+    """Return the page as HTML.
 
     Parameters
     ----------
-    trace : the verdict and what it stands on
-    result : of ``verdict.json``
-    campaign : that was read
+    trace : the verdict with the fits behind it
+    result : content of ``verdict.json``
+    campaign : the campaign
     """
     parts = [
         _verdict(result),
         _section("Error on held-out runs", _errors({**result["error"], **result["manoeuvre_error"]})),
-        _section("What was tried", _ladder(trace)),
+        _section("Candidates", _ladder(trace)),
         _section("Residual force of the training runs", _image(figures.residual_force(trace))),
         _section(
-            "What the frozen model leaves over, and what is left after",
-            f'<div class="pair">{_image(figures.spline(trace))}{_image(figures.leftovers(trace))}</div>',
+            "Splines of the residual, frozen and after",
+            f'<div class="pair">{_image(figures.draw_residual_spline(trace))}'
+            f"{_image(figures.draw_spline_gains(trace))}</div>",
         ),
         _section(
-            "What is left that goes with the brake pressure",
-            _image(figures.correlations(trace)) + CORRELATION,
+            "Correlation of the residual with brake pressure",
+            _image(figures.draw_correlations(trace)) + CORRELATION,
         ),
         _section("Residual of the training runs over time", _image(residuals_over_time(trace))),
-        _section("Held-out runs", _image(figures.traces(trace))),
-        _section("Pulls of the session", _image(figures.pulls(trace))),
+        _section("Held-out runs", _image(figures.draw_traces(trace))),
+        _section("Pulls of the session", _image(figures.draw_session_pulls(trace))),
         _section("Next experiment", _experiment(result["discriminating_experiment"])),
         _section(
-            "What this campaign could show at all",
+            "Smallest effects that this campaign can show",
             _detectable(result["minimum_detectable"], trace.start.evidence.effects),
         ),
-        _section("How often this tool is right", error_rates_html([e["name"] for e in result["effects"]])),
+        _section("Error rates of the method", error_rates_html([e["name"] for e in result["effects"]])),
         _section("Data and split, fixed before any fit", _data(result, campaign)),
     ]
     return (
@@ -110,7 +111,7 @@ def _verdict(result: Mapping[str, Any]) -> str:
     ]
     notes = [f"<li>{escape(reason)}</li>" for reason in result["reasons"]]
     notes += [
-        f"<li>left out, because halving the integration step forks it: {escape(name)}</li>"
+        f"<li>left out, because halving the integration step changes its prediction: {escape(name)}</li>"
         for name in result["runs_left_out"]
     ]
     notes += [
@@ -191,16 +192,16 @@ def _ladder(trace: Trace) -> str:
 
 def _experiment(plan: Mapping[str, Any] | None) -> str:
     if plan is None:
-        return "<p>Nothing is named, or no planned run would tell more than this campaign does.</p>"
+        return "<p>Nothing is named, or no planned run would separate the explanations better than this campaign.</p>"
     return (
         f"<p>{escape(plan['plan'])}: tells {escape(plan['between'][0])} from {escape(plan['between'][1])} by an"
-        f" expected D&sup2; of {plan['expected_d2']:.3g} a run, session and disturbances taken out.</p>"
+        f" expected D&sup2; of {plan['expected_d2']:.3g} per run, with session and disturbances projected out.</p>"
     )
 
 
 def _detectable(values: Mapping[str, float | None], effects: Sequence[Effect]) -> str:
     rows = [(e.name, e.parameters[0].name, values[e.name], e.parameters[0].unit) for e in effects]
-    text = "Smallest first parameter of each library effect that would pass the score; - where none in bounds would."
+    text = "Smallest first parameter of each library effect that would pass the score; - if no value in bounds would."
     return f"<p>{text}</p>" + _table(("effect", "parameter", "smallest", "unit"), rows)
 
 

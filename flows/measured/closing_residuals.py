@@ -8,18 +8,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from flows.drawing import escape_formulas
-from flows.measured.closing_figures import picture
+from flows.measured.closing_figures import render_figure
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import predict
-from tasks.identification.inference.hypothesis import compose
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 TITLES = ("frozen", "after")
 
 
-def residuals(
+def compute_run_residuals(
     trace: Trace, runs: tuple[RunEvidence, ...]
 ) -> Iterator[tuple[RunEvidence, tuple[NDArray[np.float64], ...]]]:
     """Measured less model of each run, frozen and after; each float64 [samples, 7] [unit of the channel].
@@ -31,12 +31,15 @@ def residuals(
     """
     models = (
         (np.zeros(len(EFFECT_TABLE)), ()),
-        compose(trace.end.base.parts, trace.end.base.values, trace.end.base.session),
+        compose_parameters(trace.end.base.parts, trace.end.base.values, trace.end.base.session),
     )
     for run in runs:
         yield (
             run,
-            tuple(run.model.measured - predict(run.model, theta, slots=slots) for theta, slots in models),
+            tuple(
+                run.model.measured - predict_channels(run.model, theta, slots=slots)
+                for theta, slots in models
+            ),
         )
 
 
@@ -57,7 +60,7 @@ def residual_rmse(trace: Trace) -> dict[str, dict[str, dict[str, float]]]:
             for c, channel in enumerate(CHANNELS)
             if np.isfinite(run.sigma[c])
         }
-        for run, both in residuals(trace, (*evidence.train, *evidence.held_out))
+        for run, both in compute_run_residuals(trace, (*evidence.train, *evidence.held_out))
     }
 
 
@@ -73,7 +76,7 @@ def residuals_over_time(trace: Trace) -> str:
     figure = Figure(figsize=(11, 11), layout="constrained")
     seen = np.flatnonzero(np.isfinite(runs[0].sigma))
     axes = figure.subplots(len(seen), 2, sharex=True, sharey="row", squeeze=False)
-    for (run, both), colour in zip(residuals(trace, runs), colours, strict=True):
+    for (run, both), colour in zip(compute_run_residuals(trace, runs), colours, strict=True):
         time = np.arange(run.model.samples) * run.model.run.interval
         for column, left in enumerate(both):
             for row, c in enumerate(seen):
@@ -89,4 +92,4 @@ def residuals_over_time(trace: Trace) -> str:
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     figure.legend(*axes[0, 1].get_legend_handles_labels(), fontsize=6, loc="outside right upper")
-    return picture(figure)
+    return render_figure(figure)

@@ -1,29 +1,28 @@
-"""The vehicle with what a verdict adds, as a catalogue entry that names where it comes from."""
+"""The vehicle with the additions of a verdict, as a catalogue entry with provenance."""
 
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
-
+from catalogs.documents import parse_yaml
 from catalogs.effects import LIBRARY_FILE
 from catalogs.entries import entry_folder, find_entry
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
-from catalogs.vehicles.added import VARIABLE_UNITS
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
-from tasks.identification.decision.forms import form_in_range
+from tasks.identification.decision.forms import make_form_in_range
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.grown import FAMILY, apply_effects
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
+from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS
 from tasks.vehicle.effects.table import PARAMETERS, EffectParameter
 from tasks.vehicle.parameters import Vehicle
 
 
 def tyre_beside(name: str) -> dict[str, bytes]:
-    """Return the property file that lies beside a vehicle's file, or beside one that it extends: what grows from it
-    needs that too.
+    """Return the tyre's property file beside a vehicle's file, or beside one that it extends.
+
+    A vehicle that is grown from it needs this file too.
 
     Parameters
     ----------
@@ -31,7 +30,7 @@ def tyre_beside(name: str) -> dict[str, bytes]:
 
     Returns
     -------
-    One file by its name, or none where the vehicle names no tyre or one of the catalogue.
+    One file by its name; none if the vehicle names no tyre, or one of the catalogue.
     """
     tyre = vehicle_tyre_source(name)
     if tyre is None or tyre.parent == entry_folder("tyre"):
@@ -42,23 +41,23 @@ def tyre_beside(name: str) -> dict[str, bytes]:
 def grown_vehicle(
     name: str, verdict: Verdict, reached: Mapping[str, tuple[float, float]]
 ) -> tuple[str | None, list[str]]:
-    """Return the text of the grown vehicle's file: what was found on top of what the vehicle has.
+    """Return the text of the grown vehicle's file: the vehicle with the effects that were found.
 
-    Errors of instruments are no part of the car. Neither is the grade of the proving ground, which is left out and
+    Errors of instruments are no part of the car. Neither is the grade of the proving ground, which is omitted and
     named.
 
     Parameters
     ----------
-    name : catalogue name or file of the vehicle that was judged
-    verdict : what was found
-    reached : of the variable of each form, the range that the runs reached [unit of the variable]
+    name : catalogue name or file of the judged vehicle
+    verdict : the verdict
+    reached : range of the variable of each form that the runs reached [unit of the variable]
 
     Returns
     -------
-    The text, or None where nothing was added; and the parameters that could not be.
+    The text, or None if nothing was added; and the parameters that no vehicle can carry.
     """
     source, content = find_entry("vehicle", name), vehicle_content(name)
-    entry: dict[str, Any] = yaml.safe_load(content)
+    entry: dict[str, Any] = parse_yaml(content, source, "vehicle")
     before = entry.pop("provenance", None) or {"bounds": {}}
     base = load_vehicle(name)
     bounds: dict[str, dict[str, Any]] = {}
@@ -69,7 +68,7 @@ def grown_vehicle(
         if effect.effect_class == "sensor":
             continue
         if effect.effect_class == "form":
-            form = form_in_range(
+            form = make_form_in_range(
                 effect.name, tuple(p.value for p in effect.parameters), *reached[effect.variable]
             )
             source_text = "; ".join(_source(effect, p, verdict) for p in effect.parameters)
@@ -80,7 +79,7 @@ def grown_vehicle(
             missing += [f"{effect.name}: {p.name}" for p in effect.parameters]
             continue
         for p in effect.parameters:
-            # two effects that share a number, as air drag and headwind do, add up
+            # effects that share a number, such as air drag and headwind, are added
             values[p.name] = values.get(p.name, 0.0) + p.value
             sources.setdefault(p.name, []).append(_source(effect, p, verdict))
             own = base.effects.get(p.name, 0.0)
@@ -123,7 +122,7 @@ def _form_entry(form: Form, source: str, campaign: str) -> dict[str, Any]:
         "shape": form.shape,
         "coefficients": {
             "value": list(form.coefficients),
-            "unit": PORT_UNITS[PORTS.index(form.port)],
+            "unit": PORT_UNITS[form.port],
             "source": source,
         },
         "scale": {"value": form.scale, "unit": unit, "source": "where x of the shape is 1: by the grammar"},
@@ -143,7 +142,7 @@ def _source(effect: NamedEffect, p: Parameter, verdict: Verdict) -> str:
 
 
 def _write(entry: dict[str, Any], grown: Vehicle, row: EffectParameter, field: str, source: str) -> None:
-    """Write one field of the grown vehicle into its file, with where it comes from."""
+    """Write one field of the grown vehicle into its file, with its source."""
     if row.kind == "added":
         old = entry.setdefault("effects", {}).get(field, {"source": ""})
         entry["effects"][field] = {
@@ -152,7 +151,7 @@ def _write(entry: dict[str, Any], grown: Vehicle, row: EffectParameter, field: s
         return
     if field.startswith(FAMILY):
         table = field.removeprefix(FAMILY)
-        # families that the weather lends a vehicle are no part of its file
+        # tyre families of the weather catalogue are no part of the vehicle's file
         for weather, tables in entry["families"].items():
             old = tables[table]
             tables[table] = {

@@ -13,8 +13,8 @@ from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.events import RecordedRun
 from tasks.errors import InputError
 from tasks.studies.stop import Stop, StopErrors, stop_of, stopping_distance
-from tasks.studies.stop_findings import after_stop, rebound, saturation, slip_cycles
-from tasks.studies.stop_study import RungResult, climb, uncalibrated
+from tasks.studies.stop_findings import after_stop, measure_rebound, measure_saturation, slip_cycles
+from tasks.studies.stop_study import RungResult, compute_uncalibrated_errors, fit_ladder
 
 NEEDED = (*CHANNELS, "brake_pressure", "brake_torque", "engine_torque")
 ERROR_UNITS = {
@@ -61,7 +61,7 @@ def stop_study(
         raise InputError([f"{recorded.name}: {problem}" for problem in problems])
     train, held_out = stops[plan.train], stops[plan.held_out]
     car, surface = load_vehicle(vehicle or recorded.vehicle), load_surface("dense-asphalt")
-    rungs = climb(train, held_out, plan.ladder, car, surface)
+    rungs = fit_ladder(train, held_out, plan.ladder, car, surface)
     last = rungs[-1]
     result: dict[str, Any] = {
         "campaign": recorded.name,
@@ -73,23 +73,26 @@ def stop_study(
         ],
         "rungs": [
             {"rung": "data sheet", "adds": "nothing fitted", "parameters": {},
-             "train": _errors(uncalibrated(train, car, surface)),
-             "held_out": _errors(uncalibrated(held_out, car, surface))},
+             "train": _errors(compute_uncalibrated_errors(train, car, surface)),
+             "held_out": _errors(compute_uncalibrated_errors(held_out, car, surface))},
             *(
                 {"rung": rung.rung.name, "adds": rung.rung.adds, "parameters": _parameters(rung),
                  "train": _errors(rung.train), "held_out": _errors(rung.held_out),
                  "after_stop": asdict(after_stop(held_out, rung.predicted)),
-                 "rebound": asdict(rebound(held_out, rung.predicted["pitch"]))}
+                 "rebound": asdict(measure_rebound(held_out, rung.predicted["pitch"]))}
                 for rung in rungs
             ),
         ],
         "findings": {
-            "saturation": {"train": asdict(saturation(train, car)), "held_out": asdict(saturation(held_out, car))},
+            "saturation": {
+                "train": asdict(measure_saturation(train, car)),
+                "held_out": asdict(measure_saturation(held_out, car)),
+            },
             "slip": {
                 "measured": asdict(slip_cycles(held_out, held_out.columns, car, last.parameters)),
                 "predicted": asdict(slip_cycles(held_out, last.predicted, car, last.parameters)),
             },
-            "rebound_deg": asdict(rebound(held_out, held_out.columns["pitch"])),
+            "rebound_deg": asdict(measure_rebound(held_out, held_out.columns["pitch"])),
         },
         "units": ERROR_UNITS,
     }  # fmt: skip

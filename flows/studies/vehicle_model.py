@@ -16,7 +16,7 @@ from tasks.eval.state_agreement import CaseAgreement, case_agreement, summarise_
 from tasks.studies.sensitivity import beside_print, sensitivity_study
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Mode, rollout
+from tasks.vehicle.rollout import Mode, simulate_scenario
 
 BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries")
 
@@ -70,7 +70,7 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
     rows: list[dict[str, Any]] = []
     splits: dict[str, list[CaseAgreement]] = {}
     for case, columns in reference:
-        ride = rollout(
+        ride = simulate_scenario(
             model, SurfaceState(kind=case.weather, friction=case.surface_coefficient), case.controls(), case.hazard(),
             mode=mode, duration_s=case.duration_s(columns),
         )  # fmt: skip

@@ -1,8 +1,8 @@
-"""The tool's own error rates: campaigns with a known truth, made unlike the model that judges them.
+"""Campaigns with a known truth, for the error rates of the method; the generator differs from the judged model.
 
 The generator integrates at an eighth of the step, draws session and run offsets, Gauss-Markov disturbances in
-force, friction and pitch moment on knots of its own, AR(1) sensor noise and coloured noise on the pressure that
-the model is given; wheel inertia is off by an amount that no nuisance covers.
+force, friction and pitch moment on its own knots, AR(1) sensor noise, and coloured noise on the pressure that
+the model reads. Its wheel inertia has an error that no nuisance covers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,10 +16,10 @@ from tasks.campaign.campaign import Campaign, Run, Tolerances
 from tasks.campaign.planned_runs import RICH, TRAINING, RunPlan, make_planned_run
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.inference.evidence import SESSION_INDEX
-from tasks.identification.inference.forward import instrument_readings, run_model, simulate_run
+from tasks.identification.inference.forward import compute_instrument_readings, prepare_run, simulate_run
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.slots import Slot
-from tasks.vehicle.effects.table import PARAMETER_INDEX, parameter_vector
+from tasks.vehicle.effects.table import PARAMETER_INDEX, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 NOISE_SIGMA = np.array([0.03, 0.05, 0.09, 0.09, 0.015, 0.1, 0.1])
@@ -41,7 +41,7 @@ DISTURBANCE = (
 """Port, standard deviation [unit of the port], correlation time and knot spacing [s]."""
 
 
-def synthetic_campaign(
+def make_synthetic_campaign(
     vehicle: Vehicle,
     surface: SurfaceParameters,
     truth: Mapping[str, float],
@@ -50,18 +50,18 @@ def synthetic_campaign(
     slots: tuple[Slot, ...] = (),
     design: Sequence[RunPlan] = RICH,
 ) -> Campaign:
-    """A campaign of a car that has what ``truth`` says.
+    """Return a campaign of a vehicle that has the effects of ``truth``.
 
     Parameters
     ----------
-    vehicle, surface : the car before anything is added
-    truth : effect parameters by name
-    seed : of all that is drawn
+    vehicle, surface : vehicle and surface without the effects
+    truth : effect parameters by name [units of the table]
+    seed : seed of all random draws
     slots : forms outside any library
-    design : the runs; the first `TRAINING` of them train
+    design : planned runs; the first `TRAINING` of them train
     """
     rng = np.random.Generator(np.random.Philox(seed))
-    theta = parameter_vector(truth)
+    theta = build_parameter_vector(truth)
     theta[list(SESSION_INDEX)] += rng.standard_normal(len(SESSION_INDEX)) * TOLERANCES.session
     theta[PARAMETER_INDEX["wheel_inertia"]] += 0.05 * rng.random()
     runs = tuple(
@@ -88,34 +88,37 @@ def _measure_run(
     slots: tuple[Slot, ...],
     rng: np.random.Generator,
 ) -> Run:
+    """Return one planned run as the instruments would have measured it."""
     run = make_planned_run(drive, f"run-{number + 1:02d}", direction, held_out=number >= TRAINING)
     pressure, count = run.pressure, len(run.pressure)
-    model = run_model(run, vehicle, surface)
+    model = prepare_run(run, vehicle, surface)
     own = theta.copy()
     own[PARAMETER_INDEX["friction"]] += TOLERANCES.friction * rng.standard_normal()
-    disturbed = tuple(_disturbance(*entry, drive.duration, rng) for entry in DISTURBANCE)
+    disturbed = tuple(_draw_disturbance(*entry, drive.duration, rng) for entry in DISTURBANCE)
     speed = drive.speed + TOLERANCES.initial_speed * rng.standard_normal()
     driven = simulate_run(
         model, own, slots=(*slots, *disturbed), initial_speed=speed, refinement=GENERATOR_REFINEMENT
     )
-    y = instrument_readings(model, own, driven)
+    y = compute_instrument_readings(model, own, driven)
     y[:, 1] += TOLERANCES.acceleration_bias * rng.standard_normal()
     y[:, 4] += TOLERANCES.pitch_offset * rng.standard_normal()
     for j in range(y.shape[1]):
-        y[:, j] += NOISE_SIGMA[j] * _autoregressive(NOISE_RHO[j], count, rng)
-    seen = np.maximum(pressure + PRESSURE_NOISE * _autoregressive(0.5, count, rng), 0.0)
+        y[:, j] += NOISE_SIGMA[j] * _draw_autoregressive_noise(NOISE_RHO[j], count, rng)
+    seen = np.maximum(pressure + PRESSURE_NOISE * _draw_autoregressive_noise(0.5, count, rng), 0.0)
     return replace(run, response=y, pressure=seen if drive.peak else pressure)
 
 
-def _disturbance(
+def _draw_disturbance(
     port: str, scale: float, time: float, spacing: float, duration: float, rng: np.random.Generator
 ) -> Slot:
+    """Return a Gauss-Markov disturbance at one port over the duration of a run."""
     count = int(duration / spacing) + 2
-    values = scale * _autoregressive(float(np.exp(-spacing / time)), count, rng)
+    values = scale * _draw_autoregressive_noise(float(np.exp(-spacing / time)), count, rng)
     return Slot(port=port, variable="time", origin=0.0, spacing=spacing, values=values)
 
 
-def _autoregressive(rho: float, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def _draw_autoregressive_noise(rho: float, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return AR(1) noise of unit variance, float64 [count]."""
     x = rng.standard_normal(count)
     for i in range(1, count):
         x[i] = rho * x[i - 1] + np.sqrt(1.0 - rho**2) * x[i]
@@ -123,13 +126,13 @@ def _autoregressive(rho: float, count: int, rng: np.random.Generator) -> NDArray
 
 
 def classify_outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] | None = None) -> str:
-    """How a verdict stands to the truth: right, wrong, set (with or without the truth), form or refused.
+    """Return how a verdict compares with the truth: right, wrong, a set with or without the truth, a form, or refused.
 
     Parameters
     ----------
-    verdict : what the tool said
+    verdict : verdict of `find_missing_effects`
     truth : name of the effect in the data; None where there is none
-    form : port and variable of a truth that no library holds
+    form : port and variable of a truth outside the library
     """
     names = [effect.name for effect in verdict.effects]
     if truth is None:
@@ -142,19 +145,19 @@ def classify_outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] 
         right = form in {(e.port, e.variable) for e in verdict.effects if e.effect_class == "form"}
         return "right form" if right else "wrong form"
     if verdict.verdict == "SET":
-        told = truth in {*names, *(rival.name for _, rival in verdict.rivals)}
-        return "set with truth" if told else "set without truth"
+        contained = truth in {*names, *(rival.name for _, rival in verdict.rivals)}
+        return "set with truth" if contained else "set without truth"
     return "right" if names == [truth] else "wrong"
 
 
 def interval_holds_truth(verdict: Verdict, truth: str, values: Mapping[str, float]) -> bool | None:
-    """Whether the 95 % interval of the first parameter holds the truth; None unless the truth alone is named.
+    """Return whether the 95 % interval of the first parameter holds the truth; None unless the truth alone is named.
 
     Parameters
     ----------
-    verdict : what the tool said
+    verdict : verdict of `find_missing_effects`
     truth : name of the effect in the data
-    values : its parameters
+    values : its parameters by name [units of the table]
     """
     if [effect.name for effect in verdict.effects] != [truth]:
         return None
@@ -162,13 +165,13 @@ def interval_holds_truth(verdict: Verdict, truth: str, values: Mapping[str, floa
     return first.ci_low <= values[first.name] <= first.ci_high
 
 
-def exact_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Clopper-Pearson interval of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404).
+def compute_exact_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Return the Clopper-Pearson interval of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404).
 
     Parameters
     ----------
-    hits, trials : counts
-    confidence : of the interval [1]
+    hits, trials : number of successes and of trials [1]
+    confidence : probability that the interval covers the share [1]
     """
     tail = 0.5 * (1.0 - confidence)
     low = float(beta.ppf(tail, hits, trials - hits + 1)) if hits else 0.0

@@ -1,4 +1,4 @@
-"""The rules by which a verdict is reached, apart from the solvers that reach it."""
+"""Decision rules of a verdict: thresholds and counts, kept apart from the solvers."""
 
 from dataclasses import dataclass
 
@@ -12,34 +12,35 @@ class DecisionRules:
     accept_score : score from which an effect may be named: gain / inflation - parameters x log N [1]
     held_out_gain : fall of the held-out misfit from which an effect may be named [1]
     rival_span : difference of scores within which two explanations cannot be told apart [1]
-    rival_gain_share : share of the named effect's gain from which another explains the runs as well [1]
+    rival_gain_share : share of the named effect's gain from which another effect counts as a rival [1]
     discrepancy_limit : mean square of a channel's whitened leftover in a run from which its noise is widened [1]
-    foreign_inflation : disagreement of the runs beside the best effects from which the car is not the model's [1]
+    foreign_inflation : inflation beside the best effects from which the vehicle's equations are not the model's [1]
     win_share : share of bootstrap resamples that the named effect must win [1]
     bootstrap_resamples : bootstrap resamples of the runs [1]
     refined_candidates : candidates of a screening that are refined through the simulation [1]
-    refined_look_alikes : look-alikes of the best candidate that are refined too [1]
-    look_alike_cosine : cosine between two library directions, nuisances taken out, from which they look alike [1]
-    trusted_screen_share : share of the best gain below which the linear screen is believed without refinement [1]
+    refined_look_alikes : nearly collinear effects of the best candidate that are refined too [1]
+    look_alike_cosine : cosine between two library directions, nuisances projected out, from which they are nearly
+        collinear [1]
+    trusted_screen_share : share of the best gain below which a linear gain counts without refinement [1]
     relinearisation_gain : gain from which derivatives taken without an effect no longer hold with it [1]
     reached_share : share of the linear gain that a first fit must reach to need no other start [1]
     most_effects : effects that one campaign can name [1]
     explored_candidates : candidates refined while only the disturbances are to be scaled [1]
-    relinearised_candidates : candidates of a round whose derivatives are taken anew, if their gain is large [1]
-    relinearisation_change : relative change of parameters below which derivatives need not be taken anew once more [1]
+    relinearised_candidates : candidates of a round that are linearised anew, if their gain is large [1]
+    relinearisation_change : relative change of parameters below which a second relinearisation is not needed [1]
     retune_pull : pull of a session nuisance, in prior sigmas, from which it is a wrong number of the vehicle [1]
-    relinearisation_pull : pull, in prior sigmas, from which derivatives are taken anew at the session [1]
-    disagreement : inflation of a named effect from which a form alone is held against it [1]
-    lone_form_share : share of the named effects' gain from which a form alone is held against them [1]
-    least_expected_d2 : expected squared distance below which a planned run says nothing [1]
+    relinearisation_pull : pull, in prior sigmas, from which the runs are linearised anew at the session [1]
+    disagreement : inflation of a named effect from which a single form is compared with it [1]
+    lone_form_share : share of the named effects' gain from which a single form is compared with them [1]
+    least_expected_d2 : expected squared distance below which a planned run is not worth driving [1]
     retune_widening : factor on the session's tolerances when a model is re-tuned without any new effect [1]
     error_resamples : bootstrap resamples of the held-out errors [1]
     worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
     longest_lag : longest lag at which residual and brake pressure are correlated [s]
     profile_points : points of the profile likelihood tried on each side of an estimate [1]
     profile_tolerance : relative error of the root deviance at which the profile is followed no further [1]
-    forked_misfit : misfit by halving the step from which a run forks and is left out [1]
-    fewest_runs : runs below which those that fork are used all the same [1]
+    forked_misfit : misfit by halving the step from which a run counts as sensitive to the step and is left out [1]
+    fewest_runs : number of other runs below which runs that are sensitive to the step are used too [1]
     """
 
     accept_score: float

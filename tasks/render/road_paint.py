@@ -7,7 +7,7 @@ import numpy as np
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.road_edit import RoadRelief
 from tasks.render.weather.ground_grid import read_between
-from tasks.render.weather.scene_light import ground_light, recoloured
+from tasks.render.weather.scene_light import ground_light, recolour_gaussians
 from tasks.scene.gaussians import Gaussians
 
 
@@ -60,6 +60,6 @@ def paint_feature(
     gain[index] = 0
     add[index] = reflectance * here[:, None] * light.lit / asphalt_albedo
     sh, kind = gaussians.sh.copy(), gaussians.class_id.copy()
-    sh[index] = recoloured(gaussians, gain, add).sh[index]
+    sh[index] = recolour_gaussians(gaussians, gain, add).sh[index]
     kind[index[mark]] = SemanticClass.MARKING
     return replace(gaussians, sh=sh, class_id=kind)

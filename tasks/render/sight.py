@@ -1,4 +1,4 @@
-"""One frame of the sensor and the ground truth of its pixels: as drawn, or read out row by row."""
+"""One frame of the sensor with the ground truth of its pixels, by a global or a rolling shutter."""
 
 from dataclasses import dataclass
 
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from tasks.render.camera import Camera, world_to_camera
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.readout import Field, read_out
-from tasks.render.weather.attribution import attribution, changed
+from tasks.render.weather.attribution import attribute_pixels, mark_changed_pixels
 from tasks.render.weather.falling.particles import Shutter
-from tasks.render.weather.layer import recompose
+from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, particle_layer, pixel_rays
 
 
@@ -43,7 +43,7 @@ def take_drawn_frame(
 
     Parameters
     ----------
-    weather, finished, gbuffer, shutter : as `attribution` takes them
+    weather, finished, gbuffer, shutter : as `attribute_pixels` takes them
     labelled : with `points` and `changes`
     """
     eye = shutter.T_world_camera[:3, 3]
@@ -53,7 +53,7 @@ def take_drawn_frame(
         class_id=gbuffer.class_id,
         normal=gbuffer.normal,
         points=eye + gbuffer.depth[..., None] * pixel_rays(shutter) if labelled else None,
-        changes=attribution(weather, finished, gbuffer, shutter) if labelled else None,
+        changes=attribute_pixels(weather, finished, gbuffer, shutter) if labelled else None,
     )
 
 
@@ -71,7 +71,7 @@ def take_frame_through_sensor(
 
     Parameters
     ----------
-    weather, still, gbuffer, wide : the wide picture without its particles, as `attribution` takes them
+    weather, still, gbuffer, wide : the wide picture without its particles, as `attribute_pixels` takes them
     camera, field : the camera, and from `sensor_field`
     T_world_rows : float64 [3, H, 4, 4] camera poses at the beginning, the middle and the end of each row's
         exposure [m]
@@ -90,7 +90,7 @@ def take_frame_through_sensor(
         camera.motion_blur,
     )
     picture = seen.picture
-    changes = attribution(weather, still, gbuffer, wide).ravel()[seen.source] if labelled else None
+    changes = attribute_pixels(weather, still, gbuffer, wide).ravel()[seen.source] if labelled else None
     if weather.overcast is not None and weather.overcast.population is not None:
         own = Shutter(
             T_world_camera=wide.T_world_camera, K=camera.K, width=camera.width, height=camera.height,
@@ -98,9 +98,9 @@ def take_frame_through_sensor(
             line_delay_s=camera.line_delay_s,
         )  # fmt: skip
         layer = particle_layer(weather, weather.overcast.population, weather.overcast.sky, seen.depth, own)
-        picture = recompose(seen.picture, (layer,))
+        picture = recompose_layers(seen.picture, (layer,))
         if changes is not None:
-            changes |= changed(seen.picture, picture, layer)
+            changes |= mark_changed_pixels(seen.picture, picture, layer)
     return SensorFrame(
         picture=picture,
         depth=seen.depth,

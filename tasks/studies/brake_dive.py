@@ -10,10 +10,10 @@ from scipy.optimize import least_squares
 
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.campaign.events import Event
-from tasks.identification.inference.forward import RunModel, run_model, simulate_run
+from tasks.identification.inference.forward import RunModel, prepare_run, simulate_run
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import EFFECT_TABLE, PARAMETER_INDEX
-from tasks.vehicle.half_car import half_car, integrate_half_car
+from tasks.vehicle.half_car import build_half_car, integrate_half_car
 from tasks.vehicle.parameters import Vehicle
 
 REFINEMENT = 5
@@ -93,7 +93,7 @@ def dive_of_deceleration(
     )
     moment = model.pitch_gain * vehicle.sprung_mass * vehicle.cg_height * fine
     flat = np.zeros(len(moment))
-    states = integrate_half_car(flat, flat, moment, interval / REFINEMENT, half_car(car))[::REFINEMENT]
+    states = integrate_half_car(flat, flat, moment, interval / REFINEMENT, build_half_car(car))[::REFINEMENT]
     return np.degrees(states[:, 1]), np.degrees(states[:, 5])
 
 
@@ -238,4 +238,4 @@ def _event_model(event: Event, vehicle: Vehicle, surface: SurfaceParameters) -> 
         interval=float(event.time[1] - event.time[0]),
         pressure=np.maximum(event.subtract_baseline("brake_pressure")[driven], 0.0), response=response,
     )  # fmt: skip
-    return run_model(run, vehicle, surface)
+    return prepare_run(run, vehicle, surface)

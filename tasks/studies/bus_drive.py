@@ -12,9 +12,9 @@ from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
 from tasks.surface.weather import DRY
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.half_car import half_car, integrate_half_car
+from tasks.vehicle.half_car import build_half_car, integrate_half_car
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Controls, rollout
+from tasks.vehicle.rollout import Controls, simulate_scenario
 
 STEP = 0.001
 LEAD_S = 3.0
@@ -165,7 +165,7 @@ def _braking(
     controls = Controls(initial_speed=start, brake=command, hold_speed_until_brake=True)
     duration = round(LEAD_S + ramp + hold + release + SETTLING_S, 3)
     dry = SurfaceState(kind=DRY, friction=friction)
-    ride = rollout(car, dry, controls, FLAT_ROAD, mode="coupled", duration_s=duration).columns
+    ride = simulate_scenario(car, dry, controls, FLAT_ROAD, mode="coupled", duration_s=duration).columns
     count = len(ride["speed"]) - 1
     turning = _bump(count) if curved else np.zeros(count)
     side = float(rng.choice((-1.0, 1.0)))
@@ -213,7 +213,7 @@ def _answer(car: Vehicle, acceleration: NDArray[np.float64], start: float = 0.0)
     """Speed and body motion of a car that accelerates by its engine [m/s^2] from a speed [m/s]."""
     moment = -car.sprung_mass * car.cg_height * acceleration
     flat = np.zeros(len(acceleration))
-    states = integrate_half_car(flat, flat, moment, STEP, half_car(car))
+    states = integrate_half_car(flat, flat, moment, STEP, build_half_car(car))
     return {
         "speed": start + np.cumsum(acceleration) * STEP,
         "longitudinal_acceleration": acceleration,

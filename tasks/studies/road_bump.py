@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tasks.surface.road_profile import RoadHazard, road_elevation
-from tasks.vehicle.half_car import half_car, integrate_half_car
+from tasks.vehicle.half_car import build_half_car, integrate_half_car
 from tasks.vehicle.parameters import Vehicle
 
 STEP = 0.002
@@ -99,7 +99,7 @@ def ride_over(
     station = np.interp(np.arange(count) / per_sample, index, passage.station)
     front = np.asarray(road_elevation(station, feature), dtype=np.float64)
     rear = np.asarray(road_elevation(station - vehicle.wheelbase, feature), dtype=np.float64)
-    states = integrate_half_car(front, rear, np.zeros(count), STEP, half_car(vehicle))
+    states = integrate_half_car(front, rear, np.zeros(count), STEP, build_half_car(vehicle))
     vertical = np.gradient(states[:, 4], STEP)
     return (
         np.degrees(states[::per_sample, 5]),

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import DRY, Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.paper.wheels import stopping_run, wheels_of
-from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.paper.wheels import build_wheels, simulate_stop
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 LONGEST_STOP_S = 60.0
 """A stopping run that takes longer is given up [s]."""
@@ -229,7 +229,7 @@ def _stops(
     kind: str,
     rates: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    wheels = wheels_of(replace(vehicle, coast_deceleration=protocol.coast_deceleration))
+    wheels = build_wheels(replace(vehicle, coast_deceleration=protocol.coast_deceleration))
     brake = BrakeCommand(
         peak_pressure_mpa=protocol.peak_pressure_mpa,
         ramp_s=protocol.ramp_s,
@@ -248,9 +248,9 @@ def _stops(
         )
         for row, surface in enumerate(surfaces):
             friction = surface_state(weather, surface).friction
-            tyre = surface_response(vehicle, weather.kind, friction).tyre
+            tyre = compute_surface_response(vehicle, weather.kind, friction).tyre
             mu[row, column] = friction
-            stop_m[row, column], _ = stopping_run(
+            stop_m[row, column], _ = simulate_stop(
                 protocol.initial_speed, protocol.step_s, longest, brake, wheels, tyre
             )
     return mu, stop_m

@@ -106,7 +106,7 @@ def after_stop(stop: Stop, predicted: Mapping[str, NDArray[np.float64]]) -> Afte
     )
 
 
-def saturation(stop: Stop, vehicle: Vehicle) -> Saturation:
+def measure_saturation(stop: Stop, vehicle: Vehicle) -> Saturation:
     """How much of the bus's torque reaches the road.
 
     Parameters
@@ -166,7 +166,7 @@ def slip_cycles(
     )
 
 
-def rebound(stop: Stop, pitch: NDArray[np.float64]) -> Rebound:
+def measure_rebound(stop: Stop, pitch: NDArray[np.float64]) -> Rebound:
     """The swing back and forth after the stop, about the pitch at the end of the record.
 
     Parameters

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tasks.campaign.campaign import CHANNELS, Run
-from tasks.identification.inference.forward import RunModel, predict, run_model
+from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
 from tasks.studies.brake_dive import DiveModel, dive_of_deceleration, pitch_mode, with_model
 from tasks.studies.stop import MASKED_SPEED, REBOUND_S, Stop, StopErrors, rolling_radius, stop_errors
 from tasks.studies.stop_swing import Swing, fit_swing, with_swing
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.effects.table import parameter_vector
+from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 LEAD_SAMPLES = 20
@@ -72,7 +72,7 @@ class RungResult:
     predicted: dict[str, NDArray[np.float64]]
 
 
-def climb(
+def fit_ladder(
     train: Stop, held_out: Stop, ladder: Sequence[Rung], vehicle: Vehicle, surface: SurfaceParameters
 ) -> tuple[RungResult, ...]:
     """Fit every rung on the training stop alone and judge it on the other.
@@ -86,7 +86,7 @@ def climb(
     return tuple(_step(train, held_out, rung, vehicle, surface) for rung in ladder)
 
 
-def uncalibrated(stop: Stop, vehicle: Vehicle, surface: SurfaceParameters) -> StopErrors:
+def compute_uncalibrated_errors(stop: Stop, vehicle: Vehicle, surface: SurfaceParameters) -> StopErrors:
     """Errors of the model as its data sheet has it.
 
     Parameters
@@ -135,8 +135,8 @@ def _fitted(
     stop: Stop, model: RunModel, known: Mapping[str, float], names: tuple[str, ...], channels: tuple[str, ...]
 ) -> dict[str, float]:
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        theta = parameter_vector({**known, **dict(zip(names, x.tolist(), strict=True))})
-        predicted = dict(zip(CHANNELS, predict(model, theta).T, strict=True))
+        theta = build_parameter_vector({**known, **dict(zip(names, x.tolist(), strict=True))})
+        predicted = dict(zip(CHANNELS, predict_channels(model, theta).T, strict=True))
         return np.concatenate(
             [(predicted[n][: stop.slow] - stop.columns[n][: stop.slow]) / SCALES[n] for n in channels]
         )
@@ -174,7 +174,7 @@ def _fitted_dive(stop: Stop, vehicle: Vehicle) -> DiveModel:
 def _predicted(
     model: RunModel, parameters: Mapping[str, float], vehicle: Vehicle, dive: DiveModel, swing: Swing | None
 ) -> dict[str, NDArray[np.float64]]:
-    values = predict(model, parameter_vector(parameters))
+    values = predict_channels(model, build_parameter_vector(parameters))
     columns = dict(zip(CHANNELS, values.T, strict=True))
     columns |= _held_to_standstill(columns, model.run.interval)
     if swing is not None:
@@ -220,4 +220,4 @@ def _model(stop: Stop, vehicle: Vehicle, surface: SurfaceParameters, *, engine_t
     )  # fmt: skip
     start = float(np.mean(columns["speed"][:5]))
     # the stop itself and the rebound after it are part of the story, so the run is not cut at low speed
-    return replace(run_model(run, vehicle, surface), samples=len(pressure), initial_speed=start)
+    return replace(prepare_run(run, vehicle, surface), samples=len(pressure), initial_speed=start)

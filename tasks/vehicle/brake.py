@@ -10,14 +10,14 @@ from tasks.errors import InputError
 
 
 class PressureProfile(NamedTuple):
-    """A brake command as the kernels take it: infinity stands for never.
+    """A brake command in the form that the kernels take; infinity stands for never.
 
     Parameters
     ----------
-    peak : [MPa]
+    peak : pressure after the ramp [MPa]
     ramp, hold, release : durations [s]
-    onset_time : [s]
-    onset_station : [m]
+    onset_time : onset by time [s]
+    onset_station : onset by the front axle's route position [m]
     """
 
     peak: float
@@ -72,7 +72,7 @@ class BrakeCommand:
 
     @property
     def profile(self) -> PressureProfile:
-        """The same command as numbers; a command without pressure has no onset."""
+        """Return the command as numbers for the kernels; a command without pressure has no onset."""
         brakes = self.peak_pressure_mpa > 0
         return PressureProfile(
             peak=self.peak_pressure_mpa,
@@ -85,13 +85,13 @@ class BrakeCommand:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def brake_pressure(since_onset: float, profile: PressureProfile) -> float:
-    """Commanded pressure p_b [MPa].
+def compute_brake_pressure(since_onset: float, profile: PressureProfile) -> float:
+    """Return the commanded brake pressure p_b [MPa].
 
     Parameters
     ----------
     since_onset : time since the brake onset; negative before it [s]
-    profile : the command
+    profile : brake command
     """
     if since_onset < 0.0:
         return 0.0
@@ -106,17 +106,17 @@ def brake_pressure(since_onset: float, profile: PressureProfile) -> float:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def onset_by_position(time: float, station: float, speed: float, profile: PressureProfile) -> float:
-    """Time of the brake onset once its position is passed, else infinity [s].
+def find_onset_by_position(time: float, station: float, speed: float, profile: PressureProfile) -> float:
+    """Return the time of the brake onset once its position is passed, else infinity [s].
 
     The position is passed between two samples; the time of passing is that of the present speed.
 
     Parameters
     ----------
-    time : [s]
-    station : of the front axle [m]
-    speed : [m/s]
-    profile : the command
+    time : time since the start of the run [s]
+    station : route position of the front axle [m]
+    speed : speed of the vehicle, v [m/s]
+    profile : brake command
     """
     if station < profile.onset_station or speed <= 0.0:
         return inf
@@ -124,8 +124,8 @@ def onset_by_position(time: float, station: float, speed: float, profile: Pressu
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def abs_command(braking_slip: float, target_slip: float, release_width: float) -> float:
-    """Share of the brake torque that the proportional ABS asks for, q_cmd [1] (paper, Eq. app_abs_command).
+def compute_abs_command(braking_slip: float, target_slip: float, release_width: float) -> float:
+    """Return the share of the brake torque that the proportional ABS asks for, q_cmd [1] (paper, Eq. app_abs_command).
 
     Parameters
     ----------
@@ -138,8 +138,8 @@ def abs_command(braking_slip: float, target_slip: float, release_width: float) -
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def abs_update(command: float, scale: float, build_step: float, release_step: float) -> float:
-    """ABS torque scale q after one step: the command within the rate limits [1] (paper, Appendix B).
+def limit_abs_rate(command: float, scale: float, build_step: float, release_step: float) -> float:
+    """Return the ABS torque scale q after one step: the command within the rate limits [1] (paper, Appendix B).
 
     With limits of 1 or more a step this is the algebraic rule q = q_cmd exactly.
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 from tasks.vehicle.parameters import Vehicle
 
 
-def ride_rate(spring: float, tyre: float) -> float:
-    """Stiffness of an axle's suspension and tyres in series [N/m].
+def compute_ride_rate(spring: float, tyre: float) -> float:
+    """Return the ride rate: the stiffness of an axle's suspension and tyres in series [N/m].
 
     Parameters
     ----------
@@ -21,8 +21,8 @@ def ride_rate(spring: float, tyre: float) -> float:
     return spring * tyre / (spring + tyre)
 
 
-def ride_damping(damper: float, spring: float, tyre: float) -> float:
-    """Damping that the body feels above its tyres [N s/m].
+def compute_ride_damping(damper: float, spring: float, tyre: float) -> float:
+    """Return the damping that the body feels above its tyres [N s/m].
 
     The damper sees the share k_t / (k_s + k_t) of the body's motion, and this share of its force reaches the body.
 
@@ -34,8 +34,8 @@ def ride_damping(damper: float, spring: float, tyre: float) -> float:
     return damper * (tyre / (spring + tyre)) ** 2
 
 
-def natural_frequency(stiffness: float, inertia: float) -> float:
-    """Undamped natural frequency of one degree of freedom [Hz].
+def compute_natural_frequency(stiffness: float, inertia: float) -> float:
+    """Return the undamped natural frequency of one degree of freedom [Hz].
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ def natural_frequency(stiffness: float, inertia: float) -> float:
     return sqrt(stiffness / inertia) / (2.0 * pi)
 
 
-def damping_ratio(stiffness: float, damping: float, inertia: float) -> float:
-    """Damping of one degree of freedom over its critical damping [1].
+def compute_damping_ratio(stiffness: float, damping: float, inertia: float) -> float:
+    """Return the damping of one degree of freedom over its critical damping [1].
 
     Parameters
     ----------
@@ -57,38 +57,38 @@ def damping_ratio(stiffness: float, damping: float, inertia: float) -> float:
     return damping / (2.0 * sqrt(stiffness * inertia))
 
 
-def heave_constants(vehicle: Vehicle) -> tuple[float, float]:
-    """Stiffness [N/m] and damping [N s/m] of the body's vertical motion, above both axles."""
+def compute_heave_constants(vehicle: Vehicle) -> tuple[float, float]:
+    """Return stiffness [N/m] and damping [N s/m] of the body's vertical motion, both axles together."""
     return _sum_axles(vehicle, 1.0, 1.0)
 
 
-def pitch_constants(vehicle: Vehicle) -> tuple[float, float]:
-    """Stiffness [N m/rad] and damping [N m s/rad] of the body's pitch about its centre of gravity."""
+def compute_pitch_constants(vehicle: Vehicle) -> tuple[float, float]:
+    """Return stiffness [N m/rad] and damping [N m s/rad] of the body's pitch about its centre of gravity."""
     return _sum_axles(vehicle, vehicle.cg_to_front_axle**2, vehicle.cg_to_rear_axle**2)
 
 
 def _sum_axles(v: Vehicle, front: float, rear: float) -> tuple[float, float]:
-    """Ride rates and ride damping of both axles, each weighted."""
+    """Return the ride rates and the ride damping summed over both axles, each axle with its weight."""
     return (
-        front * ride_rate(v.suspension_stiffness_f, v.tyre_stiffness_f)
-        + rear * ride_rate(v.suspension_stiffness_r, v.tyre_stiffness_r),
-        front * ride_damping(v.suspension_damping_f, v.suspension_stiffness_f, v.tyre_stiffness_f)
-        + rear * ride_damping(v.suspension_damping_r, v.suspension_stiffness_r, v.tyre_stiffness_r),
+        front * compute_ride_rate(v.suspension_stiffness_f, v.tyre_stiffness_f)
+        + rear * compute_ride_rate(v.suspension_stiffness_r, v.tyre_stiffness_r),
+        front * compute_ride_damping(v.suspension_damping_f, v.suspension_stiffness_f, v.tyre_stiffness_f)
+        + rear * compute_ride_damping(v.suspension_damping_r, v.suspension_stiffness_r, v.tyre_stiffness_r),
     )
 
 
-def dynamic_index(vehicle: Vehicle) -> float:
-    """Pitch inertia over that of two masses above the axles with the same centre, I_y / (m_s l_f l_r) [1]."""
+def compute_dynamic_index(vehicle: Vehicle) -> float:
+    """Return the pitch inertia over that of two masses above the axles, same centre, I_y / (m_s l_f l_r) [1]."""
     return vehicle.pitch_inertia / (vehicle.sprung_mass * vehicle.cg_to_front_axle * vehicle.cg_to_rear_axle)
 
 
-def deceleration_per_pressure(vehicle: Vehicle) -> float:
-    """Deceleration that a pressure gives while no wheel slides, K_p / (R m) [m/s2/MPa]."""
+def compute_deceleration_per_pressure(vehicle: Vehicle) -> float:
+    """Return the deceleration that a pressure gives while no wheel slides, K_p / (R m) [m/s2/MPa]."""
     return vehicle.brake_gain / (vehicle.wheel_radius * vehicle.mass)
 
 
-def peak_deceleration(vehicle: Vehicle) -> float:
-    """Deceleration at the tyres' peak on the best surface that the vehicle has numbers for, mu g [m/s2]."""
+def compute_peak_deceleration(vehicle: Vehicle) -> float:
+    """Return the deceleration at the tyre's peak on the best surface of the vehicle's tables, mu g [m/s2]."""
     peaks = [
         friction * efficiency
         for family in vehicle.families.values()
@@ -98,7 +98,7 @@ def peak_deceleration(vehicle: Vehicle) -> float:
 
 
 class Figure(NamedTuple):
-    """One figure: its unit, as catalogue files write it, and its value."""
+    """One figure: its unit, as catalogue files write it, and the function that computes it."""
 
     unit: str
     compute: Callable[[Vehicle], float]
@@ -112,23 +112,33 @@ FIGURES: Mapping[str, Figure] = {
     "static_rear_load": Figure("N", lambda v: v.static_axle_loads[1]),
     "static_front_share": Figure("1", lambda v: v.static_axle_loads[0] / sum(v.static_axle_loads)),
     "cg_height_over_wheelbase": Figure("1", lambda v: v.cg_height / v.wheelbase),
-    "dynamic_index": Figure("1", dynamic_index),
-    "heave_frequency": Figure("Hz", lambda v: natural_frequency(heave_constants(v)[0], v.sprung_mass)),
-    "heave_damping_ratio": Figure("1", lambda v: damping_ratio(*heave_constants(v), v.sprung_mass)),
-    "pitch_frequency": Figure("Hz", lambda v: natural_frequency(pitch_constants(v)[0], v.pitch_inertia)),
-    "pitch_damping_ratio": Figure("1", lambda v: damping_ratio(*pitch_constants(v), v.pitch_inertia)),
+    "dynamic_index": Figure("1", compute_dynamic_index),
+    "heave_frequency": Figure(
+        "Hz", lambda v: compute_natural_frequency(compute_heave_constants(v)[0], v.sprung_mass)
+    ),
+    "heave_damping_ratio": Figure(
+        "1", lambda v: compute_damping_ratio(*compute_heave_constants(v), v.sprung_mass)
+    ),
+    "pitch_frequency": Figure(
+        "Hz", lambda v: compute_natural_frequency(compute_pitch_constants(v)[0], v.pitch_inertia)
+    ),
+    "pitch_damping_ratio": Figure(
+        "1", lambda v: compute_damping_ratio(*compute_pitch_constants(v), v.pitch_inertia)
+    ),
     "wheel_hop_frequency_f": Figure(
-        "Hz", lambda v: natural_frequency(v.suspension_stiffness_f + v.tyre_stiffness_f, v.unsprung_mass_f)
+        "Hz",
+        lambda v: compute_natural_frequency(v.suspension_stiffness_f + v.tyre_stiffness_f, v.unsprung_mass_f),
     ),
     "wheel_hop_frequency_r": Figure(
-        "Hz", lambda v: natural_frequency(v.suspension_stiffness_r + v.tyre_stiffness_r, v.unsprung_mass_r)
+        "Hz",
+        lambda v: compute_natural_frequency(v.suspension_stiffness_r + v.tyre_stiffness_r, v.unsprung_mass_r),
     ),
     "wheel_radius": Figure("m", lambda v: v.wheel_radius),
     "wheel_inertia_f": Figure("kg m2", lambda v: v.wheel_inertia_f),
     "wheel_inertia_r": Figure("kg m2", lambda v: v.wheel_inertia_r),
-    "deceleration_per_pressure": Figure("m s-2 MPa-1", deceleration_per_pressure),
+    "deceleration_per_pressure": Figure("m s-2 MPa-1", compute_deceleration_per_pressure),
     "front_brake_share": Figure("1", lambda v: v.front_brake_share),
-    "peak_deceleration": Figure("m s-2", peak_deceleration),
+    "peak_deceleration": Figure("m s-2", compute_peak_deceleration),
     "coast_deceleration": Figure("m s-2", lambda v: v.coast_deceleration),
     "gravity": Figure("m s-2", lambda v: v.gravity),
 }
@@ -140,7 +150,7 @@ def compute_figures(vehicle: Vehicle) -> dict[str, float]:
 
     Parameters
     ----------
-    vehicle : whose
+    vehicle : the vehicle
     """
     values: dict[str, float] = {}
     for name, figure in FIGURES.items():

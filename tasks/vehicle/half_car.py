@@ -15,7 +15,7 @@ HalfCarState = tuple[float, float, float, float, float, float, float, float]
 
 
 class HalfCar(NamedTuple):
-    """The half-car's values as the kernels take them; symbols as in the paper's Appendix B.
+    """The half-car's values in the form that the kernels take; symbols as in the paper's Appendix B.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ class HalfCar(NamedTuple):
     static_r: float
 
 
-def half_car(vehicle: Vehicle) -> HalfCar:
-    """The half-car of a vehicle."""
+def build_half_car(vehicle: Vehicle) -> HalfCar:
+    """Return the half-car of a vehicle."""
     static_f, static_r = vehicle.static_axle_loads
     return HalfCar(
         sprung_mass=vehicle.sprung_mass,
@@ -66,8 +66,10 @@ def half_car(vehicle: Vehicle) -> HalfCar:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def contact_load(road_height: float, unsprung_height: float, stiffness: float, static_load: float) -> float:
-    """Load of one axle on the road, never negative [N] (paper, Eq. app_unilateral_contact).
+def compute_contact_load(
+    road_height: float, unsprung_height: float, stiffness: float, static_load: float
+) -> float:
+    """Return the load of one axle on the road, never negative [N] (paper, Eq. app_unilateral_contact).
 
     Parameters
     ----------
@@ -79,13 +81,13 @@ def contact_load(road_height: float, unsprung_height: float, stiffness: float, s
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
-    """Spring and damper force of the front and the rear axle, F_s,f and F_s,r [N] (paper, Appendix B).
+def compute_suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
+    """Return the spring and damper forces of the front and rear axle, F_s,f and F_s,r [N] (paper, Appendix B).
 
     Parameters
     ----------
     x : half-car state [m, rad, m/s, rad/s]
-    car : its values
+    car : the half-car's values
     """
     heave, pitch, unsprung_f, unsprung_r, heave_rate, pitch_rate, unsprung_rate_f, unsprung_rate_r = x
     force_f = car.spring_f * (heave - unsprung_f - car.to_front * pitch) + car.damper_f * (
@@ -98,7 +100,7 @@ def suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def half_car_rates(
+def compute_half_car_rates(
     x: HalfCarState,
     load_f: float,
     load_r: float,
@@ -108,7 +110,7 @@ def half_car_rates(
     lift: float,
     car: HalfCar,
 ) -> HalfCarState:
-    """Rate of the half-car state (paper, Eq. app_half_car_complete).
+    """Return the rate of the half-car state (paper, Eq. app_half_car_complete).
 
     Parameters
     ----------
@@ -116,8 +118,8 @@ def half_car_rates(
     load_f, load_r : contact loads [N]
     force_f, force_r : suspension forces [N]
     moment : pitch moment on the body, nose-down positive [N m]
-    lift : upward force on the body's centre of gravity beyond the equations' own [N]
-    car : its values
+    lift : further upward force on the body's centre of gravity, such as aerodynamic lift [N]
+    car : the half-car's values
     """
     return (
         x[4],
@@ -132,8 +134,8 @@ def half_car_rates(
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def moved(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
-    """The state after going along a rate for a step [s]."""
+def advance_half_car(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
+    """Return the half-car state after a step [s] at a constant rate."""
     return (
         x[0] + step * rate[0],
         x[1] + step * rate[1],
@@ -147,12 +149,22 @@ def moved(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
 
 
 @njit(cache=True, nogil=True)
-def forced_rates(x: HalfCarState, road_f: float, road_r: float, moment: float, car: HalfCar) -> HalfCarState:
-    """Rate of the half-car state on given road heights [m] and pitch moment [N m]."""
-    load_f = contact_load(road_f, x[2], car.tyre_f, car.static_f)
-    load_r = contact_load(road_r, x[3], car.tyre_r, car.static_r)
-    force_f, force_r = suspension_forces(x, car)
-    return half_car_rates(x, load_f, load_r, force_f, force_r, moment, 0.0, car)
+def compute_forced_rates(
+    x: HalfCarState, road_f: float, road_r: float, moment: float, car: HalfCar
+) -> HalfCarState:
+    """Return the rate of the half-car state for given road heights and a pitch moment.
+
+    Parameters
+    ----------
+    x : half-car state [m, rad, m/s, rad/s]
+    road_f, road_r : road height under each axle [m]
+    moment : pitch moment on the body, nose-down positive [N m]
+    car : the half-car's values
+    """
+    load_f = compute_contact_load(road_f, x[2], car.tyre_f, car.static_f)
+    load_r = compute_contact_load(road_r, x[3], car.tyre_r, car.static_r)
+    force_f, force_r = compute_suspension_forces(x, car)
+    return compute_half_car_rates(x, load_f, load_r, force_f, force_r, moment, 0.0, car)
 
 
 @njit(cache=True, nogil=True)
@@ -163,7 +175,7 @@ def integrate_half_car(
     step: float,
     car: HalfCar,
 ) -> NDArray[np.float64]:
-    """Half-car response from rest by RK4, with inputs linear between samples (paper, Appendix B).
+    """Return the half-car's response from rest by RK4, with inputs linear between samples (paper, Appendix B).
 
     Parameters
     ----------
@@ -186,9 +198,15 @@ def integrate_half_car(
         middle_f = 0.5 * (road_f[n] + road_f[n + 1])
         middle_r = 0.5 * (road_r[n] + road_r[n + 1])
         middle_moment = 0.5 * (moment[n] + moment[n + 1])
-        k1 = forced_rates(x, road_f[n], road_r[n], moment[n], car)
-        k2 = forced_rates(moved(x, k1, 0.5 * step), middle_f, middle_r, middle_moment, car)
-        k3 = forced_rates(moved(x, k2, 0.5 * step), middle_f, middle_r, middle_moment, car)
-        k4 = forced_rates(moved(x, k3, step), road_f[n + 1], road_r[n + 1], moment[n + 1], car)
-        x = moved(moved(moved(moved(x, k1, step / 6), k2, step / 3), k3, step / 3), k4, step / 6)
+        k1 = compute_forced_rates(x, road_f[n], road_r[n], moment[n], car)
+        k2 = compute_forced_rates(advance_half_car(x, k1, 0.5 * step), middle_f, middle_r, middle_moment, car)
+        k3 = compute_forced_rates(advance_half_car(x, k2, 0.5 * step), middle_f, middle_r, middle_moment, car)
+        k4 = compute_forced_rates(
+            advance_half_car(x, k3, step), road_f[n + 1], road_r[n + 1], moment[n + 1], car
+        )
+        x = advance_half_car(
+            advance_half_car(advance_half_car(advance_half_car(x, k1, step / 6), k2, step / 3), k3, step / 3),
+            k4,
+            step / 6,
+        )
     return states

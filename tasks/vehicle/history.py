@@ -1,4 +1,4 @@
-"""The columns and times that a mode returns to the rollout."""
+"""Columns and event times that paper and coupled mode return to the rollout."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """Motion at the ticks, with the two events; infinity for an event that never comes.
+    """Motion at the ticks and the times of two events; infinity for an event that never comes.
 
     Parameters
     ----------
     columns : by the names of ``TICK_CHANNELS``, each of shape (ticks,)
     onset : brake onset [s]
-    onset_station : front axle at the onset [m]
+    onset_station : route position of the front axle at the onset [m]
     stop_time : when the vehicle comes to rest [s]
     """
 

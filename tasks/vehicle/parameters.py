@@ -1,4 +1,4 @@
-"""The vehicle: specified mechanical values, frozen empirical tables, and what they give on one surface."""
+"""The vehicle: specified mechanical values, frozen empirical tables, and the response that they give on one surface."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -71,7 +71,7 @@ class Vehicle:
     shared_families : tyre families that the kinds of weather bring, for the others
     tyre : Magic Formula of every wheel; None where the families' Burckhardt curves are the tyre
     effects : numbers of ``tasks.vehicle.effects.table`` that the model adds; none in the paper's model
-    forms : what the model adds that no effect of the library has; none in the paper's model
+    forms : forms outside the library that the model adds; none in the paper's model
     """
 
     name: str
@@ -110,8 +110,8 @@ class Vehicle:
     forms: tuple[Form, ...] = ()
     shared_families: Mapping[str, TyreFamily] = field(default_factory=dict)
 
-    def tyre_family(self, weather: str) -> TyreFamily:
-        """The tyre family in a kind of weather: the vehicle's own, else the one that the kind brings.
+    def find_tyre_family(self, weather: str) -> TyreFamily:
+        """Return the tyre family in a kind of weather: the vehicle's own, else the one that the kind brings.
 
         Parameters
         ----------
@@ -133,17 +133,17 @@ class Vehicle:
 
     @property
     def mass(self) -> float:
-        """Mass of body and axles [kg]."""
+        """Return the mass of body and axles [kg]."""
         return self.sprung_mass + self.unsprung_mass_f + self.unsprung_mass_r
 
     @property
     def wheelbase(self) -> float:
-        """Distance between the axles, L_w [m]."""
+        """Return the distance between the axles, L_w [m]."""
         return self.cg_to_front_axle + self.cg_to_rear_axle
 
     @property
     def static_axle_loads(self) -> tuple[float, float]:
-        """Front and rear axle load at rest on a level road [N] (paper, Appendix B)."""
+        """Return the front and rear axle load at rest on a level road [N] (paper, Appendix B)."""
         weight = self.sprung_mass * self.gravity
         return (
             weight * self.cg_to_rear_axle / self.wheelbase + self.unsprung_mass_f * self.gravity,
@@ -157,7 +157,7 @@ class SurfaceResponse:
 
     Parameters
     ----------
-    tyre : on this surface, its curve scaled to the peak
+    tyre : the tyre on this surface, its curve scaled to the peak
     slip_stiffness : beta_kappa [1]
     pitch_scale : gamma_theta [1]
     hold_s, release_s : tau_h and tau_r [s]
@@ -174,22 +174,22 @@ class SurfaceResponse:
     wet: bool
 
 
-def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> SurfaceResponse:
-    """Tyre curve and pitch calibration at one surface friction: piecewise linear, clamped at the end knots.
+def compute_surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> SurfaceResponse:
+    """Return tyre curve and pitch calibration at one surface friction: piecewise linear, constant beyond the end knots.
 
     Parameters
     ----------
-    vehicle : holds the tables
+    vehicle : vehicle with the tables
     family : name of a kind of weather
     surface_friction : mu_c [1]
     """
-    table = vehicle.tyre_family(family)
+    table = vehicle.find_tyre_family(family)
     knots = table.surface_friction
 
-    def at(values: tuple[float, ...]) -> float:
+    def interpolate(values: tuple[float, ...]) -> float:
         return float(np.interp(surface_friction, knots, values))
 
-    peak, slip_stiffness = at(table.efficiency) * surface_friction, at(table.slip_stiffness)
+    peak, slip_stiffness = interpolate(table.efficiency) * surface_friction, interpolate(table.slip_stiffness)
     if vehicle.tyre is None:
         tyre: Tyre = scale_burckhardt(table.burckhardt, peak, slip_stiffness)
     else:
@@ -199,9 +199,9 @@ def surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> 
     return SurfaceResponse(
         tyre=tyre,
         slip_stiffness=slip_stiffness,
-        pitch_scale=at(table.pitch_scale),
-        hold_s=at(table.hold_s),
-        release_s=at(table.release_s),
+        pitch_scale=interpolate(table.pitch_scale),
+        hold_s=interpolate(table.hold_s),
+        release_s=interpolate(table.release_s),
         extrapolated=not knots[0] - rounding <= surface_friction <= knots[-1] + rounding,
         wet=find_weather(family).wet,
     )

@@ -1,4 +1,4 @@
-"""The same models in plain NumPy: slow, short, written from the equations. The kernels are tested against them.
+"""The models in plain NumPy: slow, short, written from the equations. Tests compare the kernels with them.
 
 Arrays of two hold the front and the rear axle.
 """
@@ -13,36 +13,45 @@ from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 
 Array = NDArray[np.float64]
 SPEED, STATION, WHEELS, BODY = 0, 1, slice(2, 4), slice(4, 12)
-"""Where the coupled state keeps speed [m/s], station [m], wheel speeds [rad/s] and half-car state."""
+"""Positions of speed [m/s], station [m], wheel speeds [rad/s] and half-car state in the coupled state."""
 
 
-def burckhardt(slip: ArrayLike, vehicle: Vehicle, family: str, response: SurfaceResponse) -> Array:
-    """Peak-normalised curve mu_B, odd in slip, its peak found on a fine grid [1] (paper, Appendix B).
+def compute_reference_friction(
+    slip: ArrayLike, vehicle: Vehicle, family: str, response: SurfaceResponse
+) -> Array:
+    """Return the peak-normalised curve mu_B, odd in slip, with its peak found on a fine grid [1] (paper, Appendix B).
 
     Parameters
     ----------
     slip : braking slip [1]
-    vehicle, family, response : give the base curve, its peak and slip stiffness
+    vehicle, family, response : vehicle, kind of weather and surface response, which give the curve
     """
-    c1, c2, c3 = vehicle.tyre_family(family).burckhardt
+    c1, c2, c3 = vehicle.find_tyre_family(family).burckhardt
 
-    def base(kappa: Array) -> Array:
+    def evaluate_base_curve(kappa: Array) -> Array:
         return c1 * (1 - np.exp(-c2 * kappa)) - c3 * kappa
 
     slip = np.asarray(slip, float)
-    peak = base(np.linspace(0, 1, 10_001)).max()
-    return np.sign(slip) * response.tyre.peak / peak * base(response.slip_stiffness * np.abs(slip))
+    peak = evaluate_base_curve(np.linspace(0, 1, 10_001)).max()
+    return (
+        np.sign(slip)
+        * response.tyre.peak
+        / peak
+        * evaluate_base_curve(response.slip_stiffness * np.abs(slip))
+    )
 
 
-def abs_scale(slip: Array, before: Array, step: float, vehicle: Vehicle, response: SurfaceResponse) -> Array:
-    """ABS torque scale, as the paper writes its rate limit: a clipped change, added [1] (paper, Appendix B).
+def compute_abs_scale(
+    slip: Array, before: Array, step: float, vehicle: Vehicle, response: SurfaceResponse
+) -> Array:
+    """Return the ABS torque scale as the paper writes its rate limit: a clipped change is added [1] (Appendix B).
 
     Parameters
     ----------
     slip : braking slip of the axles [1]
     before : scale before the step [1]
-    step : [s]
-    vehicle, response : give widths, rates and target slip
+    step : length of the step [s]
+    vehicle, response : vehicle and surface response, which give widths, rates and target slip
     """
     target, width = response.tyre.target_slip, vehicle.abs_release_width
     command = np.clip((target * (1 + width) - slip) / (width * target), 0, 1)
@@ -50,7 +59,7 @@ def abs_scale(slip: Array, before: Array, step: float, vehicle: Vehicle, respons
     return np.clip(before + change, 0, 1)
 
 
-def paper_drive(
+def simulate_paper_drive(
     vehicle: Vehicle,
     family: str,
     response: SurfaceResponse,
@@ -62,7 +71,7 @@ def paper_drive(
     steps: int,
     step: float,
 ) -> dict[str, Array]:
-    """Speed, station and wheel speeds of paper mode by Euler steps, to the stop (paper, Appendix B).
+    """Return speed, station and wheel speeds of paper mode by Euler steps, to the stop (paper, Appendix B).
 
     Parameters
     ----------
@@ -81,9 +90,9 @@ def paper_drive(
     history = []
     for n in range(steps + 1):
         slip = np.clip((speed - radius * omega) / max(speed, floor), 0, 1)
-        scale = abs_scale(slip, scale, step, vehicle, response)
+        scale = compute_abs_scale(slip, scale, step, vehicle, response)
         load = loads(n, acceleration)
-        force = burckhardt(slip, vehicle, family, response) * load
+        force = compute_reference_friction(slip, vehicle, family, response) * load
         torque = share * scale * vehicle.brake_gain * pressure(n * step)
         slope = road_slope(station - np.array([0, vehicle.wheelbase]), hazard)
         acceleration = -(force + load * slope).sum() / vehicle.mass - vehicle.coast_deceleration
@@ -98,8 +107,8 @@ def paper_drive(
     return dict(zip(names, columns, strict=True))
 
 
-def half_car_matrices(vehicle: Vehicle) -> tuple[Array, Array, Array, Array, Array]:
-    """M, C, K, B_r and B_b of the half-car in contact (paper, Eq. half_car).
+def build_half_car_matrices(vehicle: Vehicle) -> tuple[Array, Array, Array, Array, Array]:
+    """Return M, C, K, B_r and B_b of the half-car in contact (paper, Eq. half_car).
 
     Parameters
     ----------
@@ -119,8 +128,8 @@ def half_car_matrices(vehicle: Vehicle) -> tuple[Array, Array, Array, Array, Arr
     return mass, stroke.T @ dampers @ stroke, stiffness, road, np.array([0.0, 1.0, 0.0, 0.0])
 
 
-def half_car_rates(x: Array, road: Array, moment: float, vehicle: Vehicle) -> Array:
-    """Rate of the half-car state, with the tyre force that contact leaves it (paper, Appendix B).
+def compute_half_car_rates(x: Array, road: Array, moment: float, vehicle: Vehicle) -> Array:
+    """Return the rate of the half-car state, with the tyre force that contact leaves it (paper, Appendix B).
 
     Parameters
     ----------
@@ -129,7 +138,7 @@ def half_car_rates(x: Array, road: Array, moment: float, vehicle: Vehicle) -> Ar
     moment : pitch moment [N m]
     vehicle : the vehicle
     """
-    mass, damping, stiffness, road_input, moment_input = half_car_matrices(vehicle)
+    mass, damping, stiffness, road_input, moment_input = build_half_car_matrices(vehicle)
     force = road_input @ road + moment_input * moment - damping @ x[4:] - stiffness @ x[:4]
     tyres = np.diag(stiffness)[2:] - np.array(
         [vehicle.suspension_stiffness_f, vehicle.suspension_stiffness_r]
@@ -139,7 +148,7 @@ def half_car_rates(x: Array, road: Array, moment: float, vehicle: Vehicle) -> Ar
     return np.concatenate([x[4:], np.linalg.solve(mass, force)])
 
 
-def coupled_rates(
+def compute_coupled_rates(
     state: Array,
     pressure: float,
     vehicle: Vehicle,
@@ -147,7 +156,7 @@ def coupled_rates(
     response: SurfaceResponse,
     hazard: RoadHazard,
 ) -> Array:
-    """Rate of the coupled model's state while it moves, with the algebraic ABS.
+    """Return the rate of the coupled model's state while it moves, with the algebraic ABS.
 
     The pitch moment is written about the body's centre of gravity: the tyre forces at the ground, the slope
     forces at wheel height, less the inertia of axles and wheels.
@@ -169,8 +178,8 @@ def coupled_rates(
     road = road_elevation(stations, hazard)
     load = np.maximum(np.array(vehicle.static_axle_loads) + tyres * (road - x[2:4]), 0)
     slip = np.clip((speed - radius * omega) / max(speed, vehicle.slip_speed_floor), -1, 1)
-    force = burckhardt(slip, vehicle, family, response) * load
-    scale = abs_scale(slip, np.ones(2), np.inf, vehicle, response)
+    force = compute_reference_friction(slip, vehicle, family, response) * load
+    scale = compute_abs_scale(slip, np.ones(2), np.inf, vehicle, response)
     torque = share * scale * vehicle.brake_gain * pressure * np.clip(omega / vehicle.lock_speed, -1, 1)
     slope_force = load * road_slope(stations, hazard)
     acceleration = -(force + slope_force).sum() / vehicle.mass - vehicle.coast_deceleration
@@ -182,4 +191,6 @@ def coupled_rates(
         + (slope_force + axle_mass * acceleration).sum() * (body_height - radius)
         - (inertia * wheel_rate).sum()
     )
-    return np.concatenate([[acceleration, speed], wheel_rate, half_car_rates(x, road, moment, vehicle)])
+    return np.concatenate(
+        [[acceleration, speed], wheel_rate, compute_half_car_rates(x, road, moment, vehicle)]
+    )

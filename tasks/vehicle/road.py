@@ -1,4 +1,4 @@
-"""Height and slope of the road feature at one station, as the kernels take them."""
+"""Height and slope of the road feature at one station, for the kernels."""
 
 from math import cos, pi, sin
 from typing import NamedTuple
@@ -16,19 +16,19 @@ class RoadFeature(NamedTuple):
     height: float
 
 
-def road_feature(hazard: RoadHazard) -> RoadFeature:
-    """The hazard as numbers; a flat road is a feature of height 0."""
+def make_road_feature(hazard: RoadHazard) -> RoadFeature:
+    """Return the hazard as numbers; a flat road is a feature of height 0."""
     return RoadFeature(float(hazard.center_m), float(hazard.length_m), float(hazard.height_m))
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def height_at(station: float, road: RoadFeature) -> float:
-    """Road height H_g [m] (paper, Eq. shared_road_profile).
+def compute_road_height(station: float, road: RoadFeature) -> float:
+    """Return the road height H_g [m] (paper, Eq. shared_road_profile).
 
     Parameters
     ----------
-    station : [m]
-    road : the feature
+    station : route position [m]
+    road : road feature
     """
     offset = station - road.center
     if road.height == 0.0 or abs(offset) > 0.5 * road.length:
@@ -37,13 +37,13 @@ def height_at(station: float, road: RoadFeature) -> float:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def slope_at(station: float, road: RoadFeature) -> float:
-    """Road slope dH_g/ds [m/m].
+def compute_road_slope(station: float, road: RoadFeature) -> float:
+    """Return the road slope dH_g/ds [m/m] (derivative of the paper's Eq. shared_road_profile).
 
     Parameters
     ----------
-    station : [m]
-    road : the feature
+    station : route position [m]
+    road : road feature
     """
     offset = station - road.center
     if road.height == 0.0 or abs(offset) > 0.5 * road.length:

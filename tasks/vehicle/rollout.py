@@ -13,11 +13,11 @@ from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.history import History
-from tasks.vehicle.model.brake_input import brake_command
+from tasks.vehicle.model.brake_input import make_command_input
 from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import COLUMNS, Simulation, simulate
-from tasks.vehicle.paper.paper_mode import history_of, run_paper_mode
-from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.paper.paper_mode import run_paper_mode, sample_history
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 Mode = Literal["paper", "coupled"]
 MODES: tuple[Mode, ...] = ("paper", "coupled")
@@ -56,8 +56,8 @@ class Rollout:
 
     Parameters
     ----------
-    columns : every channel of ``TICK_CHANNELS`` at 1 kHz, from 0 to the duration inclusive; ``pitch`` excludes
-        the static pitch
+    columns : every channel of ``TICK_CHANNELS`` at 1 kHz, from 0 to the duration inclusive [their units];
+        ``pitch`` excludes the static pitch
     mode : paper or coupled
     surface_friction : mu_c [1]
     tyre_peak : mu_eff [1]
@@ -83,7 +83,7 @@ class Rollout:
     calibration_extrapolated: bool
 
 
-def rollout(
+def simulate_scenario(
     vehicle: Vehicle,
     surface: SurfaceState,
     controls: Controls,
@@ -93,12 +93,12 @@ def rollout(
     duration_s: float,
     step_s: float = INTERNAL_STEP_S,
 ) -> Rollout:
-    """Drive one scenario; after a stop the vehicle rests and its body comes to rest too.
+    """Simulate one scenario; after a stop the vehicle stands and its body comes to rest too.
 
     Parameters
     ----------
     vehicle : the vehicle
-    surface : kind of weather, mu_c, and the snow that wheels plough where the vehicle has that effect
+    surface : kind of weather, mu_c, and the depth of the snow for vehicles with the ploughing effect
     controls : initial speed and brake
     hazard : road feature
     mode : paper follows the publication, coupled is the physical model
@@ -111,20 +111,20 @@ def rollout(
         Listing every argument that breaks a rule.
     """
     family, surface_friction, snow_depth_mm = surface.kind, surface.friction, surface.snow_depth_mm
-    per_tick = _check(vehicle, family, surface_friction, mode, duration_s, step_s)
-    response = surface_response(vehicle, family, surface_friction)
+    per_tick = _check_arguments(vehicle, family, surface_friction, mode, duration_s, step_s)
+    response = compute_surface_response(vehicle, family, surface_friction)
     ticks = round(duration_s * 1000)
     if mode == "paper":
         run = run_paper_mode(
             vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile,
             hazard, steps=ticks * per_tick, step=step_s,
         )  # fmt: skip
-        history = history_of(run, step_s, per_tick)
+        history = sample_history(run, step_s, per_tick)
     else:
-        history = _history(
+        history = _collect_history(
             simulate(
                 vehicle, response,
-                brake_command(controls.brake.profile, hold_speed=controls.hold_speed_until_brake),
+                make_command_input(controls.brake.profile, hold_speed=controls.hold_speed_until_brake),
                 Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm), samples=ticks + 1, substeps=per_tick,
                 interval=0.001, initial_speed=controls.initial_speed,
             )
@@ -153,21 +153,22 @@ def rollout(
     )
 
 
-def _history(run: Simulation) -> History:
+def _collect_history(run: Simulation) -> History:
+    """Return a simulation's columns and events in the form that both modes share."""
     columns = dict(zip(COLUMNS, run.history.T.copy(), strict=True))
     columns |= {f"axle_load_{axle}": columns[f"tyre_load_{axle}"] for axle in "fr"}
     return History(columns=columns, onset=run.onset, onset_station=run.onset_station, stop_time=run.stop)
 
 
-def _check(
+def _check_arguments(
     vehicle: Vehicle, family: str, surface_friction: float, mode: str, duration_s: float, step_s: float
 ) -> int:
-    """Internal steps per tick, once every argument keeps its rule."""
+    """Return the internal steps per tick; raise where an argument breaks its rule."""
     problems = []
     if mode not in MODES:
         problems.append(f"mode must be one of {', '.join(MODES)}; it is {mode}")
     try:
-        vehicle.tyre_family(family)
+        vehicle.find_tyre_family(family)
     except InputError as error:
         problems += error.problems
     if not (isfinite(surface_friction) and surface_friction > 0):

@@ -8,7 +8,7 @@ import pytest
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.campaign.run_validation import run_problems
-from tasks.identification.inference.forward import predict, run_model
+from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import EFFECT_TABLE
 from tests.identification.synthetic import NOISE, SURFACE, VEHICLE, plain_run
@@ -18,7 +18,7 @@ EFFECTS = load_effects()
 
 def columns_of(run: Run, theta: np.ndarray) -> dict[str, np.ndarray]:
     """The run as a car with ``theta`` would have been measured."""
-    clean = predict(run_model(run, VEHICLE, SURFACE), theta, refinement=4)
+    clean = predict_channels(prepare_run(run, VEHICLE, SURFACE), theta, refinement=4)
     response = clean + NOISE * np.random.default_rng(3).standard_normal(clean.shape)
     columns = dict(zip(CHANNELS, response.T, strict=True))
     return {"time": run.interval * np.arange(len(response)), "brake_pressure": run.pressure, **columns}

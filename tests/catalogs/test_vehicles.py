@@ -27,7 +27,7 @@ def saved(tmp_path, entry):
 @pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_vehicle_loads(name):
     vehicle = load_vehicle(name)
-    assert vehicle.name == name and all(vehicle.tyre_family(kind) for kind in WEATHERS)
+    assert vehicle.name == name and all(vehicle.find_tyre_family(kind) for kind in WEATHERS)
 
 
 def test_the_reference_vehicle_has_the_papers_loads_and_offsets():
@@ -88,14 +88,15 @@ def test_a_kind_of_weather_brings_tyres_to_a_vehicle_that_has_none_for_it(tmp_pa
     with pytest.raises(
         InputError, match=r"has no tyre family for weather snow, only for dry, rain: add families\.snow"
     ):
-        load_vehicle(path, catalogue).tyre_family("snow")
+        load_vehicle(path, catalogue).find_tyre_family("snow")
     look = yaml.safe_load((catalogue / "snow.yaml").read_text())
     (catalogue / "snow.yaml").write_text(yaml.safe_dump(look | {"tyre": snow}))
     assert (
-        load_vehicle(path, catalogue).tyre_family("snow") == load_vehicle("paper-reference").families["snow"]
+        load_vehicle(path, catalogue).find_tyre_family("snow")
+        == load_vehicle("paper-reference").families["snow"]
     )
     own = load_vehicle("paper-reference", catalogue)
-    assert own.tyre_family("snow") is own.families["snow"]
+    assert own.find_tyre_family("snow") is own.families["snow"]
 
 
 def test_a_family_of_no_kind_of_weather_is_refused(tmp_path, entry):

@@ -6,7 +6,13 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks.synthetic_street import camera_matrix, make_mount
-from tasks.eval.poses.epipolar import fit_rotation, refine_essential, scaled_step, step_length, triangulate
+from tasks.eval.poses.epipolar import (
+    fit_rotation,
+    refine_essential,
+    scaled_step,
+    step_length,
+    triangulate_points,
+)
 from tasks.eval.poses.rigid import (
     adjoint_matrix,
     advance_pose,
@@ -137,7 +143,7 @@ def test_turn_direction_depth_and_length_come_out_of_two_views_exactly() -> None
     np.testing.assert_allclose(R, MOTION[:3, :3], atol=1e-8)
     np.testing.assert_allclose(direction, t / np.linalg.norm(t), atol=1e-7)
     honest = np.arange(len(points)) % 5 != 0
-    depth, later_depth, precision = triangulate(rays, later_rays, R, direction)
+    depth, later_depth, precision = triangulate_points(rays, later_rays, R, direction)
     np.testing.assert_allclose(depth[honest] * np.linalg.norm(t), points[honest, 2], rtol=1e-4)
     np.testing.assert_allclose(
         later_depth[honest] * np.linalg.norm(t), (points @ MOTION[2, :3] + t[2])[honest], rtol=1e-4

@@ -7,7 +7,7 @@ import numpy as np
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.campaign import Run, Tolerances
-from tasks.identification.inference.forward import RunModel, predict, run_model
+from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
 
 VEHICLE = load_vehicle("paper-reference")
 SURFACE = load_surface("dense-asphalt")
@@ -36,7 +36,7 @@ def plain_run(
 
 def measured(run: Run, theta: np.ndarray, seed: int) -> RunModel:
     """The run as a car with ``theta`` would have been measured, ready for evidence."""
-    model = run_model(run, VEHICLE, SURFACE)
-    clean = predict(model, theta, refinement=4)
+    model = prepare_run(run, VEHICLE, SURFACE)
+    clean = predict_channels(model, theta, refinement=4)
     noise = NOISE * np.random.default_rng(seed).standard_normal(clean.shape)
-    return run_model(replace(run, response=clean + noise), VEHICLE, SURFACE)
+    return prepare_run(replace(run, response=clean + noise), VEHICLE, SURFACE)

@@ -12,14 +12,14 @@ from tasks.identification.decision.alternatives import find_pairs, find_pulled_n
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
 from tasks.identification.decision.held_out import find_worse_channels
-from tasks.identification.decision.rivals import Compared
-from tasks.identification.decision.search import Found, Round
+from tasks.identification.decision.rivals import RivalComparison
+from tasks.identification.decision.search import Round, SearchState
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import run_evidence
-from tasks.identification.inference.fit import Fit, fit
-from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
+from tasks.identification.inference.evidence import differentiate_run
+from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.hypothesis import make_library_hypothesis
+from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, TOLERANCES, measured, plain_run
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
@@ -28,10 +28,10 @@ LIBRARY = {e.name: e for e in load_effects() if e.name in NAMES}
 
 
 def evidence_of(truth: dict[str, float]) -> tuple[Evidence, Fit]:
-    theta = parameter_vector(truth)
+    theta = build_parameter_vector(truth)
     runs = [(32.0, 0.0, 1), (22.0, 0.0, -1), (28.0, 1.5, -1), (14.0, 0.0, 1), (15.0, 1.0, -1)]
     derived = tuple(
-        run_evidence(
+        differentiate_run(
             measured(plain_run(v, p, name=str(i), direction=d), theta, i), np.zeros(7), NOISE,
             np.zeros(len(EFFECT_TABLE)), tuple(LIBRARY.values()), TOLERANCES, QUIET,
         )
@@ -41,20 +41,20 @@ def evidence_of(truth: dict[str, float]) -> tuple[Evidence, Fit]:
         train=derived, held_out=derived[-2:], effects=tuple(LIBRARY.values()), tolerances=TOLERANCES,
         disturbance=QUIET, sensors=(np.zeros(7), NOISE), rules=load_decision_rules(),
     )  # fmt: skip
-    return evidence, fit(derived, (), evidence.session_sigma)
+    return evidence, fit_hypotheses(derived, (), evidence.session_sigma)
 
 
-def named(evidence: Evidence, null: Fit, name: str) -> tuple[Found, list[Compared]]:
+def named(evidence: Evidence, null: Fit, name: str) -> tuple[SearchState, list[RivalComparison]]:
     """One name as if it had been found, beside the two resistances that were tried in its place."""
 
     def judged(other: str) -> Candidate:
-        return judge_hypothesis(evidence, null, None, library_hypothesis(LIBRARY[other]))
+        return judge_hypothesis(evidence, null, None, make_library_hypothesis(LIBRARY[other]))
 
     own = judged(name)
     others = tuple((judged(other), 0.0) for other in ("aerodynamic_drag", "pad_drag") if other != name)
     rounds = (Round(base=null, tried=(), accepted=own, evidence=evidence),)
-    found = Found(evidence=evidence, base=own.fitted, rounds=rounds)
-    return found, [Compared(own=own, share=1.0, others=others, near=())]
+    found = SearchState(evidence=evidence, base=own.fitted, rounds=rounds)
+    return found, [RivalComparison(own=own, share=1.0, others=others, near=())]
 
 
 def test_two_effects_that_together_explain_as_much_stand_beside_the_one_that_is_named() -> None:
@@ -72,7 +72,9 @@ def test_two_effects_do_not_stand_beside_the_truth() -> None:
 def test_a_number_that_stays_pulled_beyond_belief_stands_beside_what_is_named() -> None:
     evidence, null = evidence_of({"pressure_gain": 0.15})
     found, _ = named(evidence, null, "brake_fade")
-    (other,) = [a for a in find_pulled_numbers(found) if a.candidate.hypothesis.name == "retuned_pressure_gain"]
+    (other,) = [
+        a for a in find_pulled_numbers(found) if a.candidate.hypothesis.name == "retuned_pressure_gain"
+    ]
     assert other.candidate.fitted.values[-1] == pytest.approx(0.15, abs=0.03)
     plain, null = evidence_of({})
     assert find_pulled_numbers(named(plain, null, "brake_fade")[0]) == []

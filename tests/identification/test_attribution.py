@@ -13,11 +13,11 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.identification.decision.attribution import refine_candidates
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.disturbance import Disturbance, prior_precision
-from tasks.identification.inference.evidence import run_evidence
-from tasks.identification.inference.fit import fit
-from tasks.identification.inference.forward import predict, run_model
-from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
+from tasks.identification.inference.disturbance import Disturbance, compute_prior_precision
+from tasks.identification.inference.evidence import differentiate_run
+from tasks.identification.inference.fit import fit_hypotheses
+from tasks.identification.inference.forward import predict_channels, prepare_run
+from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 
 WANTED = (
     "aerodynamic_drag",
@@ -40,7 +40,7 @@ def evidence_of(theta: np.ndarray) -> Evidence:
         (15.0, 0.0, 1, 20.0),
     ]
     derived = tuple(
-        run_evidence(
+        differentiate_run(
             measured(plain_run(v, p, name=str(i), direction=d, disc_rise=t), theta, i),
             np.zeros(7),
             NOISE,
@@ -73,8 +73,8 @@ def evidence_of(theta: np.ndarray) -> Evidence:
 def test_the_effect_in_the_data_tops_the_ladder_with_its_value(
     effect: str, parameter: str, value: float
 ) -> None:
-    evidence = evidence_of(parameter_vector({parameter: value}))
-    null = fit(evidence.train, (), evidence.session_sigma)
+    evidence = evidence_of(build_parameter_vector({parameter: value}))
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     best = refine_candidates(evidence, null, count=3)[0]
     assert best.hypothesis.name == effect and best.score > 25.0
     sigma = np.sqrt(best.fitted.covariance[-1, -1] * best.inflation)
@@ -83,7 +83,7 @@ def test_the_effect_in_the_data_tops_the_ladder_with_its_value(
 
 def test_nothing_passes_where_nothing_is_missing() -> None:
     evidence = evidence_of(np.zeros(len(EFFECT_TABLE)))
-    null = fit(evidence.train, (), evidence.session_sigma)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     assert not any(c.passes for c in refine_candidates(evidence, null, count=3))
 
 
@@ -91,7 +91,7 @@ def test_the_marginal_misfit_is_that_of_the_dense_covariance() -> None:
     evidence = evidence_of(np.zeros(len(EFFECT_TABLE)))
     run = evidence.train[0]
     keep = slice(0, 600)
-    precision, _ = prior_precision(run.knots, TOLERANCES, QUIET)
+    precision, _ = compute_prior_precision(run.knots, TOLERANCES, QUIET)
     j = run.nuisance[keep]
     r = np.random.default_rng(0).standard_normal(600)
     dense = r @ np.linalg.solve(np.eye(600) + j @ np.linalg.inv(precision) @ j.T, r)
@@ -114,20 +114,20 @@ def test_every_library_effect_moves_some_instrument_and_zero_moves_none() -> Non
                 "hazard_height": 0.075,
             }
         )
-        model = run_model(changed, VEHICLE, SURFACE)
-        plain[weather] = (model, predict(model, np.zeros(len(EFFECT_TABLE))))
+        model = prepare_run(changed, VEHICLE, SURFACE)
+        plain[weather] = (model, predict_channels(model, np.zeros(len(EFFECT_TABLE))))
     for effect in load_effects():
-        theta = parameter_vector({p.name: p.start for p in effect.parameters})
+        theta = build_parameter_vector({p.name: p.start for p in effect.parameters})
         theta[effect.parameters[0].index] = 5 * effect.parameters[0].step
-        moved = max(float(np.max(np.abs(predict(m, theta) - y) / NOISE)) for m, y in plain.values())
+        moved = max(float(np.max(np.abs(predict_channels(m, theta) - y) / NOISE)) for m, y in plain.values())
         assert moved > 0.3, effect.name
-        off = parameter_vector({p.name: p.start for p in effect.parameters[1:]})
+        off = build_parameter_vector({p.name: p.start for p in effect.parameters[1:]})
         if effect.name != "pad_friction_speed":
-            assert all(np.array_equal(predict(m, off), y) for m, y in plain.values()), effect.name
+            assert all(np.array_equal(predict_channels(m, off), y) for m, y in plain.values()), effect.name
 
 
 def test_halving_the_step_changes_less_than_the_noise() -> None:
-    model = run_model(plain_run(20.0, 2.0), VEHICLE, SURFACE)
+    model = prepare_run(plain_run(20.0, 2.0), VEHICLE, SURFACE)
     theta = np.zeros(len(EFFECT_TABLE))
-    difference = np.abs(predict(model, theta) - predict(model, theta, refinement=4))
+    difference = np.abs(predict_channels(model, theta) - predict_channels(model, theta, refinement=4))
     assert np.all(difference.max(axis=0) < 0.35 * NOISE)

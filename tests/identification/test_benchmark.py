@@ -11,22 +11,24 @@ from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.measured import closing_benchmark
-from flows.measured.closing_benchmark_summary import pair_outcome, summary
+from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from tasks.campaign.planned_runs import TRAINING
-from tasks.identification.benchmark import exact_interval, synthetic_campaign
+from tasks.identification.benchmark import compute_exact_interval, make_synthetic_campaign
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 
 
 def test_the_same_seed_gives_the_same_campaign_and_another_does_not() -> None:
-    first, again, other = (synthetic_campaign(VEHICLE, SURFACE, {"fade": 0.05}, seed) for seed in (3, 3, 4))
+    first, again, other = (
+        make_synthetic_campaign(VEHICLE, SURFACE, {"fade": 0.05}, seed) for seed in (3, 3, 4)
+    )
     assert all(np.array_equal(a.response, b.response) for a, b in zip(first.runs, again.runs, strict=True))
     assert not np.array_equal(first.runs[0].response, other.runs[0].response)
     assert len(first.train) == TRAINING and len(first.held_out) == len(first.runs) - TRAINING
 
 
 def test_the_truth_shows_in_the_runs_that_feel_it() -> None:
-    plain, faded = (synthetic_campaign(VEHICLE, SURFACE, truth, 5) for truth in ({}, {"fade": 0.06}))
+    plain, faded = (make_synthetic_campaign(VEHICLE, SURFACE, truth, 5) for truth in ({}, {"fade": 0.06}))
     hot = next(i for i, run in enumerate(plain.runs) if run.disc_rise == 350.0)
     assert faded.runs[hot].response[-1, 0] - plain.runs[hot].response[-1, 0] > 1.0
     coasting = next(i for i, run in enumerate(plain.runs) if run.pressure.max() == 0.0)
@@ -34,8 +36,8 @@ def test_the_truth_shows_in_the_runs_that_feel_it() -> None:
 
 
 def test_the_exact_interval_is_clopper_and_pearsons() -> None:
-    assert exact_interval(0, 100) == pytest.approx((0.0, 1.0 - 0.025**0.01))
-    low, high = exact_interval(3, 40)
+    assert compute_exact_interval(0, 100) == pytest.approx((0.0, 1.0 - 0.025**0.01))
+    low, high = compute_exact_interval(3, 40)
     assert binom.sf(2, 40, low) == pytest.approx(0.025) and binom.cdf(3, 40, high) == pytest.approx(0.025)
 
 
@@ -63,7 +65,7 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
         return answer("brake_fade")
 
     monkeypatch.setattr(
-        closing_benchmark, "synthetic_campaign", lambda model, road, truth, seed, slots, design: seed
+        closing_benchmark, "make_synthetic_campaign", lambda model, road, truth, seed, slots, design: seed
     )
     monkeypatch.setattr(closing_benchmark, "find_missing_effects", judge)
     monkeypatch.setattr(closing_benchmark, "interval_holds_truth", lambda *_: None)
@@ -130,7 +132,7 @@ def test_the_summary_counts_each_kind_once() -> None:
         row("brake_lag", "refused") | {"kind": "size"}, row("brake_lag", "refused") | {"kind": "poor"},
         row("brake_lag + brake_fade", "one") | {"kind": "pair"},
     ]  # fmt: skip
-    result = summary(rows)
+    result = summarise_benchmark(rows)
     assert (result["false_discoveries"]["hits"], result["false_discoveries"]["of"]) == (1, 2)
     shares = {entry["figure"]: (entry["hits"], entry["of"]) for entry in result["summary"]}
     assert shares["library effect named exactly"] == (1, 3) and shares["wrong single label"] == (1, 3)

@@ -9,8 +9,8 @@ from catalogs.decision_rules import load_decision_rules
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import widen_noise
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import run_evidence
-from tasks.identification.inference.fit import fit
+from tasks.identification.inference.evidence import differentiate_run
+from tasks.identification.inference.fit import fit_hypotheses
 from tasks.identification.inference.forward import RunModel
 from tasks.vehicle.effects.table import EFFECT_TABLE
 from tests.identification.synthetic import NOISE, TOLERANCES, measured, plain_run
@@ -30,7 +30,7 @@ def cycling(run: RunModel) -> RunModel:
 
 
 def evidence_of(*runs: RunModel) -> Evidence:
-    derived = tuple(run_evidence(r, np.zeros(7), NOISE, NOTHING, (), TOLERANCES, QUIET) for r in runs)
+    derived = tuple(differentiate_run(r, np.zeros(7), NOISE, NOTHING, (), TOLERANCES, QUIET) for r in runs)
     return Evidence(
         train=derived[:2], held_out=derived[2:], effects=(), tolerances=TOLERANCES, disturbance=QUIET,
         sensors=(np.zeros(7), NOISE), rules=load_decision_rules(),
@@ -44,7 +44,7 @@ def plain(seed: int, peak: float = 1.5) -> RunModel:
 @pytest.fixture(scope="module")
 def widened() -> Evidence:
     evidence = evidence_of(plain(1), cycling(plain(2)), cycling(plain(3)))
-    return widen_noise(evidence, fit(evidence.train, (), evidence.session_sigma))
+    return widen_noise(evidence, fit_hypotheses(evidence.train, (), evidence.session_sigma))
 
 
 def test_runs_that_the_model_follows_keep_the_noise_of_their_sensors(widened: Evidence) -> None:
@@ -65,7 +65,7 @@ def test_held_out_runs_are_widened_alike(widened: Evidence) -> None:
 
 def test_what_a_better_fit_follows_again_has_its_sensors_noise_again() -> None:
     evidence = evidence_of(plain(1), plain(2), plain(3))
-    null = fit(evidence.train, (), evidence.session_sigma)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     wide = replace(
         evidence, train=(evidence.train[0], replace(evidence.train[1], sigma=8.0 * NOISE)),
         held_out=(replace(evidence.held_out[0], sigma=8.0 * NOISE),),

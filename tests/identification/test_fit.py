@@ -12,18 +12,28 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.forms import RIDGE, form_hypotheses, scan_leftovers, spline_slopes
-from tasks.identification.decision.screening import screen
+from tasks.identification.decision.forms import (
+    RIDGE,
+    differentiate_by_splines,
+    fit_residual_splines,
+    make_form_hypotheses,
+)
+from tasks.identification.decision.screening import screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import run_evidence, second_values
-from tasks.identification.inference.fit import fit
-from tasks.identification.inference.forward import RunModel, predict, run_model, starting_speed
-from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import fit_disturbance, whitened_residuals
+from tasks.identification.inference.evidence import differentiate_run, list_second_values
+from tasks.identification.inference.fit import fit_hypotheses
+from tasks.identification.inference.forward import (
+    RunModel,
+    compute_starting_speed,
+    predict_channels,
+    prepare_run,
+)
+from tasks.identification.inference.hypothesis import make_library_hypothesis
+from tasks.identification.inference.linearisation import compute_whitened_residuals, fit_disturbance
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
-from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
+from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
 LIBRARY = {e.name: e for e in load_effects()}
@@ -31,7 +41,7 @@ PLAIN = np.zeros(len(EFFECT_TABLE))
 
 
 def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence:
-    runs = tuple(run_evidence(m, np.zeros(7), NOISE, PLAIN, effects, TOLERANCES, QUIET) for m in models)
+    runs = tuple(differentiate_run(m, np.zeros(7), NOISE, PLAIN, effects, TOLERANCES, QUIET) for m in models)
     return Evidence(
         train=runs, held_out=runs[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET,
         sensors=(np.zeros(7), NOISE),
@@ -42,7 +52,7 @@ def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence
 def over_a_hump(speed_offset: float) -> RunModel:
     run = replace(plain_run(11.0, 0.0), hazard_center=12.0, hazard_length=3.7, hazard_height=0.075)
     model = measured(run, PLAIN, 0)
-    late = predict(replace(model, initial_speed=11.0 + speed_offset), PLAIN, refinement=4)
+    late = predict_channels(replace(model, initial_speed=11.0 + speed_offset), PLAIN, refinement=4)
     # the speed before the brake is read off other noise than the hump is: the run starts a little off
     return replace(model, run=replace(model.run, response=late), initial_speed=11.0)
 
@@ -52,9 +62,9 @@ def test_a_hump_that_is_reached_a_moment_later_is_not_taken_for_information() ->
     widths = []
     for offset in (0.0, 0.08):
         evidence = evidence_of([over_a_hump(offset), over_a_hump(-offset)], (rolling,))
-        null = fit(evidence.train, (), evidence.session_sigma)
-        fitted = fit(
-            evidence.train, (library_hypothesis(rolling),), evidence.session_sigma, values=np.zeros(1),
+        null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+        fitted = fit_hypotheses(
+            evidence.train, (make_library_hypothesis(rolling),), evidence.session_sigma, values=np.zeros(1),
             offsets=null.offsets,
         )  # fmt: skip
         widths.append(np.sqrt(fitted.covariance[0, 0]))
@@ -63,16 +73,20 @@ def test_a_hump_that_is_reached_a_moment_later_is_not_taken_for_information() ->
 
 def test_a_start_on_the_accepted_fit_finds_what_a_fresh_one_finds() -> None:
     fade = LIBRARY["brake_fade"]
-    truth = parameter_vector({"fade": 0.06})
+    truth = build_parameter_vector({"fade": 0.06})
     models = [
         measured(plain_run(25.0, p, disc_rise=t), truth, i)
         for i, (p, t) in enumerate(((1.8, 250.0), (1.2, 150.0)))
     ]
     evidence = evidence_of(models, (fade,))
-    null = fit(evidence.train, (), evidence.session_sigma)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     held, fresh = (
-        fit(
-            evidence.train, (library_hypothesis(fade),), evidence.session_sigma, values=start, offsets=offsets
+        fit_hypotheses(
+            evidence.train,
+            (make_library_hypothesis(fade),),
+            evidence.session_sigma,
+            values=start,
+            offsets=offsets,
         )
         for start, offsets in ((np.zeros(1), null.offsets), (np.array([0.06]), None))
     )
@@ -82,13 +96,13 @@ def test_a_start_on_the_accepted_fit_finds_what_a_fresh_one_finds() -> None:
 
 def test_a_threshold_of_what_starts_at_nothing_is_fitted_once_that_has_moved() -> None:
     creep = LIBRARY["idle_creep"]
-    truth = parameter_vector({"creep_force": 250.0, "creep_speed": 5.0})
+    truth = build_parameter_vector({"creep_force": 250.0, "creep_speed": 5.0})
     models = [
         measured(plain_run(v, p), truth, i) for i, (v, p) in enumerate(((6.5, 0.0), (5.0, 0.1), (3.5, 0.0)))
     ]
     evidence = evidence_of(models, (creep,))
-    fitted = fit(
-        evidence.train, (library_hypothesis(creep),), evidence.session_sigma, values=np.array([0.0, 4.0]),
+    fitted = fit_hypotheses(
+        evidence.train, (make_library_hypothesis(creep),), evidence.session_sigma, values=np.array([0.0, 4.0]),
         iterations=12,
     )  # fmt: skip
     assert fitted.values == pytest.approx([250.0, 5.0], rel=0.2)
@@ -96,23 +110,23 @@ def test_a_threshold_of_what_starts_at_nothing_is_fitted_once_that_has_moved() -
 
 def test_the_screen_sees_an_effect_whose_threshold_is_far_from_its_first_value() -> None:
     creep = LIBRARY["idle_creep"]
-    truth = parameter_vector({"creep_force": 600.0, "creep_speed": 8.0})
+    truth = build_parameter_vector({"creep_force": 600.0, "creep_speed": 8.0})
     models = [
         measured(plain_run(v, p), truth, i) for i, (v, p) in enumerate(((9.0, 0.0), (8.0, 0.2), (7.0, 0.0)))
     ]
     evidence = evidence_of(models, (creep,))
-    null = fit(evidence.train, (), evidence.session_sigma)
-    gains, estimates, seconds = screen(evidence, null)
-    tried = [value for _, value in second_values(evidence.effects)]
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    gains, estimates, seconds = screen_library(evidence, null)
+    tried = [value for _, value in list_second_values(evidence.effects)]
     assert seconds[0] == min(tried, key=lambda value: abs(value - 8.0)) != creep.parameters[1].start
     assert gains[0] > 50.0 and estimates[0] > 300.0
 
 
 def test_a_run_starts_at_the_speed_the_sensor_read_less_its_scale_error() -> None:
-    model = run_model(plain_run(20.0, 0.0), VEHICLE, SURFACE)
-    scaled = parameter_vector({"speed_scale": 0.02})
-    assert starting_speed(model, scaled) == pytest.approx(20.0 / 1.02)
-    assert predict(model, scaled)[0, 0] == pytest.approx(20.0)
+    model = prepare_run(plain_run(20.0, 0.0), VEHICLE, SURFACE)
+    scaled = build_parameter_vector({"speed_scale": 0.02})
+    assert compute_starting_speed(model, scaled) == pytest.approx(20.0 / 1.02)
+    assert predict_channels(model, scaled)[0, 0] == pytest.approx(20.0)
 
 
 HUMP = Slot(
@@ -127,21 +141,21 @@ HUMP = Slot(
 def hump_in_the_brake() -> Evidence:
     models = []
     for i, (speed, peak) in enumerate(((30.0, 1.6), (26.0, 1.2), (20.0, 1.4), (14.0, 1.0), (28.0, 1.0))):
-        model = run_model(plain_run(speed, peak), VEHICLE, SURFACE)
-        clean = predict(model, PLAIN, slots=(HUMP,), refinement=4)
+        model = prepare_run(plain_run(speed, peak), VEHICLE, SURFACE)
+        clean = predict_channels(model, PLAIN, slots=(HUMP,), refinement=4)
         noise = NOISE * np.random.default_rng(i).standard_normal(clean.shape)
-        models.append(run_model(replace(model.run, response=clean + noise), VEHICLE, SURFACE))
+        models.append(prepare_run(replace(model.run, response=clean + noise), VEHICLE, SURFACE))
     return evidence_of(models, (LIBRARY["brake_fade"],))
 
 
 def test_a_form_outside_the_library_does_not_pass_for_a_disturbance() -> None:
     evidence = hump_in_the_brake()
-    null = fit(evidence.train, (), evidence.session_sigma)
-    splines = spline_slopes(evidence, null)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    splines = differentiate_by_splines(evidence, null)
     told, blind = (
         fit_disturbance(
             evidence.train,
-            whitened_residuals(evidence, null),
+            compute_whitened_residuals(evidence, null),
             TOLERANCES,
             evidence.effects,
             QUIET,
@@ -155,7 +169,7 @@ def test_a_form_outside_the_library_does_not_pass_for_a_disturbance() -> None:
 
 def test_a_bump_is_in_the_grammar() -> None:
     evidence = hump_in_the_brake()
-    null = fit(evidence.train, (), evidence.session_sigma)
-    best = scan_leftovers(evidence, null)[0]
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    best = fit_residual_splines(evidence, null)[0]
     assert (best.port, best.variable) == ("brake_torque", "speed")
-    assert "a exp(-(4x - 2)^2)" in form_hypotheses(best, evidence.samples)[0].name
+    assert "a exp(-(4x - 2)^2)" in make_form_hypotheses(best, evidence.samples)[0].name

@@ -12,22 +12,22 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.benchmark import synthetic_campaign
+from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
 from tasks.identification.decision.intervals import (
-    curvature_interval,
-    profile_interval,
+    compute_curvature_interval,
+    compute_profile_interval,
+    compute_student_quantile,
     refit_named,
-    student_quantile,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import run_evidence
-from tasks.identification.inference.fit import fit, misfit_by_run
-from tasks.identification.inference.forward import predict, run_model
-from tasks.identification.inference.hypothesis import library_hypothesis
+from tasks.identification.inference.evidence import differentiate_run
+from tasks.identification.inference.fit import compute_misfit_by_run, fit_hypotheses
+from tasks.identification.inference.forward import predict_channels, prepare_run
+from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.inference.linearisation import prepare_evidence
-from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
+from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 
 LIBRARY = tuple(
     e for e in load_effects() if e.name in ("wet_friction_speed", "rolling_resistance", "brake_lag")
@@ -37,22 +37,22 @@ Judged = tuple[Evidence, Candidate, float]
 
 
 def rain_stops(speeds: tuple[float, ...], truth: dict[str, float], disturbance: Disturbance) -> Judged:
-    theta, zero, derived = parameter_vector(truth), np.zeros(len(EFFECT_TABLE)), []
+    theta, zero, derived = build_parameter_vector(truth), np.zeros(len(EFFECT_TABLE)), []
     for i, speed in enumerate(speeds):
         run = replace(plain_run(speed, 6.0), weather="rain", precipitation_mm_h=8.0)
-        clean = predict(run_model(run, VEHICLE, SURFACE), theta, refinement=4)
+        clean = predict_channels(prepare_run(run, VEHICLE, SURFACE), theta, refinement=4)
         noise = NOISE * np.random.default_rng(i).standard_normal(clean.shape)
-        model = run_model(replace(run, response=clean + noise), VEHICLE, SURFACE)
-        derived.append(run_evidence(model, np.zeros(7), NOISE, zero, LIBRARY, TOLERANCES, disturbance))
+        model = prepare_run(replace(run, response=clean + noise), VEHICLE, SURFACE)
+        derived.append(differentiate_run(model, np.zeros(7), NOISE, zero, LIBRARY, TOLERANCES, disturbance))
     evidence = Evidence(
         train=tuple(derived), held_out=tuple(derived[-2:]), effects=LIBRARY, tolerances=TOLERANCES,
         disturbance=disturbance, sensors=(np.zeros(7), NOISE), rules=load_decision_rules(),
     )  # fmt: skip
-    base = fit(evidence.train, (), evidence.session_sigma)
-    held_out = misfit_by_run(evidence.held_out, base)
+    base = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    held_out = compute_misfit_by_run(evidence.held_out, base)
     return (
         evidence,
-        judge_hypothesis(evidence, base, held_out, library_hypothesis(WET, 0.004)),
+        judge_hypothesis(evidence, base, held_out, make_library_hypothesis(WET, 0.004)),
         base.objective,
     )
 
@@ -76,8 +76,8 @@ def test_an_effect_whose_score_excludes_zero_has_an_interval_that_does(
 ) -> None:
     evidence, candidate, none = valley
     root = np.sqrt((none - candidate.fitted.objective) / candidate.inflation)
-    assert candidate.passes and root > student_quantile(candidate)
-    low, high = profile_interval(candidate, evidence)
+    assert candidate.passes and root > compute_student_quantile(candidate)
+    low, high = compute_profile_interval(candidate, evidence)
     assert low[0] > 0.0
     assert low[0] < 0.01 < high[0] and low[1] < 8.0 < high[1]
 
@@ -87,19 +87,21 @@ def test_at_an_end_of_the_interval_the_best_fit_is_worse_by_the_quantile(
 ) -> None:
     evidence, candidate, _ = sharp
     h, best = candidate.hypothesis, candidate.fitted.objective
-    for ends in profile_interval(candidate, evidence):
+    for ends in compute_profile_interval(candidate, evidence):
         for j in (j for j in range(2) if h.lower[j] < ends[j] < h.upper[j]):
             # the other parameter on a grid, not by the optimiser under test
             k = 1 - j
-            reach = 1.5 * np.ptp(np.array(curvature_interval(candidate))[:, k])
+            reach = 1.5 * np.ptp(np.array(compute_curvature_interval(candidate))[:, k])
             near = candidate.fitted.values[k] + np.linspace(-reach, reach, 21)
             rises = []
             for other in near:
                 pair = np.array([ends[0], other] if j == 0 else [other, ends[1]])
                 held = replace(h, lower=pair, upper=pair, start=pair)
-                rises.append(fit(evidence.train, (held,), evidence.session_sigma, iterations=1).objective)
+                rises.append(
+                    fit_hypotheses(evidence.train, (held,), evidence.session_sigma, iterations=1).objective
+                )
             root = np.sqrt((min(rises) - best) / candidate.inflation)
-            assert root == pytest.approx(student_quantile(candidate), rel=0.15), (j, ends[j])
+            assert root == pytest.approx(compute_student_quantile(candidate), rel=0.15), (j, ends[j])
 
 
 def test_intervals_stay_within_the_bounds_of_their_parameters(
@@ -108,21 +110,23 @@ def test_intervals_stay_within_the_bounds_of_their_parameters(
     evidence, candidate, _ = valley
     wide = replace(candidate, fitted=replace(candidate.fitted, covariance=1e6 * candidate.fitted.covariance))
     h = candidate.hypothesis
-    for low, high in (curvature_interval(wide), profile_interval(wide, evidence)):
+    for low, high in (compute_curvature_interval(wide), compute_profile_interval(wide, evidence)):
         assert np.all(low >= h.lower) and np.all(high <= h.upper)
-    assert np.array_equal(curvature_interval(wide)[0], h.lower)
+    assert np.array_equal(compute_curvature_interval(wide)[0], h.lower)
 
 
 def test_with_derivatives_taken_at_it_an_estimate_forgets_where_it_started() -> None:
     rolling = next(e for e in LIBRARY if e.name == "rolling_resistance")
-    campaign = synthetic_campaign(VEHICLE, SURFACE, {"rolling_coefficient": 0.012}, 56)
+    campaign = make_synthetic_campaign(VEHICLE, SURFACE, {"rolling_coefficient": 0.012}, 56)
     evidence = prepare_evidence(campaign, VEHICLE, SURFACE, (rolling,), load_decision_rules())
-    null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
-    part = library_hypothesis(rolling)
-    far = fit(evidence.train, (part,), evidence.session_sigma, session=null.session, iterations=8)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma, iterations=6)
+    part = make_library_hypothesis(rolling)
+    far = fit_hypotheses(evidence.train, (part,), evidence.session_sigma, session=null.session, iterations=8)
     true = np.array([0.012])
     here, settled, _ = refit_named(evidence, far, [])
-    near = fit(here.train, (part,), here.session_sigma, values=true, session=far.session, iterations=8)
+    near = fit_hypotheses(
+        here.train, (part,), here.session_sigma, values=true, session=far.session, iterations=8
+    )
     sigma = np.sqrt(settled.covariance[0, 0])
     assert abs(settled.values[0] - near.values[0]) < 0.3 * sigma < abs(far.values[0] - near.values[0])
     # what the stale derivatives promised was too much

@@ -7,7 +7,7 @@ import pytest
 
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.errors import InputError
-from tasks.identification.inference.noise import channel_noise, unwhiten, whiten
+from tasks.identification.inference.noise import estimate_channel_noise, unwhiten_channels, whiten_channels
 from tests.identification.synthetic import NOISE, TOLERANCES, plain_run
 
 
@@ -30,7 +30,7 @@ def quiet_campaign(step: np.ndarray | float = 0.0, brake_at: float = 1.0, *, noi
 
 
 def test_white_noise_is_found() -> None:
-    rho, sigma = channel_noise(quiet_campaign())
+    rho, sigma = estimate_channel_noise(quiet_campaign())
     assert sigma == pytest.approx(NOISE, rel=0.25) and (rho < 0.3).all()
 
 
@@ -42,35 +42,35 @@ def test_a_coarse_channel_has_the_noise_of_its_rounding(coarseness: float) -> No
     moved = campaign.runs[0].response.copy()
     moved[-1] += step
     campaign = replace(campaign, runs=(replace(campaign.runs[0], response=moved), *campaign.runs[1:]))
-    rho, sigma = channel_noise(campaign)
+    rho, sigma = estimate_channel_noise(campaign)
     assert (sigma >= 0.999 * step / np.sqrt(12)).all() and (sigma < step).all()
-    assert np.isfinite(whiten(campaign.runs[0].response, rho, sigma)).all()
+    assert np.isfinite(whiten_channels(campaign.runs[0].response, rho, sigma)).all()
 
 
 def test_one_coarse_channel_leaves_the_others_as_they_are() -> None:
     step = np.zeros(len(CHANNELS))
     step[CHANNELS.index("wheel_speed_rear")] = 0.3
-    rho, sigma = channel_noise(quiet_campaign(step))
-    whole_rho, whole_sigma = channel_noise(quiet_campaign())
+    rho, sigma = estimate_channel_noise(quiet_campaign(step))
+    whole_rho, whole_sigma = estimate_channel_noise(quiet_campaign())
     fine = step == 0
     assert (rho[fine] == whole_rho[fine]).all() and (sigma[fine] == whole_sigma[fine]).all()
 
 
 def test_runs_that_brake_from_the_first_sample_show_their_noise_as_a_whole() -> None:
-    rho, sigma = channel_noise(quiet_campaign(brake_at=0.1))
+    rho, sigma = estimate_channel_noise(quiet_campaign(brake_at=0.1))
     assert np.isfinite(sigma).all() and (sigma > 0.0).all() and (rho < 0.95).all()
 
 
 def test_a_channel_that_was_not_measured_weighs_nothing() -> None:
     campaign = quiet_campaign()
     seen = tuple(name for name in CHANNELS if name != "pitch")
-    _, sigma = channel_noise(replace(campaign, channels=seen))
+    _, sigma = estimate_channel_noise(replace(campaign, channels=seen))
     assert (
         np.isinf(sigma[CHANNELS.index("pitch")])
         and np.isfinite(np.delete(sigma, CHANNELS.index("pitch"))).all()
     )
     assert (
-        whiten(np.ones((5, 7)), np.zeros(7), sigma).reshape(5, 7)[:, CHANNELS.index("pitch")] == 0.0
+        whiten_channels(np.ones((5, 7)), np.zeros(7), sigma).reshape(5, 7)[:, CHANNELS.index("pitch")] == 0.0
     ).all()
 
 
@@ -82,7 +82,7 @@ def test_a_channel_that_never_changes_and_runs_that_are_too_short_are_both_named
         still[:, CHANNELS.index("pitch")] = 0.0
         runs.append(replace(run, response=still, pressure=run.pressure[:22]))
     with pytest.raises(InputError) as caught:
-        channel_noise(replace(campaign, runs=tuple(runs)))
+        estimate_channel_noise(replace(campaign, runs=tuple(runs)))
     text = str(caught.value)
     assert (
         len(caught.value.problems) == 2
@@ -94,4 +94,4 @@ def test_a_channel_that_never_changes_and_runs_that_are_too_short_are_both_named
 def test_unwhitening_undoes_whitening() -> None:
     x = np.random.default_rng(1).standard_normal((40, 7, 3))
     rho = np.array([0.6, 0.0, 0.9, 0.2, 0.8, 0.0, 0.5])
-    assert unwhiten(whiten(x, rho, NOISE), rho, NOISE) == pytest.approx(x)
+    assert unwhiten_channels(whiten_channels(x, rho, NOISE), rho, NOISE) == pytest.approx(x)

@@ -15,17 +15,17 @@ from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, make_planned_run
 from tasks.identification.decision.attribution import refine_candidates
-from tasks.identification.decision.experiment import next_experiment
+from tasks.identification.decision.experiment import plan_next_experiment
 from tasks.identification.decision.rivals import find_detectable_sizes
-from tasks.identification.decision.screening import inflation, look_alikes
+from tasks.identification.decision.screening import compute_inflation, find_look_alikes
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import run_evidence
-from tasks.identification.inference.fit import fit, sum_misfit_falls
-from tasks.identification.inference.forward import run_model
-from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import step_change
-from tasks.vehicle.effects.table import EFFECT_TABLE, parameter_vector
+from tasks.identification.inference.evidence import differentiate_run
+from tasks.identification.inference.fit import fit_hypotheses, sum_misfit_falls
+from tasks.identification.inference.forward import prepare_run
+from tasks.identification.inference.hypothesis import make_library_hypothesis
+from tasks.identification.inference.linearisation import compute_step_misfit
+from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
 LIBRARY = {e.name: e for e in load_effects()}
@@ -35,7 +35,7 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
     effects = tuple(LIBRARY[name] for name in names)
     runs = [(30.0, 0.0, 1, 20.0), (28.0, 1.5, -1, 20.0), (25.0, 1.8, 1, 250.0), (15.0, 0.0, -1, 20.0)]
     derived = tuple(
-        run_evidence(
+        differentiate_run(
             measured(plain_run(v, p, name=str(i), direction=d, disc_rise=t), theta, i), np.zeros(7), NOISE,
             np.zeros(len(EFFECT_TABLE)), effects, TOLERANCES, QUIET,
         )
@@ -55,7 +55,7 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
 def test_a_run_that_forks_at_the_abs_threshold_is_told_from_sound_ones() -> None:
     forked = load_decision_rules().forked_misfit
     changes = [
-        step_change(run_model(make_planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
+        compute_step_misfit(prepare_run(make_planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
         for drive in (RICH[0], RICH[2], RICH[11], RICH[19], replace(RICH[19], speed=12.0, peak=3.0))
     ]
     assert max(changes[:4]) < 0.5 * forked < 10.0 * forked < changes[4]
@@ -68,9 +68,9 @@ def test_a_fall_counts_only_beyond_the_doubt() -> None:
 
 
 def test_a_free_parameter_takes_its_session_nuisance_over() -> None:
-    evidence = evidence_of(parameter_vector({"pressure_gain": 0.1}), "retuned_pressure_gain")
-    fitted = fit(
-        evidence.train, (library_hypothesis(LIBRARY["retuned_pressure_gain"]),), evidence.session_sigma,
+    evidence = evidence_of(build_parameter_vector({"pressure_gain": 0.1}), "retuned_pressure_gain")
+    fitted = fit_hypotheses(
+        evidence.train, (make_library_hypothesis(LIBRARY["retuned_pressure_gain"]),), evidence.session_sigma,
         iterations=8,
     )  # fmt: skip
     assert abs(fitted.session[SESSION.index("pressure_gain")]) < 1e-12
@@ -79,7 +79,7 @@ def test_a_free_parameter_takes_its_session_nuisance_over() -> None:
 
 def test_an_interval_does_not_depend_on_the_unit_of_its_parameter() -> None:
     evidence = evidence_of(np.zeros(len(EFFECT_TABLE)), "progressive_spring")
-    spring = library_hypothesis(LIBRARY["progressive_spring"])
+    spring = make_library_hypothesis(LIBRARY["progressive_spring"])
     build = spring.build
     scaled = replace(
         spring, build=lambda x: build(1e9 * x), **{
@@ -87,31 +87,34 @@ def test_an_interval_does_not_depend_on_the_unit_of_its_parameter() -> None:
         },
     )  # fmt: skip
     sigmas = [
-        np.sqrt(fit(evidence.train, (h,), evidence.session_sigma).covariance[0, 0]) for h in (spring, scaled)
+        np.sqrt(fit_hypotheses(evidence.train, (h,), evidence.session_sigma).covariance[0, 0])
+        for h in (spring, scaled)
     ]
     assert sigmas[0] > 0.0 and sigmas[0] == pytest.approx(1e9 * sigmas[1], rel=1e-3)
 
 
 def test_effects_of_one_shape_are_look_alikes_and_others_are_not() -> None:
     names = ("rolling_resistance", "pad_drag", "sensor_pitch_scale", "brake_fade")
-    alike = look_alikes(evidence_of(np.zeros(len(EFFECT_TABLE)), *names), 0)
+    alike = find_look_alikes(evidence_of(np.zeros(len(EFFECT_TABLE)), *names), 0)
     assert alike == [1]
 
 
 def test_the_next_experiment_excites_what_tells_the_two_apart() -> None:
-    evidence = evidence_of(parameter_vector({"fade": 0.06}), "brake_fade", "pressure_nonlinearity")
-    null = fit(evidence.train, (), evidence.session_sigma)
-    faded = fit(evidence.train, (library_hypothesis(LIBRARY["brake_fade"], 0.06),), evidence.session_sigma)
-    plan = next_experiment(evidence, faded, null, VEHICLE, SURFACE)
+    evidence = evidence_of(build_parameter_vector({"fade": 0.06}), "brake_fade", "pressure_nonlinearity")
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    faded = fit_hypotheses(
+        evidence.train, (make_library_hypothesis(LIBRARY["brake_fade"], 0.06),), evidence.session_sigma
+    )
+    plan = plan_next_experiment(evidence, faded, null, VEHICLE, SURFACE)
     assert plan is not None
     assert plan.plan in {words for words, _ in EXPERIMENTS} and "hot discs" in plan.plan
     assert plan.expected_d2 > 20.0
-    assert next_experiment(evidence, faded, faded, VEHICLE, SURFACE) is None
+    assert plan_next_experiment(evidence, faded, faded, VEHICLE, SURFACE) is None
 
 
 def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> None:
-    evidence = evidence_of(parameter_vector({"fade": 0.06}), "brake_fade", "rolling_resistance")
-    null = fit(evidence.train, (), evidence.session_sigma)
+    evidence = evidence_of(build_parameter_vector({"fade": 0.06}), "brake_fade", "rolling_resistance")
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     plain, asked = (
         {c.hypothesis.name for c in refine_candidates(evidence, null, gated=False, also=also)}
         for also in (frozenset[str](), frozenset({"rolling_resistance"}))
@@ -121,12 +124,12 @@ def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> 
 
 def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bounds() -> None:
     evidence = evidence_of(np.zeros(len(EFFECT_TABLE)), "rolling_resistance", "wet_friction_speed")
-    null = fit(evidence.train, (), evidence.session_sigma)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     sizes = find_detectable_sizes(evidence, null)
     assert 0.0 < sizes["rolling_resistance"] < 0.05
     rolling = LIBRARY["rolling_resistance"]
-    found = fit(evidence.train, (library_hypothesis(rolling),), evidence.session_sigma)
-    one = 2.0 * (25.0 + np.log(evidence.samples)) * inflation(evidence, null, None)
+    found = fit_hypotheses(evidence.train, (make_library_hypothesis(rolling),), evidence.session_sigma)
+    one = 2.0 * (25.0 + np.log(evidence.samples)) * compute_inflation(evidence, null, None)
     assert sizes["rolling_resistance"] == pytest.approx(np.sqrt(one * found.covariance[0, 0]), rel=0.3)
     (first,) = rolling.parameters
     tight = replace(rolling, parameters=(replace(first, bounds=(0.0, 0.9 * sizes["rolling_resistance"])),))

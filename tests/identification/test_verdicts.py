@@ -11,12 +11,12 @@ from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run
-from tasks.identification.benchmark import synthetic_campaign
+from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import find_missing_effects
-from tasks.identification.inference.forward import predict, run_model
+from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.effects.table import parameter_vector
+from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
@@ -52,7 +52,7 @@ def judged(
     design: tuple[RunPlan, ...] = LEAN,
 ) -> Verdict:
     slots = OUTSIDE[outside].slots if outside else ()
-    campaign = synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
+    campaign = make_synthetic_campaign(VEHICLE, SURFACE, values, seed, slots=slots, design=design)
     last = 3 * len(design) // 4
     runs = tuple(replace(run, held_out=number >= last) for number, run in enumerate(campaign.runs))
     return find_missing_effects(
@@ -119,17 +119,17 @@ class TestACarThatIsGrown:
 
     def test_it_predicts_as_the_plain_car_with_its_effects(self) -> None:
         run = make_planned_run(RICH[4], "pulsed")
-        theta = parameter_vector({"lag": 0.08, "drag_area": 0.7})
-        grown = predict(run_model(run, self.GROWN, SURFACE), np.zeros_like(theta))
-        np.testing.assert_array_equal(grown, predict(run_model(run, VEHICLE, SURFACE), theta))
+        theta = build_parameter_vector({"lag": 0.08, "drag_area": 0.7})
+        grown = predict_channels(prepare_run(run, self.GROWN, SURFACE), np.zeros_like(theta))
+        np.testing.assert_array_equal(grown, predict_channels(prepare_run(run, VEHICLE, SURFACE), theta))
 
     def test_it_predicts_with_its_forms(self) -> None:
         run = make_planned_run(RICH[4], "pulsed")
-        none = parameter_vector({})
-        grown = predict(run_model(run, replace(VEHICLE, forms=(self.FORM,)), SURFACE), none)
-        added = predict(run_model(run, VEHICLE, SURFACE), none, slots=(self.FORM.slot,))
+        none = build_parameter_vector({})
+        grown = predict_channels(prepare_run(run, replace(VEHICLE, forms=(self.FORM,)), SURFACE), none)
+        added = predict_channels(prepare_run(run, VEHICLE, SURFACE), none, slots=(self.FORM.slot,))
         np.testing.assert_array_equal(grown, added)
-        assert np.abs(grown - predict(run_model(run, VEHICLE, SURFACE), none)).max() > 0.1
+        assert np.abs(grown - predict_channels(prepare_run(run, VEHICLE, SURFACE), none)).max() > 0.1
 
     def test_it_lacks_only_what_it_has_not(self) -> None:
         verdict = judged({"lag": 0.08, "drag_area": 0.7}, vehicle=replace(self.GROWN, effects={"lag": 0.08}))
@@ -142,7 +142,7 @@ class TestACarThatIsGrown:
     def test_a_calibrated_vehicle_is_judged_with_all_that_calibration_gave_it(self) -> None:
         grown = load_vehicle("multibody-grown")
         assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
-        campaign = synthetic_campaign(grown, SURFACE, {"lag": 0.08}, 31)
+        campaign = make_synthetic_campaign(grown, SURFACE, {"lag": 0.08}, 31)
         verdict = find_missing_effects(
             campaign, grown, SURFACE, load_effects(), load_decision_rules()
         ).verdict

@@ -82,7 +82,7 @@ def test_road_pixels_know_their_station_and_side(monkeypatch):
     poses = np.tile(np.eye(4), (351, 1, 1))
     poses[:, 0, 3] = station
     route = Route(station=station + 50, T_world_rig=poses)
-    monkeypatch.setattr("tasks.render.sight.attribution", lambda *drawn: None)
+    monkeypatch.setattr("tasks.render.sight.attribute_pixels", lambda *drawn: None)
     points = take_drawn_frame(None, SimpleNamespace(picture=None), gbuffer, view, True).points
     place = road_coordinates(gbuffer.class_id, points, route)
     road = gbuffer.class_id == SemanticClass.ROAD

@@ -16,7 +16,7 @@ from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import sensor_field
 from tasks.render.sight import row_points
 from tasks.render.weather.attribution import LAYER_BITS
-from tasks.render.weather.scene_light import appended
+from tasks.render.weather.scene_light import append_gaussians
 from tasks.scene.route import route_from_positions
 from tasks.scene.scene import Scene
 from tasks.surface.state import SurfaceState
@@ -62,7 +62,7 @@ def street():
     )
     foot, height = (part.ravel() for part in np.meshgrid(np.arange(8.0, 20, 3), np.arange(0, 3, 0.05)))
     post = surfels(np.column_stack((foot, np.full(foot.size, 2.5), height)), (-1, 0, 0), 0.05, 0.8, 8)
-    return appended(appended(road(length=22), wall), post)
+    return append_gaussians(append_gaussians(road(length=22), wall), post)
 
 
 def clip(street, camera, parameters, state=None, **more):

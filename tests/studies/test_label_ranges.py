@@ -12,7 +12,7 @@ from catalogs.vehicles import load_vehicle
 from flows.making.driving import controls_of, hazard_of, ranges_of, simulate_drive, weather_of
 from tasks.studies.label_ranges import DRIVEN_PERCENTILES, label_ranges, sampled_friction
 from tasks.surface.state import SurfaceState
-from tasks.vehicle.rollout import rollout
+from tasks.vehicle.rollout import simulate_scenario
 
 RAIN = {"weather": "rain", "precipitation_mm_h": 50.0}
 SNOW = {"weather": "snow", "precipitation_mm_h": 1.0, "snow_accumulation_h": 1.0}
@@ -54,7 +54,7 @@ def test_five_drives_find_what_a_drive_of_every_sample_finds(entries):
 
     def again(mu: float) -> tuple[float, float]:
         driven.append(mu)
-        ride = rollout(
+        ride = simulate_scenario(
             vehicle,
             SurfaceState(kind="rain", friction=mu),
             controls_of(scenario),

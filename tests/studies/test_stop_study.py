@@ -10,12 +10,12 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.events import RecordedRun
-from tasks.identification.inference.forward import predict
+from tasks.identification.inference.forward import predict_channels
 from tasks.studies.stop import Stop, stop_errors, stop_of, stopping_distance
-from tasks.studies.stop_findings import rebound, saturation, slip_cycles
-from tasks.studies.stop_study import Rung, _model, climb, uncalibrated
+from tasks.studies.stop_findings import measure_rebound, measure_saturation, slip_cycles
+from tasks.studies.stop_study import Rung, _model, compute_uncalibrated_errors, fit_ladder
 from tasks.studies.stop_swing import Swing, fit_swing, swing_acceleration, with_swing
-from tasks.vehicle.effects.table import parameter_vector
+from tasks.vehicle.effects.table import build_parameter_vector
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 INTERVAL = 0.01
@@ -32,7 +32,9 @@ def made_stop(peak: float, speed: float, truth: dict[str, float], name: str) -> 
     }  # fmt: skip
     blank = Stop(name=name, interval=INTERVAL, columns=columns, onset=40)
     # the wheels of a standing car chatter at the slip's floor: the measured car is taken to stand from 2 m/s on
-    values = predict(_model(blank, VEHICLE, SURFACE, engine_torque=True), parameter_vector(truth))
+    values = predict_channels(
+        _model(blank, VEHICLE, SURFACE, engine_torque=True), build_parameter_vector(truth)
+    )
     made = dict(zip(CHANNELS, values.T, strict=True))
     slow = int(np.argmax(made["speed"] < 2.0))
     rest = made["speed"][slow] + made["longitudinal_acceleration"][slow - 1] * INTERVAL * np.arange(
@@ -55,7 +57,7 @@ def rung(name: str, engine: bool, *longitudinal: str, swing: bool = False) -> Ru
 
 
 def test_effects_that_are_there_are_found_on_one_stop_and_predict_the_other(stops: tuple[Stop, Stop]) -> None:
-    plain, full = climb(
+    plain, full = fit_ladder(
         *stops,
         [rung("plain", False, "pressure_gain"), rung("full", True, "pressure_gain", "lag")],
         VEHICLE,
@@ -72,14 +74,14 @@ def test_the_held_out_stop_is_never_looked_at_while_fitting(stops: tuple[Stop, S
     ladder = [rung("full", True, "pressure_gain", "lag", swing=True)]
     spoilt = replace(held_out, columns={**held_out.columns, "pitch": held_out.columns["pitch"] + 3.0,
                                         "speed": np.maximum(held_out.columns["speed"] - 1.0, 0.0)})  # fmt: skip
-    (clean,), (dirty,) = (climb(train, other, ladder, VEHICLE, SURFACE) for other in (held_out, spoilt))
+    (clean,), (dirty,) = (fit_ladder(train, other, ladder, VEHICLE, SURFACE) for other in (held_out, spoilt))
     assert (clean.parameters, clean.dive, clean.swing) == (dirty.parameters, dirty.dive, dirty.swing)
 
 
 def test_calibrating_beats_the_data_sheet(stops: tuple[Stop, Stop]) -> None:
     train, held_out = stops
-    (found,) = climb(train, held_out, [rung("plain", False, "pressure_gain")], VEHICLE, SURFACE)
-    assert found.held_out.speed_rmse < uncalibrated(held_out, VEHICLE, SURFACE).speed_rmse
+    (found,) = fit_ladder(train, held_out, [rung("plain", False, "pressure_gain")], VEHICLE, SURFACE)
+    assert found.held_out.speed_rmse < compute_uncalibrated_errors(held_out, VEHICLE, SURFACE).speed_rmse
 
 
 def test_a_perfect_prediction_has_no_errors(stops: tuple[Stop, Stop]) -> None:
@@ -148,7 +150,7 @@ def test_torque_that_rises_past_the_tyres_limit_is_put_in_numbers() -> None:
         "longitudinal_acceleration": -deceleration,
     }
     columns["speed"][-1] = 1.0
-    found = saturation(Stop(name="x", interval=INTERVAL, columns=columns, onset=1), VEHICLE)
+    found = measure_saturation(Stop(name="x", interval=INTERVAL, columns=columns, onset=1), VEHICLE)
     assert found.share_used_before == pytest.approx(1.0, abs=0.05)
     assert found.torque_largest == pytest.approx(29_800, rel=0.01)
     assert found.share_used_then == pytest.approx(limit * lever / 29_800, rel=0.02)
@@ -183,7 +185,7 @@ def test_the_rebound_is_measured_about_the_pitch_at_rest() -> None:
     t = np.arange(400) * INTERVAL
     pitch = np.where(t < 1.0, 1.0, 0.2 + 0.5 * np.exp(-3 * (t - 1)) * np.cos(2 * np.pi * 1.5 * (t - 1)))
     stop = Stop(name="x", interval=INTERVAL, columns={"speed": np.where(t < 0.95, 5.0, 0.0)}, onset=10)
-    found = rebound(stop, pitch)
+    found = measure_rebound(stop, pitch)
     assert found.back == pytest.approx(-0.5 * np.exp(-3 / 3), abs=0.02)
     assert 0.03 < found.forth < 0.2
 

@@ -17,8 +17,8 @@ from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.rollout import MODES, Controls, rollout
+from tasks.vehicle.parameters import compute_surface_response
+from tasks.vehicle.rollout import MODES, Controls, simulate_scenario
 
 ASPHALT = load_surface("dense-asphalt")
 ICE = surface_state(Weather(kind="ice"), ASPHALT)
@@ -50,9 +50,9 @@ def test_its_friction_and_the_range_of_its_labels_are_those_of_the_literature():
 def test_the_tyre_on_ice_is_burckhardts_with_a_top():
     """c1 and c2 of Burckhardt 1993; c3 moves the top from infinity to 3.1 % slip and takes 2 % off a locked wheel."""
     vehicle = load_vehicle("paper-reference")
-    c1, c2, c3 = vehicle.tyre_family("ice").burckhardt
+    c1, c2, c3 = vehicle.find_tyre_family("ice").burckhardt
     assert (c1, c2) == (0.05, 306.39)
-    tyre = surface_response(vehicle, "ice", ICE.friction).tyre
+    tyre = compute_surface_response(vehicle, "ice", ICE.friction).tyre
     slip = np.linspace(0, 1, 100_001)
     curve = c1 * (1 - np.exp(-c2 * slip)) - c3 * slip
     assert (
@@ -67,7 +67,8 @@ def test_every_car_takes_several_times_the_way_on_ice_with_its_abs_at_work(name,
     dry = SurfaceState(kind="dry", friction=0.82)
     vehicle = load_vehicle(name)
     on_ice, on_dry = (
-        rollout(vehicle, surface, STOP, FLAT_ROAD, mode=mode, duration_s=16.0) for surface in (ICE, dry)
+        simulate_scenario(vehicle, surface, STOP, FLAT_ROAD, mode=mode, duration_s=16.0)
+        for surface in (ICE, dry)
     )
     slowing = 9.81 * ICE.friction + vehicle.coast_deceleration
     assert on_ice.stopping_distance == pytest.approx(SPEED**2 / (2 * slowing), rel=0.03)

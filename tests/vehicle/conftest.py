@@ -9,7 +9,7 @@ from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Controls, Rollout, rollout
+from tasks.vehicle.rollout import Controls, Rollout, simulate_scenario
 
 HUMP = RoadHazard(center_m=20.0, length_m=3.7, height_m=0.075)
 Drive = Callable[..., Rollout]
@@ -45,7 +45,7 @@ def drive(vehicle: Vehicle) -> Drive:
         controls = Controls(
             initial_speed=speed_km_h / 3.6, brake=brake or command(), hold_speed_until_brake=hold
         )
-        return rollout(
+        return simulate_scenario(
             car or vehicle,
             SurfaceState(kind=family, friction=friction),
             controls,

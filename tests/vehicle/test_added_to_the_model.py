@@ -7,12 +7,12 @@ import pytest
 
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
-from tasks.vehicle.effects.forms import SHAPES, Form, coefficient_count
+from tasks.vehicle.effects.forms import SHAPES, Form, count_coefficients
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.effects.table import EFFECT_UNITS
-from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.rollout import Controls, rollout
-from tasks.vehicle.tyres.contract import tyre_friction
+from tasks.vehicle.parameters import compute_surface_response
+from tasks.vehicle.rollout import Controls, simulate_scenario
+from tasks.vehicle.tyres.contract import compute_tyre_friction
 from tests.vehicle.conftest import HUMP, command
 
 STOP = command(1.5, onset=0.5)
@@ -54,8 +54,10 @@ def test_snow_and_water_act_only_where_they_lie(vehicle, coupled):
     assert coupled(thing, surface=WET)["speed"][-1] > coupled(surface=WET)["speed"][-1] + 0.1
     coast = Controls(initial_speed=15.0, brake=command(0.0, onset=None), hold_speed_until_brake=False)
     deep, bare = (
-        rollout(replace(vehicle, effects=thing), SurfaceState(kind="snow", friction=0.42, snow_depth_mm=depth), coast,
-                FLAT_ROAD, mode="coupled", duration_s=1.0).columns["longitudinal_acceleration"][500]
+        simulate_scenario(
+            replace(vehicle, effects=thing), SurfaceState(kind="snow", friction=0.42, snow_depth_mm=depth), coast,
+            FLAT_ROAD, mode="coupled", duration_s=1.0,
+        ).columns["longitudinal_acceleration"][500]
         for depth in (12.0, 0.0)
     )  # fmt: skip
     turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
@@ -64,10 +66,10 @@ def test_snow_and_water_act_only_where_they_lie(vehicle, coupled):
 
 def test_the_slip_that_builds_up_force_follows_over_the_relaxation_length(vehicle, coupled):
     """d kappa'/dt = v (kappa - kappa') / L (Pacejka 2012), with kappa' read from the curve at the logged force."""
-    tyre = surface_response(vehicle, "dry", 0.82).tyre
+    tyre = compute_surface_response(vehicle, "dry", 0.82).tyre
     columns = coupled({"relaxation_length": 0.8}, brake=command(1.0, onset=0.2, ramp_s=0.4), duration=1.2)
     slips = np.linspace(0.0, tyre.target_slip, 2001)
-    curve = np.array([tyre_friction(slip, 4e3, tyre) for slip in slips])
+    curve = np.array([compute_tyre_friction(slip, 4e3, tyre) for slip in slips])
     felt = np.interp(columns["tyre_force_f"] / columns["tyre_load_f"], curve, slips)
     rate = np.gradient(felt, 1e-3)[250:1150]
     expected = (columns["speed"] * (columns["braking_slip_f"] - felt) / 0.8)[250:1150]
@@ -81,11 +83,11 @@ def test_a_relaxation_length_that_goes_to_zero_is_the_plain_model(coupled):
 
 
 def test_sliding_heats_the_tyre_and_heat_takes_its_grip(vehicle, coupled):
-    tyre = surface_response(vehicle, *WET).tyre
+    tyre = compute_surface_response(vehicle, *WET).tyre
     columns = coupled({"tyre_heating": 2.0}, surface=WET)
     slip = columns["braking_slip_f"]
     heat = np.cumsum(np.abs(columns["tyre_force_f"] * slip) * columns["speed"]) * 1e-3
-    cold = np.array([tyre_friction(k, 4e3, tyre) for k in slip]) * columns["tyre_load_f"]
+    cold = np.array([compute_tyre_friction(k, 4e3, tyre) for k in slip]) * columns["tyre_load_f"]
     assert heat[2500] > 8e3
     np.testing.assert_allclose(
         columns["tyre_force_f"][:2500], ((1.0 - 2.0 * heat / 1e5) * cold)[:2500], atol=5.0
@@ -141,7 +143,7 @@ def test_forms_add_up(coupled):
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_table_follows_its_shape(shape):
-    coefficients = (0.3, -0.2)[: coefficient_count(shape)]
+    coefficients = (0.3, -0.2)[: count_coefficients(shape)]
     made = form("friction", "speed", *coefficients, shape=shape, scale=30.0, low=0.0, high=30.0)
     slot = made.slot
     x = (slot.origin + slot.spacing * np.arange(len(slot.values))) / 30.0

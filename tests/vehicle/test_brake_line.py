@@ -6,16 +6,21 @@ from math import exp
 import numpy as np
 import pytest
 
-from tasks.vehicle.effects.brake_line import DISC_COOLING, acting_pressure, disc_rate, line_after
-from tasks.vehicle.effects.equations import friction_factor, resistance, strut_force
-from tasks.vehicle.effects.table import effect_values
+from tasks.vehicle.effects.brake_line import (
+    DISC_COOLING,
+    compute_acting_pressure,
+    compute_disc_temperature_rate,
+    compute_line_pressure,
+)
+from tasks.vehicle.effects.equations import compute_friction_factor, compute_resistance, compute_strut_force
+from tasks.vehicle.effects.table import pack_effect_values
 from tests.vehicle.conftest import command
 
 STOP = command(1.5)
 
 
 def theta(**values):
-    return effect_values(values)
+    return pack_effect_values(values)
 
 
 @pytest.fixture
@@ -27,23 +32,23 @@ def coupled(drive, vehicle):
 
 
 def test_with_no_numbers_the_acting_pressure_is_the_commanded_one():
-    assert acting_pressure(2.345, 17.0, 300.0, theta()) == 2.345
-    assert line_after(1.0, 2.0, 2.345, 5e-4, theta()) == 2.345
-    assert friction_factor(theta(), 30.0, 1.4, 1e5, 1.0) == 1.0
+    assert compute_acting_pressure(2.345, 17.0, 300.0, theta()) == 2.345
+    assert compute_line_pressure(1.0, 2.0, 2.345, 5e-4, theta()) == 2.345
+    assert compute_friction_factor(theta(), 30.0, 1.4, 1e5, 1.0) == 1.0
 
 
 def test_each_number_of_the_line_does_what_it_says():
-    assert acting_pressure(2.0, 20.0, 0.0, theta(push_out=0.1)) == pytest.approx(1.9)
-    assert acting_pressure(2.0, 20.0, 200.0, theta(fade=0.06)) == pytest.approx(2.0 * 0.88)
-    assert acting_pressure(2.0, 20.0, 0.0, theta(pressure_curve=0.04)) == pytest.approx(2.16)
+    assert compute_acting_pressure(2.0, 20.0, 0.0, theta(push_out=0.1)) == pytest.approx(1.9)
+    assert compute_acting_pressure(2.0, 20.0, 200.0, theta(fade=0.06)) == pytest.approx(2.0 * 0.88)
+    assert compute_acting_pressure(2.0, 20.0, 0.0, theta(pressure_curve=0.04)) == pytest.approx(2.16)
     pads = theta(pad_speed=0.006, pad_speed_reference=15.0)
-    assert acting_pressure(2.0, 20.0, 0.0, pads) == pytest.approx(2.0 * 0.97)
-    assert line_after(0.0, 1.0, 1.0, 0.1, theta(lag=0.1)) == pytest.approx(1.0 - exp(-1.0))
+    assert compute_acting_pressure(2.0, 20.0, 0.0, pads) == pytest.approx(2.0 * 0.97)
+    assert compute_line_pressure(0.0, 1.0, 1.0, 0.1, theta(lag=0.1)) == pytest.approx(1.0 - exp(-1.0))
 
 
 def test_discs_take_the_heat_and_give_it_to_the_air():
-    assert disc_rate(0.0, 7400.0, 7400.0) == 1.0
-    assert disc_rate(50.0, 50.0 * DISC_COOLING, 7400.0) == 0.0
+    assert compute_disc_temperature_rate(0.0, 7400.0, 7400.0) == 1.0
+    assert compute_disc_temperature_rate(50.0, 50.0 * DISC_COOLING, 7400.0) == 0.0
 
 
 def test_a_lag_and_a_dead_time_delay_the_torque_by_as_much(coupled):
@@ -82,18 +87,18 @@ def test_wind_creep_rubbing_pads_and_rolling_by_speed_change_coasting_by_their_f
             vehicle.mass + turning
         )
         assert got == pytest.approx(force, rel=0.02), effects
-    assert resistance(theta(drag_area=1.0, wind_speed=-10.0), 10.0, 1.0, 0.0) == 0.0
+    assert compute_resistance(theta(drag_area=1.0, wind_speed=-10.0), 10.0, 1.0, 0.0) == 0.0
 
 
 def test_struts_meet_friction_and_a_stop():
     dry = theta(coulomb_friction=80.0)
-    assert strut_force(dry, 0.0, 0.0, 0.0, 0.5) == pytest.approx(80.0)
-    assert strut_force(dry, 0.0, 0.0, 0.0, -0.5) == pytest.approx(-80.0)
+    assert compute_strut_force(dry, 0.0, 0.0, 0.0, 0.5) == pytest.approx(80.0)
+    assert compute_strut_force(dry, 0.0, 0.0, 0.0, -0.5) == pytest.approx(-80.0)
     stop = theta(stop_stiffness=1e5, stop_clearance=0.04)
-    assert strut_force(stop, 0.0, 0.0, -0.03, 0.0) == 0.0
-    assert strut_force(stop, 0.0, 0.0, -0.05, 0.0) == pytest.approx(-1000.0)
+    assert compute_strut_force(stop, 0.0, 0.0, -0.03, 0.0) == 0.0
+    assert compute_strut_force(stop, 0.0, 0.0, -0.05, 0.0) == pytest.approx(-1000.0)
 
 
 def test_friction_falls_with_speed_and_load():
     effects = theta(friction_speed=0.01, load_sensitivity=0.15)
-    assert friction_factor(effects, 20.0, 1.2, 0.0, 0.0) == pytest.approx(0.8 * 0.97)
+    assert compute_friction_factor(effects, 20.0, 1.2, 0.0, 0.0) == pytest.approx(0.8 * 0.97)

@@ -6,16 +6,16 @@ import pytest
 
 from tasks.errors import InputError
 from tasks.vehicle.effects.chassis import (
-    effective_friction,
-    effective_slope,
-    footprint,
-    grip_reserve,
-    stick_share,
+    average_over_footprint,
+    compute_effective_friction,
+    compute_effective_slope,
+    compute_lateral_reserve,
+    compute_stick_share,
 )
 from tasks.vehicle.effects.equations import AIR_DENSITY
-from tasks.vehicle.effects.table import effect_values
-from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.road import height_at, road_feature
+from tasks.vehicle.effects.table import pack_effect_values
+from tasks.vehicle.parameters import compute_surface_response
+from tasks.vehicle.road import compute_road_height, make_road_feature
 from tests.vehicle.conftest import HUMP, command
 
 COAST = command(0.0, onset=None)
@@ -32,7 +32,7 @@ def coupled(drive, vehicle):
 
 def test_an_effect_that_is_none_is_named_and_those_that_exist_are_listed():
     with pytest.raises(InputError, match=r"effect turbo: a vehicle has no such number.*drag_area"):
-        effect_values({"turbo": 1.0})
+        pack_effect_values({"turbo": 1.0})
 
 
 def test_coasting_loses_what_air_and_rolling_resistance_take(vehicle, coupled):
@@ -55,24 +55,26 @@ def test_brakes_lock_the_wheels_below_the_cut_off_and_not_above(coupled):
 
 
 def test_a_sticking_tyre_has_its_own_friction_below_one_speed_and_the_curve_above_the_other(vehicle):
-    effects = effect_values({"stick_ratio": 0.7, "stick_below": 1.0, "stick_above": 3.0})
-    tyre = surface_response(vehicle, "rain", 0.4).tyre
-    shares = [stick_share(v, effects) for v in (0.1, 1.0, 2.0, 3.0, 20.0)]
+    effects = pack_effect_values({"stick_ratio": 0.7, "stick_below": 1.0, "stick_above": 3.0})
+    tyre = compute_surface_response(vehicle, "rain", 0.4).tyre
+    shares = [compute_stick_share(v, effects) for v in (0.1, 1.0, 2.0, 3.0, 20.0)]
     assert shares == [1.0, 1.0, pytest.approx(0.5), 0.0, 0.0]
-    assert effective_friction(1.0, 4e3, 1.0, tyre, effects) == pytest.approx(0.7 * tyre.peak, rel=1e-4)
-    assert effective_friction(tyre.target_slip, 4e3, 0.0, tyre, effects) == pytest.approx(tyre.peak)
+    assert compute_effective_friction(1.0, 4e3, 1.0, tyre, effects) == pytest.approx(
+        0.7 * tyre.peak, rel=1e-4
+    )
+    assert compute_effective_friction(tyre.target_slip, 4e3, 0.0, tyre, effects) == pytest.approx(tyre.peak)
     for slip in (0.003, 0.02, 0.3):
-        rise = (effective_friction(slip + 1e-6, 4e3, 0.4, tyre, effects)
-                - effective_friction(slip - 1e-6, 4e3, 0.4, tyre, effects)) / 2e-6  # fmt: skip
-        assert effective_slope(slip, 4e3, 0.4, tyre, effects) == pytest.approx(rise, rel=1e-5)
+        rise = (compute_effective_friction(slip + 1e-6, 4e3, 0.4, tyre, effects)
+                - compute_effective_friction(slip - 1e-6, 4e3, 0.4, tyre, effects)) / 2e-6  # fmt: skip
+        assert compute_effective_slope(slip, 4e3, 0.4, tyre, effects) == pytest.approx(rise, rel=1e-5)
 
 
 def test_the_footprint_feels_the_mean_of_the_road(vehicle):
-    road, effects = road_feature(HUMP), effect_values({"enveloping_length": 0.2})
+    road, effects = make_road_feature(HUMP), pack_effect_values({"enveloping_length": 0.2})
     for station in (18.2, 18.9, 20.0, 21.3):
         at = np.linspace(station - 0.1, station + 0.1, 2001)
-        heights = np.array([height_at(s, road) for s in at])
-        height, slope = footprint(station, road, effects)
+        heights = np.array([compute_road_height(s, road) for s in at])
+        height, slope = average_over_footprint(station, road, effects)
         assert height == pytest.approx(np.trapezoid(heights, at) / 0.2, abs=2e-5)
         assert slope == pytest.approx((heights[-1] - heights[0]) / 0.2, rel=1e-9)
 
@@ -102,5 +104,7 @@ def test_anti_dive_and_anti_lift_take_their_share_of_the_load_from_the_springs(v
 
 
 def test_the_friction_circle_leaves_all_grip_free_and_none_at_the_peak():
-    assert [grip_reserve(f, 0.8) for f in (0.0, 0.48, 0.8, 0.9)] == pytest.approx([1.0, 0.8, 0.0, 0.0])
-    assert grip_reserve(0.4, 0.8) == pytest.approx(sqrt(0.75))
+    assert [compute_lateral_reserve(f, 0.8) for f in (0.0, 0.48, 0.8, 0.9)] == pytest.approx(
+        [1.0, 0.8, 0.0, 0.0]
+    )
+    assert compute_lateral_reserve(0.4, 0.8) == pytest.approx(sqrt(0.75))

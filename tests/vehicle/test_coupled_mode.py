@@ -9,12 +9,12 @@ from scipy.integrate import solve_ivp
 
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle import reference
-from tasks.vehicle.model.chassis import Conditions, chassis_of
-from tasks.vehicle.model.ports import ports_at
+from tasks.vehicle.model.chassis import Conditions, build_chassis
+from tasks.vehicle.model.ports import compute_ports
 from tasks.vehicle.model.states import AT_REST, Instant, Memory, Motion
-from tasks.vehicle.model.step import body_rates, motion_rates
-from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.road import road_feature
+from tasks.vehicle.model.step import compute_body_rates, compute_motion_rates
+from tasks.vehicle.parameters import compute_surface_response
+from tasks.vehicle.road import make_road_feature
 from tests.vehicle.conftest import HUMP, command
 
 COAST = command(0.0, onset=None)
@@ -32,15 +32,15 @@ def work(columns, power):
 
 @pytest.mark.parametrize("pressure", [0.0, 0.7, 2.3])
 def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
-    response = surface_response(vehicle, "rain", 0.4)
-    chassis = chassis_of(vehicle, response, Conditions())
+    response = compute_surface_response(vehicle, "rain", 0.4)
+    chassis = build_chassis(vehicle, response, Conditions())
     rng = np.random.default_rng(2)
     for _ in range(200):
         speed, station = rng.uniform(0.1, 30), rng.uniform(17, 25)
         omega = speed / 0.32 * rng.uniform(0.6, 1.1, 2)
         x = rng.normal(0, 0.02, 8)
         motion = Motion(station, speed, *omega)
-        ports = ports_at(
+        ports = compute_ports(
             motion,
             Memory(AT_REST, AT_REST),
             tuple(x),
@@ -51,11 +51,11 @@ def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
             None,
             chassis,
             response.tyre,
-            road_feature(HUMP),
+            make_road_feature(HUMP),
         )
-        rates = motion_rates(motion, ports, False, chassis)
-        body = body_rates(tuple(x), ports, chassis.body)
-        twin = reference.coupled_rates(
+        rates = compute_motion_rates(motion, ports, False, chassis)
+        body = compute_body_rates(tuple(x), ports, chassis.body)
+        twin = reference.compute_coupled_rates(
             np.array([speed, station, *omega, *x]), pressure, vehicle, "rain", response, HUMP
         )
         kernel = [rates.speed, rates.station, rates.omega_f, rates.omega_r, *body]
@@ -69,12 +69,12 @@ def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
 def test_motion_agrees_with_an_adaptive_implicit_solver(
     vehicle, coupled, family, friction, speed_km_h, hazard
 ):
-    response = surface_response(vehicle, family, friction)
+    response = compute_surface_response(vehicle, family, friction)
     v0 = speed_km_h / 3.6
 
     def rates(t, y):
         pressure = 2.3 * min(max(t - 1.0, 0.0) / 0.5, 1.0)
-        return reference.coupled_rates(y, pressure, vehicle, family, response, hazard)
+        return reference.compute_coupled_rates(y, pressure, vehicle, family, response, hazard)
 
     state = np.array([v0, 0.0, v0 / 0.32, v0 / 0.32, *np.zeros(8)])
     times = np.arange(0, 2.6, 0.1)
@@ -139,11 +139,11 @@ def test_newtons_law_holds_on_the_logged_columns(vehicle, coupled):
 
 
 def test_tyre_force_is_friction_of_slip_times_the_one_load(vehicle, coupled):
-    response = surface_response(vehicle, "rain", 0.4)
+    response = compute_surface_response(vehicle, "rain", 0.4)
     c = coupled("rain", 0.4, speed_km_h=40, hazard=HUMP, duration=3.0).columns
     for axle in "fr":
         np.testing.assert_array_equal(c[f"tyre_load_{axle}"], c[f"axle_load_{axle}"])
-        friction = reference.burckhardt(c[f"braking_slip_{axle}"], vehicle, "rain", response)
+        friction = reference.compute_reference_friction(c[f"braking_slip_{axle}"], vehicle, "rain", response)
         np.testing.assert_allclose(c[f"tyre_force_{axle}"], friction * c[f"axle_load_{axle}"], atol=0.1)
 
 

@@ -5,7 +5,7 @@ from scipy.integrate import solve_ivp
 
 from tasks.surface.road_profile import RoadHazard, road_elevation
 from tasks.vehicle import reference
-from tasks.vehicle.half_car import forced_rates, half_car, integrate_half_car
+from tasks.vehicle.half_car import build_half_car, compute_forced_rates, integrate_half_car
 
 STEP = 5e-4
 TIME = np.arange(6001) * STEP
@@ -21,22 +21,22 @@ def braking_moment():
 
 
 def test_static_loads_are_the_papers(vehicle):
-    car = half_car(vehicle)
+    car = build_half_car(vehicle)
     assert (round(car.static_f, 1), round(car.static_r, 1)) == (7069.7, 5761.7)
 
 
 def test_nothing_moves_on_a_flat_road_without_brakes(vehicle):
     nothing = np.zeros(2001)
-    assert not integrate_half_car(nothing, nothing, nothing, STEP, half_car(vehicle)).any()
+    assert not integrate_half_car(nothing, nothing, nothing, STEP, build_half_car(vehicle)).any()
 
 
 def test_rates_agree_with_the_matrix_form_in_and_out_of_contact(vehicle):
     rng = np.random.default_rng(1)
     for scale in (0.005, 0.2):  # the larger one opens contacts
         for x, heights in zip(rng.normal(0, scale, (50, 8)), rng.normal(0, scale, (50, 2)), strict=True):
-            kernel = forced_rates(tuple(x), *heights, 1000.0, half_car(vehicle))
+            kernel = compute_forced_rates(tuple(x), *heights, 1000.0, build_half_car(vehicle))
             np.testing.assert_allclose(
-                kernel, reference.half_car_rates(x, heights, 1000.0, vehicle), rtol=1e-9, atol=1e-9
+                kernel, reference.compute_half_car_rates(x, heights, 1000.0, vehicle), rtol=1e-9, atol=1e-9
             )
 
 
@@ -45,28 +45,28 @@ def test_response_agrees_with_an_adaptive_solver(vehicle):
 
     def rates(t, x):
         heights = np.array([np.interp(t, TIME, front), np.interp(t, TIME, rear)])
-        return reference.half_car_rates(x, heights, np.interp(t, TIME, moment), vehicle)
+        return reference.compute_half_car_rates(x, heights, np.interp(t, TIME, moment), vehicle)
 
     solution = solve_ivp(
         rates, (0, 1.6), np.zeros(8), rtol=1e-7, atol=1e-10, max_step=0.005, t_eval=TIME[:3201:100]
     )
-    states = integrate_half_car(front, rear, moment, STEP, half_car(vehicle))
+    states = integrate_half_car(front, rear, moment, STEP, build_half_car(vehicle))
     np.testing.assert_allclose(states[:3201:100], solution.y.T, atol=2e-6)
 
 
 def test_halving_the_step_changes_nothing_visible(vehicle):
     fine_time = np.arange(12001) * STEP / 2
-    coarse = integrate_half_car(*road(HUMP), braking_moment(), STEP, half_car(vehicle))
+    coarse = integrate_half_car(*road(HUMP), braking_moment(), STEP, build_half_car(vehicle))
     fine = integrate_half_car(
         *(np.interp(fine_time, TIME, signal) for signal in (*road(HUMP), braking_moment())),
         STEP / 2,
-        half_car(vehicle),
+        build_half_car(vehicle),
     )
     assert np.abs(coarse - fine[::2]).max() < 1e-7
 
 
 def test_road_and_brake_response_add_up_in_contact(vehicle):
-    car, (front, rear), moment = half_car(vehicle), road(HUMP), braking_moment()
+    car, (front, rear), moment = build_half_car(vehicle), road(HUMP), braking_moment()
     nothing = np.zeros_like(moment)
     together = integrate_half_car(front, rear, moment, STEP, car)
     apart = integrate_half_car(front, rear, nothing, STEP, car) + integrate_half_car(
@@ -76,7 +76,7 @@ def test_road_and_brake_response_add_up_in_contact(vehicle):
 
 
 def test_a_depression_mirrors_a_hump_in_contact(vehicle):
-    car, nothing = half_car(vehicle), np.zeros_like(TIME)
+    car, nothing = build_half_car(vehicle), np.zeros_like(TIME)
     up = integrate_half_car(*road(HUMP), nothing, STEP, car)
     down = integrate_half_car(
         *road(RoadHazard(center_m=8.0, length_m=3.7, height_m=-0.075)), nothing, STEP, car
@@ -85,7 +85,7 @@ def test_a_depression_mirrors_a_hump_in_contact(vehicle):
 
 
 def test_superposition_and_mirror_break_once_a_wheel_leaves_the_road(vehicle):
-    car, nothing = half_car(vehicle), np.zeros_like(TIME)
+    car, nothing = build_half_car(vehicle), np.zeros_like(TIME)
     kerb = road(RoadHazard(center_m=8.0, length_m=0.6, height_m=0.10))
     hole = road(RoadHazard(center_m=8.0, length_m=0.6, height_m=-0.10))
     up, down = (integrate_half_car(*heights, nothing, STEP, car) for heights in (kerb, hole))
@@ -95,7 +95,7 @@ def test_superposition_and_mirror_break_once_a_wheel_leaves_the_road(vehicle):
 
 def test_energy_from_road_and_brake_is_stored_or_damped(vehicle):
     """Power of road and moment = change of kinetic and elastic energy + dampers, from the equations of motion."""
-    car, (front, rear), moment = half_car(vehicle), road(HUMP), braking_moment()
+    car, (front, rear), moment = build_half_car(vehicle), road(HUMP), braking_moment()
     x = integrate_half_car(front, rear, moment, STEP, car)
     stroke_f, stroke_r = x[:, 0] - x[:, 2] - 1.2 * x[:, 1], x[:, 0] - x[:, 3] + 1.5 * x[:, 1]
     rate_f, rate_r = x[:, 4] - x[:, 6] - 1.2 * x[:, 5], x[:, 4] - x[:, 7] + 1.5 * x[:, 5]
@@ -119,16 +119,16 @@ def test_energy_from_road_and_brake_is_stored_or_damped(vehicle):
 def test_a_steady_moment_pitches_the_body_as_its_springs_say(vehicle):
     """Static solution of K x = B_b M by NumPy."""
     states = integrate_half_car(
-        np.zeros(20001), np.zeros(20001), np.full(20001, 3000.0), STEP, half_car(vehicle)
+        np.zeros(20001), np.zeros(20001), np.full(20001, 3000.0), STEP, build_half_car(vehicle)
     )
-    _, _, stiffness, _, moment = reference.half_car_matrices(vehicle)
+    _, _, stiffness, _, moment = reference.build_half_car_matrices(vehicle)
     np.testing.assert_allclose(states[-1, :4], np.linalg.solve(stiffness, moment * 3000), rtol=1e-6)
 
 
 def test_load_is_never_negative(vehicle):
     nothing = np.zeros_like(TIME)
     kerb = road(RoadHazard(center_m=8.0, length_m=0.6, height_m=0.15))
-    car = half_car(vehicle)
+    car = build_half_car(vehicle)
     states = integrate_half_car(*kerb, nothing, STEP, car)
     assert np.isfinite(states).all()
     free_fall = states[car.tyre_f * (kerb[0] - states[:, 2]) < -car.static_f, 6]

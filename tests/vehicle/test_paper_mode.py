@@ -10,9 +10,9 @@ from catalogs.surfaces import load_surface
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle import reference
-from tasks.vehicle.paper.paper_mode import body_response, run_paper_mode
-from tasks.vehicle.paper.wheels import stopping_run, wheels_of
-from tasks.vehicle.parameters import surface_response
+from tasks.vehicle.paper.paper_mode import run_paper_mode, simulate_body
+from tasks.vehicle.paper.wheels import build_wheels, simulate_stop
+from tasks.vehicle.parameters import compute_surface_response
 from tests.vehicle.conftest import HUMP, command
 
 ONSET_NOW = command(onset=0.0)
@@ -20,8 +20,8 @@ ONSET_NOW = command(onset=0.0)
 
 def stop_of(vehicle, family, friction, *, speed_km_h=60.0, step=5e-4):
     free = replace(vehicle, coast_deceleration=0.0)
-    tyre = surface_response(free, family, friction).tyre
-    return stopping_run(speed_km_h / 3.6, step, 200_000, ONSET_NOW.profile, wheels_of(free), tyre)[0]
+    tyre = compute_surface_response(free, family, friction).tyre
+    return simulate_stop(speed_km_h / 3.6, step, 200_000, ONSET_NOW.profile, build_wheels(free), tyre)[0]
 
 
 def friction_of(kind, rate):
@@ -94,7 +94,7 @@ def test_weak_braking_stops_where_constant_force_says(vehicle, drive):
 
 def test_fast_motion_agrees_with_the_twin(vehicle):
     """Down to 5 m/s: below, the last bit of a sum decides which way the wheel chatters."""
-    response, steps = surface_response(vehicle, "rain", 0.4), 6000
+    response, steps = compute_surface_response(vehicle, "rain", 0.4), 6000
     run = run_paper_mode(
         vehicle, response, 60 / 3.6, False, ONSET_NOW.profile, FLAT_ROAD, steps=steps, step=5e-4
     )
@@ -104,7 +104,7 @@ def test_fast_motion_agrees_with_the_twin(vehicle):
     def loads(n, acceleration):
         return np.array([weight * 1.5 - transfer * acceleration, weight * 1.2 + transfer * acceleration])
 
-    twin = reference.paper_drive(
+    twin = reference.simulate_paper_drive(
         vehicle, "rain", response, 60 / 3.6, lambda t: 2.3 * min(t / 0.5, 1.0), loads, FLAT_ROAD, steps=steps, step=5e-4
     )  # fmt: skip
     fast = twin["speed"][:, 0] > 5
@@ -121,11 +121,11 @@ def test_fast_motion_agrees_with_the_twin(vehicle):
 
 
 def test_road_feature_motion_agrees_with_the_twin(vehicle):
-    response, steps = surface_response(vehicle, "dry", 0.82), 4000
+    response, steps = compute_surface_response(vehicle, "dry", 0.82), 4000
     run = run_paper_mode(
         vehicle, response, 40 / 3.6, False, command(onset=1.5).profile, HUMP, steps=steps, step=5e-4
     )
-    twin = reference.paper_drive(
+    twin = reference.simulate_paper_drive(
         vehicle, "dry", response, 40 / 3.6, lambda t: 2.3 * min(max(t - 1.5, 0) / 0.5, 1.0),
         lambda n, _: run.log[n, 9:11], HUMP, steps=steps, step=5e-4,
     )  # fmt: skip
@@ -145,7 +145,7 @@ def test_a_slow_abs_is_the_published_rate_limit(vehicle, drive):
 
 
 def test_fixed_point_passes_converge(vehicle):
-    response = surface_response(vehicle, "dry", 0.82)
+    response = compute_surface_response(vehicle, "dry", 0.82)
     changes = [
         run_paper_mode(
             vehicle, response, 40 / 3.6, True, command().profile, HUMP, steps=8000, step=5e-4, passes=passes
@@ -158,14 +158,14 @@ def test_fixed_point_passes_converge(vehicle):
 
 def test_the_body_response_is_that_of_road_and_brake_together(vehicle):
     """Superposition: one integration with both inputs, in the matrix form, for a braked hump."""
-    response = surface_response(vehicle, "dry", 0.82)
+    response = compute_surface_response(vehicle, "dry", 0.82)
     run = run_paper_mode(vehicle, response, 40 / 3.6, True, command().profile, HUMP, steps=6000, step=5e-4)
-    states, road, loads = body_response(vehicle, response, HUMP, run.log, run.onset, run.stop, 5e-4)
+    states, road, loads = simulate_body(vehicle, response, HUMP, run.log, run.onset, run.stop, 5e-4)
     assert (loads > 0).all()
     rates = np.gradient(states, 5e-4, axis=0)
     sample = slice(3500, 5000, 100)
     for x, rate, heights in zip(states[sample], rates[sample], road[sample], strict=True):
-        without = reference.half_car_rates(x, heights, 0.0, vehicle)
+        without = reference.compute_half_car_rates(x, heights, 0.0, vehicle)
         np.testing.assert_allclose(np.delete(rate - without, 5), 0, atol=0.02)
 
 
@@ -173,7 +173,7 @@ def test_steady_braking_pitches_the_body_by_the_calibrated_moment(vehicle, drive
     """K x = B_b gamma m_s h d, gamma 1.104778 on dry asphalt (Eq. app_brake_pitch)."""
     columns = drive(brake=command(1.5), duration=3.9).columns
     moment = 1.104778 * 1200 * 0.55 * -columns["longitudinal_acceleration"][3800]
-    _, _, stiffness, _, direction = reference.half_car_matrices(vehicle)
+    _, _, stiffness, _, direction = reference.build_half_car_matrices(vehicle)
     assert columns["pitch"][3800] == pytest.approx(
         np.linalg.solve(stiffness, direction * moment)[1], rel=1e-3
     )

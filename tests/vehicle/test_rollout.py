@@ -9,7 +9,7 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceState
-from tasks.vehicle.rollout import MODES, Controls, rollout
+from tasks.vehicle.rollout import MODES, Controls, simulate_scenario
 from tests.vehicle.conftest import HUMP, command
 
 BOTH = pytest.mark.parametrize("mode", MODES)
@@ -132,7 +132,7 @@ def test_what_the_tables_gave_is_reported(drive):
 def test_all_wrong_arguments_are_named_at_once(vehicle):
     controls = Controls(initial_speed=10.0, brake=command(), hold_speed_until_brake=False)
     with pytest.raises(InputError) as error:
-        rollout(vehicle, SurfaceState(kind="hail", friction=-0.1), controls, FLAT_ROAD, mode="fast",
+        simulate_scenario(vehicle, SurfaceState(kind="hail", friction=-0.1), controls, FLAT_ROAD, mode="fast",
                 duration_s=1.0005, step_s=0.0003)  # fmt: skip
     said = error.value.problems
     assert len(said) == 5

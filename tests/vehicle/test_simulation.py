@@ -7,15 +7,15 @@ import pytest
 
 from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
-from tasks.vehicle.brake import brake_pressure
+from tasks.vehicle.brake import compute_brake_pressure
 from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE, EFFECT_UNITS, PARAMETERS
-from tasks.vehicle.model.brake_input import brake_command, measured_trace
+from tasks.vehicle.model.brake_input import make_command_input, make_trace_input
 from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import simulate
-from tasks.vehicle.model.states import STATE_WIDTH, state_of_row, state_row
-from tasks.vehicle.parameters import surface_response
+from tasks.vehicle.model.states import STATE_WIDTH, pack_state, unpack_state
+from tasks.vehicle.parameters import compute_surface_response
 from tests.vehicle.conftest import command
 
 HUMP = Conditions(hazard=RoadHazard(center_m=12.0, length_m=3.7, height_m=0.075), disc_rise=80.0)
@@ -27,8 +27,8 @@ EFFECTS = {"lag": 0.08, "dead_time": 0.03, "relaxation_length": 0.4, "fade": 0.0
 def run(vehicle):
     def simulated(drive=None, *, samples=300, effects=None, conditions=HUMP, substeps=5, **options):
         return simulate(
-            replace(vehicle, effects=effects or {}), surface_response(vehicle, "rain", 0.5),
-            drive or brake_command(STOP), conditions, samples=samples, substeps=substeps, interval=0.01,
+            replace(vehicle, effects=effects or {}), compute_surface_response(vehicle, "rain", 0.5),
+            drive or make_command_input(STOP), conditions, samples=samples, substeps=substeps, interval=0.01,
             initial_speed=18.0, **options,
         )  # fmt: skip
 
@@ -36,9 +36,9 @@ def run(vehicle):
 
 
 def test_a_command_and_its_pressure_at_the_samples_drive_alike(run):
-    trace = np.array([brake_pressure(0.01 * n - 0.5, STOP) for n in range(300)])
+    trace = np.array([compute_brake_pressure(0.01 * n - 0.5, STOP) for n in range(300)])
     for effects in ({}, EFFECTS):
-        commanded, measured = run(effects=effects), run(measured_trace(trace, 0.01), effects=effects)
+        commanded, measured = run(effects=effects), run(make_trace_input(trace, 0.01), effects=effects)
         np.testing.assert_allclose(measured.history, commanded.history, rtol=1e-9, atol=1e-9)
 
 
@@ -53,7 +53,7 @@ def test_a_run_goes_on_from_a_stored_state_bit_by_bit(run, effects):
 
 def test_a_state_is_its_row(run):
     row = run(effects=EFFECTS, keep_states=True).states[200]
-    assert state_row(state_of_row(row)) == tuple(row)
+    assert pack_state(unpack_state(row)) == tuple(row)
 
 
 def test_a_branch_differs_from_where_something_else_acts(run):
@@ -71,7 +71,7 @@ def test_a_branch_differs_from_where_something_else_acts(run):
 
 
 def test_a_grade_takes_its_share_of_gravity_and_pitches_the_body_as_braking_does(vehicle, run):
-    coast = measured_trace(np.zeros(300), 0.01)
+    coast = make_trace_input(np.zeros(300), 0.01)
     up, flat, down = (run(coast, conditions=Conditions(grade=0.03, direction=d)) for d in (1, 0, -1))
     turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
     share = vehicle.mass / (vehicle.mass + turning)
@@ -85,12 +85,12 @@ def test_a_grade_takes_its_share_of_gravity_and_pitches_the_body_as_braking_does
 def test_a_measured_engine_torque_acts_through_the_wheels(vehicle, run):
     """A held torque decelerates the whole inertia; on ice it cannot take more than the tyres pass on."""
     none, torque = np.zeros(300), np.full(300, -600.0)
-    coast, dragged = run(measured_trace(none, 0.01)), run(measured_trace(none, 0.01, torque))
+    coast, dragged = run(make_trace_input(none, 0.01)), run(make_trace_input(none, 0.01, torque))
     turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
     lost = coast.column("longitudinal_acceleration")[250] - dragged.column("longitudinal_acceleration")[250]
     assert lost == pytest.approx(600.0 / vehicle.wheel_radius / (vehicle.mass + turning), rel=5e-3)
     assert dragged.column("wheel_speed_f")[250] < dragged.column("speed")[250] / vehicle.wheel_radius
-    hard = measured_trace(none, 0.01, np.full(300, -40000.0))
+    hard = make_trace_input(none, 0.01, np.full(300, -40000.0))
     assert -run(hard).column("longitudinal_acceleration").min() < 1.05 * 0.5 * vehicle.gravity
 
 
@@ -111,7 +111,7 @@ class TestEffectsOfAVehicle:
         assert grown.sprung_mass == vehicle.sprung_mass * 1.1
         assert grown.wheel_inertia_f == vehicle.wheel_inertia_f + 1.5
         for kind in ("dry", "snow", "ice"):
-            peaks = [surface_response(car, kind, 0.2).tyre.peak for car in (grown, vehicle)]
+            peaks = [compute_surface_response(car, kind, 0.2).tyre.peak for car in (grown, vehicle)]
             assert peaks[0] == pytest.approx(0.8 * peaks[1])
 
     def test_a_grade_and_an_instrument_are_no_part_of_it(self, vehicle):

@@ -13,11 +13,15 @@ from hypothesis import strategies as st
 from catalogs.surfaces import load_surface
 from catalogs.tyres import load_tyre
 from manifests.provenance import SOURCE_ROOT
-from tasks.identification.inference.forward import predict, run_model
+from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.vehicle.effects.table import PARAMETER_INDEX
-from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.tyres.contract import tyre_friction, tyre_slope
-from tasks.vehicle.tyres.magic_formula import lateral_friction, longitudinal_friction, tyre_forces
+from tasks.vehicle.parameters import compute_surface_response
+from tasks.vehicle.tyres.contract import compute_tyre_friction, compute_tyre_slope
+from tasks.vehicle.tyres.magic_formula import (
+    compute_lateral_friction,
+    compute_longitudinal_friction,
+    compute_tyre_forces,
+)
 from tasks.vehicle.tyres.magic_formula_tyre import scale_magic_formula
 from tasks.vehicle.tyres.scaling import fold_scaling
 from tests.identification.synthetic import plain_run
@@ -72,7 +76,7 @@ def test_mf61_agrees_with_mfeval_in_combined_slip_camber_and_pressure(
 ):
     """MFeval.jl, useMode 221, by the fixtures of github.com/robertscholz22/autonomousim (commit a14080a)."""
     values = coefficients("mf61-mfeval-sample.tir") | {"INFLPRES": pressure}
-    forces = tyre_forces(slip, angle, camber, load, fold_scaling(values, "MF 6.1"))
+    forces = compute_tyre_forces(slip, angle, camber, load, fold_scaling(values, "MF 6.1"))
     np.testing.assert_allclose(forces, (fx, fy), rtol=1e-8)
 
 
@@ -90,7 +94,7 @@ def test_mf61_agrees_with_mfeval_in_combined_slip_camber_and_pressure(
 def test_mf52_agrees_with_mfeval_under_camber_and_a_scaled_nominal_load(load, slip, angle, camber, fx, fy):
     """MFeval.jl, useMode 221, by the fixtures of github.com/robertscholz22/autonomousim (commit a14080a)."""
     tyre = load_tyre(FILES / "mf52-chrono-sedan.tir")
-    np.testing.assert_allclose(tyre_forces(slip, angle, camber, load, tyre), (fx, fy), rtol=1e-8)
+    np.testing.assert_allclose(compute_tyre_forces(slip, angle, camber, load, tyre), (fx, fy), rtol=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -103,7 +107,7 @@ def test_mf52_agrees_with_mfeval_under_camber_and_a_scaled_nominal_load(load, sl
 )  # fmt: skip
 def test_the_books_tyre_brakes_as_a_second_library_says(book, slip, angle, load, fx):
     """teasit/magic-formula-tyre-library e9f0354 on Table A3.1, by the golden files of github.com/KMoula30/outlap."""
-    assert tyre_forces(slip, angle, 0.0, load, book)[0] == pytest.approx(fx, rel=1e-9)
+    assert compute_tyre_forces(slip, angle, 0.0, load, book)[0] == pytest.approx(fx, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -115,44 +119,50 @@ def test_the_books_tyre_brakes_as_a_second_library_says(book, slip, angle, load,
 )  # fmt: skip
 def test_the_books_tyre_corners_as_a_second_library_says(book, angle, camber, load, fy):
     """As above; in pure lateral slip that library takes the slip angle itself where the book has its tangent."""
-    assert tyre_forces(0.0, atan(angle), camber, load, book)[1] == pytest.approx(fy, rel=1e-9)
+    assert compute_tyre_forces(0.0, atan(angle), camber, load, book)[1] == pytest.approx(fy, rel=1e-9)
 
 
 def test_the_curve_has_the_slope_peak_and_shifts_that_its_coefficients_say(book):
     """K_x at the centre, D_x at the top, S_V and S_H away from it (Pacejka 2012, section 4.3.2)."""
     c = book.longitudinal._replace(pvx1=0.02)
     centre = -c.phx1
-    assert longitudinal_friction(centre, 0.0, 0.0, c) == pytest.approx(0.02, abs=1e-12)
-    rise = longitudinal_friction(centre + 1e-7, 0.0, 0.0, c) - longitudinal_friction(
+    assert compute_longitudinal_friction(centre, 0.0, 0.0, c) == pytest.approx(0.02, abs=1e-12)
+    rise = compute_longitudinal_friction(centre + 1e-7, 0.0, 0.0, c) - compute_longitudinal_friction(
         centre - 1e-7, 0.0, 0.0, c
     )
     assert rise / 2e-7 == pytest.approx(21.51, rel=1e-6)
     slips = np.linspace(0, 1, 20_001)
-    assert max(longitudinal_friction(k, 0.0, 0.0, c) for k in slips) == pytest.approx(1.21 + 0.02, rel=1e-7)
-    assert max(longitudinal_friction(k, 0.5, 0.0, c) for k in slips) == pytest.approx(
+    assert max(compute_longitudinal_friction(k, 0.0, 0.0, c) for k in slips) == pytest.approx(
+        1.21 + 0.02, rel=1e-7
+    )
+    assert max(compute_longitudinal_friction(k, 0.5, 0.0, c) for k in slips) == pytest.approx(
         1.21 - 0.037 / 2 + 0.02, rel=1e-7
     )
     side = book.lateral._replace(phy1=0.0, phy2=0.0, pvy1=0.0, pvy2=0.0)
-    assert lateral_friction(0.0, 0.0, 0.0, side) == 0.0
-    assert lateral_friction(0.05, 0.0, 0.0, side) < 0.0 < lateral_friction(-0.05, 0.0, 0.0, side)
+    assert compute_lateral_friction(0.0, 0.0, 0.0, side) == 0.0
+    assert (
+        compute_lateral_friction(0.05, 0.0, 0.0, side) < 0.0 < compute_lateral_friction(-0.05, 0.0, 0.0, side)
+    )
 
 
 def test_without_the_other_slip_combined_forces_are_the_pure_ones(book):
     for slip in (-0.3, -0.04, 0.0, 0.1):
-        pure = LOAD * longitudinal_friction(slip, 0.0, 0.0, book.longitudinal)
-        assert tyre_forces(slip, 0.0, 0.0, LOAD, book)[0] == pytest.approx(pure, rel=1e-12)
+        pure = LOAD * compute_longitudinal_friction(slip, 0.0, 0.0, book.longitudinal)
+        assert compute_tyre_forces(slip, 0.0, 0.0, LOAD, book)[0] == pytest.approx(pure, rel=1e-12)
     for angle in (-0.2, 0.0, 0.05):
-        pure = LOAD * lateral_friction(np.tan(angle), 0.0, 0.0, book.lateral)
-        assert tyre_forces(0.0, angle, 0.0, LOAD, book)[1] == pytest.approx(pure, rel=1e-12)
-    assert tyre_forces(-0.1, 0.1, 0.0, 0.0, book) == (0.0, 0.0)
+        pure = LOAD * compute_lateral_friction(np.tan(angle), 0.0, 0.0, book.lateral)
+        assert compute_tyre_forces(0.0, angle, 0.0, LOAD, book)[1] == pytest.approx(pure, rel=1e-12)
+    assert compute_tyre_forces(-0.1, 0.1, 0.0, 0.0, book) == (0.0, 0.0)
 
 
 def test_either_slip_takes_grip_from_the_other_force(book):
-    braking = [abs(tyre_forces(-0.1, angle, 0.0, LOAD, book)[0]) for angle in (0.01, 0.05, 0.1, 0.2)]
-    cornering = [abs(tyre_forces(slip, 0.1, 0.0, LOAD, book)[1]) for slip in (-0.02, -0.1, -0.2, -0.4)]
+    braking = [abs(compute_tyre_forces(-0.1, angle, 0.0, LOAD, book)[0]) for angle in (0.01, 0.05, 0.1, 0.2)]
+    cornering = [
+        abs(compute_tyre_forces(slip, 0.1, 0.0, LOAD, book)[1]) for slip in (-0.02, -0.1, -0.2, -0.4)
+    ]
     assert braking == sorted(braking, reverse=True) and cornering == sorted(cornering, reverse=True)
     slips, angles = np.linspace(-0.5, 0.5, 41), np.linspace(-0.4, 0.4, 41)
-    used = max(np.hypot(*tyre_forces(k, a, 0.0, LOAD, book)) / LOAD for k in slips for a in angles)
+    used = max(np.hypot(*compute_tyre_forces(k, a, 0.0, LOAD, book)) / LOAD for k in slips for a in angles)
     assert used < 1.03 * 1.21
 
 
@@ -161,8 +171,8 @@ def test_a_mirrored_tyre_is_the_mirror_image(book):
     combined = book.combined._replace(rhx1=0.0, rby3=0.0, rvy1=0.0, rvy2=0.0)
     tyre = book._replace(lateral=lateral, combined=combined)
     for slip, angle, camber in [(-0.1, 0.1, 0.03), (0.0, 0.2, 0.0), (0.2, -0.05, 0.06)]:
-        fx, fy = tyre_forces(slip, angle, camber, LOAD, tyre)
-        assert tyre_forces(slip, -angle, -camber, LOAD, tyre) == (
+        fx, fy = compute_tyre_forces(slip, angle, camber, LOAD, tyre)
+        assert compute_tyre_forces(slip, -angle, -camber, LOAD, tyre) == (
             pytest.approx(fx, rel=1e-12),
             pytest.approx(-fy, rel=1e-12),
         )
@@ -198,43 +208,46 @@ def test_a_scaling_factor_scales_what_the_book_multiplies_by_it(factor, group, s
 
 @pytest.mark.parametrize(("family", "friction"), SURFACES)
 def test_the_surface_sets_the_peak_and_the_family_the_stiffness(vehicle, car, family, friction):
-    burckhardt, magic = (surface_response(v, family, friction) for v in (vehicle, car))
+    burckhardt, magic = (compute_surface_response(v, family, friction) for v in (vehicle, car))
     load = 2 * LOAD
     assert magic.tyre.peak == pytest.approx(burckhardt.tyre.peak, rel=1e-12)
-    assert tyre_friction(magic.tyre.target_slip, load, magic.tyre) == pytest.approx(
+    assert compute_tyre_friction(magic.tyre.target_slip, load, magic.tyre) == pytest.approx(
         magic.tyre.peak, rel=1e-12
     )
-    assert tyre_slope(magic.tyre.target_slip, load, magic.tyre) == pytest.approx(0.0, abs=1e-6)
+    assert compute_tyre_slope(magic.tyre.target_slip, load, magic.tyre) == pytest.approx(0.0, abs=1e-6)
     slips = np.linspace(0, 1, 2001)
-    assert max(tyre_friction(slip, load, magic.tyre) for slip in slips) <= magic.tyre.peak * (1 + 1e-12)
-    assert tyre_friction(0.0, load, magic.tyre) == 0.0
-    assert tyre_slope(0.0, load, magic.tyre) == pytest.approx(21.51 * magic.slip_stiffness, rel=1e-12)
+    assert max(compute_tyre_friction(slip, load, magic.tyre) for slip in slips) <= magic.tyre.peak * (
+        1 + 1e-12
+    )
+    assert compute_tyre_friction(0.0, load, magic.tyre) == 0.0
+    assert compute_tyre_slope(0.0, load, magic.tyre) == pytest.approx(21.51 * magic.slip_stiffness, rel=1e-12)
 
 
 @given(slip=st.floats(0.0, 1.0), load=st.floats(0.0, 40_000.0))
 def test_the_slope_is_the_derivative_under_any_load(book, slip, load):
     tyre = scale_magic_formula(book, 0.6, 1.3)
     step = 1e-6
-    numeric = (tyre_friction(slip + step, load, tyre) - tyre_friction(max(slip - step, 0.0), load, tyre)) / (
-        step + min(slip, step)
-    )
-    assert tyre_slope(slip, load, tyre) == pytest.approx(numeric, rel=1e-4, abs=1e-4)
+    numeric = (
+        compute_tyre_friction(slip + step, load, tyre)
+        - compute_tyre_friction(max(slip - step, 0.0), load, tyre)
+    ) / (step + min(slip, step))
+    assert compute_tyre_slope(slip, load, tyre) == pytest.approx(numeric, rel=1e-4, abs=1e-4)
 
 
 def test_a_loaded_tyre_grips_less_of_its_load_and_is_stiffer(book):
     """PDX2 of -0.037 on 1.21, PKX3 of 0.245; nothing changes beyond three times the nominal load."""
     tyre = scale_magic_formula(book, 1.21, 1.0)
-    assert tyre_friction(0.15, 16_000, tyre) < tyre_friction(0.15, 8_000, tyre)
+    assert compute_tyre_friction(0.15, 16_000, tyre) < compute_tyre_friction(0.15, 8_000, tyre)
     stiffness = (21.51 - 0.163) * np.exp(0.245)
-    assert tyre_slope(0.0, 16_000, tyre) == pytest.approx(stiffness, rel=1e-12)
-    assert tyre_friction(0.1, 24_000, tyre) == tyre_friction(0.1, 90_000, tyre)
+    assert compute_tyre_slope(0.0, 16_000, tyre) == pytest.approx(stiffness, rel=1e-12)
+    assert compute_tyre_friction(0.1, 24_000, tyre) == compute_tyre_friction(0.1, 90_000, tyre)
 
 
 def test_a_curve_without_a_top_below_full_slip_is_used_to_full_slip(book):
     flat = book._replace(longitudinal=book.longitudinal._replace(pkx1=1.0, pkx2=0.0))
     tyre = scale_magic_formula(flat, 1.0, 1.0)
     assert tyre.target_slip == 1.0
-    assert tyre.peak == tyre_friction(1.0, 2 * LOAD, tyre) < 1.0
+    assert tyre.peak == compute_tyre_friction(1.0, 2 * LOAD, tyre) < 1.0
 
 
 @pytest.mark.parametrize("mode", ["paper", "coupled"])
@@ -243,16 +256,18 @@ def test_a_vehicle_on_the_magic_formula_stops_as_its_friction_allows(drive, car,
     """The ABS uses all but a few percent of the peak: 1.04 to 1.06 of v^2 / (2 mu_eff g), as on Burckhardt's curve."""
     run = drive(family, friction, car=car, mode=mode, duration=14.0, hold=True)
     shortest = (60 / 3.6) ** 2 / (2 * run.tyre_peak * car.gravity)
-    assert run.target_slip == surface_response(car, family, friction).tyre.target_slip
+    assert run.target_slip == compute_surface_response(car, family, friction).tyre.target_slip
     assert 1.03 * shortest < run.stopping_distance < 1.07 * shortest
 
 
 def test_the_force_of_each_tick_is_the_curves_at_its_slip_and_load(drive, car):
     run = drive("rain", 0.4, car=car, mode="coupled", hazard=HUMP, duration=3.0)
-    tyre, columns = surface_response(car, "rain", 0.4).tyre, run.columns
+    tyre, columns = compute_surface_response(car, "rain", 0.4).tyre, run.columns
     for axle in "fr":
         slip, load = columns[f"braking_slip_{axle}"], columns[f"tyre_load_{axle}"]
-        expected = [np.sign(k) * tyre_friction(abs(k), f, tyre) * f for k, f in zip(slip, load, strict=True)]
+        expected = [
+            np.sign(k) * compute_tyre_friction(abs(k), f, tyre) * f for k, f in zip(slip, load, strict=True)
+        ]
         np.testing.assert_allclose(columns[f"tyre_force_{axle}"], expected, rtol=1e-9, atol=1e-9)
         assert np.ptp(load) > 2000.0
 
@@ -260,13 +275,13 @@ def test_the_force_of_each_tick_is_the_curves_at_its_slip_and_load(drive, car):
 def test_an_effect_is_found_in_a_car_on_the_magic_formula(car):
     """The one model serves identification too: three Newton steps find a tyre that grips 4 % less than its surface."""
     run = replace(plain_run(20.0, 2.3), weather="rain", precipitation_mm_h=50.0)
-    model = run_model(run, car, load_surface("dense-asphalt"))
+    model = prepare_run(run, car, load_surface("dense-asphalt"))
     unit = np.zeros(len(PARAMETER_INDEX))
     unit[PARAMETER_INDEX["friction"]] = 1.0
-    measured, found = predict(model, -0.04 * unit), 0.0
+    measured, found = predict_channels(model, -0.04 * unit), 0.0
     for _ in range(3):
-        here = predict(model, found * unit)
-        rise = (predict(model, (found + 1e-4) * unit) - here) / 1e-4
+        here = predict_channels(model, found * unit)
+        rise = (predict_channels(model, (found + 1e-4) * unit) - here) / 1e-4
         found += float(np.sum(rise * (measured - here)) / np.sum(rise * rise))
     assert found == pytest.approx(-0.04, abs=1e-4)
 

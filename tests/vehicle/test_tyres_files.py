@@ -14,7 +14,7 @@ from catalogs.vehicles import load_vehicle
 from flows.making.plan import make_plan
 from manifests.explain import input_differences
 from tasks.errors import InputError
-from tasks.vehicle.tyres.magic_formula import MagicFormula, tyre_forces
+from tasks.vehicle.tyres.magic_formula import MagicFormula, compute_tyre_forces
 
 BOOK = (entry_folder("tyre") / "pacejka-205-60r15.tir").read_text()
 
@@ -124,7 +124,7 @@ def test_damaged_files_are_read_or_refused_in_sentences(noise, at, lost):
     except InputError as error:
         assert all(problem.startswith("my.tir: ") and len(problem) < 1000 for problem in error.problems)
     else:
-        assert abs(tyre_forces(-0.1, 0.05, 0.0, tyre.nominal_load, tyre)[0]) < float("inf")
+        assert abs(compute_tyre_forces(-0.1, 0.05, 0.0, tyre.nominal_load, tyre)[0]) < float("inf")
 
 
 def own_vehicle(folder: Path, tyre: object) -> Path:

@@ -85,7 +85,7 @@ class Constants:
         return front if axle == "f" else 1.0 - front
 
 
-def burckhardt(slip: Floats, base: tuple[float, float, float]) -> Floats:
+def compute_burckhardt_friction(slip: Floats, base: tuple[float, float, float]) -> Floats:
     """b(kappa) (paper, Appendix B).
 
     Parameters

@@ -6,7 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from tasks.eval.physics.constants import Constants, Floats, burckhardt, peak_slip, pressure_at, raised_cosine
+from tasks.eval.physics.constants import (
+    Constants,
+    Floats,
+    compute_burckhardt_friction,
+    peak_slip,
+    pressure_at,
+    raised_cosine,
+)
 
 INNER_STEP = 0.0005
 """Step of the integration behind the ticks (paper, Table frozen_physical_params) [s]."""
@@ -63,7 +70,9 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
         if analytic:
             lever = car["cg_to_rear_axle" if axle == "f" else "cg_to_front_axle"]
             between = m / L * (car["gravity"] * lever + sign * a[:-1] * car["cg_height"])
-        grip = burckhardt(beta * slip, tyre.burckhardt) / burckhardt(np.array(top), tyre.burckhardt)
+        grip = compute_burckhardt_friction(beta * slip, tyre.burckhardt) / compute_burckhardt_friction(
+            np.array(top), tyre.burckhardt
+        )
         push = facts["tyre_peak"] * grip * between
         share = np.clip((target * (1 + width) - slip) / (width * target), 0.0, 1.0)
         brake = share * constants.brake_share(axle) * car["brake_gain"] * pressure

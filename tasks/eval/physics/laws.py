@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.constants import Constants, Floats, burckhardt, peak_slip, pressure_at, raised_cosine
+from tasks.eval.physics.constants import (
+    Constants,
+    Floats,
+    compute_burckhardt_friction,
+    peak_slip,
+    pressure_at,
+    raised_cosine,
+)
 from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset, pressure_shape
 
 ROUNDING = 1e-9
@@ -103,8 +110,8 @@ def wheel_laws(
     target, width = top / beta, car["abs_release_width"]
 
     slip = np.clip((v - radius * omega) / np.maximum(v, car["slip_speed_floor"]), 0.0, 1.0)
-    grip = facts["tyre_peak"] * burckhardt(beta * kappa, tyre.burckhardt)
-    grip = grip / burckhardt(np.array(top), tyre.burckhardt)
+    grip = facts["tyre_peak"] * compute_burckhardt_friction(beta * kappa, tyre.burckhardt)
+    grip = grip / compute_burckhardt_friction(np.array(top), tyre.burckhardt)
     asked = np.clip((target * (1 + width) - kappa) / (width * target), 0.0, 1.0)
     gain = constants.brake_share(axle) * car["brake_gain"]
 

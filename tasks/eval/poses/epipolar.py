@@ -111,7 +111,9 @@ def refine_essential(
     return R, t, variance * np.linalg.inv(H), weight
 
 
-def triangulate(rays: Floats, later_rays: Floats, R: Floats, t: Floats) -> tuple[Floats, Floats, Floats]:
+def triangulate_points(
+    rays: Floats, later_rays: Floats, R: Floats, t: Floats
+) -> tuple[Floats, Floats, Floats]:
     """Return the depth of points by least squares, for a step of length one.
 
     Parameters

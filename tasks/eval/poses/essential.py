@@ -16,7 +16,7 @@ from tasks.eval.poses.epipolar import (
     refine_essential,
     scaled_step,
     step_length,
-    triangulate,
+    triangulate_points,
 )
 from tasks.eval.poses.links import Link, link_placements
 from tasks.eval.poses.motion import (
@@ -225,7 +225,7 @@ def _solve_step(
     if inliers < max(settings.min_points, settings.min_inlier_share * count):
         return failed_step(f"{inliers} of {count} tracked points agree on a pose", inliers), key
 
-    depth, later_depth, precision = triangulate(pairs.rays, pairs.later_rays, R, t)
+    depth, later_depth, precision = triangulate_points(pairs.rays, pairs.later_rays, R, t)
     precision = np.where((weight > 0) & (depth > 0) & (later_depth > 0), precision, 0.0)
     split = int(pairs.kept.sum())
     length, length_std = 1.0, 0.0

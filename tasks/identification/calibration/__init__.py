@@ -1,1 +1,1 @@
-"""Calibration of what is known: staged fits of a vehicle's scalars to reference traces, and how well they are known."""
+"""Calibration of known parameters: staged fits of a vehicle's scalars to reference traces, and their uncertainty."""

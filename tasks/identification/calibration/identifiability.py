@@ -1,4 +1,4 @@
-"""Which calibrated scalars the reference runs determine, and which they cannot tell apart."""
+"""Identifiability of the calibrated scalars: which ones the reference runs determine, and which are confounded."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,28 +7,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.calibration.residual import CalibrationCase
-from tasks.identification.calibration.scalars import CalibrationScalar, calibration_scalars, scalar_value
-from tasks.identification.calibration.staged import Procedure, Stage, smoothness, stage_jacobian
+from tasks.identification.calibration.scalars import CalibrationScalar, list_calibration_scalars, read_scalar
+from tasks.identification.calibration.staged import (
+    Procedure,
+    Stage,
+    build_smoothness_rows,
+    compute_stage_jacobian,
+)
 from tasks.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
 CONFOUNDED = 0.95
-"""Correlation from which two scalars count as not told apart [1]."""
+"""Correlation from which two scalars count as confounded [1]."""
 DETERMINED = 0.5
 """Share of the prior's standard deviation below which a scalar counts as determined [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScalarKnowledge:
-    """How well one scalar is known.
+    """Uncertainty of one scalar.
 
     Parameters
     ----------
-    name : of the scalar
-    value : as calibrated [unit]
-    unit : of the value
-    sd : standard deviation, all others unknown too [unit]
-    sd_alone : the same were all others known [unit]
+    name : name of the scalar
+    value : calibrated value [unit]
+    unit : unit of the value
+    sd : standard deviation, with all others unknown too [unit]
+    sd_alone : standard deviation, with all others known [unit]
     share_of_prior : sd over that of a uniform distribution between the bounds [1]
     determined : whether that share is below `DETERMINED`
     """
@@ -44,14 +49,14 @@ class ScalarKnowledge:
 
 @dataclass(frozen=True, kw_only=True)
 class Identifiability:
-    """The report of one calibration.
+    """Identifiability report of one calibration.
 
     Parameters
     ----------
     scalars : one entry each
     confounded : pairs of names with their correlation, strongest first
-    eigenvalues : of the prior-scaled Fisher information, descending; one is what the bounds alone say [1]
-    weakest : direction of the smallest eigenvalue: share of each scalar that has more than a tenth, by name
+    eigenvalues : eigenvalues of the prior-scaled Fisher information, descending; the bounds alone give 1 [1]
+    weakest : direction of the smallest eigenvalue: share of each scalar with more than a tenth, by name [1]
     """
 
     scalars: tuple[ScalarKnowledge, ...]
@@ -60,56 +65,56 @@ class Identifiability:
     weakest: dict[str, float]
 
 
-def identifiability(
+def compute_identifiability(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
 ) -> Identifiability:
-    """Fisher information of all scalars from all responses of all cases, with bounds and smoothness as the
-    prior.
+    """Return the identifiability of all scalars by their Fisher information over all cases.
 
-    Every response of every case counts as one observation whose standard deviation is the response's scale:
-    residuals of a deterministic model are one smooth curve a case and not thousands of independent samples.
+    Bounds and smoothness are the prior. Every response of every case counts as one observation, whose standard
+    deviation is the response's scale, because the residual of a deterministic model is one smooth curve per case and
+    not thousands of independent samples.
 
     Parameters
     ----------
-    vehicle : calibrated
+    vehicle : calibrated vehicle
     cases : development cases
     procedure : groups, bounds and scales
     """
-    scalars = calibration_scalars(vehicle, procedure.groups)
+    scalars = list_calibration_scalars(vehicle, procedure.groups)
     everything = Stage(
         name="all", groups=procedure.groups, responses=("speed", "pitch", "slip", "wheel_load", "stop"),
         kinds=("flat", "hump", "depression"), phase="event",
     )  # fmt: skip
-    x = np.array([scalar_value(vehicle, s) for s in scalars])
+    x = np.array([read_scalar(vehicle, s) for s in scalars])
     coasting = replace(everything, responses=("speed_drop",), phase="start")
     jacobian = np.vstack(
         [
-            stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
-            stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
-            smoothness(scalars, procedure),
+            compute_stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
+            compute_stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
+            build_smoothness_rows(scalars, procedure),
         ]
     )
     bounds = [procedure.bounds[s.group] for s in scalars]
-    return knowledge(
+    return summarise_jacobian(
         jacobian, scalars, x, [b.unit for b in bounds], np.array([b.upper - b.lower for b in bounds])
     )
 
 
-def knowledge(
+def summarise_jacobian(
     jacobian: Floats,
     scalars: Sequence[CalibrationScalar],
     values: Floats,
     units: Sequence[str],
     widths: Floats,
 ) -> Identifiability:
-    """Standard deviations, correlations and directions from a Jacobian.
+    """Return standard deviations, correlations and the weakest direction that follow from a Jacobian.
 
     Parameters
     ----------
-    jacobian : of residuals in units of their standard deviation, shape (m, n) [1 / unit]
-    scalars, units : names and units, n of each
-    values : shape (n,) [unit]
-    widths : between the bounds, shape (n,) [unit]
+    jacobian : derivatives of residuals in units of their standard deviation, shape (m, n) [1 / unit]
+    scalars, units : the n scalars and their units
+    values : calibrated values, shape (n,) [unit]
+    widths : distances between the bounds, shape (n,) [unit]
     """
     prior_sd = widths / np.sqrt(12.0)
     scaled = jacobian * prior_sd

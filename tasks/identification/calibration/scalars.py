@@ -1,4 +1,4 @@
-"""The scalars a calibration may move: each a name, and the places of the vehicle that hold its one value."""
+"""Scalars that a calibration may move: each has a name and the entries of the vehicle that hold its value."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,8 +19,8 @@ class CalibrationScalar:
 
     Parameters
     ----------
-    name : unique; a knot's name holds its family and surface friction
-    group : the name its stage and bounds go by
+    name : unique name; a knot's name holds its family and surface friction
+    group : name of its group, which stages and bounds use
     places : (family, knot) pairs that share the value; empty for a field of the vehicle itself
     """
 
@@ -29,12 +29,12 @@ class CalibrationScalar:
     places: tuple[tuple[str, int], ...] = ()
 
 
-def calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[CalibrationScalar, ...]:
-    """The scalars of some groups, in their order; all of the paper's groups together hold its 40.
+def list_calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[CalibrationScalar, ...]:
+    """Return the scalars of some groups, in their order; all of the paper's groups together hold its 40.
 
     Parameters
     ----------
-    vehicle : whose families and knots are counted
+    vehicle : vehicle with the families and knots
     groups : `KNOT_GROUPS`, fields of the vehicle that hold a number, or names of its effects' parameters
 
     Raises
@@ -56,13 +56,15 @@ def calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[Calibr
     scalars: list[CalibrationScalar] = []
     for group in groups:
         scalars += (
-            _knots(vehicle, group) if group in KNOT_GROUPS else [CalibrationScalar(name=group, group=group)]
+            _list_knots(vehicle, group)
+            if group in KNOT_GROUPS
+            else [CalibrationScalar(name=group, group=group)]
         )
     return tuple(scalars)
 
 
-def scalar_value(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
-    """The scalar's value in a vehicle, in the unit of its field.
+def read_scalar(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
+    """Return the scalar's value in a vehicle [unit of its field].
 
     Parameters
     ----------
@@ -77,13 +79,13 @@ def scalar_value(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
     return float(getattr(vehicle.families[family], scalar.group)[knot])
 
 
-def with_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> Vehicle:
-    """The vehicle with other values of some scalars; moving its centre of gravity leaves the wheelbase as it is.
+def set_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> Vehicle:
+    """Return the vehicle with other values of some scalars; if its centre of gravity moves, the wheelbase stays.
 
     Parameters
     ----------
     vehicle : the vehicle
-    values : by scalar, in the unit of its field
+    values : value of each scalar [unit of its field]
     """
     families = dict(vehicle.families)
     effects = dict(vehicle.effects)
@@ -103,10 +105,12 @@ def with_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) ->
 
 
 def _is_field(vehicle: Vehicle, group: str) -> bool:
+    """Return whether a group is a numeric field of the vehicle."""
     return isinstance(vars(vehicle).get(group), float | int)
 
 
-def _knots(vehicle: Vehicle, group: str) -> list[CalibrationScalar]:
+def _list_knots(vehicle: Vehicle, group: str) -> list[CalibrationScalar]:
+    """Return one scalar for each knot of each family; families with a shared hold time have one together."""
     scalars = []
     shared: list[tuple[str, int]] = []
     for family, table in vehicle.families.items():

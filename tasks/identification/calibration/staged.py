@@ -1,4 +1,4 @@
-"""The paper's staged calibration: each group of scalars against the response it acts on, then all cases again."""
+"""The paper's staged calibration: each stage fits a group of scalars to the responses that it acts on."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,17 +14,17 @@ from tasks.identification.calibration.residual import (
     Phase,
     Response,
     Yardstick,
-    driven,
-    residuals,
+    compute_residuals,
+    simulate_case,
 )
 from tasks.identification.calibration.scalars import (
     CalibrationScalar,
-    calibration_scalars,
-    scalar_value,
-    with_scalars,
+    list_calibration_scalars,
+    read_scalar,
+    set_scalars,
 )
 from tasks.vehicle.effects.table import EFFECT_UNITS
-from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
 from tasks.vehicle.rollout import Mode
 
 Floats = NDArray[np.float64]
@@ -36,11 +36,11 @@ class Bounds:
 
     Parameters
     ----------
-    unit : of the group's scalars
+    unit : unit of the group's scalars
     lower, upper : limits of every scalar [unit]
-    step : for finite differences [unit]
+    step : step of finite differences [unit]
     smooth : standard deviation of the difference between neighbouring knots of a family; infinite for none [unit]
-    start : where an effect begins that the vehicle does not have yet; None for 0 [unit]
+    start : first value of an effect that the vehicle does not have yet; None for 0 [unit]
     """
 
     unit: str
@@ -57,10 +57,10 @@ class Stage:
 
     Parameters
     ----------
-    name : what it is called
-    groups : whose scalars move together
-    responses : what they are held against
-    kinds : of the cases that are used: flat, hump, depression
+    name : name of the stage
+    groups : groups whose scalars move together
+    responses : responses that they are fitted to
+    kinds : kinds of the cases that are used: flat, hump, depression
     phase : start, braking, tail or event
     """
 
@@ -73,15 +73,15 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True)
 class Procedure:
-    """A whole calibration.
+    """Procedure of a whole calibration.
 
     Parameters
     ----------
     mode : paper or coupled
-    stages : in order
-    passes : how often the stages are gone through
-    evaluations : most Jacobians of one stage
-    bounds : by group
+    stages : stages, in order
+    passes : number of passes through all stages
+    evaluations : largest number of residual evaluations of one stage
+    bounds : bounds by group
     yardstick : scales and speeds
     """
 
@@ -94,7 +94,7 @@ class Procedure:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Every group that some stage moves, in order of first appearance."""
+        """Return every group that some stage moves, in order of first appearance."""
         return tuple(dict.fromkeys(group for stage in self.stages for group in stage.groups))
 
 
@@ -104,10 +104,10 @@ class StageRecord:
 
     Parameters
     ----------
-    stage, turn : its name, and which pass it belongs to, from 1
-    before, after : its own loss, the sum of (RMSE / scale)^2 over its cases [1]
-    moved : largest change of a scalar as a share of its bounds [1]
-    at_bounds : scalars that came to rest on a bound
+    stage, turn : name of the stage, and number of the pass, from 1
+    before, after : loss of the stage, the sum of (RMSE / scale)^2 over its cases [1]
+    moved : largest change of a scalar over the distance between its bounds [1]
+    at_bounds : scalars that ended on a bound
     """
 
     stage: str
@@ -118,15 +118,15 @@ class StageRecord:
     at_bounds: tuple[str, ...]
 
 
-def calibrate(
+def calibrate_vehicle(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
 ) -> tuple[Vehicle, tuple[StageRecord, ...]]:
-    """Go through the stages; a stage that does not lower its own loss is not accepted.
+    """Calibrate a vehicle stage by stage; a stage that does not lower its own loss is not accepted.
 
     Parameters
     ----------
-    vehicle : where it starts
-    cases : the development cases
+    vehicle : vehicle to start from
+    cases : development cases
     procedure : stages, bounds, scales
 
     Returns
@@ -134,7 +134,7 @@ def calibrate(
     The calibrated vehicle and a record of every stage.
     """
     records: list[StageRecord] = []
-    vehicle = _begun(vehicle, procedure)
+    vehicle = _add_missing_effects(vehicle, procedure)
     for turn in range(1, procedure.passes + 1):
         for stage in procedure.stages:
             vehicle, record = run_stage(vehicle, cases, stage, procedure)
@@ -145,39 +145,41 @@ def calibrate(
 def run_stage(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], stage: Stage, procedure: Procedure
 ) -> tuple[Vehicle, StageRecord]:
-    """Bounded nonlinear least squares over one stage's scalars (Branch, Coleman and Li 1999,
-    doi:10.1137/S1064827595289108).
+    """Fit one stage's scalars by bounded nonlinear least squares.
 
-    The bounds act as a weak prior about the start, so that a scalar to which no run answers stays where it was.
+    The method is that of Branch, Coleman and Li (1999, doi:10.1137/S1064827595289108). The bounds act as a weak prior
+    about the start, so that a scalar that no run is sensitive to keeps its value.
 
     Parameters
     ----------
-    vehicle : where it starts
-    cases : the development cases
-    stage : which scalars against which responses
+    vehicle : vehicle to start from
+    cases : development cases
+    stage : scalars and the responses that they are fitted to
     procedure : bounds, scales, number of evaluations
     """
-    scalars = calibration_scalars(vehicle, stage.groups)
+    scalars = list_calibration_scalars(vehicle, stage.groups)
     chosen = [case for case in cases if case.kind in stage.kinds]
     limits = np.array([(procedure.bounds[s.group].lower, procedure.bounds[s.group].upper) for s in scalars])
     width = limits[:, 1] - limits[:, 0]
-    start = np.array([scalar_value(vehicle, s) for s in scalars])
+    start = np.array([read_scalar(vehicle, s) for s in scalars])
     start = np.clip(start, limits[:, 0] + 1e-6 * width, limits[:, 1] - 1e-6 * width)
 
     prior = np.diag(np.sqrt(12.0) / width)
-    smooth = smoothness(scalars, procedure)
+    smooth = build_smoothness_rows(scalars, procedure)
 
-    def residual(x: Floats) -> Floats:
-        changed = with_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
-        parts = [_case_residual(changed, case, stage, procedure) for case in chosen]
+    def compute_residual(x: Floats) -> Floats:
+        changed = set_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
+        parts = [_compute_case_residual(changed, case, stage, procedure) for case in chosen]
         return np.concatenate([*parts, prior @ (x - start), smooth @ x])
 
-    def jacobian(x: Floats) -> Floats:
-        return np.vstack([stage_jacobian(vehicle, chosen, stage, procedure, scalars, x), prior, smooth])
+    def compute_jacobian(x: Floats) -> Floats:
+        return np.vstack(
+            [compute_stage_jacobian(vehicle, chosen, stage, procedure, scalars, x), prior, smooth]
+        )
 
-    before = float(np.sum(residual(start) ** 2))
+    before = float(np.sum(compute_residual(start) ** 2))
     solution = least_squares(
-        residual, start, jacobian, bounds=(limits[:, 0], limits[:, 1]), x_scale=width,
+        compute_residual, start, compute_jacobian, bounds=(limits[:, 0], limits[:, 1]), x_scale=width,
         max_nfev=procedure.evaluations, xtol=1e-5, ftol=1e-5,
     )  # fmt: skip
     after = float(np.sum(solution.fun**2))
@@ -191,10 +193,10 @@ def run_stage(
         moved=float(np.max(np.abs(best - start) / width)),
         at_bounds=tuple(s.name for s, hit in zip(scalars, on_bound, strict=True) if hit),
     )
-    return with_scalars(vehicle, dict(zip(scalars, map(float, best), strict=True))), record
+    return set_scalars(vehicle, dict(zip(scalars, map(float, best), strict=True))), record
 
 
-def stage_jacobian(
+def compute_stage_jacobian(
     vehicle: Vehicle,
     cases: Sequence[CalibrationCase],
     stage: Stage,
@@ -202,44 +204,47 @@ def stage_jacobian(
     scalars: Sequence[CalibrationScalar],
     x: Floats,
 ) -> Floats:
-    """Derivatives of the stage's residuals by central differences; a case that a scalar cannot reach is not driven.
+    """Return the derivatives of a stage's residuals by central differences.
+
+    A case that a scalar cannot influence is not simulated.
 
     Parameters
     ----------
-    vehicle : gives all that does not move
+    vehicle : vehicle with all values that stay fixed
     cases, stage, procedure : as in ``run_stage``
-    scalars : what moves
+    scalars : scalars that move
     x : their values, shape (n,) [units of the scalars]
 
     Returns
     -------
     Shape (residuals, n) [1 / unit].
     """
-    here = with_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
-    unmoved = [np.zeros_like(_case_residual(here, case, stage, procedure)) for case in cases]
+    here = set_scalars(vehicle, dict(zip(scalars, map(float, x), strict=True)))
+    unmoved = [np.zeros_like(_compute_case_residual(here, case, stage, procedure)) for case in cases]
     columns = []
     for scalar in scalars:
-        step, value = procedure.bounds[scalar.group].step, scalar_value(here, scalar)
-        above, below = (with_scalars(here, {scalar: value + side * step}) for side in (1.0, -1.0))
+        step, value = procedure.bounds[scalar.group].step, read_scalar(here, scalar)
+        above, below = (set_scalars(here, {scalar: value + side * step}) for side in (1.0, -1.0))
         parts = []
         for case, zeros in zip(cases, unmoved, strict=True):
-            if _sees_no_difference(above, below, case):
+            if _hides_difference(above, below, case):
                 parts.append(zeros)
                 continue
-            up, down = (_case_residual(side, case, stage, procedure) for side in (above, below))
+            up, down = (_compute_case_residual(side, case, stage, procedure) for side in (above, below))
             parts.append((up - down) / (2 * step))
         columns.append(np.concatenate(parts))
     return np.stack(columns, axis=1)
 
 
-def smoothness(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Floats:
-    """Rows that weigh the difference between neighbouring knots of a family, so that interpolation between them
-    holds where one of them is poorly determined.
+def build_smoothness_rows(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Floats:
+    """Return the rows that penalise differences between neighbouring knots of a family.
+
+    They keep the interpolation between knots sensible where the runs determine one of them poorly.
 
     Parameters
     ----------
-    scalars : n of them
-    procedure : holds the allowed differences
+    scalars : the n scalars
+    procedure : procedure with the standard deviation of these differences
 
     Returns
     -------
@@ -256,21 +261,24 @@ def smoothness(scalars: Sequence[CalibrationScalar], procedure: Procedure) -> Fl
     return np.array(rows).reshape(-1, len(scalars))
 
 
-def _begun(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
-    """The vehicle with the start values of effects that it does not have yet."""
+def _add_missing_effects(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
+    """Return the vehicle with the start values of effects that it does not have yet."""
     missing = [group for group in procedure.groups if group in EFFECT_UNITS and group not in vehicle.effects]
     starts = {group: procedure.bounds[group].start or 0.0 for group in missing}
     return replace(vehicle, effects={**vehicle.effects, **starts})
 
 
-def _case_residual(vehicle: Vehicle, case: CalibrationCase, stage: Stage, procedure: Procedure) -> Floats:
-    ride = driven(vehicle, case, procedure.mode, procedure.yardstick.margin_s)
-    return residuals(ride, case, stage.responses, stage.phase, procedure.yardstick)
+def _compute_case_residual(
+    vehicle: Vehicle, case: CalibrationCase, stage: Stage, procedure: Procedure
+) -> Floats:
+    """Return a stage's residuals of one case [1]."""
+    ride = simulate_case(vehicle, case, procedure.mode, procedure.yardstick.margin_s)
+    return compute_residuals(ride, case, stage.responses, stage.phase, procedure.yardstick)
 
 
-def _sees_no_difference(one: Vehicle, other: Vehicle, case: CalibrationCase) -> bool:
-    """Whether a case's conditions hide all that differs between two vehicles."""
+def _hides_difference(one: Vehicle, other: Vehicle, case: CalibrationCase) -> bool:
+    """Return whether a case's conditions hide all that differs between two vehicles."""
     if replace(one, families={}) != replace(other, families={}):
         return False
     at = (case.family, case.surface_friction)
-    return surface_response(one, *at) == surface_response(other, *at)
+    return compute_surface_response(one, *at) == compute_surface_response(other, *at)

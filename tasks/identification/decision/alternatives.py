@@ -8,9 +8,9 @@ import numpy as np
 
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
-from tasks.identification.decision.rivals import Compared
-from tasks.identification.decision.search import Found
-from tasks.identification.inference.hypothesis import library_hypothesis
+from tasks.identification.decision.rivals import RivalComparison
+from tasks.identification.decision.search import SearchState
+from tasks.identification.inference.hypothesis import make_library_hypothesis
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class Alternative:
     reason: str
 
 
-def find_pulled_numbers(found: Found) -> list[Alternative]:
+def find_pulled_numbers(found: SearchState) -> list[Alternative]:
     """Return the vehicle's own numbers that stay pulled beyond belief beside what is named.
 
     An effect that needs the mass off by five tolerances may stand for the wrong mass itself.
@@ -46,7 +46,7 @@ def find_pulled_numbers(found: Found) -> list[Alternative]:
         effect = next(
             e for e in evidence.effects if e.parameters[0].name == SESSION[place] and len(e.parameters) == 1
         )
-        hypothesis = library_hypothesis(effect, float(base.session[place]))
+        hypothesis = make_library_hypothesis(effect, float(base.session[place]))
         alternatives.append(
             Alternative(
                 candidate=judge_hypothesis(evidence, base, None, hypothesis),
@@ -57,7 +57,7 @@ def find_pulled_numbers(found: Found) -> list[Alternative]:
     return alternatives
 
 
-def find_pairs(found: Found, compared: Sequence[Compared]) -> list[Alternative]:
+def find_pairs(found: SearchState, compared: Sequence[RivalComparison]) -> list[Alternative]:
     """Return the members of two effects that together explain as much as the one that is named alone.
 
     Drag of the air and of the pads together look like a resistance that grows with speed.

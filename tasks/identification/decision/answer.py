@@ -1,4 +1,4 @@
-"""The parts of an answer: effects with their parameters, errors by channel, the verdict itself."""
+"""The verdict and its parts: named effects with their parameters, and errors by channel."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -31,14 +31,14 @@ class Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class NamedEffect:
-    """An effect of the verdict or a rival of one.
+    """An effect that the verdict names, or a rival of one.
 
     Parameters
     ----------
     name, effect_class, port, variable : as in the library, or of the form found
     parameters : estimates
-    score : gain / inflation - parameters x log N, beyond the other effects
-    gain, inflation, held_out_gain, win_share : what the score is made of and the gates it met
+    score : gain / inflation - parameters x log N, in addition to the other effects [1]
+    gain, inflation, held_out_gain, win_share : terms of the score and of the gates that it passed [1]
     """
 
     name: str
@@ -55,15 +55,16 @@ class NamedEffect:
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelError:
-    """RMSE of one channel or figure over the held-out runs: as delivered, re-tuned, and with the effects.
+    """RMSE of one channel or figure over the held-out runs: for the model as delivered, re-tuned, and with the effects.
 
     Parameters
     ----------
     frozen, retuned, after : RMSE [unit]
     ci_low, ci_high : 95 % bootstrap interval over runs of ``after`` [unit]
-    change_low, change_high : the same of after minus frozen, paired [unit]
+    change_low, change_high : 95 % bootstrap interval of after minus frozen, paired by run [unit]
     wins : held-out runs in which ``after`` is below ``frozen``
-    worst_run : the run with the largest ``after``
+    worst_run : name of the run with the largest ``after``
+    unit : unit of the errors
     """
 
     frozen: float
@@ -84,23 +85,23 @@ class Verdict:
 
     Parameters
     ----------
-    verdict : the kind of answer
-    effects : the effects named, in the order found
-    rivals : effects that cannot be told from the named ones, with the effect each rivals
+    verdict : kind of verdict
+    effects : named effects, in the order in which they were found
+    rivals : effects that cannot be told from a named one, each after the name of that effect
     tried : best candidates of the last round that were not accepted
-    error : by channel, on held-out runs
-    manoeuvre_error : the same of stopping distance [m] and peak pitch [deg], on held-out runs that brake
-    correlation : by channel, of the residual with brake pressure, on held-out runs
-    session_pulls : session nuisances in prior sigmas, before and after
+    error : errors by channel, on held-out runs
+    manoeuvre_error : errors of stopping distance [m] and peak pitch [deg], on held-out runs that brake
+    correlation : correlation of each channel's residual with brake pressure, on held-out runs
+    session_pulls : session nuisances in prior sigmas, before and after [1]
     noise : AR(1) coefficient and sigma by channel
     disturbance : scales and times of the smooth disturbances
-    detectable : by library effect, the smallest value of its first parameter that would be named
-    campaign, content_hash, split_hash : what was read
+    detectable : smallest first parameter of each library effect that would be named [its unit]
+    campaign, content_hash, split_hash : name and hashes of the campaign
     theta : float64 full parameter vector of the effects, without session nuisances
     slots : tables of the forms found
-    experiment : the planned run that would tell the first effect from its closest alternative best
-    forked : runs left out because they fork when the integration step is halved
-    reasons : sentences that say why the answer is what it is
+    experiment : planned run that separates the first effect best from its closest alternative
+    forked : names of runs left out because halving the integration step changes their prediction
+    reasons : sentences that explain the verdict
     """
 
     verdict: VerdictName
@@ -124,13 +125,13 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:
-    """A candidate as it is reported.
+def make_named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:
+    """Return a candidate in the form in which the verdict reports it.
 
     Parameters
     ----------
-    candidate : refined and judged
-    share : bootstrap win share
+    candidate : refined and judged candidate
+    share : bootstrap win share [1]
     interval : ends of the parameters' 95 % intervals, float64 [K] each
     """
     h = candidate.hypothesis

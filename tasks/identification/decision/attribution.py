@@ -1,4 +1,4 @@
-"""Which effect, if any, the model lacks: screening, refinement, gates, rivals."""
+"""Attribution of a residual to the effect that the model lacks: screening, refinement, gates and rivals."""
 
 from dataclasses import dataclass, replace
 
@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
-from tasks.identification.decision.screening import inflation, look_alikes, screen
+from tasks.identification.decision.screening import compute_inflation, find_look_alikes, screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fit, misfit_by_run, sum_misfit_falls
-from tasks.identification.inference.hypothesis import Hypothesis, library_hypothesis
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses, sum_misfit_falls
+from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
 from tasks.identification.rules import DecisionRules
 
 Misfits = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -17,18 +17,18 @@ Misfits = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """One hypothesis added to what is already accepted, refined and judged.
+    """One hypothesis, added to the accepted ones, refined and judged.
 
     Parameters
     ----------
-    hypothesis : what is added
+    hypothesis : added hypothesis
     fitted : joint fit of it and all accepted ones; its parameters come last
-    gain : log likelihood gained
-    inflation : empirical-null factor by which the gain is divided
-    score : gain / inflation - parameters x log N
-    held_out_gain : fall of the held-out marginal misfit, divided by the inflation; 0 where the score fails
-    informed : number of training runs that inform its first parameter
-    rules : by which it is judged
+    gain : rise of the log likelihood [1]
+    inflation : empirical-null factor by which the gain is divided [1]
+    score : gain / inflation - parameters x log N [1]
+    held_out_gain : fall of the held-out marginal misfit, divided by the inflation; 0 where the score fails [1]
+    informed : number of training runs that are sensitive to its first parameter [1]
+    rules : decision rules
     """
 
     hypothesis: Hypothesis
@@ -42,7 +42,7 @@ class Candidate:
 
     @property
     def passes(self) -> bool:
-        """Whether score, held-out test and bounds all hold."""
+        """Return whether score, held-out test and bounds all hold."""
         enough = self.score > self.rules.accept_score and self.held_out_gain > self.rules.held_out_gain
         return enough and not self.fitted.at_bound
 
@@ -59,25 +59,25 @@ def judge_hypothesis(
     Parameters
     ----------
     evidence : the runs
-    base : fit of what is accepted so far
-    base_held_out : `misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
-    hypothesis : what may be added
-    foreseen : gain by the linear screen: a first fit that reaches it needs no other start
+    base : fit of the hypotheses accepted so far
+    base_held_out : `compute_misfit_by_run` of the held-out runs under ``base``; None if only the gain is needed
+    hypothesis : hypothesis that may be added
+    foreseen : gain by the linear screen; a first fit that reaches it needs no other start [1]
     """
     rules = evidence.rules
     first = np.arange(len(hypothesis.names)) == 0
     if hypothesis.names[0] in SESSION:
         # the session already carries the same number under a prior: hand it over to the free parameter
         hypothesis = replace(hypothesis, start=base.session[[SESSION.index(hypothesis.names[0])]])
-    # Starts: where the accepted fit is, which the hypothesis extends; and the linear estimate with fresh offsets,
-    # which have not yet absorbed what is sought.
+    # Two starts: the accepted fit, which the hypothesis extends; and the linear estimate with offsets of 0, which
+    # have not absorbed the effect yet.
     free = hypothesis.names[0] in SESSION
     none = hypothesis.start * (~first if hypothesis.effect_class != "form" and not free else free)
     starts = ((none, base.offsets), (hypothesis.start, None))
     trials: list[Fit] = []
     for begin, offsets in starts:
         trials.append(
-            fit(
+            fit_hypotheses(
                 evidence.train,
                 (*base.parts, hypothesis),
                 evidence.session_sigma,
@@ -89,7 +89,7 @@ def judge_hypothesis(
             )
         )
         gain = 0.5 * (base.objective - trials[-1].objective)
-        # a large one is only ranked here: derivatives are taken anew at it
+        # a large gain is only ranked here: the runs are linearised anew at its estimate later
         enough = rules.reached_share * foreseen if len(hypothesis.names) == 1 else np.inf
         hopeless = max(gain, foreseen) < 0.3 * rules.accept_score
         if gain > min(enough, rules.relinearisation_gain) or hopeless:
@@ -110,22 +110,22 @@ def assess_fit(
     Parameters
     ----------
     evidence : the runs, with derivatives that hold at the fit
-    base : fit of what is accepted so far
-    base_held_out : `misfit_by_run` of the held-out runs under ``base``; None where only the gain is asked for
-    hypothesis : what was added; its parameters come last
+    base : fit of the hypotheses accepted so far
+    base_held_out : `compute_misfit_by_run` of the held-out runs under ``base``; None if only the gain is needed
+    hypothesis : added hypothesis; its parameters come last
     fitted : the joint fit
     """
     gain = 0.5 * (base.objective - fitted.objective)
-    own = _own_scores(evidence, fitted, hypothesis)
-    factor = inflation(evidence, fitted, own)
+    own = _compute_own_scores(evidence, fitted, hypothesis)
+    factor = compute_inflation(evidence, fitted, own)
     penalty = float(len(hypothesis.names) * np.log(evidence.samples))
     if gain / factor - penalty > evidence.rules.accept_score and base_held_out is not None:
-        # what the base reaches from here as well is no merit of the hypothesis
+        # a fall of the misfit that the base reaches from here too is no gain of the hypothesis
         gain = min(gain, 0.5 * (_refit_base(evidence, base, hypothesis, fitted).objective - fitted.objective))
     score = gain / factor - penalty
     held_out = 0.0
     if score > evidence.rules.accept_score and base_held_out is not None:
-        held_out = sum_misfit_falls(base_held_out, misfit_by_run(evidence.held_out, fitted)) / factor
+        held_out = sum_misfit_falls(base_held_out, compute_misfit_by_run(evidence.held_out, fitted)) / factor
     return Candidate(
         hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
         informed=len(own) or len(evidence.train), rules=evidence.rules,
@@ -133,18 +133,19 @@ def assess_fit(
 
 
 def _refit_base(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:
-    """The base fitted again from where a fit that extends it ended."""
+    """Return the base, fitted again from where a fit that extends it ended."""
     session = fitted.session.copy()
     k = len(hypothesis.names)
     if hypothesis.names[0] in SESSION:
         session[SESSION.index(hypothesis.names[0])] += fitted.values[-k]
-    return fit(
+    return fit_hypotheses(
         evidence.train, base.parts, evidence.session_sigma, values=fitted.values[:-k], session=session,
         offsets=fitted.offsets, iterations=4,
     )  # fmt: skip
 
 
-def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDArray[np.float64]:
+def _compute_own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDArray[np.float64]:
+    """Return the score z of each run that is sensitive to a library effect's direction, float64 [R']."""
     names = [e.name for e in evidence.effects]
     if hypothesis.name not in names:
         return np.empty(0)
@@ -155,7 +156,7 @@ def _own_scores(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> NDAr
         q = run.library_q[:, j]
         information = float(a @ a - q @ q)
         if information * hypothesis.step[0] ** 2 > 0.05:
-            scores.append(float(a @ r - q @ run.project(r)) / np.sqrt(information))
+            scores.append(float(a @ r - q @ run.project_on_nuisances(r)) / np.sqrt(information))
     return np.array(scores)
 
 
@@ -167,24 +168,24 @@ def refine_candidates(
     gated: bool = True,
     also: frozenset[str] = frozenset(),
 ) -> list[Candidate]:
-    """The best candidates to add to ``base``, refined and sorted by score, best first.
+    """Return the best candidates to add to ``base``, refined and sorted by score, best first.
 
     Parameters
     ----------
     evidence : the runs
-    base : fit of what is accepted so far
-    count : how many of the screening are refined; None takes as many as the rules say
-    gated : judge them on held-out runs as well, and refine what looks like the best of them too
-    also : names of effects that are refined whatever the screen says of them
+    base : fit of the hypotheses accepted so far
+    count : number of screened effects that are refined; None takes the number of the rules
+    gated : judge them on held-out runs too, and refine effects that are nearly collinear with the best
+    also : names of effects that are refined whatever their linear gain
     """
     rules = evidence.rules
-    gains, estimates, seconds = screen(evidence, base)
-    held_out = misfit_by_run(evidence.held_out, base) if gated else None
+    gains, estimates, seconds = screen_library(evidence, base)
+    held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None
     hopeful = [int(j) for j in np.argsort(-gains, kind="stable") if gains[j] > 0.3 * rules.accept_score]
     order = hopeful[: rules.refined_candidates if count is None else count]
 
-    def judged(j: int) -> Candidate:
-        hypothesis = library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
+    def judge_library_effect(j: int) -> Candidate:
+        hypothesis = make_library_hypothesis(evidence.effects[j], float(estimates[j]), float(seconds[j]))
         return judge_hypothesis(evidence, base, held_out, hypothesis, float(gains[j]))
 
     candidates: list[Candidate] = []
@@ -192,29 +193,31 @@ def refine_candidates(
     for j in order:
         best_so_far = max((c.gain / c.inflation for c in candidates), default=0.0)
         if gains[j] > rules.trusted_screen_share * best_so_far:
-            candidates.append(judged(j))
+            candidates.append(judge_library_effect(j))
             refined.append(j)
     known = {p.name for p in base.parts}
     for j, effect in enumerate(evidence.effects):
         if effect.name in also and effect.name not in known and j not in refined:
-            candidates.append(judged(j))
+            candidates.append(judge_library_effect(j))
             refined.append(j)
     if candidates and gated:
         best = max(range(len(candidates)), key=lambda i: candidates[i].score)
         if candidates[best].score > rules.accept_score:
-            near = [j for j in look_alikes(evidence, refined[best]) if j not in refined and gains[j] > 0.0]
-            candidates += [judged(j) for j in near[: rules.refined_look_alikes]]
+            near = [
+                j for j in find_look_alikes(evidence, refined[best]) if j not in refined and gains[j] > 0.0
+            ]
+            candidates += [judge_library_effect(j) for j in near[: rules.refined_look_alikes]]
     return sorted(candidates, key=lambda c: -c.score)
 
 
-def bootstrap_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
-    """Share of bootstrap resamples of the runs in which the first candidate keeps the best score.
+def compute_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
+    """Return the share of bootstrap resamples of the runs in which the first candidate keeps the best score [1].
 
     Parameters
     ----------
-    candidates : refined, best first
-    base : the fit they were added to
-    seed : of the resampling
+    candidates : refined candidates, best first
+    base : fit to which they were added
+    seed : seed of the resampling
     """
     runs = len(base.by_run)
     draws = np.random.Generator(np.random.Philox(seed)).integers(
@@ -230,24 +233,24 @@ def bootstrap_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -
 
 
 def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
-    """Whether every parameter of ``small`` is also one of ``large``."""
+    """Return whether every parameter of ``small`` is also one of ``large``."""
     return set(small.names) < set(large.names)
 
 
-def refit_without(base: Fit, index: int, evidence: Evidence) -> Fit:
-    """Refit with one accepted part left out.
+def refit_without_part(base: Fit, index: int, evidence: Evidence) -> Fit:
+    """Return the fit again with one accepted part left out.
 
     Parameters
     ----------
     base : fit with all parts
-    index : the part to leave out
+    index : position of the part to leave out
     evidence : the runs
     """
     parts = tuple(p for i, p in enumerate(base.parts) if i != index)
     sizes = [len(p.names) for p in base.parts]
     at = sum(sizes[:index])
     values = np.delete(base.values, np.arange(at, at + sizes[index]))
-    return fit(
+    return fit_hypotheses(
         evidence.train, parts, base.session_sigma, values=values, session=base.session, offsets=base.offsets,
         iterations=8,
     )  # fmt: skip

@@ -1,7 +1,7 @@
-"""Cross-correlation of what a model leaves over with the brake pressure it was given.
+"""Cross-correlation of a model's residual with its input, the brake pressure.
 
-A model that holds all that the input does leaves nothing that goes with it at any lag (Ljung 1999, System
-Identification, section 16.6).
+If a model describes all that the input causes, its residual is uncorrelated with the input at every lag (Ljung 1999,
+System Identification, section 16.6).
 """
 
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import predict
-from tasks.identification.inference.noise import whiten
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.slots import Slot
 
 CORRELATED = ("longitudinal_acceleration", "pitch")
@@ -26,7 +26,7 @@ class Correlation:
     ----------
     lags : float64 [L] time by which the residual follows the pressure [s]
     frozen, after : float64 [L] correlation coefficients [1]
-    band : half width within which 95 % would lie if they had nothing to do with each other [1]
+    band : half width of the interval that holds 95 % of the coefficients of independent series [1]
     """
 
     lags: NDArray[np.float64]
@@ -35,45 +35,47 @@ class Correlation:
     band: float
 
 
-def residual_input_correlation(
+def correlate_residual_with_pressure(
     runs: tuple[RunEvidence, ...], theta: NDArray[np.float64], slots: tuple[Slot, ...], longest_lag: float
 ) -> dict[str, Correlation]:
-    """Correlation over the held-out runs, residual and pressure whitened by the channel's noise.
+    """Return the correlations over the held-out runs; the channel's noise whitens residual and pressure.
 
     Parameters
     ----------
-    runs : held-out
-    theta, slots : full parameters of the grown model
-    longest_lag : [s]
+    runs : held-out runs
+    theta, slots : full parameter vector and slots of the grown model
+    longest_lag : longest lag [s]
     """
     plain = np.zeros(len(theta))
     residuals = [
-        [(run.model.measured - predict(run.model, p, slots=s)) for run in runs]
+        [(run.model.measured - predict_channels(run.model, p, slots=s)) for run in runs]
         for p, s in ((plain, ()), (theta, slots))
     ]
     measured = [name for name in CORRELATED if np.isfinite(runs[0].sigma[CHANNELS.index(name)])]
     return {
-        name: _channel(runs, residuals, CHANNELS.index(name), longest_lag) for name in measured or ["speed"]
+        name: _correlate_channel(runs, residuals, CHANNELS.index(name), longest_lag)
+        for name in measured or ["speed"]
     }
 
 
-def _channel(
+def _correlate_channel(
     runs: tuple[RunEvidence, ...],
     residuals: list[list[NDArray[np.float64]]],
     channel: int,
     longest_lag: float,
 ) -> Correlation:
+    """Return the correlation of one channel's residual with pressure over all runs."""
     interval = runs[0].model.run.interval
     most = round(longest_lag / interval)
     sums = np.zeros((2, 2 * most + 1))
     powers, pressed, count = np.zeros(2), 0.0, 0
     for i, run in enumerate(runs):
         rho, sigma = run.rho[channel : channel + 1], run.sigma[channel : channel + 1]
-        u = _white(run.model.run.pressure[: run.model.samples], rho, sigma)
+        u = _whiten_channel(run.model.run.pressure[: run.model.samples], rho, sigma)
         pressed += float(u @ u)
         count += len(u)
         for j in range(2):
-            e = _white(residuals[j][i][:, channel], rho, sigma)
+            e = _whiten_channel(residuals[j][i][:, channel], rho, sigma)
             powers[j] += float(e @ e)
             sums[j] += np.correlate(np.pad(e, most), u, mode="valid")
     scale = np.sqrt(np.maximum(powers * pressed, 1e-300))[:, None]
@@ -86,8 +88,9 @@ def _channel(
     )
 
 
-def _white(
+def _whiten_channel(
     x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    white = whiten(x[:, None], rho, sigma)[1:]
+    """Return one channel, whitened and without its mean, float64 [N - 1]."""
+    white = whiten_channels(x[:, None], rho, sigma)[1:]
     return np.asarray(white - white.mean(), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Everything the engine looks for in one order: the library, wrong numbers, then forms outside the library."""
+"""The search in its order: effects of the library, wrong numbers of the vehicle, then forms outside the library."""
 
 from dataclasses import replace
 
@@ -6,11 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
-from tasks.identification.decision.forms import form_hypotheses, is_constant, scan_leftovers, spline_slopes
-from tasks.identification.decision.screening import inflation
+from tasks.identification.decision.forms import (
+    differentiate_by_splines,
+    fit_residual_splines,
+    is_constant,
+    make_form_hypotheses,
+)
+from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.search import (
-    Found,
     Round,
+    SearchState,
     find_retune,
     relinearise_candidate,
     scale_disturbances,
@@ -18,53 +23,53 @@ from tasks.identification.decision.search import (
 )
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import widen_noise
-from tasks.identification.inference.fit import Fit, fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
 from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
 from tasks.identification.rules import DecisionRules
 
 
 class ForeignCarError(Exception):
-    """The runs disagree about every direction even beside the best effects: the car's equations are others."""
+    """The runs disagree about every direction even with the best effects: the model's equations do not fit the car."""
 
 
 def search_forms(
-    start: Found,
-    null: Found,
+    start: SearchState,
+    null: SearchState,
     reasons: list[str],
     splines: tuple[NDArray[np.float64], ...] | None = None,
-) -> tuple[Found, Candidate | None]:
-    """Look for forms outside the library: alone against all that was named, and in what the named leave over.
+) -> tuple[SearchState, Candidate | None]:
+    """Search forms outside the library: alone against all that was named, and in the residual of the named effects.
 
     Parameters
     ----------
-    start : what the library explains
-    null : nothing accepted, same scales
-    reasons : is added to
-    splines : `spline_slopes` of ``start`` where they are known
+    start : state of the search with the effects of the library
+    null : state without any effect, with the same scales
+    reasons : list to which sentences are appended
+    splines : `differentiate_by_splines` of ``start``; None if not computed yet
 
     Returns
     -------
-    The state, and a form alone that cannot be told from the first effect.
+    The state, and a single form that cannot be told from the first effect.
     """
     state, near, rules = start, None, start.evidence.rules
-    left = best_form(state.evidence, state.base, splines=splines)
-    over = left is not None and left.passes and not _bends_session(left.fitted, state.base, rules)
+    left = find_best_form(state.evidence, state.base, splines=splines)
+    over = left is not None and left.passes and not _pulls_session(left.fitted, state.base, rules)
     disagreeing = any(r.accepted.inflation > rules.disagreement for r in state.rounds)
     # a number is held to be wrong by its pull, so a form need not reach the score of an effect beside it
     retuned = all(r.accepted.hypothesis.effect_class == "retune" for r in state.rounds)
     if state.rounds and (over or disagreeing):
         least = rules.lone_form_share * sum(r.accepted.gain for r in state.rounds)
-        alone = best_form(null.evidence, null.base, least, accept=0.0 if retuned else None)
+        alone = find_best_form(null.evidence, null.base, least, accept=0.0 if retuned else None)
         ahead = -np.inf
         if alone is not None and (alone.passes or retuned):
-            # a form has no direction of its own to be judged by, so both sides take the larger inflation
+            # a form has no library direction, hence no inflation of its own: both sides take the larger one
             common = max(alone.inflation, *(r.accepted.inflation for r in state.rounds))
             log_n = float(np.log(state.evidence.samples))
             extra = len(alone.hypothesis.names) - sum(len(r.accepted.hypothesis.names) for r in state.rounds)
             ahead = (alone.gain - sum(r.accepted.gain for r in state.rounds)) / common - extra * log_n
         first = state.rounds[0].accepted.hypothesis
-        # a form of the same variable at the same port is the named effect in another dress, not an unknown one
-        dressed = (
+        # a form of the same variable at the same port describes the named effect again, not an unknown one
+        same_effect = (
             alone is not None
             and alone.hypothesis.port == first.port
             and (
@@ -75,20 +80,20 @@ def search_forms(
         if (
             alone is not None
             and alone.passes
-            and not dressed
+            and not same_effect
             and (ahead > rules.rival_span or (retuned and disagreeing))
         ):
-            reasons.append(f"a form alone explains more than the library: {alone.hypothesis.name}")
-            state = Found(
+            reasons.append(f"a single form explains more than the library: {alone.hypothesis.name}")
+            state = SearchState(
                 evidence=null.evidence,
                 base=alone.fitted,
                 rounds=(Round(base=null.base, tried=(), accepted=alone, evidence=null.evidence),),
             )
         elif alone is not None and ahead > (0.0 if retuned else -rules.rival_span):
             elsewhere = alone.hypothesis.port != first.port
-            near = alone if (ahead > rules.rival_span if dressed else elsewhere or disagreeing) else None
+            near = alone if (ahead > rules.rival_span if same_effect else elsewhere or disagreeing) else None
     if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
-        reasons.append(f"something is left over: {left.hypothesis.name}")
+        reasons.append(f"a form explains a part of the residual: {left.hypothesis.name}")
         state = replace(
             state,
             base=left.fitted,
@@ -97,7 +102,7 @@ def search_forms(
     return state, near
 
 
-def _bends_session(fitted: Fit, base: Fit, rules: DecisionRules) -> bool:
+def _pulls_session(fitted: Fit, base: Fit, rules: DecisionRules) -> bool:
     """Whether a fit pulls a number of the session beyond belief that was not pulled so before.
 
     A damping force that is undone by a wrong damping is no discovery.
@@ -106,73 +111,75 @@ def _bends_session(fitted: Fit, base: Fit, rules: DecisionRules) -> bool:
     return bool(np.any((after > rules.retune_pull) & (before <= rules.retune_pull)))
 
 
-def best_form(
+def find_best_form(
     evidence: Evidence,
     base: Fit,
     least: float = 0.0,
     splines: tuple[NDArray[np.float64], ...] | None = None,
     accept: float | None = None,
 ) -> Candidate | None:
-    """The form that explains most of what a fit leaves over, refined and judged; None if nothing real is left.
+    """Return the form that explains most of the residual of a fit, refined and judged; None if no form passes.
 
     Parameters
     ----------
     evidence : the runs
     base : the fit
-    least : gain in log likelihood from which a spline is followed up
-    splines : `spline_slopes` where they are known
-    accept : score that a spline must promise; None takes that of an effect
+    least : gain in log likelihood from which a spline leads to forms [1]
+    splines : `differentiate_by_splines` at the fit; None if not computed yet
+    accept : score that a spline must promise [1]; None takes that of an effect
     """
     promised = evidence.rules.accept_score if accept is None else accept
-    level = inflation(evidence, base, None)
+    level = compute_inflation(evidence, base, None)
     enough = max(promised + float(np.log(evidence.samples)), least / level)
-    leftovers = [x for x in scan_leftovers(evidence, base, splines)[:2] if x.gain > enough]
+    leftovers = [x for x in fit_residual_splines(evidence, base, splines)[:2] if x.gain > enough]
     if not leftovers:
         return None
-    held_out = misfit_by_run(evidence.held_out, base)
+    held_out = compute_misfit_by_run(evidence.held_out, base)
     judged = [
         judge_hypothesis(evidence, base, held_out, h)
         for x in leftovers
-        for h in form_hypotheses(x, evidence.samples)
+        for h in make_form_hypotheses(x, evidence.samples)
     ]
     return relinearise_candidate(evidence, base, max(judged, key=lambda c: c.score))[1]
 
 
-def search_all(evidence: Evidence, null: Fit, reasons: list[str]) -> tuple[Found, Found, Candidate | None]:
+def search_library_and_forms(
+    evidence: Evidence, null: Fit, reasons: list[str]
+) -> tuple[SearchState, SearchState, Candidate | None]:
     """Scale the disturbances, then search library and forms under every gate.
 
     Parameters
     ----------
     evidence : the runs under a first guess of the scales
     null : fit without effects
-    reasons : is added to
+    reasons : list to which sentences are appended
 
     Returns
     -------
-    The start without effects, what was found, and a form alone that cannot be told from the first effect.
+    The state without effects, the state with those found, and a single form that cannot be told from the first effect.
 
     Raises
     ------
     ForeignCarError
-        If the model's own misfit would drown what is looked for.
+        If the model's own misfit exceeds any effect that could be found.
     """
     if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
         evidence = differentiate_at(evidence, null, library=True)
-        null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+        null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     evidence = widen_noise(evidence, null)
-    null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
-    explored = search_library(Found(evidence=evidence, base=null), gated=False)
-    if inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+    explored = search_library(SearchState(evidence=evidence, base=null), gated=False)
+    if compute_inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
         raise ForeignCarError
-    splines = spline_slopes(explored.evidence, explored.base)
+    splines = differentiate_by_splines(explored.evidence, explored.base)
     scales = scale_disturbances(explored, splines)
     evidence = rescale_disturbances(evidence, scales)
     explored = replace(
         explored,
         rounds=tuple(replace(r, evidence=rescale_disturbances(r.evidence, scales)) for r in explored.rounds),
     )
-    null = fit(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
-    start = Found(evidence=evidence, base=null)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
+    start = SearchState(evidence=evidence, base=null)
     found = search_library(start, gated=True, explored=explored)
     if not found.rounds:
         found = replace(find_retune(start, reasons), tried=found.tried)

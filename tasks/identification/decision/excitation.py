@@ -1,4 +1,4 @@
-"""Ranges that the runs of a campaign reach of each variable that a form can depend on."""
+"""Range of each form variable that the runs of a campaign reach."""
 
 from collections.abc import Iterable
 
@@ -12,22 +12,23 @@ from tasks.vehicle.effects.slots import Slot
 def find_reached_range(
     models: Iterable[RunModel], theta: NDArray[np.float64], slots: tuple[Slot, ...], variable: str
 ) -> tuple[float, float]:
-    """Return the lowest and highest value of a variable over runs, by the grown model [unit of the variable].
+    """Return the lowest and highest value of a variable over runs in the grown model [unit of the variable].
 
     Parameters
     ----------
     models : the runs
-    theta : float64 [len(EFFECT_TABLE)] effects found
-    slots : forms found
+    theta : float64 [len(EFFECT_TABLE)] effects that were found
+    slots : forms that were found
     variable : one of `VARIABLES`
     """
-    values = [_history(model, theta, slots, variable) for model in models]
+    values = [_simulate_variable(model, theta, slots, variable) for model in models]
     return float(min(v.min() for v in values)), float(max(v.max() for v in values))
 
 
-def _history(
+def _simulate_variable(
     model: RunModel, theta: NDArray[np.float64], slots: tuple[Slot, ...], variable: str
 ) -> NDArray[np.float64]:
+    """Return the simulated values of a variable in one run, float64 [N] [unit of the variable]."""
     if variable == "time":
         return np.arange(model.samples, dtype=np.float64) * model.run.interval
     column = simulate_run(model, theta, slots=slots).column

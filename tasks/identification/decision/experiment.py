@@ -1,4 +1,4 @@
-"""The next experiment: which planned run would tell two fitted explanations apart best."""
+"""The next experiment: the planned run that separates two fitted explanations best."""
 
 from dataclasses import dataclass, replace
 
@@ -6,25 +6,25 @@ import numpy as np
 
 from tasks.campaign.planned_runs import EXPERIMENTS, make_planned_run
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.evidence import run_evidence
+from tasks.identification.inference.evidence import differentiate_run
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.forward import predict, run_model
-from tasks.identification.inference.hypothesis import compose
-from tasks.identification.inference.noise import whiten
+from tasks.identification.inference.forward import predict_channels, prepare_run
+from tasks.identification.inference.hypothesis import compose_parameters
+from tasks.identification.inference.noise import whiten_channels
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
 
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """A planned run and what it is expected to say.
+    """A planned run and the evidence that it is expected to give.
 
     Parameters
     ----------
-    between : the two explanations
-    plan : in words
-    expected_d2 : squared distance between their predictions, nuisances and noise taken out; each unit is half a
-        unit of log likelihood, so 20 from one run settles it
+    between : names of the two explanations
+    plan : description of the run
+    expected_d2 : squared distance between their whitened predictions with nuisances projected out; each unit is half
+        a unit of log likelihood, so 20 from one run decides [1]
     """
 
     between: tuple[str, str]
@@ -32,33 +32,35 @@ class Experiment:
     expected_d2: float
 
 
-def next_experiment(
+def plan_next_experiment(
     evidence: Evidence, first: Fit, second: Fit, vehicle: Vehicle, surface: SurfaceParameters
 ) -> Experiment | None:
-    """The planned run with the largest nuisance-marginalised D2 between two fits; None if none tells them apart.
+    """Return the planned run with the largest nuisance-marginalised D2 between two fits; None if all are alike.
 
     Parameters
     ----------
-    evidence : whose noise and priors hold
+    evidence : the runs, which give noise and priors
     first, second : fitted explanations
-    vehicle, surface : the model
+    vehicle, surface : the judged model
     """
     rho, sigma = evidence.train[0].rho, evidence.train[0].sigma
     best = ("", -1.0)
     for plan, drive in EXPERIMENTS:
-        theta, slots = compose(first.parts, first.values, first.session)
-        other, other_slots = compose(second.parts, second.values, second.session)
-        model = run_model(make_planned_run(drive, plan), vehicle, surface)
-        ridden = predict(model, theta, slots=slots)
-        # planned again with the speed it will have, so that the run ends where the car is slow
-        model = run_model(replace(model.run, response=ridden), vehicle, surface)
-        expected = run_evidence(
+        theta, slots = compose_parameters(first.parts, first.values, first.session)
+        other, other_slots = compose_parameters(second.parts, second.values, second.session)
+        model = prepare_run(make_planned_run(drive, plan), vehicle, surface)
+        predicted = predict_channels(model, theta, slots=slots)
+        # prepared again with the predicted speed, so that the run ends where the vehicle is slow
+        model = prepare_run(replace(model.run, response=predicted), vehicle, surface)
+        expected = differentiate_run(
             model, rho, sigma, theta, (), evidence.tolerances, evidence.disturbance, slots
         )
-        change = whiten(
-            predict(model, other, slots=other_slots) - predict(model, theta, slots=slots), rho, sigma
+        change = whiten_channels(
+            predict_channels(model, other, slots=other_slots) - predict_channels(model, theta, slots=slots),
+            rho,
+            sigma,
         )
-        q = expected.project(change)
+        q = expected.project_on_nuisances(change)
         session = expected.session.T @ expected.session - expected.session_q.T @ expected.session_q
         session += np.diag(1.0 / np.square(evidence.session_sigma))
         shared = expected.session.T @ change - expected.session_q.T @ q

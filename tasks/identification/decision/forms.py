@@ -1,4 +1,4 @@
-"""Residual left over, as splines over pairs of port and variable, and the simple shape that a spline has."""
+"""Forms outside the library: splines of the residual over pairs of port and variable, and simple shapes for them."""
 
 from dataclasses import dataclass
 
@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.identification.decision.screening import inflation
+from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.forward import predict
-from tasks.identification.inference.hypothesis import Hypothesis, compose
-from tasks.identification.inference.noise import whiten
-from tasks.vehicle.effects.forms import SHAPES, Form, form_name
-from tasks.vehicle.effects.ports import PORT_UNITS, PORTS
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
+from tasks.identification.inference.noise import whiten_channels
+from tasks.vehicle.effects.forms import SHAPES, Form, name_form
+from tasks.vehicle.effects.ports import PORT_UNITS
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
@@ -34,7 +34,7 @@ SCANNED = {
     "pitch_moment": ("speed", "deceleration", "pressure_rate"),
     "suspension_force": ("suspension_travel", "suspension_speed"),
 }
-"""Variables that each port is scanned over."""
+"""Variables over which each port is scanned."""
 RANGE = {
     "speed": (2.0, 34.0), "deceleration": (0.0, 9.0), "pressure": (0.0, 3.6), "disc_temperature": (0.0, 400.0),
     "pressure_rate": (-12.0, 12.0), "load_ratio": (0.4, 1.6), "suspension_travel": (-0.06, 0.06),
@@ -43,17 +43,17 @@ RANGE = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Leftover:
-    """A spline of one variable at one port, fitted linearly to what a fit leaves.
+class ResidualSpline:
+    """A spline of one variable at one port, fitted linearly to the residual of a fit.
 
     Parameters
     ----------
-    port, variable : where
+    port, variable : port and variable of the spline
     grid : float64 [K] knots [unit of the variable]
     values : float64 [K] [unit of the port]
-    covariance : float64 [K, K]
-    gain : log likelihood gained, divided by the inflation
-    score : gain less K log N
+    covariance : float64 [K, K] [unit of the port squared]
+    gain : rise of the log likelihood, divided by the inflation [1]
+    score : gain less K log N [1]
     """
 
     port: str
@@ -70,24 +70,24 @@ RIDGE = np.repeat([(20.0 * PORT_STEP[port]) ** -2 for port, _ in KEYS], KNOTS)
 """Precision of the broad priors of all knots, in the order of `KEYS`."""
 
 
-def scan_leftovers(
+def fit_residual_splines(
     evidence: Evidence, at: Fit, splines: tuple[NDArray[np.float64], ...] | None = None
-) -> list[Leftover]:
+) -> list[ResidualSpline]:
     """Fit a spline at every scanned port and variable to the residuals of ``at``; best first.
 
     Parameters
     ----------
     evidence : the runs
-    at : fit whose residuals are scanned
-    splines : of `spline_slopes` where they are known
+    at : fit whose residuals are used
+    splines : `differentiate_by_splines` at the fit; None if not computed yet
     """
     size, n_session = KNOTS * len(KEYS), len(evidence.session_sigma)
     gram, cross, right = np.zeros((size, size)), np.zeros((size, n_session)), np.zeros(size)
     session = np.diag(1.0 / np.square(evidence.session_sigma))
     pull = -at.session / np.square(evidence.session_sigma)
-    slopes = spline_slopes(evidence, at) if splines is None else splines
+    slopes = differentiate_by_splines(evidence, at) if splines is None else splines
     for run, r, columns in zip(evidence.train, at.residuals, slopes, strict=True):
-        q, qr = run.project(columns), run.project(r)
+        q, qr = run.project_on_nuisances(columns), run.project_on_nuisances(r)
         gram += columns.T @ columns - q.T @ q
         cross += columns.T @ run.session - q.T @ run.session_q
         session += run.session.T @ run.session - run.session_q.T @ run.session_q
@@ -96,7 +96,7 @@ def scan_leftovers(
     inverse = np.linalg.inv(session)
     gram -= cross @ inverse @ cross.T
     right = right - cross @ inverse @ pull
-    level = inflation(evidence, at, None)
+    level = compute_inflation(evidence, at, None)
     found = []
     for i, (port, variable) in enumerate(KEYS):
         block = slice(KNOTS * i, KNOTS * (i + 1))
@@ -104,7 +104,7 @@ def scan_leftovers(
         values = covariance @ right[block]
         gain = 0.5 * float(values @ right[block]) / level
         found.append(
-            Leftover(
+            ResidualSpline(
                 port=port,
                 variable=variable,
                 grid=np.linspace(*RANGE[variable], KNOTS),
@@ -117,20 +117,23 @@ def scan_leftovers(
     return sorted(found, key=lambda leftover: -leftover.score)
 
 
-def spline_slopes(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], ...]:
-    """Whitened derivatives of every training run by all knots of all scanned splines, float64 [M, K] each.
+def differentiate_by_splines(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], ...]:
+    """Return the whitened derivatives of every training run by all knots of all splines, float64 [M, K] each.
 
     Parameters
     ----------
     evidence : the runs
-    at : fit about which
+    at : fit about which the derivatives are taken
     """
-    theta, slots = compose(at.parts, at.values, at.session)
-    return tuple(_hats(run, theta, slots) for run in evidence.train)
+    theta, slots = compose_parameters(at.parts, at.values, at.session)
+    return tuple(_differentiate_run(run, theta, slots) for run in evidence.train)
 
 
-def _hats(run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...]) -> NDArray[np.float64]:
-    y = predict(run.model, theta, slots=slots)
+def _differentiate_run(
+    run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...]
+) -> NDArray[np.float64]:
+    """Return the whitened derivatives of one run by all knots, float64 [M, K]."""
+    y = predict_channels(run.model, theta, slots=slots)
     columns = []
     for port, variable in KEYS:
         low, high = RANGE[variable]
@@ -140,19 +143,19 @@ def _hats(run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...])
             extra = Slot(
                 port=port, variable=variable, origin=low, spacing=(high - low) / (KNOTS - 1), values=hat
             )
-            moved = predict(run.model, theta, slots=(*slots, extra))
+            moved = predict_channels(run.model, theta, slots=(*slots, extra))
             columns.append((moved - y) / PORT_STEP[port])
-    return whiten(np.stack(columns, axis=-1), run.rho, run.sigma)
+    return whiten_channels(np.stack(columns, axis=-1), run.rho, run.sigma)
 
 
-def form_hypotheses(leftover: Leftover, samples: int, count: int = 2) -> list[Hypothesis]:
-    """The grammar's shapes that fit a spline best, as hypotheses for the simulation.
+def make_form_hypotheses(leftover: ResidualSpline, samples: int, count: int = 2) -> list[Hypothesis]:
+    """Return the grammar's shapes that fit a spline best, as hypotheses for the simulation.
 
     Parameters
     ----------
-    leftover : the spline
+    leftover : spline of the residual
     samples : N of the score's penalty
-    count : how many shapes to return
+    count : number of shapes to return
     """
     scale = float(np.max(np.abs(leftover.grid)))
     precision = np.linalg.inv(leftover.covariance)
@@ -165,28 +168,30 @@ def form_hypotheses(leftover: Leftover, samples: int, count: int = 2) -> list[Hy
         cost = 0.5 * float(miss @ precision @ miss) + basis.shape[1] * np.log(samples)
         ranked.append((cost, name, np.asarray(coefficients, dtype=np.float64)))
     ranked.sort(key=lambda entry: entry[0])
-    return [_form(leftover, name, coefficients, scale) for _, name, coefficients in ranked[:count]]
+    return [
+        _make_form_hypothesis(leftover, name, coefficients, scale) for _, name, coefficients in ranked[:count]
+    ]
 
 
-def curve(form: Hypothesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A form at its first values: its variable and its value at the port, float64 [TABLE] each.
+def sample_form(form: Hypothesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a form at its first values: its variable and its value at the port, float64 [TABLE] each.
 
     Parameters
     ----------
-    form : of `form_hypotheses`
+    form : hypothesis of `make_form_hypotheses`
     """
     (slot,) = form.build(form.start)[1]
     return slot.origin + slot.spacing * np.arange(len(slot.values), dtype=np.float64), slot.values
 
 
-def form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: float) -> Form:
-    """A form that was found, held constant beyond the range of its variable that the runs reached.
+def make_form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: float) -> Form:
+    """Return a form that was found, constant beyond the range of its variable that the runs reached.
 
     Parameters
     ----------
-    name : of its hypothesis
+    name : name of its hypothesis
     coefficients : a, or a and b [unit of the port]
-    low, high : what the runs reached [unit of the variable]; the scanned range bounds it
+    low, high : range that the runs reached, cut to the scanned range [unit of the variable]
 
     Raises
     ------
@@ -198,7 +203,7 @@ def form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: 
             first, last = RANGE[variable]
             scale = max(abs(first), abs(last))
             for shape in SHAPES:
-                if form_name(port, variable, shape, scale) == name:
+                if name_form(port, variable, shape, scale) == name:
                     return Form(
                         port=port, variable=variable, shape=shape, coefficients=coefficients, scale=scale,
                         low=max(first, low), high=min(last, high),
@@ -207,20 +212,23 @@ def form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: 
 
 
 def is_constant(form: Hypothesis) -> bool:
-    """Whether a form does not depend on its variable.
+    """Return whether a form does not depend on its variable.
 
     Parameters
     ----------
-    form : of `form_hypotheses`
+    form : hypothesis of `make_form_hypotheses`
     """
-    return bool(np.ptp(curve(form)[1]) == 0.0)
+    return bool(np.ptp(sample_form(form)[1]) == 0.0)
 
 
-def _form(leftover: Leftover, name: str, start: NDArray[np.float64], scale: float) -> Hypothesis:
+def _make_form_hypothesis(
+    leftover: ResidualSpline, name: str, start: NDArray[np.float64], scale: float
+) -> Hypothesis:
+    """Return one shape of the grammar as a hypothesis with broad bounds."""
     port, variable = leftover.port, leftover.variable
     low, high = RANGE[variable]
 
-    def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+    def build_slots(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
         form = Form(
             port=port, variable=variable, shape=name, coefficients=tuple(values.tolist()), scale=scale, low=low,
             high=high,
@@ -230,7 +238,7 @@ def _form(leftover: Leftover, name: str, start: NDArray[np.float64], scale: floa
     k = len(start)
     step = np.full(k, PORT_STEP[port])
     return Hypothesis(
-        name=form_name(port, variable, name, scale), effect_class="form", port=port, variable=variable,
-        names=("a", "b")[:k], units=(PORT_UNITS[PORTS.index(port)],) * k, lower=-100.0 * step, upper=100.0 * step,
-        step=step, start=start.copy(), build=build,
+        name=name_form(port, variable, name, scale), effect_class="form", port=port, variable=variable,
+        names=("a", "b")[:k], units=(PORT_UNITS[port],) * k, lower=-100.0 * step, upper=100.0 * step,
+        step=step, start=start.copy(), build=build_slots,
     )  # fmt: skip

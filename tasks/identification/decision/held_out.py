@@ -1,4 +1,4 @@
-"""Error on runs that no fit has seen: as delivered, re-tuned without any new effect, and with the effects."""
+"""Errors on held-out runs: of the model as delivered, re-tuned without any new effect, and with the effects."""
 
 from collections.abc import Mapping
 
@@ -9,21 +9,21 @@ from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fit
-from tasks.identification.inference.forward import predict
-from tasks.identification.inference.hypothesis import compose
+from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 
-def held_out_error(
+def compute_held_out_errors(
     evidence: Evidence, null: Fit, base: Fit
 ) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
-    """RMSE on held-out runs under the frozen, the re-tuned and the grown model.
+    """Return the RMSE on held-out runs under the frozen, the re-tuned and the grown model.
 
     Parameters
     ----------
     evidence : the runs
-    null : fit without effects, where re-tuning starts
+    null : fit without effects, from which re-tuning starts
     base : fit with the accepted effects
 
     Returns
@@ -31,19 +31,19 @@ def held_out_error(
     Errors by channel; and of stopping distance and peak pitch, over the runs that brake.
     """
     rules = evidence.rules
-    retuned = fit(
+    retuned = fit_hypotheses(
         evidence.train, (), rules.retune_widening * evidence.session_sigma, session=null.session, iterations=8
     )
     models = (
         (np.zeros(len(EFFECT_TABLE)), ()),
-        compose((), np.empty(0), retuned.session),
-        compose(base.parts, base.values, base.session),
+        compose_parameters((), np.empty(0), retuned.session),
+        compose_parameters(base.parts, base.values, base.session),
     )
     names, square, braked, manoeuvres = [], [], [], []
     measured = np.isfinite(evidence.train[0].sigma)
     for run in evidence.held_out:
         model = run.model
-        y = np.array([predict(model, theta, slots=slots) for theta, slots in models])
+        y = np.array([predict_channels(model, theta, slots=slots) for theta, slots in models])
         names.append(model.run.name)
         square.append(np.mean((model.measured - y) ** 2, axis=1))
         pressure = model.run.pressure[: model.samples]
@@ -65,7 +65,15 @@ def held_out_error(
 def summarise_errors(
     square: NDArray[np.float64], runs: list[str], units: Mapping[str, str], resamples: int
 ) -> dict[str, ChannelError]:
-    """Root mean squares with bootstrap intervals from mean squares by run and model, float64 [R, 3, C]."""
+    """Return RMSE and bootstrap intervals by channel.
+
+    Parameters
+    ----------
+    square : float64 [R, 3, C] mean squared errors by run, model (frozen, re-tuned, grown) and channel [unit^2]
+    runs : names of the R runs
+    units : unit of each of the C channels, by name
+    resamples : number of bootstrap resamples [1]
+    """
     draws = np.random.Generator(np.random.Philox(0)).integers(0, len(runs), (resamples, len(runs)))
     errors = {}
     for c, (name, unit) in enumerate(units.items()):

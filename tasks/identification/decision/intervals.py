@@ -1,4 +1,4 @@
-"""95 % intervals of a hypothesis' parameters, within their bounds and at one with the likelihood."""
+"""95 % intervals of a hypothesis' parameters, by curvature or by profile likelihood, within the bounds."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from scipy.stats import t as student
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, fit
+from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.linearisation import differentiate_at
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -19,26 +19,26 @@ Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
 def refit_named(
     evidence: Evidence, base: Fit, candidates: Sequence[Candidate]
 ) -> tuple[Evidence, Fit, list[Candidate]]:
-    """Return the named effects, fitted with derivatives that are taken at them.
+    """Return the named effects, fitted with derivatives that are taken at their estimates.
 
-    Derivatives of the nuisances that were taken elsewhere take too little from those of an effect: on a road feature
-    that is reached a moment later most of all. The search can live with that; the information that they promise is up
-    to three times too large, and estimates stop short.
+    If the derivatives of the nuisances are those of another linearisation point, too little of an effect's derivative
+    is projected out, most of all where the vehicle reaches a road feature a moment later. That is accurate enough for
+    the search, but the information is up to three times too large, and the estimates stop before the optimum.
 
     Parameters
     ----------
     evidence : the runs
     base : fit of all that is named
-    candidates : each named effect as it was judged, beyond all others
+    candidates : each named effect as it was judged, in addition to all others
 
     Returns
     -------
-    The runs with derivatives at ``base``, the fits again.
+    The runs with derivatives at ``base``, the base fitted again, and the candidates fitted again.
     """
     here = differentiate_at(evidence, base, library=False)
 
-    def again(fitted: Fit) -> Fit:
-        return fit(
+    def refit_here(fitted: Fit) -> Fit:
+        return fit_hypotheses(
             here.train,
             fitted.parts,
             here.session_sigma,
@@ -47,20 +47,25 @@ def refit_named(
             iterations=8,
         )
 
-    return here, again(base), [replace(c, fitted=again(c.fitted)) for c in candidates]
+    return here, refit_here(base), [replace(c, fitted=refit_here(c.fitted)) for c in candidates]
 
 
-def student_quantile(candidate: Candidate) -> float:
-    """Student's t with as many runs as inform the parameter, less one: the runs' scatter is itself estimated."""
-    return float(student.ppf(0.975, max(candidate.informed - 1, 1)))
-
-
-def curvature_interval(candidate: Candidate) -> Bounds:
-    """Intervals from the curvature at the estimate, widened by the runs' disagreement, cut at the bounds.
+def compute_student_quantile(candidate: Candidate) -> float:
+    """Return Student's t at 97.5 % with the runs that inform the parameter, less one, as degrees of freedom [1].
 
     Parameters
     ----------
-    candidate : refined and judged
+    candidate : refined and judged candidate
+    """
+    return float(student.ppf(0.975, max(candidate.informed - 1, 1)))
+
+
+def compute_curvature_interval(candidate: Candidate) -> Bounds:
+    """Return intervals from the curvature at the estimate, widened by the runs' disagreement, cut at the bounds.
+
+    Parameters
+    ----------
+    candidate : refined and judged candidate
 
     Returns
     -------
@@ -70,35 +75,35 @@ def curvature_interval(candidate: Candidate) -> Bounds:
     k = len(h.names)
     values = candidate.fitted.values[-k:]
     variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation
-    # the session's own tolerance of the same number belongs to the car's
+    # the session's tolerance of the same number adds to the uncertainty of the vehicle's
     tolerance = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
-    reach = np.sqrt(variance + np.square(tolerance)) * student_quantile(candidate)
+    reach = np.sqrt(variance + np.square(tolerance)) * compute_student_quantile(candidate)
     return np.clip(values - reach, h.lower, h.upper), np.clip(values + reach, h.lower, h.upper)
 
 
-def profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
-    """Intervals of an effect of several parameters from its profile likelihood.
+def compute_profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
+    """Return intervals of an effect of several parameters from its profile likelihood.
 
-    A value belongs to the interval where the best fit that holds it is worse by less than t^2 times the inflation
-    (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter matters only together with another,
-    curvature at the estimate says nothing about 'no effect'; the profile says there what the score says: its deviance
-    at 0 is twice the gain.
+    A value belongs to the interval if the best fit with that value is worse by less than t^2 times the inflation
+    (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter acts only together with another, the
+    curvature at the estimate does not tell whether there is an effect. The profile does, in agreement with the score:
+    its deviance at 0 is twice the gain.
 
     Parameters
     ----------
-    candidate : refined and judged; of one parameter, the curvature is taken
+    candidate : refined and judged candidate; with one parameter, its curvature is used
     evidence : the runs
 
     Returns
     -------
     Lower and upper ends, float64 [K] each.
     """
-    low, high = curvature_interval(candidate)
+    low, high = compute_curvature_interval(candidate)
     k = len(candidate.hypothesis.names)
     if k == 1:
         return low, high
     fitted = candidate.fitted
-    centre = fit(
+    centre = fit_hypotheses(
         evidence.train, fitted.parts, evidence.session_sigma, values=fitted.values, session=fitted.session,
         iterations=4,
     )  # fmt: skip
@@ -112,37 +117,37 @@ def profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
 def _find_limit(
     candidate: Candidate, centre: Fit, evidence: Evidence, place: int, guess: float, bound: float
 ) -> float:
-    """Where the profile's root deviance reaches the quantile between the estimate and a bound, by false position."""
+    """Return the value between estimate and bound where the root deviance reaches the quantile, by false position."""
     k = len(candidate.hypothesis.names)
-    wanted = student_quantile(candidate)
+    wanted = compute_student_quantile(candidate)
     inside, outside = float(centre.values[place - k]), float(bound)
     if inside == outside:
         return outside
 
-    def root(x: float) -> float:
+    def compute_root_deviance(x: float) -> float:
         rise = _fit_pinned(centre, evidence, place - k, x).objective - centre.objective
         return float(np.sqrt(max(rise, 0.0) / candidate.inflation))
 
-    at_inside, at_outside = 0.0, root(outside)
+    at_inside, at_outside = 0.0, compute_root_deviance(outside)
     if at_outside <= wanted:
         return outside
     x = guess if min(inside, outside) < guess < max(inside, outside) else 0.5 * (inside + outside)
     for _ in range(evidence.rules.profile_points):
-        here = root(x)
+        here = compute_root_deviance(x)
         if abs(here - wanted) < evidence.rules.profile_tolerance * wanted:
             return x
         if here < wanted:
             inside, at_inside = x, here
         else:
             outside, at_outside = x, here
-        # away from both ends, so that a bent profile cannot hold one of them for ever
+        # kept away from both ends, so that a curved profile cannot keep one of them for ever
         share = np.clip((wanted - at_inside) / (at_outside - at_inside), 0.1, 0.9)
         x = inside + float(share) * (outside - inside)
     return x
 
 
 def _fit_pinned(centre: Fit, evidence: Evidence, place: int, value: float) -> Fit:
-    """The best fit that holds one parameter of the last hypothesis (``place`` counts from the end)."""
+    """Return the best fit that holds one parameter of the last hypothesis (``place`` counts from the end)."""
     last = centre.parts[-1]
     lower, upper = last.lower.copy(), last.upper.copy()
     lower[place] = upper[place] = value
@@ -152,7 +157,7 @@ def _fit_pinned(centre: Fit, evidence: Evidence, place: int, value: float) -> Fi
     k = len(last.names)
     start[-k:] = np.clip(start[-k:], lower, upper)
     pinned = (*centre.parts[:-1], replace(last, lower=lower, upper=upper))
-    return fit(
+    return fit_hypotheses(
         evidence.train, pinned, evidence.session_sigma, values=start, session=centre.session,
         iterations=4,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rivals of the named effects, and how large an effect would have to be to be named at all."""
+"""Rivals of the named effects, and the smallest effects that could be named."""
 
 from dataclasses import dataclass, replace
 
@@ -7,28 +7,28 @@ import numpy as np
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (  # fmt: skip
     Candidate,
-    bootstrap_win_share,
+    compute_win_share,
     is_nested,
     judge_hypothesis,
     refine_candidates,
-    refit_without,
+    refit_without_part,
 )
-from tasks.identification.decision.screening import inflation
+from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.search import Round
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, misfit_by_run
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compared:
-    """An accepted effect beside all else that was tried in its place.
+class RivalComparison:
+    """An accepted effect and the alternatives that were tried in its place.
 
     Parameters
     ----------
-    own : the effect, beyond all other accepted ones
-    share : bootstrap win share
-    others : what was tried in its place, with win shares, best first
-    near : those of them that cannot be told from it
+    own : the effect, in addition to all other accepted ones
+    share : bootstrap win share [1]
+    others : alternatives with their win shares, best first
+    near : alternatives that cannot be told from the effect
     """
 
     own: Candidate
@@ -37,28 +37,28 @@ class Compared:
     near: tuple[tuple[Candidate, float], ...]
 
 
-def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[Compared]:
-    """Hold every accepted effect against its alternatives, all other accepted ones present.
+def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]) -> list[RivalComparison]:
+    """Compare every accepted effect with its alternatives, with all other accepted effects in the model.
 
     Parameters
     ----------
     evidence : the runs, with derivatives that hold at ``base``
     base : fit of all accepted effects
-    rounds : how they were found
+    rounds : rounds of the search that accepted them
     """
     compared = []
     for i, found in enumerate(rounds):
         rest, own, tried = found.base, found.accepted, found.tried
         if i + 1 < len(rounds):
-            # what was accepted later may change how this effect compares with its rivals
-            rest = refit_without(base, i, evidence)
+            # an effect that was accepted later may change the comparison of this effect with its rivals
+            rest = refit_without_part(base, i, evidence)
             at = sum(len(p.names) for p in base.parts[:i])
             part = replace(base.parts[i], start=base.values[at : at + len(base.parts[i].names)])
-            own = judge_hypothesis(evidence, rest, misfit_by_run(evidence.held_out, rest), part)
+            own = judge_hypothesis(evidence, rest, compute_misfit_by_run(evidence.held_out, rest), part)
             tried = tuple(refine_candidates(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
-        share = bootstrap_win_share([own, *others], rest)
-        shares = [bootstrap_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
+        share = compute_win_share([own, *others], rest)
+        shares = [compute_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
         near = tuple(
             (c, wins)
             for c, wins in zip(others, shares, strict=True)
@@ -68,18 +68,18 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             and _is_credible(c, own, evidence)
         )
         compared.append(
-            Compared(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
+            RivalComparison(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
         )
     return compared
 
 
 def is_close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
-    """Whether another explanation cannot be told from the named one: by score, by gain, or by resamples.
+    """Return whether another explanation cannot be told from the named one: by score, by gain, or by resamples.
 
     Parameters
     ----------
     own, other : the named effect and the other
-    share, wins : their shares of bootstrap resamples
+    share, wins : their shares of bootstrap resamples [1]
     """
     needed = own.rules.win_share
     if other.gain > own.rules.rival_gain_share * own.gain:
@@ -88,22 +88,22 @@ def is_close(own: Candidate, share: float, other: Candidate, wins: float) -> boo
 
 
 def _is_credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
-    """An explanation that still bends the session beyond belief is none, beside one that does not."""
+    """Return whether the other explanation keeps the session within belief, unless the named one does not either."""
     bent, straight = (float(np.max(np.abs(c.fitted.session) / evidence.session_sigma)) for c in (other, own))
     return bent <= evidence.rules.retune_pull or straight > evidence.rules.retune_pull
 
 
 def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:
-    """Smallest first parameter whose linear gain would pass the score gate, at the level of the null's inflation.
+    """Return the smallest first parameter of each effect whose linear gain would pass the score gate.
 
-    Infinite where the library's bounds end before.
+    The gate is taken at the null's inflation [unit of the parameter]; infinite where the bounds exclude that size.
 
     Parameters
     ----------
     evidence : the runs
     base : fit without effects
     """
-    level = inflation(evidence, base, None)
+    level = compute_inflation(evidence, base, None)
     library = np.zeros((len(evidence.effects),) * 2)
     cross = np.zeros((len(evidence.effects), len(SESSION)))
     session = np.diag(1.0 / np.square(evidence.session_sigma))

@@ -1,17 +1,17 @@
-"""The library held against residuals: gain and estimate of every effect, linearly."""
+"""Linear screening of the library: gain and estimate of every effect, and the inflation of the runs."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.evidence import second_values
+from tasks.identification.inference.evidence import list_second_values
 from tasks.identification.inference.fit import Fit
 
 
-def screen(
+def screen_library(
     evidence: Evidence, at: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Gain and estimate of every library effect, linearly, beyond the accepted ones.
+    """Return gain and estimate of every library effect beyond the accepted ones, by linear algebra alone.
 
     Parameters
     ----------
@@ -20,21 +20,21 @@ def screen(
 
     Returns
     -------
-    gains float64 [E], estimates float64 [E] of the first parameter, and float64 [E] the value of the second at which
-    the gain is largest (nan where its first value is, or where there is none)
+    Gains float64 [E]; estimates of the first parameter float64 [E] [its unit]; and the value of the second parameter
+    with the largest gain float64 [E] [its unit], NaN if that is its first value or if there is no second parameter.
     """
     effects = evidence.effects
     accepted = [j for j, e in enumerate(effects) if e.name in {p.name for p in at.parts}]
-    tried = [(j, np.nan) for j in range(len(effects))] + second_values(effects)
+    tried = [(j, np.nan) for j in range(len(effects))] + list_second_values(effects)
     library, n_session = len(tried), len(evidence.session_sigma)
     gram, right = np.zeros((library + n_session,) * 2), np.zeros(library + n_session)
-    several = bool(second_values(effects))
+    several = bool(list_second_values(effects))
     for run, r in zip(evidence.train, at.residuals, strict=True):
         extra, extra_q = ((run.others,), (run.others_q,)) if several else ((), ())
         b = np.column_stack((run.library, *extra, run.session))
         q = np.column_stack((run.library_q, *extra_q, run.session_q))
         gram += b.T @ b - q.T @ q
-        right += b.T @ r - q.T @ run.project(r)
+        right += b.T @ r - q.T @ run.project_on_nuisances(r)
     others = [*accepted, *range(library, library + n_session)]
     precision = np.concatenate((np.zeros(len(accepted)), 1.0 / np.square(evidence.session_sigma)))
     right[library:] -= at.session / np.square(evidence.session_sigma)
@@ -58,22 +58,22 @@ def screen(
     return gains, estimates, seconds
 
 
-def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> float:
-    """How much the runs disagree beyond their noise about one direction and about the library's in general.
+def compute_inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> float:
+    """Return the factor by which the runs disagree beyond their noise [1].
 
-    Under a right model every run's score z in any direction is standard normal. Q is the sum of z^2 over runs
-    (Cochran 1954, doi:10.2307/3001666); the null's level is the median over the library's directions, and the
-    direction's own Q counts beside it.
+    Under a correct model every run's score z in any direction is standard normal, and Q, the sum of z^2 over runs,
+    equals their number on average (Cochran 1954, doi:10.2307/3001666). The null's level is the median over the
+    library's directions; the direction's own Q is combined with it.
 
     Parameters
     ----------
     evidence : the runs
-    at : fit whose residuals are looked at
-    own : float64 [R] z of the direction itself, or None
+    at : fit whose residuals are used
+    own : float64 [R] z of the direction itself, or None for the null's level alone
     """
     z = np.full((len(evidence.train), len(evidence.effects)), np.nan)
     for i, (run, r) in enumerate(zip(evidence.train, at.residuals, strict=True)):
-        q, qr = run.library_q, run.project(r)
+        q, qr = run.library_q, run.project_on_nuisances(r)
         information = np.einsum("ij,ij->j", run.library, run.library) - np.einsum("ij,ij->j", q, q)
         alive = information * np.array([e.parameters[0].step for e in evidence.effects]) ** 2 > 0.05
         z[i, alive] = ((run.library.T @ r - q.T @ qr) / np.sqrt(np.maximum(information, 1e-30)))[alive]
@@ -85,13 +85,13 @@ def inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | None) -> f
     return max(level, (float(np.sum(own**2)) + 6.0 * level) / (len(own) - 1 + 6.0))
 
 
-def look_alikes(evidence: Evidence, index: int) -> list[int]:
-    """Library effects that the runs can hardly tell from one of them, the most alike first.
+def find_look_alikes(evidence: Evidence, index: int) -> list[int]:
+    """Return the library effects that the runs can hardly tell from one of them, the most alike first.
 
     Parameters
     ----------
     evidence : the runs
-    index : of the effect in the library
+    index : position of the effect in the library
     """
     size, n_session = len(evidence.effects), len(evidence.session_sigma)
     gram, cross = np.zeros((size, size)), np.zeros((size, n_session))

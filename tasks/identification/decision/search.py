@@ -1,4 +1,4 @@
-"""The search: what is added to the model, round by round, and where derivatives must be taken anew."""
+"""The search: effects are added to the model round by round, and the runs are linearised anew where needed."""
 
 from dataclasses import dataclass, replace
 
@@ -16,16 +16,25 @@ from tasks.identification.decision.attribution import (
 from tasks.identification.decision.forms import RIDGE
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.fit import Fit, fit, misfit_by_run, sum_misfit_falls
-from tasks.identification.inference.hypothesis import library_hypothesis
-from tasks.identification.inference.linearisation import differentiate_at, fit_disturbance, whitened_residuals
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses, sum_misfit_falls
+from tasks.identification.inference.hypothesis import make_library_hypothesis
+from tasks.identification.inference.linearisation import (
+    compute_whitened_residuals,
+    differentiate_at,
+    fit_disturbance,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Round:
-    """One round of the search: what was tried on top of ``base`` and which candidate was accepted.
+    """One round of the search.
 
-    ``evidence`` has its derivatives at the accepted one.
+    Parameters
+    ----------
+    base : fit before the round
+    tried : candidates that were tried in addition to ``base``
+    accepted : candidate that was accepted
+    evidence : the runs, with derivatives at the accepted candidate
     """
 
     base: Fit
@@ -35,14 +44,14 @@ class Round:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class SearchState:
     """State of the search.
 
     Parameters
     ----------
     evidence : the runs, with derivatives that hold at ``base``
-    base : fit of what is accepted
-    rounds : how it came about
+    base : fit of the accepted hypotheses
+    rounds : rounds of the search so far
     tried : candidates of the last round, none of which was accepted
     """
 
@@ -55,15 +64,15 @@ class Found:
 def relinearise_candidate(
     evidence: Evidence, base: Fit, candidate: Candidate, *, gated: bool = True, known: Evidence | None = None
 ) -> tuple[Evidence, Candidate]:
-    """Take derivatives anew at a candidate whose gain is large, refit it and judge it there.
+    """Linearise the runs anew at a candidate with a large gain, refit it and judge it there.
 
     Parameters
     ----------
     evidence : the runs as differentiated for ``base``
-    base : fit of what is accepted so far
-    candidate : judged with them
-    gated : judge it on held-out runs as well
-    known : derivatives that were taken at the candidate before
+    base : fit of the hypotheses accepted so far
+    candidate : candidate judged with these derivatives
+    gated : judge it on held-out runs too
+    known : derivatives at the candidate, if an earlier search took them
 
     Returns
     -------
@@ -75,25 +84,25 @@ def relinearise_candidate(
     for _ in range(2):
         here = known or differentiate_at(here, fitted, library=True)
         known = None
-        again = fit(
+        again = fit_hypotheses(
             here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
         )  # fmt: skip
         shift = np.abs(again.values - fitted.values) / np.maximum(np.abs(again.values), 1e-9)
         fitted = again
         if np.all(shift < evidence.rules.relinearisation_change):
             break
-    base_held_out = misfit_by_run(evidence.held_out, base) if gated else None
+    base_held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None
     return here, assess_fit(here, base, base_held_out, candidate.hypothesis, fitted)
 
 
-def search_library(start: Found, *, gated: bool, explored: Found | None = None) -> Found:
+def search_library(start: SearchState, *, gated: bool, explored: SearchState | None = None) -> SearchState:
     """Add library effects one by one, the best first.
 
     Parameters
     ----------
-    start : what is accepted already
-    gated : accept only what passes every gate; else whatever explains most, to learn what is left beside it
-    explored : an earlier search whose first effect, where it is met again, need not be looked for anew
+    start : state of the search with the hypotheses accepted already
+    gated : accept only candidates that pass every gate; else the one with the largest gain, to see the residual with it
+    explored : earlier search; where its effects appear again, its derivatives are used
     """
     state, rules = start, start.evidence.rules
     met = frozenset(r.accepted.hypothesis.name for r in explored.rounds) if explored else frozenset()
@@ -122,13 +131,13 @@ def search_library(start: Found, *, gated: bool, explored: Found | None = None) 
         best = simpler[0] if simpler else best
         here = places.get(best.hypothesis.name, state.evidence)
         if gated and here is not state.evidence:
-            held_out = misfit_by_run(state.evidence.held_out, state.base)
+            held_out = compute_misfit_by_run(state.evidence.held_out, state.base)
             tried = [
                 c if c.score < 0.3 * best.score or c.hypothesis.name in places
                 else judge_hypothesis(here, state.base, held_out, c.hypothesis)
                 for c in tried
             ]  # fmt: skip
-        state = Found(
+        state = SearchState(
             evidence=here,
             base=best.fitted,
             rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best, evidence=here)),
@@ -136,8 +145,8 @@ def search_library(start: Found, *, gated: bool, explored: Found | None = None) 
     return state
 
 
-def _recall_candidate(explored: Found, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
-    """The candidate at the values that an earlier search settled it at, and its derivatives there."""
+def _recall_candidate(explored: SearchState, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
+    """Return the candidate at the values to which an earlier search fitted it, and the derivatives taken there."""
     k = len(candidate.hypothesis.names)
     for earlier in explored.rounds:
         known = earlier.accepted
@@ -151,30 +160,30 @@ def _recall_candidate(explored: Found, candidate: Candidate) -> tuple[Candidate,
     return candidate, None
 
 
-def scale_disturbances(explored: Found, splines: tuple[NDArray[np.float64], ...]) -> Disturbance:
-    """Scales of the disturbances beside whatever explains the runs best.
+def scale_disturbances(explored: SearchState, splines: tuple[NDArray[np.float64], ...]) -> Disturbance:
+    """Return the scales of the disturbances, fitted beside the effect that explains the runs best.
 
-    A large effect that is not yet named would otherwise pass for a disturbance, which then hides it.
+    Otherwise a large effect that is not named yet would be taken for a disturbance, which then hides it.
 
     Parameters
     ----------
-    explored : an ungated search under a first guess of the scales
-    splines : `spline_slopes` there
+    explored : ungated search under a first guess of the scales
+    splines : `differentiate_by_splines` at its fit
     """
-    residuals = whitened_residuals(explored.evidence, explored.base)
+    residuals = compute_whitened_residuals(explored.evidence, explored.base)
     here = explored.evidence
     return fit_disturbance(
         here.train, residuals, here.tolerances, here.effects, here.disturbance, splines, RIDGE
     )
 
 
-def find_retune(start: Found, reasons: list[str]) -> Found:
-    """A session nuisance pulled beyond belief is a wrong number in the vehicle and not a doubt about the session.
+def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
+    """Return the search state with a wrong number of the vehicle named, where a session nuisance is pulled too far.
 
     Parameters
     ----------
-    start : nothing accepted
-    reasons : is added to
+    start : state without effects
+    reasons : list to which sentences are appended
     """
     evidence, null = start.evidence, start.base
     pulls = np.abs(null.session / evidence.session_sigma)
@@ -186,11 +195,11 @@ def find_retune(start: Found, reasons: list[str]) -> Found:
         )
         frozen = null.session.copy()
         frozen[place] = 0.0
-        held_out = misfit_by_run(evidence.held_out, replace(null, session=frozen))
+        held_out = compute_misfit_by_run(evidence.held_out, replace(null, session=frozen))
         found = judge_hypothesis(
-            evidence, null, held_out, library_hypothesis(effect, float(null.session[place]))
+            evidence, null, held_out, make_library_hypothesis(effect, float(null.session[place]))
         )
-        gained = sum_misfit_falls(held_out, misfit_by_run(evidence.held_out, found.fitted))
+        gained = sum_misfit_falls(held_out, compute_misfit_by_run(evidence.held_out, found.fitted))
         judged.append(replace(found, held_out_gain=gained / found.inflation))
     accepted = [c for c in judged if c.held_out_gain > evidence.rules.held_out_gain and c.gain > 0.0]
     if not accepted:

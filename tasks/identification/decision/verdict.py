@@ -7,17 +7,26 @@ import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
-from tasks.identification.decision.answer import NamedEffect, Verdict, VerdictName, named_effect
+from tasks.identification.decision.answer import (
+    NamedEffect,
+    Verdict,
+    VerdictName,
+    make_named_effect,
+)
 from tasks.identification.decision.attribution import Candidate
-from tasks.identification.decision.correlation import residual_input_correlation
-from tasks.identification.decision.discovery import search_all
-from tasks.identification.decision.experiment import next_experiment
-from tasks.identification.decision.held_out import find_worse_channels, held_out_error
-from tasks.identification.decision.intervals import curvature_interval, profile_interval, refit_named
-from tasks.identification.decision.rivals import Compared, compare_with_rivals, find_detectable_sizes
-from tasks.identification.decision.search import Found
-from tasks.identification.inference.fit import Fit, fit
-from tasks.identification.inference.hypothesis import compose
+from tasks.identification.decision.correlation import correlate_residual_with_pressure
+from tasks.identification.decision.discovery import search_library_and_forms
+from tasks.identification.decision.experiment import plan_next_experiment
+from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels
+from tasks.identification.decision.intervals import (
+    compute_curvature_interval,
+    compute_profile_interval,
+    refit_named,
+)
+from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals, find_detectable_sizes
+from tasks.identification.decision.search import SearchState
+from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
@@ -38,9 +47,9 @@ class Trace:
     """
 
     verdict: Verdict
-    start: Found
-    end: Found
-    compared: tuple[Compared, ...]
+    start: SearchState
+    end: SearchState
+    compared: tuple[RivalComparison, ...]
 
 
 def find_missing_effects(
@@ -77,12 +86,12 @@ def find_missing_effects(
     )
     reasons: list[str] = []
     progress("search")
-    null = fit(evidence.train, (), evidence.session_sigma, iterations=6)
-    start, found, near_form = search_all(evidence, null, reasons)
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma, iterations=6)
+    start, found, near_form = search_library_and_forms(evidence, null, reasons)
     progress("rivals")
     compared = compare_with_rivals(found.evidence, found.base, found.rounds)
     progress("held-out error")
-    error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
+    error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     tried = list(found.tried)
     while compared and (worse := find_worse_channels(error, rules.worse_limit)):
         # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
@@ -97,25 +106,31 @@ def find_missing_effects(
             evidence=found.rounds[-2].evidence if found.rounds[1:] else start.evidence,
         )  # fmt: skip
         compared = compare_with_rivals(found.evidence, found.base, found.rounds)
-        error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
+        error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     progress("intervals")
     if compared:
         here, settled, again = refit_named(found.evidence, found.base, [c.own for c in compared])
         found = replace(found, evidence=here, base=settled)
         compared = [replace(c, own=own) for c, own in zip(compared, again, strict=True)]
-        error, manoeuvres = held_out_error(start.evidence, start.base, found.base)
-    named = [named_effect(c.own, c.share, profile_interval(c.own, found.evidence)) for c in compared]
+        error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
+    named = [
+        make_named_effect(c.own, c.share, compute_profile_interval(c.own, found.evidence)) for c in compared
+    ]
     near = [
-        (c.own.hypothesis.name, named_effect(o, wins, profile_interval(o, found.evidence)))
+        (c.own.hypothesis.name, make_named_effect(o, wins, compute_profile_interval(o, found.evidence)))
         for c in compared
         for o, wins in c.near
     ]
     for other in (*find_pairs(found, compared), *(find_pulled_numbers(found) if compared else ())):
-        near.append((named[0].name, named_effect(other.candidate, 0.0, curvature_interval(other.candidate))))
+        interval = compute_curvature_interval(other.candidate)
+        near.append((named[0].name, make_named_effect(other.candidate, 0.0, interval)))
         reasons.append(other.reason)
     if near_form is not None:
         near.append(
-            (named[0].name, named_effect(near_form, 0.0, profile_interval(near_form, start.evidence)))
+            (
+                named[0].name,
+                make_named_effect(near_form, 0.0, compute_profile_interval(near_form, start.evidence)),
+            )
         )
     kind = _verdict_name(named, near)
     if kind == "SET":
@@ -131,19 +146,19 @@ def find_missing_effects(
     experiment = None
     if compared:
         pair = _to_tell_apart(compared, near_form, start)
-        experiment = next_experiment(start.evidence, *pair, vehicle, surface)
-    theta, slots = compose(found.base.parts, found.base.values, np.zeros(len(SESSION)))
-    grown = compose(found.base.parts, found.base.values, found.base.session)
+        experiment = plan_next_experiment(start.evidence, *pair, vehicle, surface)
+    theta, slots = compose_parameters(found.base.parts, found.base.values, np.zeros(len(SESSION)))
+    grown = compose_parameters(found.base.parts, found.base.values, found.base.session)
     sigma, lead = evidence.session_sigma, evidence.train[0]
     pulls = zip(SESSION, start.base.session / sigma, found.base.session / sigma, strict=True)
     verdict = Verdict(
         verdict=kind,
         effects=tuple(named),
         rivals=tuple(near),
-        tried=tuple(named_effect(c, 0.0, curvature_interval(c)) for c in tried[:6]),
+        tried=tuple(make_named_effect(c, 0.0, compute_curvature_interval(c)) for c in tried[:6]),
         error=error,
         manoeuvre_error=manoeuvres,
-        correlation=residual_input_correlation(start.evidence.held_out, *grown, rules.longest_lag),
+        correlation=correlate_residual_with_pressure(start.evidence.held_out, *grown, rules.longest_lag),
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
         noise={
             name: (float(r), float(s))
@@ -170,7 +185,7 @@ def _is_fixed(effect: Effect, vehicle: Vehicle) -> bool:
 
 
 def _to_tell_apart(
-    compared: Sequence[Compared], near_form: Candidate | None, start: Found
+    compared: Sequence[RivalComparison], near_form: Candidate | None, start: SearchState
 ) -> tuple[Fit, Fit]:
     """The two explanations to tell apart next: rivals first, else the best of the others, else the plain model."""
     first = compared[0].own.fitted

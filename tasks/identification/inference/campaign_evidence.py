@@ -1,4 +1,4 @@
-"""A campaign as evidence: its runs, differentiated by the library, with the priors of all that is not sought."""
+"""A campaign as evidence: its runs, differentiated by the library, and the priors of all nuisances."""
 
 from dataclasses import dataclass
 
@@ -14,16 +14,16 @@ from tasks.vehicle.effects.library import Effect
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """Training and held-out runs with the library they were differentiated by.
+    """Training and held-out runs with the library by which they were differentiated.
 
     Parameters
     ----------
-    train, held_out : runs
-    effects : the library
+    train, held_out : training and held-out runs
+    effects : library of effects
     tolerances, disturbance : priors of session, offsets and disturbances
     sensors : AR(1) coefficient and standard deviation of every channel's sensor, float64 [7] each
-    rules : by which a verdict is reached
-    forked : names of the runs that fork when the integration step is halved, and are left out
+    rules : decision rules
+    forked : names of runs left out because halving the integration step changes their prediction
     """
 
     train: tuple[RunEvidence, ...]
@@ -37,10 +37,10 @@ class Evidence:
 
     @property
     def session_sigma(self) -> NDArray[np.float64]:
-        """Prior sigmas of the session, float64 [7]."""
+        """Return the prior sigmas of the session, float64 [7]."""
         return np.array(self.tolerances.session)
 
     @property
     def samples(self) -> int:
-        """Number of measured training values, N of the score."""
+        """Return the number of measured training values, N of the score."""
         return sum(run.model.samples * int(np.isfinite(run.sigma).sum()) for run in self.train)

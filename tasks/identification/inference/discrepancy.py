@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.evidence import RunEvidence, with_disturbance
+from tasks.identification.inference.evidence import RunEvidence, set_disturbance_prior
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.linearisation_points import LinearisedRun, linearise_at, linearise_runs
-from tasks.identification.inference.noise import unwhiten, whiten
+from tasks.identification.inference.noise import unwhiten_channels, whiten_channels
 
 LONGEST_MEMORY = 0.98
 """Correlation from sample to sample beyond which more is not told apart [1]."""
@@ -35,7 +35,7 @@ def widen_noise(evidence: Evidence, at: Fit) -> Evidence:
 
     def widened(run: RunEvidence, point: LinearisedRun) -> RunEvidence:
         fresh = _widened(run, point, evidence.sensors, evidence.rules.discrepancy_limit)
-        return with_disturbance(fresh, evidence.tolerances, evidence.disturbance)
+        return set_disturbance_prior(fresh, evidence.tolerances, evidence.disturbance)
 
     return replace(
         evidence,
@@ -51,9 +51,9 @@ def _widened(
     limit: float,
 ) -> RunEvidence:
     """Return a run under the noise that its leftover asks for, which is nowhere below its sensors'."""
-    left = point.residual - run.nuisance @ run.offsets(point.projected)
-    error = unwhiten(left, run.rho, run.sigma)
-    white = whiten(error, *sensors).reshape(error.shape)
+    left = point.residual - run.nuisance @ run.estimate_offsets(point.projected)
+    error = unwhiten_channels(left, run.rho, run.sigma)
+    white = whiten_channels(error, *sensors).reshape(error.shape)
     rho, sigma = sensors[0].copy(), sensors[1].copy()
     for c in np.flatnonzero(np.isfinite(sensors[1])):
         if float(np.mean(white[:, c] ** 2)) > limit:
@@ -62,7 +62,7 @@ def _widened(
             rho[c] = min(max(float(e[1:] @ e[:-1]) / power, rho[c]), LONGEST_MEMORY)
             sigma[c] = max(float(np.sqrt(power / len(e))), sigma[c])
     nuisance, session, library, others = (
-        whiten(unwhiten(columns, run.rho, run.sigma), rho, sigma)
+        whiten_channels(unwhiten_channels(columns, run.rho, run.sigma), rho, sigma)
         for columns in (run.nuisance, run.session, run.library, run.others)
     )
     return replace(

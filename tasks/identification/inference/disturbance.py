@@ -1,4 +1,4 @@
-"""Smooth disturbances of a run and its own offsets: their prior, as a precision matrix."""
+"""Prior of a run's offsets and smooth disturbances, as a precision matrix."""
 
 from dataclasses import dataclass
 
@@ -27,10 +27,23 @@ class Disturbance:
     time: tuple[float, float, float] = (1.0, 0.25, 0.2)
 
 
-def prior_precision(
+def compute_prior_precision(
     knots: tuple[int, ...], tolerances: Tolerances, disturbance: Disturbance
 ) -> tuple[NDArray[np.float64], float]:
-    """Precision of a run's offsets and knots (first-order Gauss-Markov processes) and its log determinant."""
+    """Return the prior precision of a run's offsets and disturbance knots.
+
+    The disturbances are first-order Gauss-Markov processes.
+
+    Parameters
+    ----------
+    knots : number of knots at each disturbed port
+    tolerances : prior standard deviations of the offsets
+    disturbance : scales and correlation times
+
+    Returns
+    -------
+    Precision, float64 [D, D], and its log determinant.
+    """
     size = N_OFFSETS + sum(knots)
     precision = np.zeros((size, size))
     sigmas = (

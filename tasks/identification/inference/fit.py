@@ -1,4 +1,4 @@
-"""Fitting a hypothesis through the simulation: Gauss-Newton with every nuisance integrated out."""
+"""Fit of hypotheses through the simulation: Gauss-Newton with every nuisance marginalised."""
 
 from dataclasses import dataclass
 
@@ -7,42 +7,42 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
 from tasks.identification.inference.evidence import SESSION_INDEX, RunEvidence
-from tasks.identification.inference.hypothesis import Hypothesis, compose
+from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
 from tasks.identification.inference.linearisation_points import (
     LinearisedRun,
+    collect_misfits,
     linearise_at,
     linearise_runs,
-    misfits,
     move_linearisation_points,
 )
 
 HELD = 1e18
 """Prior precision that holds a nuisance at 0."""
 MISSED = 0.3
-"""Relative miss of the foreseen fall of the misfit from which derivatives are taken anew."""
+"""Relative error of the predicted fall of the misfit from which derivatives are taken anew."""
 
 TRIALS = ((1.0, True), (0.4, True), (1.0, False), (0.4, False), (0.16, False), (0.064, False))
-"""Shares of a step that are tried, and whether the runs' own offsets move along."""
+"""Shares of a step that are tried, and whether the runs' own offsets move with it."""
 
 Slopes = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Derivatives by parameters and session, float64 [M, K + 7], and what the nuisances can take from them."""
+"""Derivatives by parameters and session, float64 [M, K + 7], and their projection on the nuisances, [D, K + 7]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """A fitted set of hypotheses.
+    """A joint fit of hypotheses.
 
     Parameters
     ----------
     parts : the hypotheses, in the order of the parameters
-    values : float64 [K] all parameters
+    values : float64 [K] all parameters [their units]
     session : float64 [7] session nuisances
     session_sigma : float64 [7] their prior sigmas
     objective : sum over runs of the marginalised misfit, plus the session's prior term
     by_run : float64 [R] misfit of each run without the session's prior
     covariance : float64 [K, K] of the parameters, session marginalised
     residuals : whitened residual of each run at the fit
-    offsets : the run's own offsets about which each residual is linearised
+    offsets : float64 [D] each, the run's own offsets about which its residual is linearised
     """
 
     parts: tuple[Hypothesis, ...]
@@ -57,7 +57,7 @@ class Fit:
 
     @property
     def at_bound(self) -> bool:
-        """Whether a parameter sits on its bound, other than at 0 for a second parameter."""
+        """Return whether a parameter sits on its bound, other than at 0 for a second parameter."""
         lower = np.concatenate([p.lower for p in self.parts]) if self.parts else np.empty(0)
         upper = np.concatenate([p.upper for p in self.parts]) if self.parts else np.empty(0)
         first = (
@@ -68,7 +68,7 @@ class Fit:
         return bool(np.any(touching & (first.astype(bool) | (self.values != 0.0))))
 
 
-def fit(
+def fit_hypotheses(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     session_sigma: NDArray[np.float64],
@@ -83,10 +83,10 @@ def fit(
     Parameters
     ----------
     evidence : the runs
-    parts : hypotheses; none fits the session alone
+    parts : hypotheses; without any, the session alone is fitted
     session_sigma : float64 [7] prior sigmas of the session
-    values, session, offsets : where to start
-    iterations : at most so many Gauss-Newton steps
+    values, session, offsets : start of the fit; by default the hypotheses' first values, 0 and 0
+    iterations : largest number of Gauss-Newton steps
     """
     lower, upper, steps, first = (
         np.concatenate([np.empty(0), *(getattr(p, field) for p in parts)])
@@ -95,7 +95,7 @@ def fit(
     x = first if values is None else values.copy()
     s = np.zeros(len(SESSION_INDEX)) if session is None else session.copy()
     prior = 1.0 / np.square(session_sigma)
-    # a free parameter that is also a session nuisance is the same number: the nuisance rests at 0
+    # a free parameter that is also a session nuisance is the same number: the nuisance stays at 0
     taken = [SESSION.index(name) for part in parts for name in part.names if name in SESSION]
     s[taken], prior[taken] = 0.0, HELD
     k = len(x)
@@ -104,7 +104,7 @@ def fit(
         if offsets is None
         else linearise_at(evidence, parts, x, s, offsets)
     )
-    objective = _total_misfit(points, prior, s)
+    objective = _compute_total_misfit(points, prior, s)
     slopes: list[Slopes] = []
     normal = np.eye(k + len(s))
     blind, fell, foreseen = False, np.inf, np.inf
@@ -114,23 +114,25 @@ def fit(
             or (k and np.isfinite(fell) and abs(fell - foreseen) > MISSED * foreseen + 1.0)
             or blind
         ):
-            slopes = _slopes(evidence, parts, x, s, np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps)
+            slopes = _differentiate_runs(
+                evidence, parts, x, s, np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps
+            )
             normal = np.diag(np.concatenate((np.zeros(k), prior)))
             for columns, q in slopes:
                 normal += columns.T @ columns - q.T @ q
-            # a threshold of what is still 0 shows only once that has moved
+            # a threshold has no derivative while its effect is 0: take derivatives again after the effect has moved
             blind = bool(np.any(np.diag(normal)[:k] == 0.0))
         right = np.concatenate((np.zeros(k), -prior * s))
         for point, (columns, q) in zip(points, slopes, strict=True):
             right += columns.T @ point.residual - q.T @ point.projected
-        move = _gauss_newton_step(normal, right, x, lower, upper)
+        move = _compute_gauss_newton_step(normal, right, x, lower, upper)
         foreseen = float(move @ right)
         if foreseen < 0.1 and abs(fell) < 3.0:
             break
         before = objective
-        # parameters and each run's own offsets move together; where that does not help, one after the other
+        # parameters and each run's own offsets move together; if that does not help, one after the other
         ahead = tuple(
-            run.offsets(point.projected - q @ move)
+            run.estimate_offsets(point.projected - q @ move)
             for run, point, (_, q) in zip(evidence, points, slopes, strict=True)
         )
         for share, together in TRIALS:
@@ -140,63 +142,68 @@ def fit(
                 for point, d in zip(points, ahead, strict=True)
             )
             trial = linearise_at(evidence, parts, x_try, s_try, own)
-            better = _total_misfit(trial, prior, s_try) < objective
+            better = _compute_total_misfit(trial, prior, s_try) < objective
             if better or foreseen < 0.1:
                 break
         if not better:
             break
         x, s = x_try, s_try
         points = trial if together else move_linearisation_points(evidence, parts, x, s, trial)
-        objective = _total_misfit(points, prior, s)
+        objective = _compute_total_misfit(points, prior, s)
         fell = before - objective
         if abs(fell) < 0.3 and foreseen < 0.5:
             break
-    # scaled first: in their own units the parameters' information spans more than double precision can invert
+    # scaled first: in their own units the information matrix is too ill-conditioned for double precision
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size)
     covariance = np.asarray(inverse[:k, :k], dtype=np.float64)
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
-        by_run=misfits(points), covariance=covariance,
+        by_run=collect_misfits(points), covariance=covariance,
         residuals=tuple(point.residual for point in points), offsets=tuple(point.offsets for point in points),
     )  # fmt: skip
 
 
-def _slopes(
+def _differentiate_runs(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
     x: NDArray[np.float64],
     s: NDArray[np.float64],
     steps: NDArray[np.float64],
 ) -> list[Slopes]:
-    """Derivatives of every run by parameters and session, and what its nuisances can take from them.
+    """Return the derivatives of every run by parameters and session, and their projection on its nuisances.
 
-    Taken where the nuisances' own are, with the run's offsets at 0: on a road feature that is reached a moment later
-    the nuisances cannot take from derivatives about other offsets what is theirs, and the information comes out many
-    times too large.
+    They are taken at the same point as those of the nuisances, with the run's offsets at 0. On a road feature that the
+    vehicle reaches a moment later, derivatives about other offsets cannot be projected on the nuisances, and the
+    information would come out many times too large.
     """
     slopes = []
-    there = compose(parts, x, s)
-    moved = [compose(parts, x + step * unit, s) for step, unit in zip(steps, np.eye(len(x)), strict=True)]
+    there = compose_parameters(parts, x, s)
+    moved = [
+        compose_parameters(parts, x + step * unit, s)
+        for step, unit in zip(steps, np.eye(len(x)), strict=True)
+    ]
     for run in evidence:
         if not moved:
             slopes.append((run.session, run.session_q))
             continue
-        r = run.residual(*there)
-        a = [(r - run.residual(*far)) / step for far, step in zip(moved, steps, strict=True)]
+        r = run.compute_residual(*there)
+        a = [(r - run.compute_residual(*far)) / step for far, step in zip(moved, steps, strict=True)]
         columns = np.column_stack((*a, run.session))
-        slopes.append((columns, np.column_stack((run.project(columns[:, : len(x)]), run.session_q))))
+        slopes.append(
+            (columns, np.column_stack((run.project_on_nuisances(columns[:, : len(x)]), run.session_q)))
+        )
     return slopes
 
 
-def _gauss_newton_step(
+def _compute_gauss_newton_step(
     normal: NDArray[np.float64],
     right: NDArray[np.float64],
     x: NDArray[np.float64],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The Gauss-Newton step of parameters and session, what sits on a bound and pushes beyond it left out."""
+    """Return the Gauss-Newton step of parameters and session, without parameters that press against a bound."""
     k = len(x)
     free = np.ones(len(right), dtype=bool)
     move = np.zeros(len(right))
@@ -211,29 +218,36 @@ def _gauss_newton_step(
     return move
 
 
-def misfit_by_run(
+def compute_misfit_by_run(
     evidence: tuple[RunEvidence, ...], fitted: Fit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Marginalised misfit of runs under a fit made on other runs, and how far it is from settled; float64 [R]."""
+    """Return the marginalised misfit of runs under a fit to other runs, and its linearisation error, float64 [R] each.
+
+    Parameters
+    ----------
+    evidence : the runs
+    fitted : fit, usually to other runs
+    """
     points = linearise_runs(evidence, fitted.parts, fitted.values, fitted.session)
-    return misfits(points), np.array([point.linearisation_error for point in points])
+    return collect_misfits(points), np.array([point.linearisation_error for point in points])
 
 
 def sum_misfit_falls(
     before: tuple[NDArray[np.float64], NDArray[np.float64]],
     after: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> float:
-    """Fall of the misfit summed over runs, each run's counted only beyond its numerical doubt.
+    """Return the fall of the misfit summed over runs; a run's change counts only beyond its numerical error.
 
     Parameters
     ----------
-    before, after : of `misfit_by_run`
+    before, after : results of `compute_misfit_by_run`
     """
     change = before[0] - after[0]
     return float(np.sum(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0)))
 
 
-def _total_misfit(
+def _compute_total_misfit(
     points: tuple[LinearisedRun, ...], prior: NDArray[np.float64], session: NDArray[np.float64]
 ) -> float:
-    return float(misfits(points).sum() + np.sum(prior * session**2))
+    """Return the misfit of all runs and of the session's prior [1]."""
+    return float(collect_misfits(points).sum() + np.sum(prior * session**2))

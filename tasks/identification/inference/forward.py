@@ -1,4 +1,4 @@
-"""Readings of the instruments that the vehicle model predicts for one run."""
+"""Readings of the instruments as the vehicle model predicts them for one run."""
 
 from dataclasses import dataclass, replace
 
@@ -13,31 +13,31 @@ from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.slots import Slot
-from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, named_values
-from tasks.vehicle.model.brake_input import measured_trace
+from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, unpack_parameter_vector
+from tasks.vehicle.model.brake_input import make_trace_input
 from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import Simulation, simulate
-from tasks.vehicle.parameters import Vehicle, surface_response
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 MASKED_SPEED = 2.0
-"""Below it the slip's denominator is not force-consistent: runs end there [m/s]."""
+"""Speed at which the used part of a run ends: below it the floor of the slip's denominator distorts slip [m/s]."""
 STEP = 0.002
-"""Longest integration step [s]; halving it is a check of its own."""
+"""Longest integration step [s]; `compute_step_misfit` checks it by halving."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunModel:
-    """A run made ready for simulation.
+    """A run prepared for simulation.
 
     Parameters
     ----------
     run : the measured run
-    vehicle : the vehicle with what it has already: what is fitted comes on top
+    vehicle : vehicle with the effects that it has already; fitted effects are added to them
     surface_friction : mu_c [1]
-    conditions : road feature, snow, direction and discs of the run
-    samples : how many samples are used (to the masked speed)
+    conditions : road feature, snow, direction and disc temperature of the run
+    samples : number of samples that are used, to `MASKED_SPEED`
     initial_speed : speed at the first sample, from the line through the speed before the brake [m/s]
-    climb : the force along the road that its measured slope gives; none where it was not measured
+    climb : force of the measured road slope over time; empty where the slope was not measured
     """
 
     run: Run
@@ -50,23 +50,23 @@ class RunModel:
 
     @property
     def substeps(self) -> int:
-        """Integration steps between samples."""
+        """Return the number of integration steps between samples."""
         return max(round(self.run.interval / STEP), 1)
 
     @property
     def measured(self) -> NDArray[np.float64]:
-        """float64 [samples, 7] measured channels that are used."""
+        """Return the measured channels that are used, float64 [samples, 7]."""
         return self.run.response[: self.samples]
 
 
-def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunModel:
-    """Return a run with its vehicle, its surface by the weather mapping, its road and its discs.
+def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunModel:
+    """Return a run with its vehicle, surface friction, road feature and disc temperature, ready for simulation.
 
     Parameters
     ----------
     run : measured run
-    vehicle : the model's vehicle
-    surface : pavement of the surface mapping
+    vehicle : judged vehicle
+    surface : pavement, from which the weather mapping computes friction
     """
     weather = Weather(
         kind=run.weather,
@@ -92,11 +92,11 @@ def run_model(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMode
         ),
         samples=int(slow[0]) if slow.size else len(speed),
         initial_speed=float(np.polyfit(np.arange(max(lead, 5)), speed[: max(lead, 5)], 1)[1]),
-        climb=_climb(run, vehicle),
+        climb=_compute_grade_force(run, vehicle),
     )
 
 
-def _climb(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
+def _compute_grade_force(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
     """Return the force of the measured slope over time, rearward positive [N]."""
     if run.road_slope is None:
         return ()
@@ -104,13 +104,13 @@ def _climb(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
     return (Slot(port="longitudinal_force", variable="time", origin=0.0, spacing=run.interval, values=force),)
 
 
-def starting_speed(model: RunModel, theta: NDArray[np.float64]) -> float:
-    """Return the speed at the first sample: the reading less its scale error [m/s].
+def compute_starting_speed(model: RunModel, theta: NDArray[np.float64]) -> float:
+    """Return the speed at the first sample: the reading without its scale error [m/s].
 
     Parameters
     ----------
     model : the run
-    theta : float64 [len(EFFECT_TABLE)]
+    theta : float64 [len(EFFECT_TABLE)] effects and sensor errors [units of the table]
     """
     return model.initial_speed / (1.0 + float(theta[PARAMETER_INDEX["speed_scale"]]))
 
@@ -130,25 +130,25 @@ def simulate_run(
     Parameters
     ----------
     model : the run
-    theta : float64 [len(EFFECT_TABLE)] effects on top of the vehicle's own
-    slots : forms on top of the vehicle's own
-    initial_speed : replaces the model's [m/s]
-    branch : sample, and an earlier simulation with its states, to branch off from; what precedes is taken over
-    refinement : factor on the integration steps between samples
-    keep_states : keep the states, from which other simulations can branch off
+    theta : float64 [len(EFFECT_TABLE)] effects, added to the vehicle's own [units of the table]
+    slots : forms, added to the vehicle's own
+    initial_speed : replaces the model's initial speed [m/s]
+    branch : sample, and an earlier simulation with its states, at which this one starts; earlier samples are copied
+    refinement : factor on the number of integration steps between samples [1]
+    keep_states : keep the states, from which other simulations can start
     """
-    values = named_values(theta)
+    values = unpack_parameter_vector(theta)
     car = apply_effects(model.vehicle, {n: v for n, v in values.items() if PARAMETERS[n].of_vehicle})
     first = branch[0] if branch else 0
     simulated = simulate(
         car,
-        surface_response(car, model.run.weather, model.surface_friction),
-        measured_trace(model.run.pressure, model.run.interval, model.run.drive_torque),
+        compute_surface_response(car, model.run.weather, model.surface_friction),
+        make_trace_input(model.run.pressure, model.run.interval, model.run.drive_torque),
         replace(model.conditions, grade=values.get("slope", 0.0)),
         samples=model.samples - first,
         substeps=refinement * model.substeps,
         interval=model.run.interval,
-        initial_speed=starting_speed(model, theta) if initial_speed is None else initial_speed,
+        initial_speed=compute_starting_speed(model, theta) if initial_speed is None else initial_speed,
         start=branch[1].states[first] if branch else None,
         slots=(*model.climb, *slots),
         keep_states=keep_states,
@@ -158,16 +158,16 @@ def simulate_run(
     return replace(simulated, history=np.concatenate((branch[1].history[:first], simulated.history)))
 
 
-def instrument_readings(
+def compute_instrument_readings(
     model: RunModel, theta: NDArray[np.float64], simulated: Simulation
 ) -> NDArray[np.float64]:
-    """Channels as the instruments give them: gravity along a grade is felt, sensor effects applied.
+    """Return the channels as the instruments give them: with gravity along a grade, and with sensor effects.
 
     Parameters
     ----------
     model : the run
-    theta : float64 [len(EFFECT_TABLE)]
-    simulated : by `simulate_run`
+    theta : float64 [len(EFFECT_TABLE)] effects and sensor errors [units of the table]
+    simulated : result of `simulate_run`
 
     Returns
     -------
@@ -218,8 +218,10 @@ def instrument_readings(
     return y
 
 
-def predict(
+def predict_channels(
     model: RunModel, theta: NDArray[np.float64], *, slots: tuple[Slot, ...] = (), refinement: int = 1
 ) -> NDArray[np.float64]:
     """Return the predicted channels of a run, float64 [samples, 7]; arguments as in `simulate_run`."""
-    return instrument_readings(model, theta, simulate_run(model, theta, slots=slots, refinement=refinement))
+    return compute_instrument_readings(
+        model, theta, simulate_run(model, theta, slots=slots, refinement=refinement)
+    )

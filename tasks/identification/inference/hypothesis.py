@@ -1,4 +1,4 @@
-"""Hypotheses: parameters with bounds that may be added to the model, and how they enter."""
+"""Hypotheses: bounded parameters that may be added to the model, and the way in which they enter it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ Build = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], tuple[Slot, .
 
 @dataclass(frozen=True, kw_only=True)
 class Hypothesis:
-    """Something that may be added to the model: parameters and how they enter.
+    """An effect or form that may be added to the model.
 
     Parameters
     ----------
-    name : label
+    name : name of the effect or form
     effect_class : effect, retune, sensor or form
-    port, variable : where it enters and what it depends on
-    names, units : of the parameters
-    lower, upper, step, start : float64 [K] bounds, finite-difference step and first value
-    build : parameters to full theta (float64) and slots
+    port, variable : port where it enters, and variable that it depends on
+    names, units : names and units of the K parameters
+    lower, upper, step, start : float64 [K] bounds, finite-difference step and first value [unit]
+    build : function from parameters to the full vector theta and slots
     """
 
     name: str
@@ -41,11 +41,18 @@ class Hypothesis:
     build: Build
 
 
-def library_hypothesis(effect: Effect, start: float | None = None, second: float = np.nan) -> Hypothesis:
-    """A library effect as a hypothesis; ``start`` and ``second`` replace the first values of its parameters."""
+def make_library_hypothesis(effect: Effect, start: float | None = None, second: float = np.nan) -> Hypothesis:
+    """Return a library effect as a hypothesis.
+
+    Parameters
+    ----------
+    effect : effect of the library
+    start : first value of its first parameter; None for one step [unit of the parameter]
+    second : first value of its second parameter; NaN for the table's [unit of the parameter]
+    """
     indices = [p.index for p in effect.parameters]
 
-    def build(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+    def build_theta(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
         theta = np.zeros(len(EFFECT_TABLE))
         theta[indices] = values
         return theta, ()
@@ -66,14 +73,21 @@ def library_hypothesis(effect: Effect, start: float | None = None, second: float
         upper=np.array([p.upper for p in effect.parameters]),
         step=np.array([p.step for p in effect.parameters]),
         start=begin,
-        build=build,
+        build=build_theta,
     )
 
 
-def compose(
+def compose_parameters(
     parts: tuple[Hypothesis, ...], values: NDArray[np.float64], session: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
-    """Full theta and slots of all parts together with the session's nuisances."""
+    """Return the full vector theta and the slots of all parts, with the session's nuisances added.
+
+    Parameters
+    ----------
+    parts : hypotheses, in the order of the parameters
+    values : float64 [K] their parameters [their units]
+    session : float64 [7] session nuisances
+    """
     theta = np.zeros(len(EFFECT_TABLE))
     theta[list(SESSION_INDEX)] += session
     slots: tuple[Slot, ...] = ()

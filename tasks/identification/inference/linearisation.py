@@ -1,4 +1,4 @@
-"""Derivatives of all runs about a point, the scales of their disturbances, and both again about another point."""
+"""Linearisation of all runs about a fit, and the scales of their disturbances."""
 
 from dataclasses import replace
 
@@ -9,12 +9,12 @@ from scipy.linalg import cholesky, solve_triangular
 from tasks.campaign.campaign import SESSION, Campaign, Tolerances
 from tasks.campaign.gauge import denoise_pressure
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.disturbance import Disturbance, prior_precision
-from tasks.identification.inference.evidence import RunEvidence, run_evidence, with_disturbance
+from tasks.identification.inference.disturbance import Disturbance, compute_prior_precision
+from tasks.identification.inference.evidence import RunEvidence, differentiate_run, set_disturbance_prior
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.forward import RunModel, predict, run_model
-from tasks.identification.inference.hypothesis import compose
-from tasks.identification.inference.noise import channel_noise, whiten
+from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
+from tasks.identification.inference.hypothesis import compose_parameters
+from tasks.identification.inference.noise import estimate_channel_noise, whiten_channels
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -23,11 +23,11 @@ from tasks.vehicle.parameters import Vehicle
 
 BODY_CHANNELS = ("pitch", "pitch_rate", "vertical_acceleration")
 SUSPENSION = ("pitch_gain", "damping", "stiffness")
-"""Session nuisances that only the body's motion shows."""
+"""Session nuisances that act on the body's motion only."""
 UNSEEN = 1e-3
-"""Factor on the tolerance of a nuisance that no channel shows: it stays where it is."""
+"""Factor on the tolerance of a nuisance that no channel depends on, which keeps it at 0."""
 FREED = 20.0
-"""Factor on the session's tolerances while the disturbances are scaled: a wrong number is no disturbance."""
+"""Factor on the session's tolerances while the disturbances are scaled, so that they do not absorb a wrong number."""
 
 
 def prepare_evidence(
@@ -37,32 +37,35 @@ def prepare_evidence(
     effects: tuple[Effect, ...],
     rules: DecisionRules,
 ) -> Evidence:
-    """Noise and derivatives about the model as it stands, under the first guess of the disturbances.
+    """Return noise and derivatives about the model as it stands, under the first guess of the disturbances.
 
     Parameters
     ----------
     campaign : measured runs with their split
-    vehicle, surface : the model that is judged
-    effects : the library of candidates
-    rules : which runs are left out, and by which all is decided
+    vehicle, surface : judged model
+    effects : library of candidates
+    rules : decision rules; they say which runs are left out
     """
-    rho, sigma = channel_noise(campaign)
+    rho, sigma = estimate_channel_noise(campaign)
     tolerances = _without_unseen(campaign)
     plain = np.zeros(len(EFFECT_TABLE))
     guess = Disturbance()
     runs = [replace(run, pressure=denoise_pressure(run.pressure)) for run in campaign.runs]
-    models = [run_model(run, vehicle, surface) for run in runs]
+    models = [prepare_run(run, vehicle, surface) for run in runs]
     used: list[str] = []
 
-    def derived(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
+    def differentiate_runs(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
+        """Return the training or the held-out runs with their derivatives."""
         own = [m for m in models if m.run.held_out == held_out]
-        sound = [m for m in own if step_change(m, rho, sigma) <= rules.forked_misfit]
-        # too few sound runs to do without the others
-        kept = sound if len(sound) >= rules.fewest_runs else own
+        insensitive = [m for m in own if compute_step_misfit(m, rho, sigma) <= rules.forked_misfit]
+        # with too few runs that are insensitive to the step, the others are used too
+        kept = insensitive if len(insensitive) >= rules.fewest_runs else own
         used.extend(m.run.name for m in kept)
-        return tuple(run_evidence(model, rho, sigma, plain, library, tolerances, guess) for model in kept)
+        return tuple(
+            differentiate_run(model, rho, sigma, plain, library, tolerances, guess) for model in kept
+        )
 
-    train, held_out = derived(False, effects), derived(True, ())
+    train, held_out = differentiate_runs(False, effects), differentiate_runs(True, ())
     forked = tuple(run.name for run in campaign.runs if run.name not in used)
     return Evidence(
         train=train, held_out=held_out, effects=effects,
@@ -71,7 +74,7 @@ def prepare_evidence(
 
 
 def _without_unseen(campaign: Campaign) -> Tolerances:
-    """Return the tolerances with the suspension held where no channel shows the body's motion."""
+    """Return the tolerances, with the suspension fixed where no channel depends on the body's motion."""
     if any(name in campaign.channels for name in BODY_CHANNELS):
         return campaign.tolerances
     session = (
@@ -81,8 +84,10 @@ def _without_unseen(campaign: Campaign) -> Tolerances:
     return replace(campaign.tolerances, session=tuple(session))
 
 
-def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.float64]) -> float:
-    """Misfit that halving the integration step alone makes: a run that forks, as at the ABS threshold, has much.
+def compute_step_misfit(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.float64]) -> float:
+    """Return the misfit that halving the integration step alone makes [1].
+
+    Runs that are sensitive to the step, such as those that stay near the threshold of the ABS, have a large one.
 
     Parameters
     ----------
@@ -90,57 +95,65 @@ def step_change(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.flo
     rho, sigma : channel noise
     """
     plain = np.zeros(len(EFFECT_TABLE))
-    change = predict(model, plain) - predict(model, plain, refinement=2)
-    return float(np.sum(whiten(change, rho, sigma) ** 2))
+    change = predict_channels(model, plain) - predict_channels(model, plain, refinement=2)
+    return float(np.sum(whiten_channels(change, rho, sigma) ** 2))
 
 
 def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
-    """The same runs with derivatives taken about a fit.
+    """Return the same runs with derivatives taken about a fit.
 
     Parameters
     ----------
     evidence : the runs
-    at : where to
-    library : also the library's derivatives; else the old ones are kept
+    at : fit, the new linearisation point
+    library : take the library's derivatives anew too; else the old ones are kept
     """
-    theta, slots = compose(at.parts, at.values, at.session)
+    theta, slots = compose_parameters(at.parts, at.values, at.session)
 
-    def moved(run: RunEvidence, effects: tuple[Effect, ...]) -> RunEvidence:
-        fresh = run_evidence(
+    def differentiate_again(run: RunEvidence, effects: tuple[Effect, ...]) -> RunEvidence:
+        fresh = differentiate_run(
             run.model, run.rho, run.sigma, theta, effects, evidence.tolerances, evidence.disturbance, slots
         )
         if effects:
             return fresh
         kept = replace(fresh, library=run.library, others=run.others)
-        return with_disturbance(kept, evidence.tolerances, evidence.disturbance)
+        return set_disturbance_prior(kept, evidence.tolerances, evidence.disturbance)
 
     return replace(
         evidence,
-        train=tuple(moved(run, evidence.effects if library else ()) for run in evidence.train),
-        held_out=tuple(moved(run, ()) for run in evidence.held_out),
+        train=tuple(differentiate_again(run, evidence.effects if library else ()) for run in evidence.train),
+        held_out=tuple(differentiate_again(run, ()) for run in evidence.held_out),
     )
 
 
 def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Evidence:
-    """The same runs under other scales of the disturbances.
+    """Return the same runs under other scales of the disturbances.
 
     Parameters
     ----------
     evidence : the runs
-    disturbance : the scales
+    disturbance : scales and correlation times
     """
     return replace(
         evidence,
         disturbance=disturbance,
-        train=tuple(with_disturbance(run, evidence.tolerances, disturbance) for run in evidence.train),
-        held_out=tuple(with_disturbance(run, evidence.tolerances, disturbance) for run in evidence.held_out),
+        train=tuple(set_disturbance_prior(run, evidence.tolerances, disturbance) for run in evidence.train),
+        held_out=tuple(
+            set_disturbance_prior(run, evidence.tolerances, disturbance) for run in evidence.held_out
+        ),
     )
 
 
-def whitened_residuals(evidence: Evidence, at: Fit) -> list[NDArray[np.float64]]:
-    """Whitened measured-minus-model of every training run at a fit, its own offsets at 0; float64 [M] each."""
-    theta, slots = compose(at.parts, at.values, at.session)
-    return [run.residual(theta, slots) for run in evidence.train]
+def compute_whitened_residuals(evidence: Evidence, at: Fit) -> list[NDArray[np.float64]]:
+    """Return the whitened residual of every training run at a fit, with its own offsets at 0; float64 [M] each.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit
+    """
+    theta, slots = compose_parameters(at.parts, at.values, at.session)
+    return [run.compute_residual(theta, slots) for run in evidence.train]
 
 
 def fit_disturbance(
@@ -152,16 +165,16 @@ def fit_disturbance(
     splines: tuple[NDArray[np.float64], ...],
     ridge: NDArray[np.float64],
 ) -> Disturbance:
-    """Scales and times by marginal likelihood, every library direction, every spline and the session free.
+    """Return scales and times by marginal likelihood, with every library direction, every spline and the session free.
 
-    With the directions fixed at 0 an effect or a form would inflate the disturbance that then hides it.
+    With these directions fixed at 0, an effect or a form would inflate the disturbance, which would then hide it.
 
     Parameters
     ----------
     evidence : training runs
-    residuals : whitened residual of each run at the base point, float64 [M]
+    residuals : whitened residual of each run at the linearisation point, float64 [M]
     tolerances : session priors
-    effects : the library, whose steps set broad priors
+    effects : library, whose steps set broad priors
     start : first guess
     splines : derivatives of each run by the knots of the splines, float64 [M, K]
     ridge : float64 [K] precision of their priors
@@ -173,11 +186,11 @@ def fit_disturbance(
         b = np.column_stack((r, run.session, run.library, columns))
         blocks.append((b.T @ b, run.nuisance.T @ b))
 
-    def cost(trial: Disturbance) -> float:
+    def compute_cost(trial: Disturbance) -> float:
         total = np.zeros_like(blocks[0][0])
         value = 0.0
         for run, (gram, cross) in zip(evidence, blocks, strict=True):
-            precision, log_det = prior_precision(run.knots, tolerances, trial)
+            precision, log_det = compute_prior_precision(run.knots, tolerances, trial)
             factor = cholesky(run.information + precision, lower=True, check_finite=False)
             q = solve_triangular(factor, cross, lower=True, check_finite=False)
             total += gram - q.T @ q
@@ -186,7 +199,7 @@ def fit_disturbance(
         q = solve_triangular(inner, total[1:, 0], lower=True, check_finite=False)
         return value + float(total[0, 0] - q @ q) + 2.0 * float(np.sum(np.log(np.diag(inner))))
 
-    best, lowest = start, cost(start)
+    best, lowest = start, compute_cost(start)
     for factor in (2.0, 1.4):
         for field in ("scale", "time"):
             for port in range(3):
@@ -196,7 +209,7 @@ def fit_disturbance(
                         values = list(getattr(best, field))
                         values[port] *= direction
                         trial = replace(best, **{field: tuple(values)})
-                        value = cost(trial) if 0.15 <= trial.time[port] <= 6.0 else np.inf
+                        value = compute_cost(trial) if 0.15 <= trial.time[port] <= 6.0 else np.inf
                         improved = value < lowest - 0.5
                         if improved:
                             best, lowest = trial, value

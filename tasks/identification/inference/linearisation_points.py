@@ -1,4 +1,4 @@
-"""Where each run is linearised: about its own offsets, which move as the parameters do."""
+"""Linearisation points: each run is linearised about its own offsets, which move with the parameters."""
 
 from dataclasses import dataclass, replace
 
@@ -6,28 +6,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.hypothesis import Hypothesis, compose
+from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
 from tasks.vehicle.effects.slots import Slot
 
 SETTLING = 4
-"""Moves of a run's point of linearisation before its misfit is taken."""
+"""Number of moves of a run's linearisation point before its misfit is taken."""
 SLACK = 1.0
-"""Rise of a run's misfit that is taken for rounding when its point of linearisation moves."""
+"""Rise of a run's misfit that counts as rounding when its linearisation point moves."""
 MISFIT_SETTLED = 0.05
-"""Change of a run's misfit by a full move of its point of linearisation below which it is moved no further."""
+"""Change of a run's misfit by a full move of its linearisation point below which the point is final."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinearisedRun:
-    """A run at some parameters, linearised about its own offsets.
+    """A run at given parameters, linearised about its own offsets.
 
     Parameters
     ----------
-    offsets : float64 [D] about which it is linearised
-    residual : float64 [M] whitened
-    projected : float64 [D] what the nuisances can take from it
-    misfit : marginalised
-    doubt : by how much the last full move of the offsets changed the misfit: 0 where the linearisation holds
+    offsets : float64 [D] offsets about which it is linearised
+    residual : float64 [M] whitened residual
+    projected : float64 [D] projection of the residual on the nuisances
+    misfit : marginalised misfit [1]
+    linearisation_error : change of the misfit by the last full move of the offsets; 0 where the linearisation holds [1]
     """
 
     offsets: NDArray[np.float64]
@@ -43,7 +43,7 @@ def linearise_runs(
     x: NDArray[np.float64],
     s: NDArray[np.float64],
 ) -> tuple[LinearisedRun, ...]:
-    """Every run linearised about its posterior, from offsets of 0.
+    """Return every run linearised about its posterior, from offsets of 0.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def move_linearisation_points(
     s: NDArray[np.float64],
     points: tuple[LinearisedRun, ...],
 ) -> tuple[LinearisedRun, ...]:
-    """Move every run's point of linearisation towards its posterior, as far as the run does not fit worse.
+    """Move every run's linearisation point towards its posterior, as far as the misfit does not rise.
 
     Parameters
     ----------
@@ -73,14 +73,14 @@ def move_linearisation_points(
     parts : hypotheses, in the order of the parameters
     x : float64 [K] their parameters
     s : float64 [7] session nuisances
-    points : where they are
+    points : the points before the move
     """
-    theta, slots = compose(parts, x, s)
+    theta, slots = compose_parameters(parts, x, s)
     after = list(points)
     for i, (run, point) in enumerate(zip(evidence, points, strict=True)):
         if point.linearisation_error < MISFIT_SETTLED:
             continue
-        move = run.offsets(point.projected) - point.offsets
+        move = run.estimate_offsets(point.projected) - point.offsets
         linearisation_error = np.inf
         for share in (1.0, 0.4):
             trial = _linearise_run(run, theta, slots, point.offsets + share * move)
@@ -100,7 +100,7 @@ def linearise_at(
     s: NDArray[np.float64],
     offsets: tuple[NDArray[np.float64] | None, ...],
 ) -> tuple[LinearisedRun, ...]:
-    """Every run linearised about given offsets.
+    """Return every run linearised about given offsets.
 
     Parameters
     ----------
@@ -110,21 +110,22 @@ def linearise_at(
     s : float64 [7] session nuisances
     offsets : float64 [D] of each run; None is 0 everywhere
     """
-    theta, slots = compose(parts, x, s)
+    theta, slots = compose_parameters(parts, x, s)
     return tuple(_linearise_run(run, theta, slots, d) for run, d in zip(evidence, offsets, strict=True))
 
 
 def _linearise_run(
     run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64] | None
 ) -> LinearisedRun:
-    residual = run.residual(theta, slots, offsets)
-    projected = run.project(residual)
+    """Return one run linearised about given offsets."""
+    residual = run.compute_residual(theta, slots, offsets)
+    projected = run.project_on_nuisances(residual)
     return LinearisedRun(
         offsets=np.zeros(run.nuisance.shape[1]) if offsets is None else offsets, residual=residual,
         projected=projected, misfit=float(residual @ residual - projected @ projected),
     )  # fmt: skip
 
 
-def misfits(points: tuple[LinearisedRun, ...]) -> NDArray[np.float64]:
-    """Marginalised misfit of each run, float64 [R]."""
+def collect_misfits(points: tuple[LinearisedRun, ...]) -> NDArray[np.float64]:
+    """Return the marginalised misfit of each run, float64 [R]."""
     return np.array([point.misfit for point in points])

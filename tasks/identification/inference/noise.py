@@ -1,4 +1,4 @@
-"""Sensor noise from quiet stretches, without a model: AR(1) noise under a slow disturbance."""
+"""Sensor noise from the samples before the brake, without a model: AR(1) noise under a slow disturbance."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,26 +13,26 @@ INTEGRALS = tuple(
     for level, rate in (("speed", "longitudinal_acceleration"), ("pitch", "pitch_rate"))
 )
 QUIET_PRESSURE = 0.1
-"""A run is quiet until its pressure first exceeds this [MPa]."""
+"""Pressure at which the quiet part of a run ends [MPa]."""
 BEFORE_BRAKE, ON_HAZARD = 5, 40
-"""Samples that the quiet stretch ends before the brake, and that it has at most where the road is not flat."""
+"""Samples between the quiet part and the brake, and its largest number of samples where the road is not flat."""
 
 
-def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """AR(1) coefficient and standard deviation of every channel.
+def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return AR(1) coefficient and standard deviation of every channel's noise.
 
-    The half variogram of AR(1) noise under a smooth motion is sigma^2 (1 - rho^k) + a k^2 at lag k; rho is
-    taken on a grid, sigma^2 and a by least squares, over what precedes the brake on flat roads; over the whole runs
-    where too little does. A coarse channel has the variance of its rounding, step^2 / 12, at least. A channel that was
-    not measured has an infinite standard deviation: it weighs nothing.
+    The semivariogram of AR(1) noise under a smooth motion is sigma^2 (1 - rho^k) + a k^2 at lag k. rho is searched on
+    a grid; sigma^2 and a follow by least squares. The data are the samples before the brake, or whole runs if these are
+    too short. A channel has at least the variance of its rounding, step^2 / 12. A channel that was not measured has an
+    infinite standard deviation and thus no weight.
 
     Parameters
     ----------
-    campaign : only its training runs are looked at
+    campaign : campaign, of which only the training runs are used
 
     Returns
     -------
-    rho float64 [7] and sigma float64 [7] [unit of the channel]
+    rho float64 [7] [1] and sigma float64 [7] [unit of the channel].
 
     Raises
     ------
@@ -40,20 +40,20 @@ def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.f
         If a measured channel never changes, or the training runs are too short.
     """
     sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros(len(LAGS))
-    stretches = [run.response[: _quiet_samples(run)].copy() for run in campaign.train]
+    stretches = [run.response[: _count_quiet_samples(run)].copy() for run in campaign.train]
     if max(len(stretch) for stretch in stretches) <= 3 * LAGS[-1]:
         stretches = [run.response.copy() for run in campaign.train]
     for run, quiet in zip(campaign.train, stretches, strict=True):
         for level, rate in INTEGRALS:
-            # what the rate explains is motion, not noise of the level
+            # a change that the rate explains is motion, not noise
             quiet[:, level] -= np.cumsum(quiet[:, rate]) * run.interval
         for i, lag in enumerate(LAGS):
             if len(quiet) > 3 * lag:
                 difference = quiet[lag:] - quiet[:-lag]
                 sums[i] += 0.5 * np.sum((difference - difference.mean(0)) ** 2, axis=0)
                 counts[i] += len(difference) - 1
-    floor = np.where(campaign.is_measured, _rounding_variance(campaign), np.inf)
-    problems = _problems(campaign, floor, max(len(stretch) for stretch in stretches))
+    floor = np.where(campaign.is_measured, _compute_rounding_variance(campaign), np.inf)
+    problems = _find_problems(campaign, floor, max(len(stretch) for stretch in stretches))
     if problems:
         raise InputError(problems)
     variogram = np.maximum(sums / counts[:, None], floor)
@@ -70,7 +70,8 @@ def channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.f
     return rho, np.maximum(sigma, np.sqrt(floor))
 
 
-def _quiet_samples(run: Run) -> int:
+def _count_quiet_samples(run: Run) -> int:
+    """Return the number of samples of a run before the brake."""
     pressed = np.flatnonzero(run.pressure > QUIET_PRESSURE)
     end = int(pressed[0]) - BEFORE_BRAKE if pressed.size else len(run.pressure)
     if run.hazard_length > 0:
@@ -78,8 +79,8 @@ def _quiet_samples(run: Run) -> int:
     return max(end, 0)
 
 
-def _rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
-    """Variance of rounding to every channel's smallest step, float64 [7] [unit^2]; NaN where nothing changes."""
+def _compute_rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
+    """Return the variance of rounding to every channel's smallest step, float64 [7] [unit^2]; NaN for a constant."""
     values = np.concatenate([run.response for run in campaign.train])
     gaps = np.diff(np.sort(values, axis=0), axis=0)
     # equal readings may differ by the last bits of a change of unit
@@ -88,7 +89,8 @@ def _rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
     return np.where(np.isfinite(steps), steps, np.nan) ** 2 / 12
 
 
-def _problems(campaign: Campaign, floor: NDArray[np.float64], longest: int) -> list[str]:
+def _find_problems(campaign: Campaign, floor: NDArray[np.float64], longest: int) -> list[str]:
+    """Return a sentence for every reason why the noise cannot be estimated."""
     problems = [
         f"{campaign.name}: channel {CHANNELS[j]} must change; it holds one value in all training runs: record it anew"
         for j in np.flatnonzero(np.isnan(floor))
@@ -101,15 +103,15 @@ def _problems(campaign: Campaign, floor: NDArray[np.float64], longest: int) -> l
     return problems
 
 
-def whiten(
+def whiten_channels(
     x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Make AR(1) noise of unit variance white along the first axis and stack the channels.
+    """Return channels with AR(1) noise whitened to unit variance along the first axis, and stacked.
 
     Parameters
     ----------
     x : float64 [N, 7] or [N, 7, P] residuals or derivatives [unit of the channel]
-    rho, sigma : float64 [7] from `channel_noise`
+    rho, sigma : float64 [7] AR(1) coefficients [1] and standard deviations [unit of the channel]
 
     Returns
     -------
@@ -121,10 +123,10 @@ def whiten(
     return white.reshape((-1, *x.shape[2:]))
 
 
-def unwhiten(
+def unwhiten_channels(
     white: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Undo `whiten`.
+    """Return what was whitened by `whiten_channels`.
 
     Parameters
     ----------

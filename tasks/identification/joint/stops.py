@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.forward import (
     RunModel,
-    instrument_readings,
-    run_model,
+    compute_instrument_readings,
+    compute_starting_speed,
+    prepare_run,
     simulate_run,
-    starting_speed,
 )
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.effects.table import PARAMETERS, parameter_vector
+from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 FITTED = ("speed", "longitudinal_acceleration", "wheel_speed_front", "wheel_speed_rear")
@@ -63,7 +63,7 @@ def make_stop(run: Run, vehicle: Vehicle, surface: SurfaceParameters, channels: 
     vehicle, surface : the model as it stands
     channels : that were measured
     """
-    model = run_model(run, vehicle, surface)
+    model = prepare_run(run, vehicle, surface)
     pressure = model.run.pressure[: model.samples]
     peak = float(pressure.max())
     pressed = np.flatnonzero(pressure > BRAKED * peak) if peak > 0.0 else np.empty(0, dtype=np.int64)
@@ -112,12 +112,12 @@ def predict_stop(
     offsets : float64 [3] in the order of `OFFSETS`
     """
     model = stop.model
-    theta = parameter_vector(complete_numbers(numbers))
+    theta = build_parameter_vector(complete_numbers(numbers))
     if stop.drive.any():
         torque = offsets[1] * model.vehicle.mass * model.vehicle.wheel_radius * stop.drive
         model = replace(model, run=replace(model.run, drive_torque=torque))
-    speed = starting_speed(model, theta) + float(offsets[0])
-    y = instrument_readings(model, theta, simulate_run(model, theta, initial_speed=speed))
+    speed = compute_starting_speed(model, theta) + float(offsets[0])
+    y = compute_instrument_readings(model, theta, simulate_run(model, theta, initial_speed=speed))
     y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
     return y
 

@@ -27,7 +27,7 @@ from tasks.identification.joint.words import SEPARATE, tell_verdict, tell_what_w
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
-from tasks.vehicle.effects.table import PARAMETERS, parameter_vector
+from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
 FIRST = ("lag", "drag_area", "speed_delay")
@@ -147,7 +147,7 @@ def judge_jointly(
         campaign=campaign.name,
         content_hash=campaign.content_hash,
         split_hash=campaign.split_hash,
-        theta=parameter_vector(complete_numbers(fitted.by_name)),
+        theta=build_parameter_vector(complete_numbers(fitted.by_name)),
         slots=(),
         experiment=None,
         forked=(),

@@ -20,7 +20,7 @@ TABLE_STEPS = 64
 
 @dataclass(frozen=True, kw_only=True)
 class Air:
-    """Optical depth along any line of sight, precipitation that is drawn one by one left out.
+    """Optical depth along any line of sight, without the particles that are drawn one by one.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Air:
 
 
 def extinction_of_visual_range(visual_range_m: float) -> float:
-    """Koschmieder's relation (1924), extinction = -ln(contrast threshold) / visual range.
+    """Return the extinction by Koschmieder's relation (1924), -ln(contrast threshold) / visual range.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ def extinction_of_visual_range(visual_range_m: float) -> float:
 def precipitating_air(
     population: Population | None, near: NearField, focal_px: float, haze_visual_range_m: float
 ) -> Air:
-    """The air of one clip: the extinction of all precipitation less what is drawn particle by particle.
+    """Return the air of one clip: the extinction of all precipitation, less that of the particles drawn one by one.
 
     Parameters
     ----------
-    population : the precipitation; None where nothing falls
-    near : where its particles are drawn one by one
+    population : the precipitation; None without precipitation
+    near : range in which its particles are drawn one by one
     focal_px : focal length of the camera [px]
     haze_visual_range_m : meteorological optical range of the air without precipitation [m]
 
@@ -77,7 +77,7 @@ def precipitating_air(
 
 
 def optical_depth(air: Air, distance: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Optical depth of the air less its drawn particles.
+    """Return the optical depth of the air without its drawn particles.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def light_layer(
     sky: SkyLight,
     rays: NDArray[np.float32],
 ) -> Layer:
-    """The same street under cloud: its light changed, its sky replaced.
+    """Return the layer that changes the light of the street to that under cloud and replaces its sky.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def light_layer(
 def air_layer(
     gbuffer: GBuffer, environment: NDArray[np.float32], air: Air, sky: SkyLight, rays: NDArray[np.float32]
 ) -> Layer:
-    """The veil of the air over the street; the sky already shines through all of it.
+    """Return the veil of the air over the street; the sky contains the veil already.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which layer changed which pixel, and the composition that the paper used for its particles."""
+"""Attribution of changed pixels to layers, and the paper's composition of particles."""
 
 from collections.abc import Collection
 
@@ -9,7 +9,7 @@ from tasks.conventions import ROAD_CLASSES
 from tasks.render.composition import encode_8bit, to_display
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.particles import Shutter
-from tasks.render.weather.layer import Layer, recompose
+from tasks.render.weather.layer import Layer, recompose_layers
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
 from tasks.render.weather.snow.field import coverage_rank, tracks_at
 from tasks.render.weather.snow.layer import GROUND_CLASSES, steepest_bearing
@@ -18,10 +18,10 @@ LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
 """Bit of each layer in an attribution picture."""
 
 
-def attribution(
+def attribute_pixels(
     weather: ClipWeather, frame: WeatherFrame, gbuffer: GBuffer, shutter: Shutter
 ) -> NDArray[np.uint8]:
-    """Layers that changed each pixel by at least half an 8-bit step, as `LAYER_BITS` added up.
+    """Return the layers that changed each pixel by at least half an 8-bit step, as the sum of their `LAYER_BITS`.
 
     Parameters
     ----------
@@ -39,19 +39,21 @@ def attribution(
     )
     picture = frame.base
     for layer in frame.layers:
-        after = recompose(picture, (layer,))
-        bits |= changed(picture, after, layer)
+        after = recompose_layers(picture, (layer,))
+        bits |= mark_changed_pixels(picture, after, layer)
         picture = after
     return bits
 
 
-def changed(before: NDArray[np.float32], after: NDArray[np.float32], layer: Layer) -> NDArray[np.uint8]:
-    """The layer's bit where it changed a pixel by at least half an 8-bit step, uint8 [H, W] [1].
+def mark_changed_pixels(
+    before: NDArray[np.float32], after: NDArray[np.float32], layer: Layer
+) -> NDArray[np.uint8]:
+    """Return the layer's bit where it changed a pixel by at least half an 8-bit step, uint8 [H, W] [1].
 
     Parameters
     ----------
     before, after : float32 [H, W, 3] linear pictures below the layer and with it [1]
-    layer : that changed them
+    layer : layer that changed them
     """
     step = np.abs(to_display(after) - to_display(before)).max(axis=-1)
     return np.where(step >= 0.5 / 255, LAYER_BITS[layer.name], 0).astype(np.uint8)
@@ -60,11 +62,11 @@ def changed(before: NDArray[np.float32], after: NDArray[np.float32], layer: Laye
 def snow_on(
     classes: Collection[int], weather: ClipWeather, gbuffer: GBuffer, shutter: Shutter
 ) -> NDArray[np.bool_]:
-    """Pixels of the ground on which snow lies, by the coverage field at the point that the pixel sees.
+    """Return the pixels of the ground on which snow lies, by the coverage field at the visible point.
 
     Parameters
     ----------
-    classes : which ground
+    classes : classes of the ground
     weather : the clip's weather
     gbuffer : the rasterisation of its scene
     shutter : pose and intrinsics
@@ -88,7 +90,7 @@ def snow_on(
 
 
 def paper_picture(frame: WeatherFrame) -> NDArray[np.uint8]:
-    """The 8-bit picture as the paper composes it (Appendix A.4).
+    """Return the 8-bit picture as the paper composes it (Appendix A.4).
 
     The particles are isolated in display space, as the signed difference of a pair of 8-bit renders of the
     street in its air with and without them, and that difference is added last to the finished still picture.
@@ -103,11 +105,11 @@ def paper_picture(frame: WeatherFrame) -> NDArray[np.uint8]:
     """
     still = [layer for layer in frame.layers if layer.name != "particles"]
     falling = [layer for layer in frame.layers if layer.name == "particles"]
-    without = recompose(frame.base, [layer for layer in still if layer.name != "wet"])
-    residual = _codes(recompose(without, falling)) - _codes(without)
-    return np.clip(_codes(recompose(frame.base, still)) + residual, 0, 255).astype(np.uint8)
+    without = recompose_layers(frame.base, [layer for layer in still if layer.name != "wet"])
+    residual = _codes(recompose_layers(without, falling)) - _codes(without)
+    return np.clip(_codes(recompose_layers(frame.base, still)) + residual, 0, 255).astype(np.uint8)
 
 
 def _codes(picture: NDArray[np.float32]) -> NDArray[np.int16]:
-    """8-bit sRGB codes as signed numbers."""
+    """Return 8-bit sRGB codes as signed numbers."""
     return encode_8bit(picture).astype(np.int16)

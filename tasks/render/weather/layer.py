@@ -23,7 +23,7 @@ class Layer:
     add: NDArray[np.float32]
 
 
-def recompose(base: NDArray[np.float32], layers: Iterable[Layer]) -> NDArray[np.float32]:
+def recompose_layers(base: NDArray[np.float32], layers: Iterable[Layer]) -> NDArray[np.float32]:
     """Apply layers to a picture in their order; the one way pictures are composed, so any layer can be redone.
 
     Parameters

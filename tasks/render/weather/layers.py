@@ -1,13 +1,13 @@
 """Weather over a clear clip. Call order, once for the clip and then for every frame:
 
 1. ``gaussians, weather = weather_scene(gaussians, environment, state, parameters, focal_px, seed, route,
-   relief, to_sun)`` with the clip's road edit already in the Gaussians' shape; rasterise the Gaussians that come back;
+   relief, to_sun)``, where the Gaussians have the clip's road edit; rasterise the returned Gaussians;
 2. ``picture = compose(gbuffer, clear sky)``: the clear linear picture, sky included, as in dry weather;
 3. ``frame = apply_weather(weather, picture, gbuffer, shutter)``, then encode ``frame.picture``.
 
 From the scene to the lens the layers are: light (cloud in place of the sun), wet (water on the road), air (veil
 over distance), particles (drops and flakes near the camera). Snow on the ground is part of the scene. In dry
-weather the scene and the picture come back as they are.
+weather the scene and the picture are returned unchanged.
 """
 
 from dataclasses import dataclass
@@ -21,11 +21,11 @@ from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.road_edit import RoadRelief, measure_road_lift
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
 from tasks.render.weather.falling.particles import Shutter, visible_streaks
-from tasks.render.weather.falling.precipitation import Population, population
+from tasks.render.weather.falling.precipitation import Population, make_population
 from tasks.render.weather.falling.streaks import draw_streaks
-from tasks.render.weather.layer import Layer, recompose
+from tasks.render.weather.layer import Layer, recompose_layers
 from tasks.render.weather.parameters import KindLook, WeatherParameters
-from tasks.render.weather.relief import clear_light, overcast_light, relit
+from tasks.render.weather.relief import clear_light, overcast_light, relight_gaussians
 from tasks.render.weather.scene_light import ground_light, without_sun
 from tasks.render.weather.sky import (
     SkyLight,
@@ -35,7 +35,7 @@ from tasks.render.weather.sky import (
     sky_light,
 )
 from tasks.render.weather.snow.field import SnowField, snow_field
-from tasks.render.weather.snow.layer import snow_layer, snowed_over, whitened
+from tasks.render.weather.snow.layer import snow_layer, snowed_over, whiten_gaussians
 from tasks.render.weather.wet.wet_road import wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
@@ -49,10 +49,10 @@ class Overcast:
 
     Parameters
     ----------
-    look : how its kind of weather looks
-    population : what falls; None where nothing does
-    air : what it does to the light on its way
-    sky : the light
+    look : appearance of its kind of weather
+    population : falling particles; None without precipitation
+    air : extinction and veil
+    sky : light of the sky
     environment : float32 [h, w, 3] environment under cloud [1]
     snow : coverage field of the scene; None where no snow lies
     """
@@ -67,12 +67,12 @@ class Overcast:
 
 @dataclass(frozen=True, kw_only=True)
 class ClipWeather:
-    """Everything about a clip's weather that its frames share.
+    """Weather of a clip that all its frames share.
 
     Parameters
     ----------
-    state : what lies on the road
-    parameters : the catalogue
+    state : surface state
+    parameters : numbers of the catalogue
     seed : visual seed of the clip [1]
     clear_environment : float32 [h, w, 3] environment in clear weather [1]
     overcast : None under a clear sky
@@ -87,7 +87,7 @@ class ClipWeather:
 
 @dataclass(frozen=True, kw_only=True)
 class WeatherFrame:
-    """One frame and what it is made of: ``picture`` is ``recompose(base, layers)``, bit for bit.
+    """One frame and its parts: ``picture`` is ``recompose_layers(base, layers)``, bit for bit.
 
     Parameters
     ----------
@@ -118,12 +118,12 @@ def weather_scene(
     ----------
     gaussians : the clear scene with the clip's road edit
     environment : float32 [h, w, 3] its clear environment, as in `Scene.environment` [1]
-    state : the weather, and what it leaves on the road
-    parameters : the catalogue
+    state : kind of weather and surface state
+    parameters : numbers of the catalogue
     focal_px : focal length of the camera [px]
     seed : visual seed of the clip [1]
-    route : where wheels have left tracks in the snow; None leaves it untouched
-    relief : the clip's road feature, lit by the weather's light as it is turned to it; None for a flat road
+    route : path of the wheels that left tracks in the snow; None for snow without tracks
+    relief : road feature of the clip, which is relit by the weather's light; None for a flat road
     to_sun : [3] unit vector to the clear sky's sun, as in `Scene.to_sun` [1]
 
     Returns
@@ -134,7 +134,7 @@ def weather_scene(
     Raises
     ------
     InputError
-        There is no such kind of weather, it has precipitation without a rate, or the scene has no road.
+        If there is no such kind of weather, it has precipitation without a rate, or the scene has no road.
     """
     p, look = parameters, parameters.find_look(state.kind)
     if look is None:
@@ -143,10 +143,12 @@ def weather_scene(
         )
         if relief is None:
             return gaussians, dry
-        return relit(gaussians, relief, clear_light(gaussians, environment, parameters.sky, to_sun)), dry
+        return relight_gaussians(
+            gaussians, relief, clear_light(gaussians, environment, parameters.sky, to_sun)
+        ), dry
     if look.particles is not None and state.precipitation_mm_h == 0:
         raise InputError(f"weather: {state.kind} needs precipitation_mm_h above 0; it is 0: use {DRY}")
-    falls = None if look.particles is None else population(look.particles, state.precipitation_mm_h)
+    falls = None if look.particles is None else make_population(look.particles, state.precipitation_mm_h)
     air = precipitating_air(falls, p.air.near, focal_px, p.air.haze_visual_range_m)
     white = ground_light(gaussians, SemanticClass.ROAD).lit / p.sky.asphalt_albedo
     cover = look.snow_cover
@@ -163,7 +165,7 @@ def weather_scene(
         amount = (state.snow_coverage, state.snow_depth_mm, cover)
         lift = None if relief is None else measure_road_lift(scene, relief)
         snow = snow_layer(scene, field, white, *amount, lift)
-        scene = snowed_over(whitened(scene, field, white, *amount), snow)
+        scene = snowed_over(whiten_gaussians(scene, field, white, *amount), snow)
     overcast = Overcast(
         look=look,
         population=falls,
@@ -173,7 +175,7 @@ def weather_scene(
         snow=field,
     )
     if relief is not None:
-        scene = relit(scene, relief, overcast_light(overcast.environment, sky))
+        scene = relight_gaussians(scene, relief, overcast_light(overcast.environment, sky))
     return scene, ClipWeather(
         state=state, parameters=p, seed=seed, clear_environment=environment, overcast=overcast
     )
@@ -187,7 +189,7 @@ def apply_weather(
     *,
     particles: bool = True,
 ) -> WeatherFrame:
-    """The picture of one frame in its weather.
+    """Return the picture of one frame in its weather.
 
     Parameters
     ----------
@@ -195,8 +197,8 @@ def apply_weather(
     picture : float32 [H, W, 3] linear picture of its scene before the clear environment [1]
     gbuffer : the rasterisation it was made from
     shutter : pose, motion, time and exposure of the frame
-    particles : False leaves them to `particle_layer`, for a sensor that sees the rest of the scene through a lens
-        or row by row: streaks are drawn as it sees them, with their own way during the exposure
+    particles : False if `particle_layer` draws them afterwards, for a sensor with a lens or a rolling shutter, whose
+        streaks are drawn with the motion that this sensor sees during the exposure
 
     Returns
     -------
@@ -209,7 +211,7 @@ def apply_weather(
     rays = pixel_rays(shutter)
     layers = [light_layer(picture, gbuffer, weather.clear_environment, overcast.environment, sky, rays)]
     if film is not None:
-        dry = recompose(picture, layers)
+        dry = recompose_layers(picture, layers)
         layers.append(
             wet_layer(
                 dry, gbuffer, overcast.environment, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
@@ -219,13 +221,13 @@ def apply_weather(
     layers.append(air_layer(gbuffer, overcast.environment, air, sky, rays))
     if particles and overcast.population is not None:
         layers.append(particle_layer(weather, overcast.population, overcast.sky, gbuffer.depth, shutter))
-    return WeatherFrame(base=picture, layers=tuple(layers), picture=recompose(picture, layers))
+    return WeatherFrame(base=picture, layers=tuple(layers), picture=recompose_layers(picture, layers))
 
 
 def particle_layer(
     weather: ClipWeather, falling: Population, sky: SkyLight, depth: NDArray[np.float32], shutter: Shutter
 ) -> Layer:
-    """The drops or flakes near the camera, lit by the sky and the ground about them.
+    """Return the layer of drops or flakes near the camera, lit by sky and ground.
 
     Parameters
     ----------
@@ -250,7 +252,7 @@ def particle_layer(
 
 
 def pixel_rays(shutter: Shutter) -> NDArray[np.float32]:
-    """World directions through the pixels' centres, of camera z 1.
+    """Return world directions through the pixels' centres, of camera z 1.
 
     Parameters
     ----------

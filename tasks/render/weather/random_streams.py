@@ -56,7 +56,7 @@ def philox(c0, c1, c2, c3, key):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def unit(word):  # type: ignore[no-untyped-def]
+def scale_to_unit(word):  # type: ignore[no-untyped-def]
     """A uint64 word below 2^32 as a number in the open interval (0, 1) [1]."""
     return (float(word) + 0.5) * _TO_UNIT
 

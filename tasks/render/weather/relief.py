@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.road_edit import RoadRelief
 from tasks.render.weather.ground_grid import read_between
-from tasks.render.weather.scene_light import GroundLight, ground_light, recoloured
+from tasks.render.weather.scene_light import GroundLight, ground_light, recolour_gaussians
 from tasks.render.weather.sky import LUMINANCE, SkyLight, SkyParameters
 from tasks.scene.gaussians import Gaussians
 
@@ -168,7 +168,7 @@ def relief_ratios(relief: RoadRelief, light: ReliefLight) -> tuple[Floats, Float
     return station, sun, sky
 
 
-def relit(gaussians: Gaussians, relief: RoadRelief, light: ReliefLight) -> Gaussians:
+def relight_gaussians(gaussians: Gaussians, relief: RoadRelief, light: ReliefLight) -> Gaussians:
     """The scene with the road feature in its light.
 
     Parameters
@@ -201,7 +201,7 @@ def relit(gaussians: Gaussians, relief: RoadRelief, light: ReliefLight) -> Gauss
     every = np.ones(len(gaussians))
     every[index] = gain
     sh = gaussians.sh.copy()
-    sh[index] = recoloured(gaussians, every, np.zeros((len(gaussians), 3))).sh[index]
+    sh[index] = recolour_gaussians(gaussians, every, np.zeros((len(gaussians), 3))).sh[index]
     return replace(gaussians, sh=sh)
 
 

@@ -1,4 +1,4 @@
-"""The clear light that a scene's Gaussians carry: how strong it is, and where it falls."""
+"""The clear light in the colours of a scene's Gaussians: its intensity and its distribution."""
 
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -31,7 +31,7 @@ LIT_ALIKE = {
 
 
 def to_display_unclipped(linear: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Linear light to sRGB-encoded values (IEC 61966-2-1), straight on beyond 1: snow in the sun is brighter.
+    """Return sRGB-encoded values of linear light (IEC 61966-2-1), without a limit at 1: snow in the sun is brighter.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ def to_display_unclipped(linear: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def mean_colours(gaussians: Gaussians) -> NDArray[np.float64]:
-    """Colour of every Gaussian, averaged over directions, in linear light.
+    """Return the colour of every Gaussian, averaged over directions, in linear light.
 
     Parameters
     ----------
-    gaussians : the cloud
+    gaussians : the set of Gaussians
 
     Returns
     -------
@@ -60,12 +60,14 @@ def mean_colours(gaussians: Gaussians) -> NDArray[np.float64]:
     return to_linear(colours).astype(np.float64) if gaussians.display_encoded else colours
 
 
-def recoloured(gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np.floating]) -> Gaussians:
-    """The cloud with every colour c turned into ``gain c + add`` in linear light.
+def recolour_gaussians(
+    gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np.floating]
+) -> Gaussians:
+    """Return the Gaussians with every colour c changed to ``gain c + add`` in linear light.
 
     Parameters
     ----------
-    gaussians : the cloud
+    gaussians : the set of Gaussians
     gain : [N] factor on the colour, not negative [1]
     add : [N, 3] linear light to add [1]
 
@@ -79,7 +81,7 @@ def recoloured(gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np
         new = to_display_unclipped(new)
     sh = gaussians.sh.copy()
     sh[:, 0] = (new - 0.5) / C0
-    # directional detail shrinks or grows with the colour it modulates, but light from elsewhere has none
+    # directional detail scales with the colour that it modulates; added light has none
     kept = gain ** (1 / 2.2) if gaussians.display_encoded else gain
     sh[:, 1:] *= kept[:, None, None].astype(np.float32)
     return replace(gaussians, sh=sh)
@@ -87,13 +89,13 @@ def recoloured(gaussians: Gaussians, gain: NDArray[np.floating], add: NDArray[np
 
 @dataclass(frozen=True, kw_only=True)
 class GroundLight:
-    """The clear light on the ground of one class, place by place.
+    """Clear light on the ground of one class, by cells.
 
     Parameters
     ----------
-    lit : float64 [3] radiance of that ground in the brighter light [1]
-    grid : cells over it
-    illumination : float64 [cells] light by that brighter light [1]
+    lit : float64 [3] radiance of that ground where it is lit [1]
+    grid : cells over the ground
+    illumination : float64 [cells] light relative to the lit ground [1]
     """
 
     lit: NDArray[np.float64]
@@ -102,10 +104,10 @@ class GroundLight:
 
 
 def ground_light(gaussians: Gaussians, ground: SemanticClass) -> GroundLight:
-    """Read the light off ground of nearly one reflectance.
+    """Return the clear light on a ground of nearly uniform reflectance.
 
-    Means over cells leave the grain out. The upper quartile of the cells stands for the lit ground: where half
-    the street lies in shadow the median would not.
+    Means over cells remove the grain. The upper quartile of the cells represents the lit ground, because the median
+    does not where half of the street is in shadow.
 
     Parameters
     ----------
@@ -140,10 +142,10 @@ def ground_light(gaussians: Gaussians, ground: SemanticClass) -> GroundLight:
 
 
 def facade_light(gaussians: Gaussians) -> NDArray[np.float64]:
-    """Clear light on facades by the way they face, by that on the sunny ones.
+    """Return the clear light on facades by compass direction, relative to the sunny ones.
 
-    Whole streets of facades differ little in mean reflectance from one compass direction to the next, so the
-    mean colour of a direction tells its light.
+    The mean reflectance of a whole street's facades differs little from one compass direction to the next, so the
+    mean colour of a direction gives its light.
 
     Parameters
     ----------
@@ -151,7 +153,7 @@ def facade_light(gaussians: Gaussians) -> NDArray[np.float64]:
 
     Returns
     -------
-    float64 [N] relative light; 1 for all that is no facade [1]
+    float64 [N] relative light; 1 for Gaussians of other classes [1]
     """
     light = np.ones(len(gaussians))
     facade = np.flatnonzero(
@@ -165,7 +167,7 @@ def facade_light(gaussians: Gaussians) -> NDArray[np.float64]:
     area = np.sort(gaussians.scales[facade].astype(np.float64), axis=1)[:, 1:].prod(axis=1)
     counted = np.bincount(bins.astype(int), area, FACADE_DIRECTIONS)
     summed = np.bincount(bins.astype(int), area * luminance, FACADE_DIRECTIONS)
-    # neighbouring directions share their facades: a rare direction is read with the common ones beside it
+    # the window spans neighbouring directions, so that a rare direction is averaged with common ones
     spread = [sum(w * np.roll(v, k) for k, w in ((-1, 0.25), (0, 1.0), (1, 0.25))) for v in (counted, summed)]
     mean = np.divide(spread[1], spread[0], out=np.full(FACADE_DIRECTIONS, np.nan), where=spread[0] > 0)
     own = np.interp(
@@ -181,7 +183,7 @@ def facade_light(gaussians: Gaussians) -> NDArray[np.float64]:
 
 
 def without_sun(gaussians: Gaussians, shadow_kept: float) -> Gaussians:
-    """The scene with light and shade on ground and facades drawn together, as under cloud.
+    """Return the scene with less contrast between light and shade on ground and facades, as under cloud.
 
     Parameters
     ----------
@@ -201,11 +203,11 @@ def without_sun(gaussians: Gaussians, shadow_kept: float) -> Gaussians:
         members = np.isin(gaussians.class_id, alike)
         relative = read_between(light.grid, light.illumination, gaussians.means[members, :2])
         gain[members] = relative ** (shadow_kept - 1)
-    return recoloured(gaussians, gain, np.zeros((len(gaussians), 3)))
+    return recolour_gaussians(gaussians, gain, np.zeros((len(gaussians), 3)))
 
 
-def appended(gaussians: Gaussians, layer: Gaussians) -> Gaussians:
-    """Two clouds of one colour space as one.
+def append_gaussians(gaussians: Gaussians, layer: Gaussians) -> Gaussians:
+    """Return two sets of Gaussians of one colour space as one.
 
     Parameters
     ----------
@@ -221,13 +223,13 @@ def appended(gaussians: Gaussians, layer: Gaussians) -> Gaussians:
     return replace(gaussians, **joined)
 
 
-def without(gaussians: Gaussians, index: NDArray[np.int64]) -> Gaussians:
-    """The cloud less some of its Gaussians.
+def remove_gaussians(gaussians: Gaussians, index: NDArray[np.int64]) -> Gaussians:
+    """Return the set without some of its Gaussians.
 
     Parameters
     ----------
-    gaussians : the cloud
-    index : int64 [B] which ones to leave out [1]
+    gaussians : the set of Gaussians
+    index : int64 [B] positions of those to remove [1]
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""From the commanded pressure to what the pads make of it: dead time, lag, push-out, pad friction, fade.
+"""The brake line: from the commanded pressure to the acting one, by dead time, lag, push-out, pad friction and fade.
 
 With every number 0 the acting pressure is the commanded one, bit for bit.
 """
@@ -7,7 +7,7 @@ from math import exp
 
 from numba import njit
 
-from tasks.vehicle.effects.equations import brake_factor
+from tasks.vehicle.effects.equations import compute_brake_factor
 from tasks.vehicle.effects.table import EffectValues
 
 DISC_CAPACITY_F, DISC_CAPACITY_R = 7400.0, 4600.0
@@ -17,15 +17,19 @@ DISC_COOLING = 30.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def line_after(line: float, before: float, after: float, step: float, effects: EffectValues) -> float:
-    """Pressure at the pads one step on: first-order lag behind the command, exact for a linear one [MPa].
+def compute_line_pressure(
+    line: float, before: float, after: float, step: float, effects: EffectValues
+) -> float:
+    """Return the pressure at the pads after one step [MPa]: a first-order lag behind the command.
+
+    The solution is exact for a command that is linear within the step.
 
     Parameters
     ----------
-    line : pressure at the pads now [MPa]
+    line : pressure at the pads before the step [MPa]
     before, after : commanded at both ends of the step, dead time taken off [MPa]
-    step : [s]
-    effects : the values
+    step : length of the step [s]
+    effects : numbers of the vehicle's effects
     """
     if effects.lag <= 0.0:
         return after
@@ -34,27 +38,27 @@ def line_after(line: float, before: float, after: float, step: float, effects: E
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def acting_pressure(line: float, speed: float, disc_rise: float, effects: EffectValues) -> float:
-    """Pressure that would give the same torque under the linear law of the paper [MPa].
+def compute_acting_pressure(line: float, speed: float, disc_rise: float, effects: EffectValues) -> float:
+    """Return the pressure that would give the same torque under the linear law of the paper [MPa].
 
     Parameters
     ----------
     line : pressure at the pads [MPa]
-    speed : of the vehicle [m/s]
+    speed : speed of the vehicle [m/s]
     disc_rise : temperature of the discs above ambient [K]
-    effects : the values
+    effects : numbers of the vehicle's effects
     """
-    return max(line - effects.push_out, 0.0) * brake_factor(effects, line, speed, disc_rise)
+    return max(line - effects.push_out, 0.0) * compute_brake_factor(effects, line, speed, disc_rise)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def disc_rate(disc_rise: float, power: float, capacity: float) -> float:
-    """Rate of the temperature of an axle's discs above ambient [K/s].
+def compute_disc_temperature_rate(disc_rise: float, power: float, capacity: float) -> float:
+    """Return the rate of the temperature of an axle's discs [K/s].
 
     Parameters
     ----------
-    disc_rise : now [K]
-    power : that the brakes turn into heat [W]
-    capacity : of the discs [J/K]
+    disc_rise : temperature of the discs above ambient [K]
+    power : heating power of the brakes [W]
+    capacity : heat capacity of the discs [J/K]
     """
     return (power - DISC_COOLING * disc_rise) / capacity

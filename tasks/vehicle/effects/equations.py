@@ -1,4 +1,4 @@
-"""Equations of the effects, one per port. With all values 0 each returns exactly what the plain model has there."""
+"""Equations of the effects, one per port; with all values 0 each returns exactly the plain model's value."""
 
 from math import exp
 
@@ -13,15 +13,15 @@ COULOMB_SPEED = 0.01
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def resistance(effects: EffectValues, speed: float, direction: float, snow_depth_mm: float) -> float:
-    """Force at the body against the motion [N]: air and ploughing, less the idle creep that drives.
+def compute_resistance(effects: EffectValues, speed: float, direction: float, snow_depth_mm: float) -> float:
+    """Return the force on the body against the motion [N]: air and snow ploughing, less the idle creep.
 
     Parameters
     ----------
-    effects : the values
-    speed : of the vehicle [m/s]
+    effects : numbers of the vehicle's effects
+    speed : speed of the vehicle [m/s]
     direction : +1 along the route, -1 against it; the wind blows along the route [1]
-    snow_depth_mm : of the snow on the road [mm]
+    snow_depth_mm : depth of the snow on the road [mm]
     """
     force = 0.0
     if speed > 0.0:
@@ -35,14 +35,14 @@ def resistance(effects: EffectValues, speed: float, direction: float, snow_depth
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def brake_factor(effects: EffectValues, pressure: float, speed: float, disc_rise: float) -> float:
-    """Pad friction and hydraulics as a factor on the linear law from pressure to torque [1].
+def compute_brake_factor(effects: EffectValues, pressure: float, speed: float, disc_rise: float) -> float:
+    """Return the factor of pad friction and hydraulics on the linear law from pressure to torque [1].
 
     Parameters
     ----------
-    effects : the values
-    pressure : at the pads [MPa]
-    speed : of the vehicle [m/s]
+    effects : numbers of the vehicle's effects
+    pressure : pressure at the pads [MPa]
+    speed : speed of the vehicle [m/s]
     disc_rise : temperature of the discs above ambient [K]
     """
     factor = 1.0 + effects.pressure_curve * pressure
@@ -52,17 +52,17 @@ def brake_factor(effects: EffectValues, pressure: float, speed: float, disc_rise
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def friction_factor(
+def compute_friction_factor(
     effects: EffectValues, speed: float, load_ratio: float, slip_energy: float, wet: float
 ) -> float:
-    """Factor on the tyre's friction [1]: load, heat of sliding, water film and speed.
+    """Return the factor of load, heat of sliding, water film and speed on the tyre's friction [1].
 
     Parameters
     ----------
-    effects : the values
-    speed : of the vehicle [m/s]
+    effects : numbers of the vehicle's effects
+    speed : speed of the vehicle [m/s]
     load_ratio : contact load over that at rest [1]
-    slip_energy : heat of sliding so far [J]
+    slip_energy : energy of sliding since the start [J]
     wet : 1 on a wet road, else 0 [1]
     """
     factor = 1.0 - effects.load_sensitivity * (load_ratio - 1.0)
@@ -74,14 +74,16 @@ def friction_factor(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def strut_force(effects: EffectValues, stiffness: float, damping: float, travel: float, rate: float) -> float:
-    """Spring and damper force of one axle, positive in extension [N].
+def compute_strut_force(
+    effects: EffectValues, stiffness: float, damping: float, travel: float, rate: float
+) -> float:
+    """Return the spring and damper force of one axle, positive in extension [N].
 
     Parameters
     ----------
-    effects : the values
-    stiffness, damping : of the axle [N/m, N s/m]
-    travel, rate : of the strut, rebound positive [m, m/s]
+    effects : numbers of the vehicle's effects
+    stiffness, damping : spring and damper constants of the axle [N/m, N s/m]
+    travel, rate : extension of the strut and its rate, rebound positive [m, m/s]
     """
     asymmetry = effects.damper_asymmetry
     c = damping * (1.0 + asymmetry) if rate > 0.0 else damping * (1.0 - asymmetry)

@@ -1,4 +1,4 @@
-"""Forms that no effect of the library has: a simple shape of one variable at one port."""
+"""Forms outside the library of effects: a simple shape of one variable at one port."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.vehicle.effects.ports import VARIABLE_UNITS, VARIABLES
+from tasks.vehicle.effects.ports import VARIABLE_UNITS, format_unit
 from tasks.vehicle.effects.slots import Slot
 
 TABLE = 65
@@ -53,12 +53,12 @@ class Form:
 
     @property
     def name(self) -> str:
-        """Port, shape and what x is."""
-        return form_name(self.port, self.variable, self.shape, self.scale)
+        """Return the form's name: its port, its shape and the definition of x."""
+        return name_form(self.port, self.variable, self.shape, self.scale)
 
     @property
     def slot(self) -> Slot:
-        """The form as a table."""
+        """Return the form as a piecewise-linear table."""
         grid = np.linspace(self.low, self.high, TABLE)
         return Slot(
             port=self.port,
@@ -69,8 +69,8 @@ class Form:
         )
 
 
-def coefficient_count(shape: str) -> int:
-    """How many coefficients a shape has.
+def count_coefficients(shape: str) -> int:
+    """Return the number of coefficients of a shape.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def coefficient_count(shape: str) -> int:
     return SHAPES[shape](np.zeros(1)).shape[1]
 
 
-def form_name(port: str, variable: str, shape: str, scale: float) -> str:
-    """Return the name of a form: its port, its shape, and what x is.
+def name_form(port: str, variable: str, shape: str, scale: float) -> str:
+    """Return the name of a form: its port, its shape and the definition of x.
 
     Parameters
     ----------
@@ -88,4 +88,4 @@ def form_name(port: str, variable: str, shape: str, scale: float) -> str:
     shape : one of `SHAPES`
     scale : magnitude of the variable at which x is 1 [unit of the variable]
     """
-    return f"{port} ~ {shape}, x = {variable}/{scale:g} {VARIABLE_UNITS[VARIABLES.index(variable)]}"
+    return f"{port} ~ {shape}, x = {variable}/{scale:g} {format_unit(VARIABLE_UNITS[variable])}"

@@ -1,4 +1,4 @@
-"""A vehicle with effects: the one way in which a fit and a grown vehicle change a car."""
+"""A vehicle with effects: fits and grown vehicles change a vehicle by this one function."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,12 +11,12 @@ FAMILY = "families."
 
 
 def apply_effects(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
-    """Return the vehicle with effects on top of those that it has.
+    """Return the vehicle with values added to the effects that it already has.
 
     Parameters
     ----------
     vehicle : the vehicle
-    values : by parameter name, in the units of the table
+    values : numbers by parameter name [units of the table]
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Effects that a fit may name: one or two rows of the table each."""
+"""Effects that a fit may name; each holds one or two rows of the table."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -16,8 +16,8 @@ class Effect:
     ----------
     name : unique in its library
     effect_class : effect, retune or sensor
-    variable : what it depends on
-    enters : the term in words and symbols
+    variable : variable that it depends on
+    enters : its term in words and symbols
     parameters : one or two rows of the table; all 0 (or the first 0) is the plain model
     """
 
@@ -29,10 +29,10 @@ class Effect:
 
     @property
     def port(self) -> str:
-        """Where it enters."""
+        """Return the port where the effect enters the equations of motion."""
         return self.parameters[0].port
 
     @property
     def source(self) -> str:
-        """Reference."""
+        """Return the reference for the effect's equation."""
         return self.parameters[0].source

@@ -18,7 +18,7 @@ class Slot:
     Parameters
     ----------
     port, variable : one of `PORTS` and `VARIABLES`
-    origin, spacing : of the grid [unit of the variable]
+    origin, spacing : first point and spacing of the grid [unit of the variable]
     values : float64 [K] at the grid points [unit of the port]
     """
 
@@ -30,7 +30,7 @@ class Slot:
 
 
 class SlotTables(NamedTuple):
-    """Slots as the kernels take them.
+    """Slots in the form that the kernels take.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ class SlotTables(NamedTuple):
     tables: NDArray[np.float64]
 
 
-def slot_tables(slots: Sequence[Slot]) -> SlotTables:
-    """Pack slots for the kernels.
+def pack_slots(slots: Sequence[Slot]) -> SlotTables:
+    """Return slots in the form that the kernels take.
 
     Parameters
     ----------
@@ -62,14 +62,14 @@ def slot_tables(slots: Sequence[Slot]) -> SlotTables:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def table_value(table: NDArray[np.float64], origin: float, spacing: float, x: float) -> float:
-    """Value of a piecewise-linear table on a uniform grid, held constant beyond its ends [unit of the port].
+def interpolate_table(table: NDArray[np.float64], origin: float, spacing: float, x: float) -> float:
+    """Return the value of a piecewise-linear table on a uniform grid, constant beyond its ends [unit of the port].
 
     Parameters
     ----------
     table : float64 [K] values
-    origin, spacing : of the grid [unit of the variable]
-    x : the variable
+    origin, spacing : first point and spacing of the grid [unit of the variable]
+    x : value of the variable [unit of the variable]
     """
     last = table.shape[0] - 1
     u = (x - origin) / spacing
@@ -82,19 +82,19 @@ def table_value(table: NDArray[np.float64], origin: float, spacing: float, x: fl
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def slot_sum(port: int, variables: tuple[float, ...], slots: SlotTables) -> float:
-    """Sum of all slots at a port [unit of the port].
+def sum_slots(port: int, variables: tuple[float, ...], slots: SlotTables) -> float:
+    """Return the sum of all slots at a port [unit of the port].
 
     Parameters
     ----------
     port : position in `PORTS`
-    variables : what slots can depend on, in the order of `VARIABLES`
+    variables : values of the variables, in the order of `VARIABLES` [their units]
     slots : the tables
     """
     total = 0.0
     for k in range(slots.keys.shape[0]):
         if slots.keys[k, 0] == port:
-            total += table_value(
+            total += interpolate_table(
                 slots.tables[k], slots.grids[k, 0], slots.grids[k, 1], variables[slots.keys[k, 1]]
             )
     return total

@@ -1,7 +1,7 @@
 """The table of effects: every number that a fit may give a vehicle, its road or its instruments.
 
 Units, bounds, the order of a parameter vector, the values that the kernels take, the checks of catalogue files and
-what a grown vehicle carries all derive from these rows. A new effect is one row here and one equation at its port.
+the numbers of a grown vehicle all derive from these rows. A new effect is one row here and one equation at its port.
 """
 
 from collections import namedtuple
@@ -31,20 +31,20 @@ DECLARED = "declared, from the residuals of the multibody reference"
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One number that a fit may move; 0 is the plain model, but for thresholds, which act with their effect only.
+    """One number that a fit may move; 0 is the plain model, except for thresholds, which act with their effect only.
 
     Parameters
     ----------
     name : unique
-    effect : what a table calls the effect that the number belongs to
-    unit : as catalogue files write it
-    port : where it enters
+    effect : name of the effect that the number belongs to, as tables print it
+    unit : unit, as catalogue files write it
+    port : port where it enters the equations of motion
     kind : added is a number of its own in the equations, scaled is a relative change of fields of the vehicle, shifted
         is added to them
     fields : of ``EffectValues``, or of the vehicle (``families.`` stands for all its tyre families)
     bounds : lowest and highest value that a fit may take [unit]
     step : for finite differences [unit]
-    source : reference
+    source : reference for the equation
     start : value from which a fit starts, and at which the effect's other number is screened [unit]
     """
 
@@ -61,126 +61,128 @@ class EffectParameter:
 
     @property
     def lower(self) -> float:
-        """Lower bound [unit]."""
+        """Return the lower bound [unit]."""
         return self.bounds[0]
 
     @property
     def upper(self) -> float:
-        """Upper bound [unit]."""
+        """Return the upper bound [unit]."""
         return self.bounds[1]
 
     @property
     def index(self) -> int:
-        """Position in a parameter vector."""
+        """Return the position in a parameter vector."""
         return PARAMETER_INDEX[self.name]
 
     @property
     def of_vehicle(self) -> bool:
-        """Whether a vehicle can carry it: the road's grade and the errors of instruments it cannot."""
+        """Return whether a vehicle can carry the number; the road's grade and the errors of instruments it cannot."""
         return self.port not in ("road", "sensor")
 
 
-def _added(
+def _add_number(
     name: str, effect: str, unit: str, port: str, bounds: tuple[float, float], step: float, source: str,
     start: float = 0.0,
 ) -> EffectParameter:  # fmt: skip
+    """Return a row whose number stands in the equations itself."""
     return EffectParameter(name, effect, unit, port, "added", (name,), bounds, step, source, start)
 
 
-def _changed(
-    name: str, kind: Kind, fields: tuple[str, ...], bounds: tuple[float, float], step: float, *, unit: str = "1",
-    effect: str = "", source: str = PAPER, port: str = "parameter",
-) -> EffectParameter:  # fmt: skip
-    return EffectParameter(
-        name, effect or name.replace("_", " "), unit, port, kind, fields, bounds, step, source
-    )
+def _change_field(
+    name: str, kind: Kind, fields: tuple[str, ...], bounds: tuple[float, float], step: float
+) -> EffectParameter:
+    """Return a row that scales or shifts fields of the vehicle, without a unit."""
+    return EffectParameter(name, name.replace("_", " "), "1", "parameter", kind, fields, bounds, step, PAPER)
 
 
-def _sensor(name: str, unit: str, bounds: tuple[float, float], step: float) -> EffectParameter:
-    return _added(name, name.replace("_", " "), unit, "sensor", bounds, step, ISO_15037)
+def _add_sensor(name: str, unit: str, bounds: tuple[float, float], step: float) -> EffectParameter:
+    """Return a row for an error of an instrument."""
+    return _add_number(name, name.replace("_", " "), unit, "sensor", bounds, step, ISO_15037)
 
 
 EFFECT_TABLE = (
     # numbers of the vehicle that may be off
-    _changed("pressure_gain", "scaled", ("brake_gain",), (-0.4, 0.4), 0.01),
-    _changed("mass", "scaled", ("sprung_mass",), (-0.3, 0.3), 0.01),
-    _added("pitch_gain", "brake-pitch gain", "1", "parameter", (-0.4, 0.4), 0.01, PAPER),
-    _changed("wheel_radius", "scaled", ("wheel_radius",), (-0.08, 0.08), 0.003),
-    _changed("damping", "scaled", ("suspension_damping_f", "suspension_damping_r"), (-0.6, 1.0), 0.02),
-    _changed("stiffness", "scaled", ("suspension_stiffness_f", "suspension_stiffness_r"), (-0.4, 0.6), 0.01),
-    _changed("friction", "scaled", ("families.efficiency",), (-0.4, 0.4), 0.01),
-    _changed("slip_stiffness", "scaled", ("families.slip_stiffness",), (-0.6, 1.5), 0.03),
-    _changed("front_bias", "shifted", ("front_brake_share",), (-0.2, 0.2), 0.01),
-    _changed(
-        "wheel_inertia", "shifted", ("wheel_inertia_f", "wheel_inertia_r"), (0.0, 20.0), 1.0, unit="kg m2",
-        effect="rotating inertia", source=MITSCHKE, port="wheel",
+    _change_field("pressure_gain", "scaled", ("brake_gain",), (-0.4, 0.4), 0.01),
+    _change_field("mass", "scaled", ("sprung_mass",), (-0.3, 0.3), 0.01),
+    _add_number("pitch_gain", "brake-pitch gain", "1", "parameter", (-0.4, 0.4), 0.01, PAPER),
+    _change_field("wheel_radius", "scaled", ("wheel_radius",), (-0.08, 0.08), 0.003),
+    _change_field("damping", "scaled", ("suspension_damping_f", "suspension_damping_r"), (-0.6, 1.0), 0.02),
+    _change_field("stiffness", "scaled", ("suspension_stiffness_f", "suspension_stiffness_r"), (-0.4, 0.6), 0.01),
+    _change_field("friction", "scaled", ("families.efficiency",), (-0.4, 0.4), 0.01),
+    _change_field("slip_stiffness", "scaled", ("families.slip_stiffness",), (-0.6, 1.5), 0.03),
+    _change_field("front_bias", "shifted", ("front_brake_share",), (-0.2, 0.2), 0.01),
+    EffectParameter(
+        "wheel_inertia", "rotating inertia", "kg m2", "wheel", "shifted", ("wheel_inertia_f", "wheel_inertia_r"),
+        (0.0, 20.0), 1.0, MITSCHKE,
     ),
-    _added("slope", "grade", "1", "road", (-0.08, 0.08), 0.001, PAPER),
+    _add_number("slope", "grade", "1", "road", (-0.08, 0.08), 0.001, PAPER),
     # forces along the road
-    _added("drag_area", "air drag", "m2", "longitudinal_force", (0.0, 3.0), 0.3, GILLESPIE),
-    _added("wind_speed", "wind", "m s-1", "longitudinal_force", (-15.0, 15.0), 2.0, GILLESPIE),
-    _added("rolling_coefficient", "rolling resistance", "1", "longitudinal_force", (0.0, 0.06), 0.004, GILLESPIE),
-    _added("rolling_speed", "rolling resistance by speed", "s m-1", "longitudinal_force", (0.0, 0.003), 0.0002,
-           GILLESPIE),
-    _added("ploughing", "snow ploughing", "N mm-1", "longitudinal_force", (0.0, 100.0), 5.0, SHOOP),
-    _added("creep_force", "idle creep", "N", "longitudinal_force", (0.0, 2500.0), 100.0, MITSCHKE),
-    _added("creep_speed", "idle creep", "m s-1", "longitudinal_force", (1.5, 12.0), 0.5, MITSCHKE, 4.0),
+    _add_number("drag_area", "air drag", "m2", "longitudinal_force", (0.0, 3.0), 0.3, GILLESPIE),
+    _add_number("wind_speed", "wind", "m s-1", "longitudinal_force", (-15.0, 15.0), 2.0, GILLESPIE),
+    _add_number("rolling_coefficient", "rolling resistance", "1", "longitudinal_force", (0.0, 0.06), 0.004, GILLESPIE),
+    _add_number("rolling_speed", "rolling resistance by speed", "s m-1", "longitudinal_force", (0.0, 0.003), 0.0002,
+                GILLESPIE),
+    _add_number("ploughing", "snow ploughing", "N mm-1", "longitudinal_force", (0.0, 100.0), 5.0, SHOOP),
+    _add_number("creep_force", "idle creep", "N", "longitudinal_force", (0.0, 2500.0), 100.0, MITSCHKE),
+    _add_number("creep_speed", "idle creep", "m s-1", "longitudinal_force", (1.5, 12.0), 0.5, MITSCHKE, 4.0),
     # torques on the wheels
-    _added("engine_torque", "engine braking", "N m", "brake_torque", (0.0, 400.0), 20.0, MITSCHKE),
-    _added("engine_viscous", "engine braking", "N m s rad-1", "brake_torque", (0.0, 6.0), 0.4, MITSCHKE),
-    _added("pad_drag", "pad drag", "N m", "brake_torque", (0.0, 250.0), 15.0, LIMPERT),
-    _added("lag", "brake lag", "s", "brake_torque", (0.0, 0.5), 0.03, LIMPERT),
-    _added("dead_time", "brake dead time", "s", "brake_torque", (0.0, 0.4), 0.02, LIMPERT),
-    _added("push_out", "push-out pressure", "MPa", "brake_torque", (0.0, 0.5), 0.02, LIMPERT),
-    _added("pressure_curve", "pressure curve", "MPa-1", "brake_torque", (-0.2, 0.25), 0.01, LIMPERT),
-    _added("fade", "brake fade", "(100 K)-1", "brake_torque", (-0.1, 0.3), 0.01, LIMPERT),
-    _added("pad_speed", "pad friction by speed", "s m-1", "brake_torque", (-0.03, 0.03), 0.001, LIMPERT),
-    _added("pad_speed_reference", "pad friction by speed", "m s-1", "brake_torque", (0.0, 35.0), 2.0, LIMPERT, 15.0),
-    _added("bias_pressure", "bias by pressure", "MPa-1", "brake_torque", (-0.12, 0.12), 0.01, LIMPERT),
-    _added("abs_cutoff", "ABS cut-off", "m s-1", "brake_torque", (0.0, 5.0), 0.2, DECLARED),
-    _added("slope_moment", "slope moment", "1", "brake_torque", (0.0, 10.0), 0.1, ZEGELAAR),
-    _added("radius_by_load", "tyre radius by load", "1", "brake_torque", (0.0, 3.0), 0.1, PACEJKA),
+    _add_number("engine_torque", "engine braking", "N m", "brake_torque", (0.0, 400.0), 20.0, MITSCHKE),
+    _add_number("engine_viscous", "engine braking", "N m s rad-1", "brake_torque", (0.0, 6.0), 0.4, MITSCHKE),
+    _add_number("pad_drag", "pad drag", "N m", "brake_torque", (0.0, 250.0), 15.0, LIMPERT),
+    _add_number("lag", "brake lag", "s", "brake_torque", (0.0, 0.5), 0.03, LIMPERT),
+    _add_number("dead_time", "brake dead time", "s", "brake_torque", (0.0, 0.4), 0.02, LIMPERT),
+    _add_number("push_out", "push-out pressure", "MPa", "brake_torque", (0.0, 0.5), 0.02, LIMPERT),
+    _add_number("pressure_curve", "pressure curve", "MPa-1", "brake_torque", (-0.2, 0.25), 0.01, LIMPERT),
+    _add_number("fade", "brake fade", "(100 K)-1", "brake_torque", (-0.1, 0.3), 0.01, LIMPERT),
+    _add_number("pad_speed", "pad friction by speed", "s m-1", "brake_torque", (-0.03, 0.03), 0.001, LIMPERT),
+    _add_number("pad_speed_reference", "pad friction by speed", "m s-1", "brake_torque", (0.0, 35.0), 2.0, LIMPERT,
+                15.0),
+    _add_number("bias_pressure", "bias by pressure", "MPa-1", "brake_torque", (-0.12, 0.12), 0.01, LIMPERT),
+    _add_number("abs_cutoff", "ABS cut-off", "m s-1", "brake_torque", (0.0, 5.0), 0.2, DECLARED),
+    _add_number("slope_moment", "slope moment", "1", "brake_torque", (0.0, 10.0), 0.1, ZEGELAAR),
+    _add_number("radius_by_load", "tyre radius by load", "1", "brake_torque", (0.0, 3.0), 0.1, PACEJKA),
     # friction of the tyre
-    _added("relaxation_length", "relaxation length", "m", "friction", (0.0, 2.0), 0.1, PACEJKA),
-    _added("load_sensitivity", "load sensitivity", "1", "friction", (-0.2, 0.6), 0.03, PACEJKA),
-    _added("tyre_heating", "tyre heating", "(100 kJ)-1", "friction", (-0.5, 3.0), 0.1, PACEJKA),
-    _added("wet_speed", "wet friction by speed", "s m-1", "friction", (0.0, 0.04), 0.002, HORNE),
-    _added("wet_threshold", "wet friction by speed", "m s-1", "friction", (0.0, 25.0), 2.0, HORNE),
-    _added("friction_speed", "tyre friction by speed", "s m-1", "friction", (-0.02, 0.03), 0.001, PACEJKA),
-    _added("stick_ratio", "sticking tyre", "1", "friction", (0.0, 1.2), 0.05, DECLARED),
-    _added("stick_below", "sticking tyre", "m s-1", "friction", (0.0, 5.0), 0.2, DECLARED),
-    _added("stick_above", "sticking tyre", "m s-1", "friction", (0.0, 10.0), 0.2, DECLARED),
+    _add_number("relaxation_length", "relaxation length", "m", "friction", (0.0, 2.0), 0.1, PACEJKA),
+    _add_number("load_sensitivity", "load sensitivity", "1", "friction", (-0.2, 0.6), 0.03, PACEJKA),
+    _add_number("tyre_heating", "tyre heating", "(100 kJ)-1", "friction", (-0.5, 3.0), 0.1, PACEJKA),
+    _add_number("wet_speed", "wet friction by speed", "s m-1", "friction", (0.0, 0.04), 0.002, HORNE),
+    _add_number("wet_threshold", "wet friction by speed", "m s-1", "friction", (0.0, 25.0), 2.0, HORNE),
+    _add_number("friction_speed", "tyre friction by speed", "s m-1", "friction", (-0.02, 0.03), 0.001, PACEJKA),
+    _add_number("stick_ratio", "sticking tyre", "1", "friction", (0.0, 1.2), 0.05, DECLARED),
+    _add_number("stick_below", "sticking tyre", "m s-1", "friction", (0.0, 5.0), 0.2, DECLARED),
+    _add_number("stick_above", "sticking tyre", "m s-1", "friction", (0.0, 10.0), 0.2, DECLARED),
     # forces between body, axles and road
-    _added("damper_asymmetry", "damper asymmetry", "1", "suspension_force", (-0.8, 0.8), 0.05, DIXON),
-    _added("coulomb_friction", "suspension friction", "N", "suspension_force", (0.0, 500.0), 20.0, MITSCHKE),
-    _added("progressive_rate", "progressive spring", "N m-3", "suspension_force", (0.0, 2e7), 2e5, MITSCHKE),
-    _added("stop_stiffness", "bump stop", "N m-1", "suspension_force", (0.0, 4e5), 1e4, MITSCHKE),
-    _added("stop_clearance", "bump stop", "m", "suspension_force", (0.005, 0.1), 0.005, MITSCHKE, 0.03),
-    _added("anti_dive", "anti-dive and anti-lift", "1", "suspension_force", (-0.5, 1.0), 0.05, GILLESPIE),
-    _added("anti_lift", "anti-dive and anti-lift", "1", "suspension_force", (-0.5, 1.0), 0.05, GILLESPIE),
-    _added("stick_anti_dive", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
-    _added("stick_anti_lift", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
-    _added("scrub_stiffness", "scrub", "1", "suspension_force", (-1.0, 1.0), 0.02, DECLARED),
-    _added("aero_lift", "air's pitch moment and lift", "N s2 m-2", "suspension_force", (-3.0, 3.0), 0.2, GILLESPIE),
-    _added("enveloping_length", "footprint", "m", "tyre_load", (0.0, 0.6), 0.02, ZEGELAAR),
-    _added("tyre_damping", "tyre damping", "N s m-1", "tyre_load", (0.0, 2000.0), 50.0, PACEJKA),
-    _added("aero_pitch", "air's pitch moment and lift", "N s2 m-1", "pitch_moment", (-3.0, 3.0), 0.1, GILLESPIE),
+    _add_number("damper_asymmetry", "damper asymmetry", "1", "suspension_force", (-0.8, 0.8), 0.05, DIXON),
+    _add_number("coulomb_friction", "suspension friction", "N", "suspension_force", (0.0, 500.0), 20.0, MITSCHKE),
+    _add_number("progressive_rate", "progressive spring", "N m-3", "suspension_force", (0.0, 2e7), 2e5, MITSCHKE),
+    _add_number("stop_stiffness", "bump stop", "N m-1", "suspension_force", (0.0, 4e5), 1e4, MITSCHKE),
+    _add_number("stop_clearance", "bump stop", "m", "suspension_force", (0.005, 0.1), 0.005, MITSCHKE, 0.03),
+    _add_number("anti_dive", "anti-dive and anti-lift", "1", "suspension_force", (-0.5, 1.0), 0.05, GILLESPIE),
+    _add_number("anti_lift", "anti-dive and anti-lift", "1", "suspension_force", (-0.5, 1.0), 0.05, GILLESPIE),
+    _add_number("stick_anti_dive", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
+    _add_number("stick_anti_lift", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
+    _add_number("scrub_stiffness", "scrub", "1", "suspension_force", (-1.0, 1.0), 0.02, DECLARED),
+    _add_number("aero_lift", "air's pitch moment and lift", "N s2 m-2", "suspension_force", (-3.0, 3.0), 0.2,
+                GILLESPIE),
+    _add_number("enveloping_length", "footprint", "m", "tyre_load", (0.0, 0.6), 0.02, ZEGELAAR),
+    _add_number("tyre_damping", "tyre damping", "N s m-1", "tyre_load", (0.0, 2000.0), 50.0, PACEJKA),
+    _add_number("aero_pitch", "air's pitch moment and lift", "N s2 m-1", "pitch_moment", (-3.0, 3.0), 0.1, GILLESPIE),
     # errors of the instruments
-    _sensor("wheel_speed_scale", "1", (-0.1, 0.1), 0.003),
-    _sensor("speed_scale", "1", (-0.1, 0.1), 0.003),
-    _sensor("acceleration_scale", "1", (-0.2, 0.2), 0.01),
-    _sensor("pitch_scale", "1", (-0.3, 0.3), 0.01),
-    _sensor("pitch_rate_scale", "1", (-0.3, 0.3), 0.01),
-    _sensor("vertical_scale", "1", (-0.3, 0.3), 0.01),
-    _sensor("gravity_leak", "1", (-1.5, 1.5), 0.1),
-    _sensor("mount_tilt", "rad", (-0.15, 0.15), 0.01),
-    _sensor("acceleration_delay", "s", (0.0, 0.3), 0.01),
-    _sensor("acceleration_lag", "s", (0.0, 0.4), 0.01),
-    _sensor("pitch_delay", "s", (0.0, 0.3), 0.01),
-    _sensor("pitch_lag", "s", (0.0, 0.4), 0.01),
-    _sensor("speed_delay", "s", (0.0, 0.3), 0.01),
-    _sensor("speed_lag", "s", (0.0, 0.4), 0.01),
-    _sensor("wheel_speed_delay", "s", (0.0, 0.3), 0.01),
+    _add_sensor("wheel_speed_scale", "1", (-0.1, 0.1), 0.003),
+    _add_sensor("speed_scale", "1", (-0.1, 0.1), 0.003),
+    _add_sensor("acceleration_scale", "1", (-0.2, 0.2), 0.01),
+    _add_sensor("pitch_scale", "1", (-0.3, 0.3), 0.01),
+    _add_sensor("pitch_rate_scale", "1", (-0.3, 0.3), 0.01),
+    _add_sensor("vertical_scale", "1", (-0.3, 0.3), 0.01),
+    _add_sensor("gravity_leak", "1", (-1.5, 1.5), 0.1),
+    _add_sensor("mount_tilt", "rad", (-0.15, 0.15), 0.01),
+    _add_sensor("acceleration_delay", "s", (0.0, 0.3), 0.01),
+    _add_sensor("acceleration_lag", "s", (0.0, 0.4), 0.01),
+    _add_sensor("pitch_delay", "s", (0.0, 0.3), 0.01),
+    _add_sensor("pitch_lag", "s", (0.0, 0.4), 0.01),
+    _add_sensor("speed_delay", "s", (0.0, 0.3), 0.01),
+    _add_sensor("speed_lag", "s", (0.0, 0.4), 0.01),
+    _add_sensor("wheel_speed_delay", "s", (0.0, 0.3), 0.01),
 )  # fmt: skip
 
 PARAMETERS = {row.name: row for row in EFFECT_TABLE}
@@ -193,7 +195,7 @@ NUMBERS_OF_EFFECTS = {
     effect: tuple(name for name in EFFECT_UNITS if PARAMETERS[name].effect == effect)
     for effect in dict.fromkeys(PARAMETERS[name].effect for name in EFFECT_UNITS)
 }
-"""The numbers of each effect that a vehicle may hold, by what a table calls it."""
+"""The numbers of each effect that a vehicle may hold, by the name that tables print."""
 
 if TYPE_CHECKING:
 
@@ -210,12 +212,12 @@ else:
     )
 
 
-def effect_values(values: Mapping[str, float]) -> EffectValues:
-    """Return the effects of a vehicle as the kernels take them; all others 0.
+def pack_effect_values(values: Mapping[str, float]) -> EffectValues:
+    """Return the effects of a vehicle in the form that the kernels take; all others are 0.
 
     Parameters
     ----------
-    values : by name, in the units of `EFFECT_UNITS`
+    values : numbers by name [units of `EFFECT_UNITS`]
 
     Raises
     ------
@@ -231,12 +233,12 @@ def effect_values(values: Mapping[str, float]) -> EffectValues:
     return EffectValues(*(float(values.get(name, 0.0)) for name in EFFECT_UNITS))
 
 
-def parameter_vector(values: Mapping[str, float]) -> NDArray[np.float64]:
-    """Return the vector of all parameters from named values; all others 0.
+def build_parameter_vector(values: Mapping[str, float]) -> NDArray[np.float64]:
+    """Return the vector of all parameters from named values; all others are 0.
 
     Parameters
     ----------
-    values : by parameter name, in the units of the table
+    values : numbers by parameter name [units of the table]
 
     Raises
     ------
@@ -253,11 +255,11 @@ def parameter_vector(values: Mapping[str, float]) -> NDArray[np.float64]:
     return theta
 
 
-def named_values(theta: NDArray[np.float64]) -> dict[str, float]:
+def unpack_parameter_vector(theta: NDArray[np.float64]) -> dict[str, float]:
     """Return the parameters of a vector that are not 0, by name.
 
     Parameters
     ----------
-    theta : float64 [len(EFFECT_TABLE)]
+    theta : float64 [len(EFFECT_TABLE)] vector of all parameters [units of the table]
     """
     return {EFFECT_TABLE[i].name: float(theta[i]) for i in np.flatnonzero(theta)}

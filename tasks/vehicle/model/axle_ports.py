@@ -1,15 +1,19 @@
-"""One axle at one instant: slip, tyre force and torques, each with its own function."""
+"""Slip, tyre force and torques of one axle at one instant, each by its own function."""
 
 from typing import NamedTuple
 
 from numba import njit
 
-from tasks.vehicle.brake import abs_command, abs_update
-from tasks.vehicle.effects.brake_line import acting_pressure
-from tasks.vehicle.effects.chassis import effective_friction, grip_reserve, stick_share
-from tasks.vehicle.effects.equations import friction_factor
+from tasks.vehicle.brake import compute_abs_command, limit_abs_rate
+from tasks.vehicle.effects.brake_line import compute_acting_pressure
+from tasks.vehicle.effects.chassis import (
+    compute_effective_friction,
+    compute_lateral_reserve,
+    compute_stick_share,
+)
+from tasks.vehicle.effects.equations import compute_friction_factor
 from tasks.vehicle.effects.ports import PORTS
-from tasks.vehicle.effects.slots import SlotTables, slot_sum
+from tasks.vehicle.effects.slots import SlotTables, sum_slots
 from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Instant
@@ -27,17 +31,17 @@ class AxlePorts(NamedTuple):
 
     Parameters
     ----------
-    ground : road and load
+    ground : road height, slope and contact load
     slip : signed braking slip; negative where the tyre drives the vehicle [1]
     force_slip : slip that builds up the tyre's force; another one where the tyre has a relaxation length [1]
     tyre_force : braking force at the contact, rearward positive [N]
     abs_scale : share of the brake torque let through [1]
     full_torque : brake torque that the pressure gives to a turning wheel without ABS [N m]
     brake_torque : against the wheel's rotation [N m]
-    shaft_torque : of the engine, against the wheel's rotation [N m]
-    suspension_force : spring, damper and what the links pass on [N]
-    lever : of the tyre force about the wheel centre [m]
-    ground_moment : of the ground's load, against the wheel's rotation [N m]
+    shaft_torque : torque of the engine, against the wheel's rotation [N m]
+    suspension_force : force of spring, damper and links [N]
+    lever : lever of the tyre force about the wheel centre [m]
+    ground_moment : moment of the contact load, against the wheel's rotation [N m]
     """
 
     ground: Ground
@@ -54,8 +58,8 @@ class AxlePorts(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
-    """Braking slip that is negative for a driven wheel, within [-1, 1]; ISO 8855's is its negative [1].
+def compute_signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
+    """Return the braking slip, negative for a driven wheel, within [-1, 1]; ISO 8855's slip is its negative [1].
 
     Parameters
     ----------
@@ -67,44 +71,46 @@ def signed_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def signed_friction(slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues) -> float:
-    """Friction of the tyre, continued oddly to driving slip [1].
+def compute_signed_friction(
+    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
+) -> float:
+    """Return the friction of the tyre, continued as an odd function to driving slip [1].
 
     Parameters
     ----------
     slip : signed braking slip [1]
-    load : of the axle [N]
-    share : of the tyre that sticks [1]
-    tyre : on the surface
-    effects : the values
+    load : load of the axle [N]
+    share : share of the tyre that sticks [1]
+    tyre : the tyre on the surface
+    effects : numbers of the vehicle's effects
     """
-    friction = effective_friction(abs(slip), load, share, tyre, effects)
+    friction = compute_effective_friction(abs(slip), load, share, tyre, effects)
     return friction if slip >= 0.0 else -friction
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def lock_share(omega: float, lock_speed: float) -> float:
-    """Share of the brake torque that friction gives at a wheel speed: all of it, save around standstill [1].
+def compute_lock_share(omega: float, lock_speed: float) -> float:
+    """Return the share of the brake torque that pad friction gives at a wheel speed: 1, but near standstill [1].
 
     Parameters
     ----------
-    omega : [rad/s]
-    lock_speed : [rad/s]
+    omega : wheel speed [rad/s]
+    lock_speed : wheel speed below which pad friction is proportional to it [rad/s]
     """
     return min(max(omega / lock_speed, -1.0), 1.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def form_variables(
+def collect_form_variables(
     speed: float, load_ratio: float, strut: Strut, memory: AxleMemory, instant: Instant
 ) -> FormVariables:
-    """Return what a form at an axle can depend on, in the order of `VARIABLES`.
+    """Return the variables that a form at an axle can depend on, in the order of `VARIABLES`.
 
     Parameters
     ----------
-    speed : [m/s]
+    speed : speed of the vehicle [m/s]
     load_ratio : contact load over that at rest [1]
-    strut, memory, instant : of the axle, and what acts from outside
+    strut, memory, instant : strut and memory of the axle, and inputs at this instant
     """
     return (
         instant.time, speed, instant.pressure, memory.disc_rise, instant.pressure_rate, load_ratio, strut.travel,
@@ -113,20 +119,20 @@ def form_variables(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
-    """How fast the slip that builds up force follows the slip: v / length; 0 where it does at once [1/s].
+def compute_relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
+    """Return the rate at which the slip that builds up force follows the slip, v / length; 0 without relaxation [1/s].
 
     Parameters
     ----------
-    speed : [m/s]
-    speed_floor : v_epsilon, the least speed of following [m/s]
+    speed : speed of the vehicle [m/s]
+    speed_floor : v_epsilon, the lowest speed that counts [m/s]
     length : relaxation length (Pacejka 2012, doi:10.1016/C2010-0-68548-8); 0 for none [m]
     """
     return max(speed, speed_floor) / length if length > 0.0 else 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def rolling_axle(
+def compute_rolling_axle(
     ground: Ground,
     strut: Strut,
     speed: float,
@@ -143,38 +149,44 @@ def rolling_axle(
     chassis: Chassis,
     tyre: Tyre,
 ) -> AxlePorts:
-    """Slip, tyre force and torques of one axle.
+    """Return slip, tyre force and torques of one axle of a moving vehicle.
 
     Parameters
     ----------
-    ground, strut : what carries it
-    speed : [m/s]
+    ground, strut : ground under the axle and strut above it
+    speed : speed of the vehicle [m/s]
     omega : wheel speed [rad/s]
-    memory : what it carries on
+    memory : slip state, sliding energy and disc temperature of the axle
     scale : ABS scale one step before, from which its rate is limited [1]
     gain : brake torque per pressure [N m/MPa]
-    shaft_torque : of the engine on turning wheels [N m]
-    static_load, stiffness : of the tyre [N, N/m]
-    step : [s]
-    instant : what acts from outside
-    forms : what no effect of the library has
-    chassis, tyre : the values
+    shaft_torque : torque of the engine on turning wheels [N m]
+    static_load, stiffness : load at rest and vertical stiffness of the tyre [N, N/m]
+    step : length of the step [s]
+    instant : inputs at this instant
+    forms : forms outside the library of effects, or None
+    chassis, tyre : the vehicle on its surface
     """
     wheels, effects = chassis.wheels, chassis.effects
-    slip = signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
+    slip = compute_signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
     force_slip = memory.slip if effects.relaxation_length > 0.0 else slip
     load_ratio = ground.load / static_load
-    grip = friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet)
-    pressure = acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
+    grip = compute_friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet)
+    pressure = compute_acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
     if forms is not None:
-        variables = form_variables(speed, load_ratio, strut, memory, instant)
-        grip *= max(1.0 + slot_sum(_FRICTION_FORM, variables, forms), 0.0)
-        pressure *= max(1.0 + slot_sum(_BRAKE_FORM, variables, forms), 0.0)
-    sticking = stick_share(speed, effects)
-    tyre_force = signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
-    wanted = abs_command(slip, tyre.target_slip, wheels.release_width) if speed >= effects.abs_cutoff else 1.0
-    abs_scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
-    turning = lock_share(omega, chassis.lock_speed)
+        variables = collect_form_variables(speed, load_ratio, strut, memory, instant)
+        grip *= max(1.0 + sum_slots(_FRICTION_FORM, variables, forms), 0.0)
+        pressure *= max(1.0 + sum_slots(_BRAKE_FORM, variables, forms), 0.0)
+    sticking = compute_stick_share(speed, effects)
+    tyre_force = (
+        compute_signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
+    )
+    wanted = (
+        compute_abs_command(slip, tyre.target_slip, wheels.release_width)
+        if speed >= effects.abs_cutoff
+        else 1.0
+    )
+    abs_scale = limit_abs_rate(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
+    turning = compute_lock_share(omega, chassis.lock_speed)
     rubbing = effects.pad_drag / (wheels.front.brake_gain + wheels.rear.brake_gain)
     brake_torque = gain * (pressure * abs_scale + rubbing) * turning
     lever = wheels.radius - effects.radius_by_load * (ground.load - static_load) / stiffness
@@ -188,13 +200,13 @@ def rolling_axle(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
-    """The ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
+def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
+    """Return the ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 
     Parameters
     ----------
-    ground, strut : what carries it
-    wheels : the values
+    ground, strut : ground under the axle and strut above it
+    wheels : wheels, brakes and longitudinal values
     """
     tyre_force = -ground.load * ground.slope
     return AxlePorts(
@@ -213,13 +225,13 @@ def standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def with_links(ports: AxlePorts, force: float) -> AxlePorts:
-    """The same ports with a force of the links in parallel to spring and damper.
+def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
+    """Return the ports with a force of the links in parallel to spring and damper.
 
     Parameters
     ----------
-    ports : of the axle
-    force : pulls body and wheel together where positive [N]
+    ports : ports of the axle
+    force : force of the links; it pulls body and wheel together where positive [N]
     """
     return AxlePorts(
         ports.ground, ports.slip, ports.force_slip, ports.tyre_force, ports.abs_scale, ports.full_torque,
@@ -228,14 +240,14 @@ def with_links(ports: AxlePorts, force: float) -> AxlePorts:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def axle_grip_reserve(ports: AxlePorts, tyre: Tyre) -> float:
-    """Sideways grip that an axle has left; none off the road [1].
+def compute_axle_lateral_reserve(ports: AxlePorts, tyre: Tyre) -> float:
+    """Return the lateral friction that an axle has left; 0 off the road [1].
 
     Parameters
     ----------
-    ports : of the axle
-    tyre : on the surface
+    ports : ports of the axle
+    tyre : the tyre on the surface
     """
     if ports.ground.load <= 0.0:
         return 0.0
-    return grip_reserve(ports.tyre_force / ports.ground.load, tyre.peak)
+    return compute_lateral_reserve(ports.tyre_force / ports.ground.load, tyre.peak)

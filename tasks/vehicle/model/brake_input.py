@@ -7,20 +7,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tasks.vehicle.brake import PressureProfile, brake_pressure
+from tasks.vehicle.brake import PressureProfile, compute_brake_pressure
 
 NO_TRACE = np.empty(0)
 NO_COMMAND = PressureProfile(0.0, 0.0, inf, 0.0, inf, inf)
 
 
 class BrakeInput(NamedTuple):
-    """The brake's input as the kernels take it; made by `brake_command` or `measured_trace`.
+    """The brake's input in the form that the kernels take; `make_command_input` and `make_trace_input` make it.
 
     Parameters
     ----------
     profile : the brake command; used where there is no trace
     trace : float64 [N] pressure at samples, linear between them and held beyond the last; empty for a command [MPa]
-    interval : between the samples [s]
+    interval : time between the samples [s]
     hold_speed : keep the speed until the command's onset
     engine : float64 [N] torque of the engine at the wheels at the samples, driving positive; empty for none [N m]
     """
@@ -32,56 +32,56 @@ class BrakeInput(NamedTuple):
     engine: NDArray[np.float64]
 
 
-def brake_command(profile: PressureProfile, *, hold_speed: bool = False) -> BrakeInput:
+def make_command_input(profile: PressureProfile, *, hold_speed: bool = False) -> BrakeInput:
     """Return a brake command as an input.
 
     Parameters
     ----------
-    profile : the command
+    profile : brake command
     hold_speed : keep the speed until its onset
     """
     return BrakeInput(profile, NO_TRACE, 1.0, hold_speed, NO_TRACE)
 
 
-def measured_trace(
+def make_trace_input(
     pressure: NDArray[np.float64], interval: float, engine: NDArray[np.float64] | None = None
 ) -> BrakeInput:
     """Return a measured pressure as an input, with the engine's torque where that was measured.
 
     Parameters
     ----------
-    pressure : float64 [N] at the samples [MPa]
-    interval : between them [s]
+    pressure : float64 [N] pressure at the samples [MPa]
+    interval : time between samples [s]
     engine : float64 [N] torque at the wheels, driving positive [N m]
     """
     return BrakeInput(NO_COMMAND, pressure, interval, False, NO_TRACE if engine is None else engine)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def pressure_at(time: float, onset: float, delay: float, drive: BrakeInput) -> float:
-    """Pressure that the driver gives, after a delay [MPa].
+def compute_input_pressure(time: float, onset: float, delay: float, drive: BrakeInput) -> float:
+    """Return the pressure that the driver gives, after a delay [MPa].
 
     Parameters
     ----------
-    time : since the start of the run [s]
-    onset : of the brake command [s]
-    delay : by which the pressure is late [s]
-    drive : the input
+    time : time since the start of the run [s]
+    onset : onset of the brake command [s]
+    delay : delay of the pressure [s]
+    drive : input of the driver
     """
     if len(drive.trace) == 0:
-        return brake_pressure(time - onset - delay, drive.profile)
-    return value_at(time - delay, drive.trace, drive.interval)
+        return compute_brake_pressure(time - onset - delay, drive.profile)
+    return interpolate_trace(time - delay, drive.trace, drive.interval)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def value_at(time: float, trace: NDArray[np.float64], interval: float) -> float:
-    """Value of a trace, linear between its samples and held beyond both ends.
+def interpolate_trace(time: float, trace: NDArray[np.float64], interval: float) -> float:
+    """Return the value of a trace, linear between its samples and held beyond both ends [unit of the trace].
 
     Parameters
     ----------
-    time : since the start of the run [s]
-    trace : float64 [N], at least one sample
-    interval : between the samples [s]
+    time : time since the start of the run [s]
+    trace : float64 [N], at least one sample [unit of the trace]
+    interval : time between the samples [s]
     """
     last = len(trace) - 1
     u = max(time, 0.0) / interval

@@ -1,12 +1,12 @@
-"""The vehicle on its surface as the kernels of the model take it."""
+"""The vehicle on its surface, in the form that the kernels of the model take."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
-from tasks.vehicle.effects.table import EffectValues, effect_values
-from tasks.vehicle.half_car import HalfCar, half_car
-from tasks.vehicle.paper.wheels import Wheels, wheels_of
+from tasks.vehicle.effects.table import EffectValues, pack_effect_values
+from tasks.vehicle.half_car import HalfCar, build_half_car
+from tasks.vehicle.paper.wheels import Wheels, build_wheels
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 
 
@@ -17,7 +17,7 @@ class Conditions:
     Parameters
     ----------
     hazard : road feature
-    snow_depth_mm : of the snow on the road [mm]
+    snow_depth_mm : depth of the snow on the road [mm]
     grade : rise of the road along the route [1]
     direction : +1 along the route, -1 against it
     disc_rise : temperature of the discs above ambient at the start [K]
@@ -31,7 +31,7 @@ class Conditions:
 
 
 class Chassis(NamedTuple):
-    """The whole vehicle on its surface, save the tyre's curve.
+    """The whole vehicle on its surface, except the tyre's curve.
 
     Parameters
     ----------
@@ -40,11 +40,11 @@ class Chassis(NamedTuple):
     lever : height of the body's centre of gravity above the wheel centres [m]
     lock_speed : wheel speed below which brake friction is proportional to it [rad/s]
     transfer : height of the centre of gravity over the wheelbase [1]
-    effects : values of its effects; a tuple, for arrays are counted at every call
+    effects : numbers of its effects; a tuple, since numba counts references of arrays at every call
     wet : 1 on a wet road, else 0 [1]
-    snow_depth_mm : of the snow on it [mm]
+    snow_depth_mm : depth of the snow on the road [mm]
     direction : +1 along the route, -1 against it; the wind blows along the route [1]
-    climb : deceleration by the grade [m/s2]
+    climb : deceleration that the grade causes [m/s2]
     """
 
     body: HalfCar
@@ -59,8 +59,8 @@ class Chassis(NamedTuple):
     climb: float
 
 
-def chassis_of(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditions) -> Chassis:
-    """Return the model's values of a vehicle on a surface.
+def build_chassis(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditions) -> Chassis:
+    """Return the values of a vehicle on a surface that the model needs.
 
     ``cg_height`` is that of the whole vehicle; the axles' centres of gravity are at wheel height.
 
@@ -68,17 +68,17 @@ def chassis_of(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditio
     ----------
     vehicle : the vehicle
     response : its tyres on the surface
-    conditions : of the run
+    conditions : conditions of the run
     """
     axles = vehicle.unsprung_mass_f + vehicle.unsprung_mass_r
     body_height = (vehicle.mass * vehicle.cg_height - axles * vehicle.wheel_radius) / vehicle.sprung_mass
     return Chassis(
-        body=half_car(vehicle),
-        wheels=wheels_of(vehicle),
+        body=build_half_car(vehicle),
+        wheels=build_wheels(vehicle),
         lever=body_height - vehicle.wheel_radius,
         lock_speed=vehicle.lock_speed,
         transfer=vehicle.cg_height / vehicle.wheelbase,
-        effects=effect_values(vehicle.effects),
+        effects=pack_effect_values(vehicle.effects),
         wet=float(response.wet),
         snow_depth_mm=float(conditions.snow_depth_mm),
         direction=float(conditions.direction),

@@ -1,29 +1,30 @@
-"""Coupled mode's physics at one instant: every force where it meets the vehicle, each with its own function.
+"""Forces and moments of the coupled model at one instant, each computed by its own function.
 
-The ports are, in the order they are worked out: road, load, suspension force, slip, friction, tyre force, brake
-torque, drag, pitch moment, lift. An effect that the model lacks acts on exactly one of them.
+A port is a place where a force or moment enters the equations of motion. The ports are, in the order of computation:
+road, load, suspension force, slip, friction, tyre force, brake torque, drag, pitch moment, lift. An effect that the
+model lacks acts on exactly one of them.
 """
 
 from typing import NamedTuple
 
 from numba import njit
 
-from tasks.vehicle.effects.chassis import link_lift, stick_share
-from tasks.vehicle.effects.equations import resistance
+from tasks.vehicle.effects.chassis import compute_link_force, compute_stick_share
+from tasks.vehicle.effects.equations import compute_resistance
 from tasks.vehicle.effects.ports import PORTS
-from tasks.vehicle.effects.slots import SlotTables, slot_sum
+from tasks.vehicle.effects.slots import SlotTables, sum_slots
 from tasks.vehicle.half_car import HalfCarState
 from tasks.vehicle.model.axle_ports import (
     AxlePorts,
-    axle_grip_reserve,
-    form_variables,
-    rolling_axle,
-    standing_axle,
-    with_links,
+    add_link_force,
+    collect_form_variables,
+    compute_axle_lateral_reserve,
+    compute_rolling_axle,
+    compute_standing_axle,
 )
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import Instant, Memory, Motion
-from tasks.vehicle.model.vertical_ports import ground_at, struts_at
+from tasks.vehicle.model.vertical_ports import compute_ground, compute_struts
 from tasks.vehicle.road import RoadFeature
 from tasks.vehicle.tyres.contract import Tyre
 
@@ -39,10 +40,10 @@ class Ports(NamedTuple):
     ----------
     front, rear : the axles
     road_force : horizontal part of the contact loads on the slope, forward positive [N]
-    drag : of coasting, the air and the snow, rearward positive [N]
+    drag : force of coasting, air, snow and grade, rearward positive [N]
     acceleration : dv/dt [m/s2]
-    pitch_moment : on the body, nose-down positive [N m]
-    lift : of the air, on the body's centre of gravity [N]
+    pitch_moment : pitch moment on the body, nose-down positive [N m]
+    lift : aerodynamic lift on the body's centre of gravity [N]
     """
 
     front: AxlePorts
@@ -55,13 +56,13 @@ class Ports(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float]:
-    """Brake torque per pressure of the front and the rear axle, of which neither is negative [N m/MPa].
+def compute_brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float]:
+    """Return the brake torque per pressure of the front and the rear axle, never negative [N m/MPa].
 
     Parameters
     ----------
-    pressure : at the pads, with which the front's share changes [MPa]
-    chassis : the values
+    pressure : pressure at the pads, which changes the front axle's share [MPa]
+    chassis : the vehicle on its surface
     """
     front, rear = chassis.wheels.front.brake_gain, chassis.wheels.rear.brake_gain
     moved = min(max(chassis.effects.bias_pressure * pressure * (front + rear), -front), rear)
@@ -69,7 +70,7 @@ def brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def ports_at(
+def compute_ports(
     motion: Motion,
     memory: Memory,
     x: HalfCarState,
@@ -82,62 +83,75 @@ def ports_at(
     tyre: Tyre,
     road: RoadFeature,
 ) -> Ports:
-    """All that acts on the vehicle in one state.
+    """Return all forces and moments that act on the vehicle in one state.
 
     The body's pitch moment follows from the forces at the ground: each axle passes its longitudinal link force
-    on at wheel height, and its brake and shaft torques. With F_x at the ground this is the same as F_x on the
-    height of the body's centre of gravity less the inertia of axles and wheels. What the engine was measured to give
-    goes to the axles as the brake's torque does: no vehicle file says which it drives.
+    on at wheel height, and its brake and shaft torques. This equals F_x at the ground times the height of the body's
+    centre of gravity, less the inertia of axles and wheels. A measured engine torque is divided between the axles as
+    the brake torque is, because no vehicle file names the driven axle.
 
     Parameters
     ----------
-    motion, memory, x : longitudinal state, what tyres and discs carry on, half-car state
-    instant : what acts from outside
+    motion, memory, x : longitudinal state, memory of tyres and discs, half-car state
+    instant : inputs at this instant
     scale_f, scale_r : ABS scales one step before [1]
-    step : [s]
-    forms : what no effect of the library has
-    chassis, tyre, road : the values
+    step : length of the step [s]
+    forms : forms outside the library of effects, or None
+    chassis, tyre, road : the vehicle on its surface, and the road feature
     """
     body, wheels, effects = chassis.body, chassis.wheels, chassis.effects
     speed, standing = motion.speed, instant.standing
-    ground_f = ground_at(motion.station, speed, x[2], x[6], body.tyre_f, body.static_f, road, effects)
+    ground_f = compute_ground(motion.station, speed, x[2], x[6], body.tyre_f, body.static_f, road, effects)
     behind = motion.station - wheels.wheelbase
-    ground_r = ground_at(behind, speed, x[3], x[7], body.tyre_r, body.static_r, road, effects)
-    strut_f, strut_r = struts_at(x, chassis)
+    ground_r = compute_ground(behind, speed, x[3], x[7], body.tyre_r, body.static_r, road, effects)
+    strut_f, strut_r = compute_struts(x, chassis)
     if standing:
-        front, rear = standing_axle(ground_f, strut_f, wheels), standing_axle(ground_r, strut_r, wheels)
+        front, rear = (
+            compute_standing_axle(ground_f, strut_f, wheels),
+            compute_standing_axle(ground_r, strut_r, wheels),
+        )
     else:
-        gain_f, gain_r = brake_gains(instant.pressure, chassis)
+        gain_f, gain_r = compute_brake_gains(instant.pressure, chassis)
         share = gain_f / (gain_f + gain_r)
         engine = effects.engine_torque + effects.engine_viscous * motion.omega_f - share * instant.engine
         engine_r = -(1.0 - share) * instant.engine
-        front = rolling_axle(
+        front = compute_rolling_axle(
             ground_f, strut_f, speed, motion.omega_f, memory.front, scale_f, gain_f, engine, body.static_f,
             body.tyre_f, step, instant, forms, chassis, tyre,
         )  # fmt: skip
-        rear = rolling_axle(
+        rear = compute_rolling_axle(
             ground_r, strut_r, speed, motion.omega_r, memory.rear, scale_r, gain_r, engine_r, body.static_r,
             body.tyre_r, step, instant, forms, chassis, tyre,
         )  # fmt: skip
-    share = 0.0 if standing else stick_share(speed, effects)
-    lift_f = link_lift(front.tyre_force, chassis.transfer, effects.anti_dive, effects.stick_anti_dive, share)
-    lift_r = link_lift(rear.tyre_force, chassis.transfer, effects.anti_lift, effects.stick_anti_lift, share)
+    share = 0.0 if standing else compute_stick_share(speed, effects)
+    lift_f = compute_link_force(
+        front.tyre_force, chassis.transfer, effects.anti_dive, effects.stick_anti_dive, share
+    )
+    lift_r = compute_link_force(
+        rear.tyre_force, chassis.transfer, effects.anti_lift, effects.stick_anti_lift, share
+    )
     if effects.scrub_stiffness != 0.0 and not standing:
         scrub = effects.scrub_stiffness * (1.0 - share)
-        lift_f -= scrub * body.spring_f * strut_f.travel * axle_grip_reserve(front, tyre)
-        lift_r += scrub * body.spring_r * strut_r.travel * axle_grip_reserve(rear, tyre)
+        lift_f -= scrub * body.spring_f * strut_f.travel * compute_axle_lateral_reserve(front, tyre)
+        lift_r += scrub * body.spring_r * strut_r.travel * compute_axle_lateral_reserve(rear, tyre)
     slope_f, slope_r = ground_f.load * ground_f.slope, ground_r.load * ground_r.slope
-    drag = wheels.mass * wheels.coast + resistance(effects, speed, chassis.direction, chassis.snow_depth_mm)
+    drag = wheels.mass * wheels.coast + compute_resistance(
+        effects, speed, chassis.direction, chassis.snow_depth_mm
+    )
     drag += wheels.mass * chassis.climb
     moment = effects.aero_pitch * speed * speed
     if forms is not None:
-        variables_f = form_variables(speed, ground_f.load / body.static_f, strut_f, memory.front, instant)
-        variables_r = form_variables(speed, ground_r.load / body.static_r, strut_r, memory.rear, instant)
-        lift_f -= slot_sum(_STRUT_FORM, variables_f, forms)
-        lift_r += slot_sum(_STRUT_FORM, variables_r, forms)
-        drag += slot_sum(_FORCE_FORM, variables_f, forms)
-        moment += slot_sum(_PITCH_FORM, variables_f, forms)
-    front, rear = with_links(front, -lift_f), with_links(rear, lift_r)
+        variables_f = collect_form_variables(
+            speed, ground_f.load / body.static_f, strut_f, memory.front, instant
+        )
+        variables_r = collect_form_variables(
+            speed, ground_r.load / body.static_r, strut_r, memory.rear, instant
+        )
+        lift_f -= sum_slots(_STRUT_FORM, variables_f, forms)
+        lift_r += sum_slots(_STRUT_FORM, variables_r, forms)
+        drag += sum_slots(_FORCE_FORM, variables_f, forms)
+        moment += sum_slots(_PITCH_FORM, variables_f, forms)
+    front, rear = add_link_force(front, -lift_f), add_link_force(rear, lift_r)
     acceleration = 0.0
     if not (standing or instant.held):
         acceleration = -(front.tyre_force + rear.tyre_force + slope_f + slope_r + drag) / wheels.mass

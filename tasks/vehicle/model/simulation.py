@@ -1,7 +1,7 @@
-"""One time loop over speed, wheels, body, contact, and the heat of tyres and discs: the vehicle model.
+"""The vehicle model: one time loop over speed, wheels, body, contact, and the heat of tyres and discs.
 
-Generated datasets, calibration and the closing of the loop all drive it; what differs is the input (a brake command,
-or a pressure trace as it was measured), the step, and how often the motion is kept.
+Generated datasets, calibration and the closing of the loop all use it. They differ in the input (a brake command or a
+measured pressure trace), in the step, and in how often they keep the motion.
 """
 
 from collections.abc import Sequence
@@ -12,12 +12,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tasks.vehicle.brake import onset_by_position
-from tasks.vehicle.effects.brake_line import line_after
-from tasks.vehicle.effects.slots import Slot, SlotTables, slot_tables
-from tasks.vehicle.model.brake_input import BrakeInput, pressure_at, value_at
-from tasks.vehicle.model.chassis import Chassis, Conditions, chassis_of
-from tasks.vehicle.model.ports import ports_at
+from tasks.vehicle.brake import find_onset_by_position
+from tasks.vehicle.effects.brake_line import compute_line_pressure
+from tasks.vehicle.effects.slots import Slot, SlotTables, pack_slots
+from tasks.vehicle.model.brake_input import BrakeInput, compute_input_pressure, interpolate_trace
+from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
+from tasks.vehicle.model.ports import compute_ports
 from tasks.vehicle.model.states import (
     STATE_WIDTH,
     AxleMemory,
@@ -25,13 +25,13 @@ from tasks.vehicle.model.states import (
     Memory,
     Motion,
     VehicleState,
-    state_of_row,
-    state_row,
-    without_slip,
+    clear_slip,
+    pack_state,
+    unpack_state,
 )
 from tasks.vehicle.model.step import take_step
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
-from tasks.vehicle.road import RoadFeature, road_feature
+from tasks.vehicle.road import RoadFeature, make_road_feature
 from tasks.vehicle.tyres.contract import Tyre
 
 COLUMNS = (
@@ -54,10 +54,10 @@ class Simulation:
     Parameters
     ----------
     history : float64 [N, len(COLUMNS)]
-    states : float64 [N, S] the state at each row, from which a run can be branched off; empty unless asked for
+    states : float64 [N, S] state at each row, from which another run can start; empty unless asked for
     onset : brake onset of a brake command [s]
-    onset_station : front axle at the onset [m]
-    stop : when the vehicle comes to rest [s]
+    onset_station : route position of the front axle at the onset [m]
+    stop : time when the vehicle comes to rest [s]
     """
 
     history: NDArray[np.float64]
@@ -67,7 +67,7 @@ class Simulation:
     stop: float
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """One column of the history, float64 [N]; ``name`` is one of `COLUMNS`."""
+        """Return one column of the history, float64 [N] [its unit]; ``name`` is one of `COLUMNS`."""
         return self.history[:, COLUMN[name]]
 
 
@@ -93,14 +93,14 @@ def simulate(
     ----------
     vehicle : the vehicle
     surface : its tyres on the surface
-    drive : what the driver does
+    drive : input of the driver
     conditions : road feature, snow, grade, direction, disc temperature
     samples : number of samples, the one at the start included
     substeps : internal steps between samples
-    interval : between samples [s]
-    initial_speed : with which the run begins, the body at rest [m/s]
-    start : a row of an earlier run's states with the same step, to branch off from; replaces ``initial_speed``
-    slots : what acts in this run alone, on top of the vehicle's forms
+    interval : time between samples [s]
+    initial_speed : speed at the start of the run, with the body at rest [m/s]
+    start : row of an earlier run's states with the same step, to start from; replaces ``initial_speed``
+    slots : tables that act in this run only, added to the vehicle's forms
     keep_states : return the state at each sample
     """
     tables = [form.slot for form in vehicle.forms] + list(slots)
@@ -112,18 +112,18 @@ def simulate(
             False, drive.profile.onset_time, inf, inf,
         )  # fmt: skip
     else:
-        state = state_of_row(start)
+        state = unpack_state(start)
     history = np.empty((samples, _WIDTH))
     states = np.empty((samples if keep_states else 0, STATE_WIDTH))
-    onset, onset_station, stop = integrate(
+    onset, onset_station, stop = integrate_motion(
         state,
         samples,
         substeps,
         interval / substeps,
         drive,
-        road_feature(conditions.hazard),
-        slot_tables(tables) if tables else None,
-        chassis_of(vehicle, surface, conditions),
+        make_road_feature(conditions.hazard),
+        pack_slots(tables) if tables else None,
+        build_chassis(vehicle, surface, conditions),
         surface.tyre,
         history,
         states,
@@ -132,7 +132,7 @@ def simulate(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def integrate(
+def integrate_motion(
     state: VehicleState,
     samples: int,
     substeps: int,
@@ -145,7 +145,7 @@ def integrate(
     history: NDArray[np.float64],
     states: NDArray[np.float64],
 ) -> tuple[float, float, float]:
-    """Drive, brake and stand; fill ``history``, and ``states`` unless it is empty.
+    """Integrate driving, braking and standing; fill ``history``, and ``states`` unless it is empty.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ def integrate(
     samples : rows to fill
     substeps : internal steps between them
     step : internal step [s]
-    drive : what the driver does
+    drive : input of the driver
     road : road feature
-    slots : forms and disturbances; None compiles to a loop that knows none
+    slots : forms and disturbances; with None the compiled loop leaves them out
     chassis, tyre : the vehicle on its surface
     history : float64 [samples, len(COLUMNS)]
     states : float64 [samples or 0, S]
@@ -187,32 +187,32 @@ def integrate(
                 onset_station,
                 stop,
             )
-            states[n // substeps] = state_row(kept)
+            states[n // substeps] = pack_state(kept)
         if isinf(onset):
-            onset = onset_by_position(time, motion.station, motion.speed, drive.profile)
+            onset = find_onset_by_position(time, motion.station, motion.speed, drive.profile)
         if isinf(onset_station) and time >= onset:
             onset_station = motion.station - motion.speed * (time - onset)
         held = drive.hold_speed and time < onset
-        commanded = pressure_at(time, onset, dead, drive)
+        commanded = compute_input_pressure(time, onset, dead, drive)
         if first + n == 0 or lag <= 0.0:
             line = commanded
-        next_line = line_after(
-            line, commanded, pressure_at(time + step, onset, dead, drive), step, chassis.effects
+        next_line = compute_line_pressure(
+            line, commanded, compute_input_pressure(time + step, onset, dead, drive), step, chassis.effects
         )
         rate = (next_line - line) / step
         engine, next_engine = 0.0, 0.0
         if len(drive.engine) > 0:
-            engine = value_at(time, drive.engine, drive.interval)
-            next_engine = value_at(time + step, drive.engine, drive.interval)
+            engine = interpolate_trace(time, drive.engine, drive.interval)
+            next_engine = interpolate_trace(time + step, drive.engine, drive.interval)
         instant = Instant(time, line, rate, deceleration, standing, held, engine)
-        ports = ports_at(motion, memory, x, instant, scale_f, scale_r, step, slots, chassis, tyre, road)
+        ports = compute_ports(motion, memory, x, instant, scale_f, scale_r, step, slots, chassis, tyre, road)
         if n % substeps == 0:
             f, r = ports.front, ports.rear
             history[n // substeps] = (
                 motion.station, motion.speed, ports.acceleration, f.slip, r.slip, motion.omega_f, motion.omega_r,
                 f.tyre_force, r.tyre_force, f.ground.load, r.ground.load, f.brake_torque, r.brake_torque, f.abs_scale,
-                r.abs_scale, pressure_at(time, onset, 0.0, drive), ports.road_force, x[0], x[1], x[2], x[3], x[4], x[5],
-                f.ground.height, r.ground.height,
+                r.abs_scale, compute_input_pressure(time, onset, 0.0, drive), ports.road_force,
+                x[0], x[1], x[2], x[3], x[4], x[5], f.ground.height, r.ground.height,
                 (ports.lift - f.suspension_force - r.suspension_force) / body.sprung_mass, memory.front.disc_rise,
                 memory.rear.disc_rise, x[0] - x[2] - body.to_front * x[1], x[0] - x[3] + body.to_rear * x[1],
                 x[4] - x[6] - body.to_front * x[5], x[4] - x[7] + body.to_rear * x[5], line,
@@ -227,5 +227,5 @@ def integrate(
         line, scale_f, scale_r = next_line, ports.front.abs_scale, ports.rear.abs_scale
         if not standing and motion.speed <= wheels.stop_speed:
             standing, stop = True, time + step
-            motion, memory = Motion(motion.station, 0.0, 0.0, 0.0), without_slip(memory)
+            motion, memory = Motion(motion.station, 0.0, 0.0, 0.0), clear_slip(memory)
     return onset, onset_station, stop

@@ -1,34 +1,34 @@
-"""The stiff part of coupled mode: how speed and wheel speeds answer to each other through slip."""
+"""The stiff part of the coupled model: derivatives that tie speed and wheel speeds to each other through slip."""
 
 from math import sqrt
 from typing import NamedTuple
 
 from numba import njit
 
-from tasks.vehicle.effects.chassis import effective_slope, stick_share
-from tasks.vehicle.model.axle_ports import AxlePorts, lock_share, relaxation_rate
+from tasks.vehicle.effects.chassis import compute_effective_slope, compute_stick_share
+from tasks.vehicle.model.axle_ports import AxlePorts, compute_lock_share, compute_relaxation_rate
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Memory, Motion
 from tasks.vehicle.paper.wheels import Axle
 from tasks.vehicle.tyres.contract import Tyre
 
 GAMMA = 1.0 - sqrt(0.5)
-"""Coefficient of ROS2 that makes it damp what is stiff."""
+"""Coefficient of ROS2 with which it damps stiff modes (L-stability)."""
 
 
 class AxleSlope(NamedTuple):
-    """How one axle's wheel and the vehicle's speed answer to each other, per wheel speed and per speed [1/s].
+    """Derivatives of the vehicle's acceleration and one axle's wheel acceleration by speed and wheel speed.
 
-    Where the tyre has a relaxation length its slip is a state of its own. It is eliminated: the first four entries
-    hold what is left of its coupling, and the last five what it takes to put it back.
+    A tyre with a relaxation length has its slip as a further state. That state is eliminated: the first four entries
+    hold the coupling that remains, and the last five restore the slip afterwards.
 
     Parameters
     ----------
-    speed_by_speed, speed_by_wheel : change of dv/dt
-    wheel_by_speed, wheel_by_wheel : change of domega/dt
-    speed_by_slip, wheel_by_slip : change of both with the rate of the eliminated slip; 0 without one
-    slip_by_speed, slip_by_wheel : change of that rate
-    slip_share : what is left of that rate itself [1]
+    speed_by_speed, speed_by_wheel : derivatives of dv/dt [1/s, m/s]
+    wheel_by_speed, wheel_by_wheel : derivatives of domega/dt [1/(m s), 1/s]
+    speed_by_slip, wheel_by_slip : derivatives of both by the rate of the eliminated slip; 0 without one [m/s, 1/s]
+    slip_by_speed, slip_by_wheel : derivatives of that rate by dv/dt and domega/dt [s/m, s]
+    slip_share : share of that rate that remains [1]
     """
 
     speed_by_speed: float
@@ -43,7 +43,7 @@ class AxleSlope(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def axle_slope(
+def compute_axle_slope(
     ports: AxlePorts,
     motion: Motion,
     omega: float,
@@ -52,31 +52,31 @@ def axle_slope(
     chassis: Chassis,
     tyre: Tyre,
 ) -> AxleSlope:
-    """Derivatives of speed and wheel rate through the slip of one axle.
+    """Return the derivatives of speed and wheel rate through the slip of one axle.
 
-    The brake friction of a standing wheel counts as soon as the wheel can come to stand within the step.
+    The stiff pad friction of a locked wheel counts as soon as the wheel can lock within the step.
 
     Parameters
     ----------
-    ports : of the axle
+    ports : ports of the axle
     motion : longitudinal state
     omega : wheel speed of the axle [rad/s]
-    step : [s]
-    axle, chassis, tyre : the values
+    step : length of the step [s]
+    axle, chassis, tyre : the axle's wheels, and the vehicle on its surface
     """
     wheels = chassis.wheels
     slip_per_wheel = -wheels.radius / max(motion.speed, wheels.speed_floor)
     slip_per_speed = (
         (1.0 - ports.slip) / motion.speed if motion.speed > wheels.speed_floor else 1.0 / wheels.speed_floor
     )
-    following = relaxation_rate(motion.speed, wheels.speed_floor, chassis.effects.relaxation_length)
+    following = compute_relaxation_rate(motion.speed, wheels.speed_floor, chassis.effects.relaxation_length)
     force, torque, locking = 0.0, 0.0, 0.0
     if abs(ports.slip) < 1.0:
-        share = stick_share(motion.speed, chassis.effects)
+        share = compute_stick_share(motion.speed, chassis.effects)
         load = ports.ground.load
-        force = effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
+        force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
         if 0.0 < ports.abs_scale < 1.0:
-            turning = lock_share(omega, chassis.lock_speed)
+            turning = compute_lock_share(omega, chassis.lock_speed)
             torque = -ports.full_torque * turning / (wheels.release_width * tyre.target_slip)
     change = step * abs(ports.lever * ports.tyre_force - ports.brake_torque) / axle.inertia
     if abs(omega) < chassis.lock_speed + change:
@@ -102,8 +102,8 @@ def axle_slope(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def without_speed(slope: AxleSlope) -> AxleSlope:
-    """The same derivatives while the speed is held from outside."""
+def drop_speed_coupling(slope: AxleSlope) -> AxleSlope:
+    """Return the same derivatives for a speed that the driver holds constant."""
     return AxleSlope(
         0.0, 0.0, slope.wheel_by_speed, slope.wheel_by_wheel, 0.0, slope.wheel_by_slip, slope.slip_by_speed,
         slope.slip_by_wheel, slope.slip_share,
@@ -118,8 +118,8 @@ def solve_slip(
 
     Parameters
     ----------
-    rates, memory : right-hand side
-    front, rear : the entries of J
+    rates, memory : right-hand side, in motion and in memory
+    front, rear : entries of J
     g : step times gamma [s]
     """
     pivot_f = 1.0 - g * front.wheel_by_wheel
@@ -134,12 +134,13 @@ def solve_slip(
     omega_f = (omega_f + g * front.wheel_by_speed * speed) / pivot_f
     omega_r = (omega_r + g * rear.wheel_by_speed * speed) / pivot_r
     return Motion(rates.station, speed, omega_f, omega_r), Memory(
-        _with_slip(memory.front, front, speed, omega_f), _with_slip(memory.rear, rear, speed, omega_r)
+        _restore_slip(memory.front, front, speed, omega_f), _restore_slip(memory.rear, rear, speed, omega_r)
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _with_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: float) -> AxleMemory:
+def _restore_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: float) -> AxleMemory:
+    """Return the memory with its eliminated slip restored from the solved speed and wheel speed."""
     if slope.slip_share == 0.0:
         return memory
     slip = slope.slip_share * memory.slip + slope.slip_by_speed * speed + slope.slip_by_wheel * omega

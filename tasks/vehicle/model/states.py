@@ -1,4 +1,4 @@
-"""State of the model: motion along the road, the half-car, what tyres, discs and brake line carry on, and events."""
+"""State of the model: motion along the road, half-car, memory of tyres, discs and brake line, and events."""
 
 from typing import NamedTuple
 
@@ -19,12 +19,12 @@ class Motion(NamedTuple):
 
 
 class AxleMemory(NamedTuple):
-    """Slip and heat of an axle's tyres and discs, which depend on what went before.
+    """Slip state, sliding energy and disc temperature of an axle, which depend on the earlier motion.
 
     Parameters
     ----------
-    slip : that builds up the force where the tyre has a relaxation length, else 0 [1]
-    slip_heat : energy of sliding so far [J]
+    slip : slip that builds up the force where the tyre has a relaxation length, else 0 [1]
+    slip_heat : energy of sliding since the start [J]
     disc_rise : temperature of the discs above ambient [K]
     """
 
@@ -34,22 +34,22 @@ class AxleMemory(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Slip and heat of both axles."""
+    """Memory of both axles."""
 
     front: AxleMemory
     rear: AxleMemory
 
 
 class Instant(NamedTuple):
-    """Inputs from outside at one instant.
+    """Inputs of the equations of motion at one instant.
 
     Parameters
     ----------
-    time : since the start [s]
-    pressure, pressure_rate : at the pads [MPa, MPa/s]
-    deceleration : -dv/dt of the evaluation before, which forms of it read [m/s2]
+    time : time since the start [s]
+    pressure, pressure_rate : pressure at the pads and its rate [MPa, MPa/s]
+    deceleration : -dv/dt of the evaluation before, for forms that depend on it [m/s2]
     standing : the vehicle has come to rest
-    held : its speed is held from outside
+    held : the driver holds its speed
     engine : torque of the engine at the wheels, driving positive [N m]
     """
 
@@ -63,18 +63,18 @@ class Instant(NamedTuple):
 
 
 STATE_WIDTH = 27
-"""Numbers of a state's row."""
+"""Number of values in a state's row."""
 AT_REST = AxleMemory(0.0, 0.0, 0.0)
 """No slip, tyres and discs at ambient temperature."""
 
 
 class VehicleState(NamedTuple):
-    """All that a run needs to go on from one instant.
+    """Complete state of a run at one instant, from which the run can continue.
 
     Parameters
     ----------
-    time : since the start of the run [s]
-    motion, memory, body : the states that are integrated
+    time : time since the start of the run [s]
+    motion, memory, body : states that are integrated
     line : pressure at the pads [MPa]
     scale_f, scale_r : ABS scales one step before [1]
     deceleration : -dv/dt of the evaluation before [m/s2]
@@ -97,8 +97,8 @@ class VehicleState(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def state_row(state: VehicleState) -> tuple[float, ...]:
-    """Return a state as a row of numbers, from which `state_of_row` makes it again."""
+def pack_state(state: VehicleState) -> tuple[float, ...]:
+    """Return a state as a row of numbers; `unpack_state` is the inverse."""
     motion, front, rear, x = state.motion, state.memory.front, state.memory.rear, state.body
     return (
         state.time, motion.station, motion.speed, motion.omega_f, motion.omega_r, front.slip, front.slip_heat,
@@ -108,12 +108,12 @@ def state_row(state: VehicleState) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-def state_of_row(row: NDArray[np.float64]) -> VehicleState:
-    """Return the state that `state_row` wrote into a row.
+def unpack_state(row: NDArray[np.float64]) -> VehicleState:
+    """Return the state that `pack_state` wrote into a row.
 
     Parameters
     ----------
-    row : float64 [S]
+    row : float64 [STATE_WIDTH]
     """
     v = [float(value) for value in row]
     return VehicleState(
@@ -124,7 +124,7 @@ def state_of_row(row: NDArray[np.float64]) -> VehicleState:
 
 @njit(cache=True, nogil=True, forceinline=True)
 def advance_motion(motion: Motion, rate: Motion, step: float) -> Motion:
-    """Return the longitudinal state after going along a rate for a step [s]."""
+    """Return the longitudinal state after a step [s] at a constant rate."""
     return Motion(
         motion.station + step * rate.station,
         motion.speed + step * rate.speed,
@@ -135,7 +135,7 @@ def advance_motion(motion: Motion, rate: Motion, step: float) -> Motion:
 
 @njit(cache=True, nogil=True, forceinline=True)
 def advance_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemory:
-    """Return slip and heat of an axle after going along a rate for a step [s]."""
+    """Return the memory of an axle after a step [s] at constant rates."""
     return AxleMemory(
         memory.slip + step * rate.slip,
         memory.slip_heat + step * rate.slip_heat,
@@ -144,8 +144,8 @@ def advance_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemor
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def without_slip(memory: Memory) -> Memory:
-    """Return the same without slip, as at rest; tyres and discs stay warm."""
+def clear_slip(memory: Memory) -> Memory:
+    """Return the memory with slip 0, as at rest; tyres and discs stay warm."""
     front, rear = memory.front, memory.rear
     return Memory(
         AxleMemory(0.0, front.slip_heat, front.disc_rise), AxleMemory(0.0, rear.slip_heat, rear.disc_rise)

@@ -1,19 +1,19 @@
 """One step of the model, by a W-method of second order.
 
 The method is ROS2 (Verwer et al. 1999, doi:10.1137/S1064827597326651), which keeps its order for any matrix in
-the place of the Jacobian. Here that matrix holds only the stiff slip that ties speed and wheels: with it the
-wheels stay quiet to standstill; everywhere else (body, axles, road, heat) the method is Heun's.
+the place of the Jacobian. Here that matrix holds only the stiff coupling of speed and wheel speeds through slip, so
+that wheel speeds do not oscillate near standstill. For all other states (body, axles, road, heat) the method is Heun's.
 """
 
 from numba import njit
 
-from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, disc_rate
+from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, compute_disc_temperature_rate
 from tasks.vehicle.effects.slots import SlotTables
-from tasks.vehicle.half_car import HalfCar, HalfCarState, half_car_rates, moved
-from tasks.vehicle.model.axle_ports import AxlePorts, relaxation_rate
+from tasks.vehicle.half_car import HalfCar, HalfCarState, advance_half_car, compute_half_car_rates
+from tasks.vehicle.model.axle_ports import AxlePorts, compute_relaxation_rate
 from tasks.vehicle.model.chassis import Chassis
-from tasks.vehicle.model.ports import Ports, ports_at
-from tasks.vehicle.model.slip_matrix import GAMMA, axle_slope, solve_slip, without_speed
+from tasks.vehicle.model.ports import Ports, compute_ports
+from tasks.vehicle.model.slip_matrix import GAMMA, compute_axle_slope, drop_speed_coupling, solve_slip
 from tasks.vehicle.model.states import AxleMemory, Instant, Memory, Motion, advance_axle, advance_motion
 from tasks.vehicle.paper.wheels import Axle
 from tasks.vehicle.road import RoadFeature
@@ -21,50 +21,50 @@ from tasks.vehicle.tyres.contract import Tyre
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def wheel_rate(ports: AxlePorts, axle: Axle) -> float:
-    """Angular acceleration of an axle's wheels [rad/s2].
+def compute_wheel_rate(ports: AxlePorts, axle: Axle) -> float:
+    """Return the angular acceleration of an axle's wheels [rad/s2].
 
     Parameters
     ----------
-    ports : of the axle
-    axle : its wheels
+    ports : ports of the axle
+    axle : wheels of the axle
     """
     torque = ports.lever * ports.tyre_force - ports.brake_torque - ports.ground_moment - ports.shaft_torque
     return torque / axle.inertia
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def memory_rate(
+def compute_axle_memory_rate(
     memory: AxleMemory, ports: AxlePorts, speed: float, omega: float, disc_capacity: float, chassis: Chassis
 ) -> AxleMemory:
-    """Rates of what an axle carries on: slip behind its relaxation length, heat of sliding, discs.
+    """Return the rates of an axle's slip state, sliding energy and disc temperature.
 
     Parameters
     ----------
-    memory, ports : of the axle
-    speed : [m/s]
+    memory, ports : memory and ports of the axle
+    speed : speed of the vehicle [m/s]
     omega : wheel speed [rad/s]
-    disc_capacity : heat capacity of its discs [J/K]
-    chassis : the values
+    disc_capacity : heat capacity of the axle's discs [J/K]
+    chassis : the vehicle on its surface
     """
-    following = relaxation_rate(speed, chassis.wheels.speed_floor, chassis.effects.relaxation_length)
+    following = compute_relaxation_rate(speed, chassis.wheels.speed_floor, chassis.effects.relaxation_length)
     return AxleMemory(
         following * (ports.slip - memory.slip),
         abs(ports.tyre_force * ports.force_slip) * speed,
-        disc_rate(memory.disc_rise, ports.brake_torque * omega, disc_capacity),
+        compute_disc_temperature_rate(memory.disc_rise, ports.brake_torque * omega, disc_capacity),
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis) -> Motion:
-    """Rates of station, speed and wheel speeds (paper, Eq. app_longitudinal_complete).
+def compute_motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis) -> Motion:
+    """Return the rates of station, speed and wheel speeds (paper, Eq. app_longitudinal_complete).
 
     Parameters
     ----------
-    motion : the state
-    ports : what acts in it
+    motion : longitudinal state
+    ports : forces and moments in that state
     standing : the vehicle has come to rest
-    chassis : the values
+    chassis : the vehicle on its surface
     """
     if standing:
         return Motion(0.0, 0.0, 0.0, 0.0)
@@ -72,39 +72,39 @@ def motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis)
     return Motion(
         motion.speed,
         ports.acceleration,
-        wheel_rate(ports.front, wheels.front),
-        wheel_rate(ports.rear, wheels.rear),
+        compute_wheel_rate(ports.front, wheels.front),
+        compute_wheel_rate(ports.rear, wheels.rear),
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: Chassis) -> Memory:
-    """Rates of what tyres and discs carry on.
+def compute_memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: Chassis) -> Memory:
+    """Return the rates of both axles' slip states, sliding energies and disc temperatures.
 
     Parameters
     ----------
-    memory, motion : the state
-    ports : what acts in it
-    chassis : the values
+    memory, motion : memory of the axles and longitudinal state
+    ports : forces and moments in that state
+    chassis : the vehicle on its surface
     """
     front, rear, speed = ports.front, ports.rear, motion.speed
     return Memory(
-        memory_rate(memory.front, front, speed, motion.omega_f, DISC_CAPACITY_F, chassis),
-        memory_rate(memory.rear, rear, speed, motion.omega_r, DISC_CAPACITY_R, chassis),
+        compute_axle_memory_rate(memory.front, front, speed, motion.omega_f, DISC_CAPACITY_F, chassis),
+        compute_axle_memory_rate(memory.rear, rear, speed, motion.omega_r, DISC_CAPACITY_R, chassis),
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def body_rates(x: HalfCarState, ports: Ports, body: HalfCar) -> HalfCarState:
-    """Rate of the half-car state under the ports (paper, Eq. app_half_car_complete).
+def compute_body_rates(x: HalfCarState, ports: Ports, body: HalfCar) -> HalfCarState:
+    """Return the rate of the half-car state under the forces of the ports (paper, Eq. app_half_car_complete).
 
     Parameters
     ----------
     x : half-car state [m, rad, m/s, rad/s]
-    ports : what acts in it
+    ports : forces and moments in that state
     body : the half-car
     """
-    return half_car_rates(
+    return compute_half_car_rates(
         x,
         ports.front.ground.load,
         ports.rear.ground.load,
@@ -130,39 +130,39 @@ def take_step(
     tyre: Tyre,
     road: RoadFeature,
 ) -> tuple[Motion, Memory, HalfCarState]:
-    """One ROS2 step from a state whose ports are known.
+    """Take one ROS2 step from a state whose ports are known.
 
     Parameters
     ----------
-    motion, memory, x : longitudinal state, what tyres and discs carry on, half-car state
-    ports : what acts in it
-    instant, next_instant : what acts from outside now and after the step
-    step : [s]
-    forms : what no effect of the library has
-    chassis, tyre, road : the values
+    motion, memory, x : longitudinal state, memory of tyres and discs, half-car state
+    ports : forces and moments in that state
+    instant, next_instant : inputs before and after the step
+    step : length of the step [s]
+    forms : forms outside the library of effects, or None
+    chassis, tyre, road : the vehicle on its surface, and the road feature
 
     Returns
     -------
     The three states after the step.
     """
     body, wheels = chassis.body, chassis.wheels
-    front = axle_slope(ports.front, motion, motion.omega_f, step, wheels.front, chassis, tyre)
-    rear = axle_slope(ports.rear, motion, motion.omega_r, step, wheels.rear, chassis, tyre)
+    front = compute_axle_slope(ports.front, motion, motion.omega_f, step, wheels.front, chassis, tyre)
+    rear = compute_axle_slope(ports.rear, motion, motion.omega_r, step, wheels.rear, chassis, tyre)
     if instant.held:
-        front, rear = without_speed(front), without_speed(rear)
-    f1 = motion_rates(motion, ports, instant.standing, chassis)
-    k1, m1 = solve_slip(f1, memory_rates(memory, motion, ports, chassis), front, rear, GAMMA * step)
-    h1 = body_rates(x, ports, body)
-    ahead, x_ahead = advance_motion(motion, k1, step), moved(x, h1, step)
+        front, rear = drop_speed_coupling(front), drop_speed_coupling(rear)
+    f1 = compute_motion_rates(motion, ports, instant.standing, chassis)
+    k1, m1 = solve_slip(f1, compute_memory_rates(memory, motion, ports, chassis), front, rear, GAMMA * step)
+    h1 = compute_body_rates(x, ports, body)
+    ahead, x_ahead = advance_motion(motion, k1, step), advance_half_car(x, h1, step)
     memory_ahead = Memory(
         advance_axle(memory.front, m1.front, step), advance_axle(memory.rear, m1.rear, step)
     )
-    later = ports_at(
+    later = compute_ports(
         ahead, memory_ahead, x_ahead, next_instant, ports.front.abs_scale, ports.rear.abs_scale, step, forms,
         chassis, tyre, road,
     )  # fmt: skip
-    f2 = motion_rates(ahead, later, instant.standing, chassis)
-    g2 = memory_rates(memory_ahead, ahead, later, chassis)
+    f2 = compute_motion_rates(ahead, later, instant.standing, chassis)
+    g2 = compute_memory_rates(memory_ahead, ahead, later, chassis)
     k2, m2 = solve_slip(
         advance_motion(f2, k1, -2.0),
         Memory(advance_axle(g2.front, m1.front, -2.0), advance_axle(g2.rear, m1.rear, -2.0)),
@@ -170,7 +170,7 @@ def take_step(
         rear,
         GAMMA * step,
     )
-    h2 = body_rates(x_ahead, later, body)
+    h2 = compute_body_rates(x_ahead, later, body)
     after = Motion(
         motion.station + step * (1.5 * k1.station + 0.5 * k2.station),
         motion.speed + step * (1.5 * k1.speed + 0.5 * k2.speed),
@@ -181,9 +181,10 @@ def take_step(
         _advance_axle_twice(memory.front, m1.front, m2.front, step),
         _advance_axle_twice(memory.rear, m1.rear, m2.rear, step),
     )
-    return after, remembered, moved(moved(x, h1, 0.5 * step), h2, 0.5 * step)
+    return after, remembered, advance_half_car(advance_half_car(x, h1, 0.5 * step), h2, 0.5 * step)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _advance_axle_twice(memory: AxleMemory, k1: AxleMemory, k2: AxleMemory, step: float) -> AxleMemory:
+    """Return the memory after both stages of ROS2, with their weights 3/2 and 1/2."""
     return advance_axle(advance_axle(memory, k1, 1.5 * step), k2, 0.5 * step)

@@ -1,13 +1,13 @@
-"""Road under an axle, its load, and the strut above it, at one instant."""
+"""Ground under an axle and strut above it at one instant."""
 
 from typing import NamedTuple
 
 from numba import njit
 
-from tasks.vehicle.effects.chassis import footprint
-from tasks.vehicle.effects.equations import strut_force
+from tasks.vehicle.effects.chassis import average_over_footprint
+from tasks.vehicle.effects.equations import compute_strut_force
 from tasks.vehicle.effects.table import EffectValues
-from tasks.vehicle.half_car import HalfCarState, contact_load
+from tasks.vehicle.half_car import HalfCarState, compute_contact_load
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.road import RoadFeature
 
@@ -29,7 +29,7 @@ class Strut(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def ground_at(
+def compute_ground(
     station: float,
     speed: float,
     unsprung_height: float,
@@ -39,38 +39,38 @@ def ground_at(
     road: RoadFeature,
     effects: EffectValues,
 ) -> Ground:
-    """Road and load under one axle.
+    """Return road height, slope and contact load under one axle.
 
     Parameters
     ----------
-    station : of the axle [m]
-    speed : of the vehicle [m/s]
-    unsprung_height, unsprung_rate : of the axle [m, m/s]
-    stiffness : of the tyre [N/m]
-    static_load : half-car's load at rest [N]
-    road : the feature
-    effects : the values
+    station : route position of the axle [m]
+    speed : speed of the vehicle [m/s]
+    unsprung_height, unsprung_rate : height of the axle and its rate, about static equilibrium [m, m/s]
+    stiffness : vertical stiffness of the tyre, k_t [N/m]
+    static_load : contact load of the half-car at rest [N]
+    road : road feature
+    effects : numbers of the vehicle's effects
     """
-    height, slope = footprint(station, road, effects)
-    load = contact_load(height, unsprung_height, stiffness, static_load)
+    height, slope = average_over_footprint(station, road, effects)
+    load = compute_contact_load(height, unsprung_height, stiffness, static_load)
     if load > 0.0:
         load = max(load + effects.tyre_damping * (speed * slope - unsprung_rate), 0.0)
     return Ground(height, slope, load)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def struts_at(x: HalfCarState, chassis: Chassis) -> tuple[Strut, Strut]:
-    """The struts of the front and the rear axle.
+def compute_struts(x: HalfCarState, chassis: Chassis) -> tuple[Strut, Strut]:
+    """Return travel, rate and force of the struts of the front and the rear axle.
 
     Parameters
     ----------
     x : half-car state [m, rad, m/s, rad/s]
-    chassis : the values
+    chassis : the vehicle on its surface
     """
     body, effects = chassis.body, chassis.effects
     travel_f, rate_f = x[0] - x[2] - body.to_front * x[1], x[4] - x[6] - body.to_front * x[5]
     travel_r, rate_r = x[0] - x[3] + body.to_rear * x[1], x[4] - x[7] + body.to_rear * x[5]
     return (
-        Strut(travel_f, rate_f, strut_force(effects, body.spring_f, body.damper_f, travel_f, rate_f)),
-        Strut(travel_r, rate_r, strut_force(effects, body.spring_r, body.damper_r, travel_r, rate_r)),
+        Strut(travel_f, rate_f, compute_strut_force(effects, body.spring_f, body.damper_f, travel_f, rate_f)),
+        Strut(travel_r, rate_r, compute_strut_force(effects, body.spring_r, body.damper_r, travel_r, rate_r)),
     )

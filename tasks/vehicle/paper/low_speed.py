@@ -1,6 +1,6 @@
 """The low-speed pitch rule of paper mode: a steady brake-pitch input to the stop, and its release.
 
-It needs the time of the stop, so it runs after the drive; it does not change speed or distance.
+The rule needs the time of the stop, so it is applied after the drive; it changes neither speed nor distance.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ CAP_WINDOW_S = 0.2
 CAP_RATIO = 1.05
 
 
-def brake_pitch_input(
+def compute_brake_pitch_input(
     acceleration: NDArray[np.float64],
     step: float,
     onset: float,
@@ -22,7 +22,7 @@ def brake_pitch_input(
     release_s: float,
     hold_ratio: float,
 ) -> NDArray[np.float64]:
-    """Deceleration d_theta that drives the body's pitch [m/s2] (paper, Appendix B, low-speed pitch rule).
+    """Return the deceleration d_theta that drives the body's pitch [m/s2] (paper, Appendix B, low-speed pitch rule).
 
     The reference is the median of the positive decelerations over the 0.6 s before the hold; without any the
     input stays as it is.
@@ -41,20 +41,20 @@ def brake_pitch_input(
     if stop < 0 or not np.isfinite(onset):
         return d
 
-    def samples(seconds: float) -> int:
+    def count_samples(seconds: float) -> int:
         return round(seconds / step)
 
-    hold = max(min(samples(onset), stop), stop - samples(hold_s))
-    before = d[max(hold - samples(REFERENCE_WINDOW_S), 0) : hold]
+    hold = max(min(count_samples(onset), stop), stop - count_samples(hold_s))
+    before = d[max(hold - count_samples(REFERENCE_WINDOW_S), 0) : hold]
     before = before[before > 0]
     if len(before) == 0:
         return d
     reference = float(np.median(before))
-    tail = d[max(stop - samples(TAIL_WINDOW_S), 0) : stop]
+    tail = d[max(stop - count_samples(TAIL_WINDOW_S), 0) : stop]
     if np.median(tail) < hold_ratio * reference:
         d[hold:stop] = reference
     else:
-        capped = slice(max(stop - samples(CAP_WINDOW_S), 0), stop)
+        capped = slice(max(stop - count_samples(CAP_WINDOW_S), 0), stop)
         d[capped] = np.minimum(d[capped], CAP_RATIO * reference)
     since_stop = np.arange(len(d) - stop) * step
     d[stop:] = d[stop - 1] * np.maximum(1 - since_stop / release_s, 0.0)

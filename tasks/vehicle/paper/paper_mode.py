@@ -1,7 +1,8 @@
 """Paper mode: the published update order, from Appendix B line by line.
 
-A flat road feeds the tyres with analytic load transfer; the half-car follows. On a road feature half-car and
-wheels are passed over the whole time grid in turn. Road and brake response are integrated apart and added.
+On a flat road the tyres take the loads of the analytic load transfer, and the half-car is integrated afterwards. On a
+road feature, half-car and wheels are integrated over the whole time grid in turn. The responses to the road and to the
+brake are integrated separately and added.
 """
 
 from dataclasses import dataclass
@@ -12,12 +13,12 @@ from numpy.typing import NDArray
 
 from tasks.surface.road_profile import RoadHazard, road_elevation
 from tasks.vehicle.brake import PressureProfile
-from tasks.vehicle.half_car import half_car, integrate_half_car
+from tasks.vehicle.half_car import build_half_car, integrate_half_car
 from tasks.vehicle.history import History
-from tasks.vehicle.paper.low_speed import brake_pitch_input
-from tasks.vehicle.paper.wheels import DRIVE_COLUMNS, drive, wheels_of
+from tasks.vehicle.paper.low_speed import compute_brake_pitch_input
+from tasks.vehicle.paper.wheels import DRIVE_COLUMNS, build_wheels, simulate_drive
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
-from tasks.vehicle.road import road_feature
+from tasks.vehicle.road import make_road_feature
 
 FIXED_POINT_PASSES = 5
 ANALYTIC_LOADS = np.empty((0, 2))
@@ -69,26 +70,26 @@ def run_paper_mode(
     ----------
     vehicle : the vehicle
     response : its tyres and pitch calibration on the surface
-    initial_speed : [m/s]
+    initial_speed : speed at the start [m/s]
     hold_speed : keep the speed until the brake onset
     profile : brake command
     hazard : road feature
     steps, step : number and length of the internal steps [s]
     passes : fixed-point passes on a road feature
     """
-    wheels, road = wheels_of(vehicle), road_feature(hazard)
-    log, onset, stop = drive(
+    wheels, road = build_wheels(vehicle), make_road_feature(hazard)
+    log, onset, stop = simulate_drive(
         initial_speed, hold_speed, steps, step, profile, road, ANALYTIC_LOADS, wheels, response.tyre
     )
     if hazard.height_m == 0:
-        states, heights, loads = body_response(vehicle, response, hazard, log, onset, stop, step)
+        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, step)
         return PaperRun(
             log=log, states=states, road=heights, loads=loads, onset=onset, stop=stop, last_change=0.0
         )
     for _ in range(passes):
         station = log[:, 0]
-        states, heights, loads = body_response(vehicle, response, hazard, log, onset, stop, step)
-        log, onset, stop = drive(
+        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, step)
+        log, onset, stop = simulate_drive(
             initial_speed, hold_speed, steps, step, profile, road, loads, wheels, response.tyre
         )
     return PaperRun(
@@ -102,7 +103,7 @@ def run_paper_mode(
     )
 
 
-def body_response(
+def simulate_body(
     vehicle: Vehicle,
     response: SurfaceResponse,
     hazard: RoadHazard,
@@ -111,18 +112,18 @@ def body_response(
     stop: int,
     step: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Half-car states, road heights and contact loads along a drive (paper, Eqs. half_car and app_brake_pitch).
+    """Return half-car states, road heights and contact loads along a drive (paper, Eqs. half_car and app_brake_pitch).
 
     Parameters
     ----------
     vehicle, response, hazard : as in ``run_paper_mode``
-    log : a drive
+    log : log of `simulate_drive`, shape (n, 17)
     onset : brake onset [s]
-    stop : sample of the stop
-    step : [s]
+    stop : sample of the stop; -1 if there is none
+    step : step of the grid [s]
     """
-    car = half_car(vehicle)
-    d_theta = brake_pitch_input(
+    car = build_half_car(vehicle)
+    d_theta = compute_brake_pitch_input(
         log[:, 2],
         step,
         onset,
@@ -145,13 +146,13 @@ def body_response(
     return states, np.stack([road_f, road_r], axis=1), loads
 
 
-def history_of(run: PaperRun, step: float, per_tick: int) -> History:
-    """The run at every ``per_tick``-th sample.
+def sample_history(run: PaperRun, step: float, per_tick: int) -> History:
+    """Return every ``per_tick``-th sample of a run, with its events.
 
     Parameters
     ----------
-    run : on the internal grid
-    step : of that grid [s]
+    run : run on the internal grid
+    step : step of that grid [s]
     per_tick : samples per tick
     """
     station = run.log[:, 0]

@@ -14,10 +14,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tasks.vehicle.brake import PressureProfile, abs_command, abs_update, brake_pressure, onset_by_position
+from tasks.vehicle.brake import (
+    PressureProfile,
+    compute_abs_command,
+    compute_brake_pressure,
+    find_onset_by_position,
+    limit_abs_rate,
+)
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.road import RoadFeature, slope_at
-from tasks.vehicle.tyres.contract import Tyre, braking_slip, tyre_friction
+from tasks.vehicle.road import RoadFeature, compute_road_slope
+from tasks.vehicle.tyres.contract import Tyre, compute_braking_slip, compute_tyre_friction
 
 
 class Axle(NamedTuple):
@@ -27,7 +33,7 @@ class Axle(NamedTuple):
     ----------
     inertia : I_w [kg m2]
     brake_gain : brake torque per pressure, b_a K_p [N m/MPa]
-    static_load : without acceleration, as the analytic load transfer has it [N]
+    static_load : load without acceleration, by the analytic load transfer [N]
     """
 
     inertia: float
@@ -36,7 +42,7 @@ class Axle(NamedTuple):
 
 
 class Wheels(NamedTuple):
-    """Longitudinal values as the kernels take them.
+    """Longitudinal values of a vehicle in the form that the kernels take.
 
     Parameters
     ----------
@@ -45,10 +51,10 @@ class Wheels(NamedTuple):
     radius : R [m]
     wheelbase : L_w [m]
     transfer : load moved to the front per deceleration, m h_cg / L_w [N s2/m]
-    release_width : delta_a of the ABS [1]
-    build_rate, release_rate : of the ABS torque scale [1/s]
+    release_width : delta_a of the ABS, relative to the target slip [1]
+    build_rate, release_rate : largest rates of the ABS torque scale [1/s]
     coast : a_coast [m/s2]
-    speed_floor, stop_speed : [m/s]
+    speed_floor, stop_speed : v_epsilon, and speed at or below which the vehicle stands [m/s]
     """
 
     front: Axle
@@ -65,8 +71,8 @@ class Wheels(NamedTuple):
     stop_speed: float
 
 
-def wheels_of(vehicle: Vehicle) -> Wheels:
-    """The longitudinal values of a vehicle."""
+def build_wheels(vehicle: Vehicle) -> Wheels:
+    """Return the longitudinal values of a vehicle."""
     share = vehicle.front_brake_share
     load_per_lever = vehicle.mass * vehicle.gravity / vehicle.wheelbase
     return Wheels(
@@ -104,7 +110,7 @@ class AxleStep(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def axle_step(
+def compute_axle_step(
     speed: float,
     omega: float,
     load: float,
@@ -115,29 +121,29 @@ def axle_step(
     wheels: Wheels,
     tyre: Tyre,
 ) -> AxleStep:
-    """Slip, ABS, tyre force and wheel acceleration of one axle (paper, Eqs. app_abs_command and on).
+    """Return slip, ABS scale, tyre force and wheel acceleration of one axle (paper, from Eq. app_abs_command on).
 
     Parameters
     ----------
     speed : v [m/s]
     omega : wheel speed [rad/s]
-    load : on the tyre [N]
+    load : load of the axle [N]
     pressure : brake pressure [MPa]
     scale : ABS scale before the step [1]
-    step : [s]
-    axle, wheels, tyre : the rest of the values
+    step : Euler step [s]
+    axle, wheels, tyre : the axle's wheels, the vehicle's longitudinal values, its tyre on the surface
     """
-    slip = braking_slip(speed, wheels.radius * omega, wheels.speed_floor)
-    wanted = abs_command(slip, tyre.target_slip, wheels.release_width)
-    scale = abs_update(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
-    force = tyre_friction(slip, load, tyre) * load
+    slip = compute_braking_slip(speed, wheels.radius * omega, wheels.speed_floor)
+    wanted = compute_abs_command(slip, tyre.target_slip, wheels.release_width)
+    scale = limit_abs_rate(wanted, scale, wheels.build_rate * step, wheels.release_rate * step)
+    force = compute_tyre_friction(slip, load, tyre) * load
     torque = scale * (axle.brake_gain * pressure)
     return AxleStep(slip, force, torque, scale, (wheels.radius * force - torque) * (1.0 / axle.inertia))
 
 
 @njit(cache=True, nogil=True)
-def transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float]:
-    """Axle loads by longitudinal load transfer, F_z^long [N] (paper, Appendix B).
+def compute_transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float]:
+    """Return the axle loads by longitudinal load transfer, F_z^long [N] (paper, Appendix B).
 
     Parameters
     ----------
@@ -149,16 +155,16 @@ def transferred_loads(acceleration: float, wheels: Wheels) -> tuple[float, float
 
 
 @njit(cache=True, nogil=True)
-def stopping_run(
+def simulate_stop(
     initial_speed: float, step: float, longest: int, profile: PressureProfile, wheels: Wheels, tyre: Tyre
 ) -> tuple[float, float]:
-    """Brake on a flat road from t = 0 to the stop, keeping nothing on the way.
+    """Brake on a flat road from t = 0 to the stop, without a log.
 
     Parameters
     ----------
-    initial_speed : at the brake onset [m/s]
+    initial_speed : speed at the brake onset [m/s]
     step : Euler step [s]
-    longest : give up after this many steps
+    longest : largest number of steps [1]
     profile : brake command with its onset at 0
     wheels, tyre : the vehicle on its surface
 
@@ -169,10 +175,10 @@ def stopping_run(
     speed, omega_f, omega_r = initial_speed, initial_speed / wheels.radius, initial_speed / wheels.radius
     scale_f, scale_r, acceleration, distance = 1.0, 1.0, 0.0, 0.0
     for n in range(longest):
-        pressure = brake_pressure(n * step, profile)
-        load_f, load_r = transferred_loads(acceleration, wheels)
-        f = axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
-        r = axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
+        pressure = compute_brake_pressure(n * step, profile)
+        load_f, load_r = compute_transferred_loads(acceleration, wheels)
+        f = compute_axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
+        r = compute_axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
         scale_f, scale_r = f.scale, r.scale
         acceleration = -(f.force + r.force) * (1.0 / wheels.mass) - wheels.coast
         after = speed + step * acceleration
@@ -190,11 +196,11 @@ DRIVE_COLUMNS = (
     "wheel_speed_r", "tyre_force_f", "tyre_force_r", "tyre_load_f", "tyre_load_r", "brake_torque_f",
     "brake_torque_r", "abs_scale_f", "abs_scale_r", "brake_pressure_mpa", "road_force",
 )  # fmt: skip
-"""Columns of the log that ``drive`` returns."""
+"""Columns of the log that ``simulate_drive`` returns."""
 
 
 @njit(cache=True, nogil=True)
-def drive(
+def simulate_drive(
     initial_speed: float,
     hold_speed: bool,
     steps: int,
@@ -205,11 +211,11 @@ def drive(
     wheels: Wheels,
     tyre: Tyre,
 ) -> tuple[NDArray[np.float64], float, int]:
-    """Drive, brake and stand, with every sample logged.
+    """Drive, brake and stand on a road, and log every sample.
 
     Parameters
     ----------
-    initial_speed : [m/s]
+    initial_speed : speed at the start [m/s]
     hold_speed : keep the speed until the brake onset
     steps : number of Euler steps
     step : Euler step [s]
@@ -231,15 +237,17 @@ def drive(
     onset, stop = profile.onset_time, -1
     for n in range(steps + 1):
         if isinf(onset):
-            onset = onset_by_position(n * step, station, speed, profile)
-        pressure = brake_pressure(n * step - onset, profile)
+            onset = find_onset_by_position(n * step, station, speed, profile)
+        pressure = compute_brake_pressure(n * step - onset, profile)
         if len(loads) > 0:
             load_f, load_r = loads[n, 0], loads[n, 1]
         else:
-            load_f, load_r = transferred_loads(acceleration, wheels)
-        f = axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
-        r = axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
-        road_force = -load_f * slope_at(station, road) - load_r * slope_at(station - wheels.wheelbase, road)
+            load_f, load_r = compute_transferred_loads(acceleration, wheels)
+        f = compute_axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
+        r = compute_axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
+        road_force = -load_f * compute_road_slope(station, road) - load_r * compute_road_slope(
+            station - wheels.wheelbase, road
+        )
         acceleration = (road_force - (f.force + r.force)) * (1.0 / wheels.mass) - wheels.coast
         if stop >= 0:
             road_force, acceleration = 0.0, 0.0

@@ -47,26 +47,26 @@ def scale_burckhardt(
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def burckhardt_friction(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
+def compute_burckhardt_friction(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
     """Return braking force over load [1] (paper, Eq. tire_force).
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle; without influence [N]
-    tyre : the scaled curve
+    load : load of the axle; without influence [N]
+    tyre : scaled curve
     """
     return tyre.rise * (1.0 - exp(-tyre.decay * braking_slip)) - tyre.fall * braking_slip
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def burckhardt_slope(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
-    """Return the derivative of ``burckhardt_friction`` by slip [1].
+def compute_burckhardt_slope(braking_slip: float, load: float, tyre: BurckhardtTyre) -> float:
+    """Return the derivative of ``compute_burckhardt_friction`` by slip [1].
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle; without influence [N]
-    tyre : the scaled curve
+    load : load of the axle; without influence [N]
+    tyre : scaled curve
     """
     return tyre.rise * tyre.decay * exp(-tyre.decay * braking_slip) - tyre.fall

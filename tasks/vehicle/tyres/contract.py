@@ -11,11 +11,15 @@ from typing import Any, NamedTuple
 from numba import njit
 from numba.extending import overload
 
-from tasks.vehicle.tyres.burckhardt import BurckhardtTyre, burckhardt_friction, burckhardt_slope
+from tasks.vehicle.tyres.burckhardt import (
+    BurckhardtTyre,
+    compute_burckhardt_friction,
+    compute_burckhardt_slope,
+)
 from tasks.vehicle.tyres.magic_formula_tyre import (
     MagicFormulaTyre,
-    magic_formula_friction,
-    magic_formula_slope,
+    compute_magic_formula_friction,
+    compute_magic_formula_slope,
 )
 
 Tyre = BurckhardtTyre | MagicFormulaTyre
@@ -36,58 +40,60 @@ class TyreLaw(NamedTuple):
 
 
 LAWS: dict[type[Tyre], TyreLaw] = {
-    BurckhardtTyre: TyreLaw(burckhardt_friction, burckhardt_slope),
-    MagicFormulaTyre: TyreLaw(magic_formula_friction, magic_formula_slope),
+    BurckhardtTyre: TyreLaw(compute_burckhardt_friction, compute_burckhardt_slope),
+    MagicFormulaTyre: TyreLaw(compute_magic_formula_friction, compute_magic_formula_slope),
 }
 """The law of each kind of tyre."""
 
 
-def tyre_friction(braking_slip: float, load: float, tyre: Tyre) -> float:
+def compute_tyre_friction(braking_slip: float, load: float, tyre: Tyre) -> float:
     """Return braking force over load [1].
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle, that is of two tyres [N]
-    tyre : on the surface
+    load : load of the axle, that is of two tyres [N]
+    tyre : the tyre on the surface
     """
     return LAWS[type(tyre)].friction(braking_slip, load, tyre)
 
 
-def tyre_slope(braking_slip: float, load: float, tyre: Tyre) -> float:
-    """Return the derivative of ``tyre_friction`` by slip [1].
+def compute_tyre_slope(braking_slip: float, load: float, tyre: Tyre) -> float:
+    """Return the derivative of ``compute_tyre_friction`` by slip [1].
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle, that is of two tyres [N]
-    tyre : on the surface
+    load : load of the axle, that is of two tyres [N]
+    tyre : the tyre on the surface
     """
     return LAWS[type(tyre)].slope(braking_slip, load, tyre)
 
 
-@overload(tyre_friction)
+@overload(compute_tyre_friction)
 def _compile_friction(braking_slip: Any, load: Any, tyre: Any) -> Callable[..., float]:
+    """Return the implementation of ``compute_tyre_friction`` that Numba compiles for a kind of tyre."""
     law = LAWS[tyre.instance_class].friction
 
-    def friction(braking_slip: Any, load: Any, tyre: Any) -> float:
+    def evaluate_friction(braking_slip: Any, load: Any, tyre: Any) -> float:
         return law(braking_slip, load, tyre)
 
-    return friction
+    return evaluate_friction
 
 
-@overload(tyre_slope)
+@overload(compute_tyre_slope)
 def _compile_slope(braking_slip: Any, load: Any, tyre: Any) -> Callable[..., float]:
+    """Return the implementation of ``compute_tyre_slope`` that Numba compiles for a kind of tyre."""
     law = LAWS[tyre.instance_class].slope
 
-    def slope(braking_slip: Any, load: Any, tyre: Any) -> float:
+    def evaluate_slope(braking_slip: Any, load: Any, tyre: Any) -> float:
         return law(braking_slip, load, tyre)
 
-    return slope
+    return evaluate_slope
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def braking_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
+def compute_braking_slip(speed: float, rim_speed: float, speed_floor: float) -> float:
     """Return the braking slip kappa, clipped to [0, 1] [1] (paper, Eq. tire_force).
 
     Parameters

@@ -93,7 +93,7 @@ class Combined(NamedTuple):
 
 
 class MagicFormula(NamedTuple):
-    """One tyre.
+    """Coefficients of one tyre.
 
     Parameters
     ----------
@@ -120,18 +120,18 @@ def bend_slip(scaled_slip: float, curvature: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def relative_load(load: float, nominal_load: float) -> float:
+def compute_load_change(load: float, nominal_load: float) -> float:
     """Return df_z, how far a load exceeds the nominal one, relative to it [1] (4.E2).
 
     Parameters
     ----------
-    load, nominal_load : of one tyre, or both of an axle [N]
+    load, nominal_load : both of one tyre, or both of an axle [N]
     """
     return (load - nominal_load) / nominal_load
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def longitudinal_peak(load_change: float, camber: float, c: Longitudinal) -> float:
+def compute_longitudinal_peak(load_change: float, camber: float, c: Longitudinal) -> float:
     """Return the peak friction mu_x [1] (4.E13).
 
     Parameters
@@ -144,7 +144,7 @@ def longitudinal_peak(load_change: float, camber: float, c: Longitudinal) -> flo
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def longitudinal_curvature(load_change: float, slip: float, c: Longitudinal) -> float:
+def compute_longitudinal_curvature(load_change: float, slip: float, c: Longitudinal) -> float:
     """Return E_x, which can differ between driving and braking [1] (4.E14).
 
     Parameters
@@ -158,7 +158,7 @@ def longitudinal_curvature(load_change: float, slip: float, c: Longitudinal) -> 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def longitudinal_stiffness(load_change: float, c: Longitudinal) -> float:
+def compute_longitudinal_stiffness(load_change: float, c: Longitudinal) -> float:
     """Return slip stiffness over load, K_x / F_z [1] (4.E15).
 
     Parameters
@@ -170,7 +170,7 @@ def longitudinal_stiffness(load_change: float, c: Longitudinal) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def longitudinal_friction(slip: float, load_change: float, camber: float, c: Longitudinal) -> float:
+def compute_longitudinal_friction(slip: float, load_change: float, camber: float, c: Longitudinal) -> float:
     """Return force over load in pure longitudinal slip, F_x0 / F_z [1] (4.E9 to 4.E18).
 
     Parameters
@@ -181,14 +181,14 @@ def longitudinal_friction(slip: float, load_change: float, camber: float, c: Lon
     c : coefficients
     """
     x = slip + c.phx1 + c.phx2 * load_change
-    peak = longitudinal_peak(load_change, camber, c)
-    scaled = longitudinal_stiffness(load_change, c) / (c.pcx1 * peak) * x
-    bent = bend_slip(scaled, longitudinal_curvature(load_change, x, c))
+    peak = compute_longitudinal_peak(load_change, camber, c)
+    scaled = compute_longitudinal_stiffness(load_change, c) / (c.pcx1 * peak) * x
+    bent = bend_slip(scaled, compute_longitudinal_curvature(load_change, x, c))
     return peak * sin(c.pcx1 * atan(bent)) + c.pvx1 + c.pvx2 * load_change
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lateral_peak(load_change: float, camber: float, c: Lateral) -> float:
+def compute_lateral_peak(load_change: float, camber: float, c: Lateral) -> float:
     """Return the peak friction mu_y; negative in the book's signs [1] (4.E23).
 
     Parameters
@@ -201,7 +201,7 @@ def lateral_peak(load_change: float, camber: float, c: Lateral) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lateral_stiffness(load_change: float, camber: float, c: Lateral) -> float:
+def compute_lateral_stiffness(load_change: float, camber: float, c: Lateral) -> float:
     """Return cornering stiffness over load, K_y / F_z; negative in the book's signs [1] (4.E25).
 
     Parameters
@@ -216,7 +216,7 @@ def lateral_stiffness(load_change: float, camber: float, c: Lateral) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lateral_friction(slip: float, load_change: float, camber: float, c: Lateral) -> float:
+def compute_lateral_friction(slip: float, load_change: float, camber: float, c: Lateral) -> float:
     """Return force over load in pure lateral slip, F_y0 / F_z [1] (4.E19 to 4.E30).
 
     Parameters
@@ -226,12 +226,12 @@ def lateral_friction(slip: float, load_change: float, camber: float, c: Lateral)
     camber : gamma*, its sine [1]
     c : coefficients
     """
-    stiffness = lateral_stiffness(load_change, camber, c)
+    stiffness = compute_lateral_stiffness(load_change, camber, c)
     from_camber = (c.pvy3 + c.pvy4 * load_change) * camber
     lean = (c.pky6 + c.pky7 * load_change) * camber - from_camber
     shift = c.phy1 + c.phy2 * load_change + c.phy3 * camber + c.shift_by_stiffness * lean / stiffness
     x = slip + shift
-    peak = lateral_peak(load_change, camber, c)
+    peak = compute_lateral_peak(load_change, camber, c)
     side = (c.pey3 + c.pey4 * camber) * copysign(1.0, x)
     curvature = (c.pey1 + c.pey2 * load_change) * (1.0 + c.pey5 * camber * camber - side)
     bent = bend_slip(stiffness / (c.pcy1 * peak) * x, curvature)
@@ -255,7 +255,7 @@ def weigh_slip(slip: float, shift: float, narrowness: float, shape: float, curva
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def tyre_forces(
+def compute_tyre_forces(
     slip: float, slip_angle: float, camber: float, load: float, tyre: MagicFormula
 ) -> tuple[float, float]:
     """Return longitudinal and lateral force in combined slip, F_x and F_y [N] (4.E50 to 4.E67).
@@ -265,21 +265,23 @@ def tyre_forces(
     slip : kappa, positive where the wheel drives [1]
     slip_angle : alpha [rad]
     camber : gamma [rad]
-    load : on the tyre; without it there is no force [N]
-    tyre : the coefficients
+    load : load on the tyre; without load there is no force [N]
+    tyre : coefficients of the tyre
     """
     if load <= 0.0:
         return 0.0, 0.0
-    c, load_change = tyre.combined, relative_load(load, tyre.nominal_load)
+    c, load_change = tyre.combined, compute_load_change(load, tyre.nominal_load)
     angle, lean = tan(slip_angle), sin(camber)
     narrow_x = (c.rbx1 + c.rbx3 * lean * lean) * cos(atan(c.rbx2 * slip))
     weight_x = weigh_slip(angle, c.rhx1, narrow_x, c.rcx1, c.rex1 + c.rex2 * load_change)
     narrow_y = (c.rby1 + c.rby4 * lean * lean) * cos(atan(c.rby2 * (angle - c.rby3)))
     shift_y = c.rhy1 + c.rhy2 * load_change
     weight_y = weigh_slip(slip, shift_y, narrow_y, c.rcy1, c.rey1 + c.rey2 * load_change)
-    steer = lateral_peak(load_change, lean, tyre.lateral) * (c.rvy1 + c.rvy2 * load_change + c.rvy3 * lean)
+    steer = compute_lateral_peak(load_change, lean, tyre.lateral) * (
+        c.rvy1 + c.rvy2 * load_change + c.rvy3 * lean
+    )
     steer *= cos(atan(c.rvy4 * angle)) * sin(c.rvy5 * atan(c.rvy6 * slip))
     return (
-        load * weight_x * longitudinal_friction(slip, load_change, camber, tyre.longitudinal),
-        load * (weight_y * lateral_friction(angle, load_change, lean, tyre.lateral) + steer),
+        load * weight_x * compute_longitudinal_friction(slip, load_change, camber, tyre.longitudinal),
+        load * (weight_y * compute_lateral_friction(angle, load_change, lean, tyre.lateral) + steer),
     )

@@ -1,4 +1,4 @@
-"""The Magic Formula as the vehicle takes it: pure longitudinal slip on one surface, for the two tyres of an axle."""
+"""The Magic Formula in the form that the vehicle takes: longitudinal slip on one surface, for two tyres of an axle."""
 
 from math import atan, cos, inf, pi, tan
 from typing import NamedTuple
@@ -9,15 +9,15 @@ from tasks.vehicle.tyres.magic_formula import (
     Longitudinal,
     MagicFormula,
     bend_slip,
-    longitudinal_curvature,
-    longitudinal_friction,
-    longitudinal_peak,
-    longitudinal_stiffness,
-    relative_load,
+    compute_load_change,
+    compute_longitudinal_curvature,
+    compute_longitudinal_friction,
+    compute_longitudinal_peak,
+    compute_longitudinal_stiffness,
 )
 
 MOST_LOAD_CHANGE = 2.0
-"""df_z from which friction over load stays as it is: no tyre is measured at over three times its nominal load [1]."""
+"""df_z above which friction stays constant: no tyre is measured at over three times its nominal load [1]."""
 
 
 class MagicFormulaTyre(NamedTuple):
@@ -25,7 +25,7 @@ class MagicFormulaTyre(NamedTuple):
 
     Parameters
     ----------
-    nominal_load : of both tyres of an axle [N]
+    nominal_load : nominal load of both tyres of an axle [N]
     longitudinal : coefficients, scaled to the surface and without shifts
     peak : friction at the top of the curve under the nominal load, mu_eff [1]
     target_slip : braking slip there, kappa* [1]
@@ -46,7 +46,7 @@ def scale_magic_formula(tyre: MagicFormula, peak: float, slip_stiffness: float) 
 
     Parameters
     ----------
-    tyre : the file's
+    tyre : tyre of the property file
     peak : mu_eff [1]
     slip_stiffness : beta [1]
     """
@@ -65,7 +65,7 @@ def scale_magic_formula(tyre: MagicFormula, peak: float, slip_stiffness: float) 
     return MagicFormulaTyre(
         nominal_load=2.0 * tyre.nominal_load,
         longitudinal=scaled,
-        peak=-longitudinal_friction(-target_slip, 0.0, 0.0, scaled),
+        peak=-compute_longitudinal_friction(-target_slip, 0.0, 0.0, scaled),
         target_slip=target_slip,
     )
 
@@ -78,7 +78,7 @@ def find_peak_slip(c: Longitudinal) -> float:
     c : coefficients without shifts
     """
     stiffness = c.pkx1 / (c.pcx1 * c.pdx1)
-    curvature = longitudinal_curvature(0.0, -1.0, c)
+    curvature = compute_longitudinal_curvature(0.0, -1.0, c)
     top = tan(0.5 * pi / c.pcx1) if c.pcx1 > 1.0 else inf
     low, high = 0.0, 1.0
     if bend_slip(stiffness, curvature) <= top:
@@ -89,34 +89,34 @@ def find_peak_slip(c: Longitudinal) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def magic_formula_friction(braking_slip: float, load: float, tyre: MagicFormulaTyre) -> float:
+def compute_magic_formula_friction(braking_slip: float, load: float, tyre: MagicFormulaTyre) -> float:
     """Return braking force over load [1] (Pacejka 2012, 4.E9).
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more; the book's is its negative [1]
-    load : of the axle [N]
-    tyre : on the surface
+    load : load of the axle [N]
+    tyre : the tyre on the surface
     """
-    load_change = min(relative_load(load, tyre.nominal_load), MOST_LOAD_CHANGE)
-    return -longitudinal_friction(-braking_slip, load_change, 0.0, tyre.longitudinal)
+    load_change = min(compute_load_change(load, tyre.nominal_load), MOST_LOAD_CHANGE)
+    return -compute_longitudinal_friction(-braking_slip, load_change, 0.0, tyre.longitudinal)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def magic_formula_slope(braking_slip: float, load: float, tyre: MagicFormulaTyre) -> float:
-    """Return the derivative of ``magic_formula_friction`` by slip [1].
+def compute_magic_formula_slope(braking_slip: float, load: float, tyre: MagicFormulaTyre) -> float:
+    """Return the derivative of ``compute_magic_formula_friction`` by slip [1].
 
     Parameters
     ----------
     braking_slip : kappa, 0 or more [1]
-    load : of the axle [N]
-    tyre : on the surface
+    load : load of the axle [N]
+    tyre : the tyre on the surface
     """
     c = tyre.longitudinal
-    load_change = min(relative_load(load, tyre.nominal_load), MOST_LOAD_CHANGE)
-    peak = longitudinal_peak(load_change, 0.0, c)
-    stiffness = longitudinal_stiffness(load_change, c) / (c.pcx1 * peak)
-    curvature = min(longitudinal_curvature(load_change, -1.0, c), 1.0)
+    load_change = min(compute_load_change(load, tyre.nominal_load), MOST_LOAD_CHANGE)
+    peak = compute_longitudinal_peak(load_change, 0.0, c)
+    stiffness = compute_longitudinal_stiffness(load_change, c) / (c.pcx1 * peak)
+    curvature = min(compute_longitudinal_curvature(load_change, -1.0, c), 1.0)
     scaled = stiffness * braking_slip
     bent = bend_slip(scaled, curvature)
     bending = stiffness * (1.0 - curvature + curvature / (1.0 + scaled * scaled))

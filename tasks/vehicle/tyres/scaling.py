@@ -1,4 +1,4 @@
-"""From the numbers of a tyre property file to a Magic Formula with scaling factors and pressure folded in.
+"""Folding of the scaling factors and the pressure of a tyre property file into the coefficients of a Magic Formula.
 
 Equation numbers are those of Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012; MF 5.2 differs from them as its manual
 says (MF-Tyre/MF-Swift 6.1 Equation Manual, TNO 2008, and MF-Tyre 5.2 User Manual, TNO 2001): no pressure, camber by
@@ -51,11 +51,11 @@ LOW_FRICTION = 10.0
 
 
 def fold_scaling(values: Mapping[str, float], version: str) -> MagicFormula:
-    """Return the tyre with every scaling factor, and the distance of INFLPRES from NOMPRES, in its coefficients.
+    """Return the tyre with every scaling factor and the inflation pressure in its coefficients.
 
     Parameters
     ----------
-    values : of a tyre property file by name, with all that the version needs; what it does not know is left out
+    values : numbers of a tyre property file by name, with all that the version needs; others are ignored
     version : key of ``NAMES``
     """
     newer = version == "MF 6.1"
@@ -74,9 +74,10 @@ def fold_scaling(values: Mapping[str, float], version: str) -> MagicFormula:
 
 
 def _fold_longitudinal(v: Mapping[str, float], pressure: float, newer: bool) -> Longitudinal:
+    """Return the longitudinal coefficients with factors and pressure in them [1]."""
     stiffness = v["LKX"] * (1.0 + v["PPX1"] * pressure + v["PPX2"] * pressure**2)
     friction = v["LMUX"] * (1.0 + v["PPX3"] * pressure + v["PPX4"] * pressure**2)
-    shift = v["LVX"] * (_slow_friction(v["LMUX"]) if newer else v["LMUX"])
+    shift = v["LVX"] * (_compute_shift_scale(v["LMUX"]) if newer else v["LMUX"])
     return Longitudinal(
         pcx1=v["PCX1"] * v["LCX"],
         pdx1=v["PDX1"] * friction,
@@ -97,8 +98,9 @@ def _fold_longitudinal(v: Mapping[str, float], pressure: float, newer: bool) -> 
 
 
 def _fold_lateral(v: Mapping[str, float], pressure: float, newer: bool) -> Lateral:
+    """Return the lateral coefficients with factors and pressure in them [1]."""
     friction = v["LMUY"] * (1.0 + v["PPY3"] * pressure + v["PPY4"] * pressure**2)
-    slow = _slow_friction(v["LMUY"]) if newer else v["LMUY"]
+    slow = _compute_shift_scale(v["LMUY"]) if newer else v["LMUY"]
     lean, load = v["LGAY"], 1.0 + v["PPY2"] * pressure
     stiffness = v["LKYC"] * (1.0 + v["PPY5"] * pressure)
     return Lateral(
@@ -130,6 +132,7 @@ def _fold_lateral(v: Mapping[str, float], pressure: float, newer: bool) -> Later
 
 
 def _fold_combined(v: Mapping[str, float]) -> Combined:
+    """Return the coefficients of combined slip with their factors in them [1]."""
     factor = {"RBX1": "LXAL", "RBX3": "LXAL", "RBY1": "LYKA", "RBY4": "LYKA"}
     factor |= dict.fromkeys(("RVY1", "RVY2", "RVY3"), "LVYKA")
     return Combined(**{
@@ -137,6 +140,6 @@ def _fold_combined(v: Mapping[str, float]) -> Combined:
     })  # fmt: skip
 
 
-def _slow_friction(friction: float) -> float:
-    """The friction scale of vertical shifts, lambda_mu' [1] (4.E8)."""
+def _compute_shift_scale(friction: float) -> float:
+    """Return the friction scale of vertical shifts, lambda_mu' [1] (4.E8)."""
     return LOW_FRICTION * friction / (1.0 + (LOW_FRICTION - 1.0) * friction)

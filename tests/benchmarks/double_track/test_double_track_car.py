@@ -28,9 +28,9 @@ from benchmarks.double_track.tyre import magic_formula
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.surface.weather import Weather, surface_state
-from tasks.vehicle.parameters import surface_response
-from tasks.vehicle.tyres.burckhardt import burckhardt_friction
-from tasks.vehicle.tyres.magic_formula import Longitudinal, longitudinal_friction
+from tasks.vehicle.parameters import compute_surface_response
+from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction
+from tasks.vehicle.tyres.magic_formula import Longitudinal, compute_longitudinal_friction
 
 SURFACES = read_declared("car")["surfaces"]["rows"]
 
@@ -170,7 +170,7 @@ def test_the_tyre_is_as_another_implementation_has_it(slip):
     c = Longitudinal(**dict.fromkeys(Longitudinal._fields, 0.0))
     c = c._replace(pcx1=1.3, pdx1=0.9, pex1=0.4, pkx1=25.0)
     assert magic_formula(slip, 0.9, 25.0, 1.3, 0.4) == pytest.approx(
-        longitudinal_friction(slip, 0.0, 0.0, c), rel=1e-9
+        compute_longitudinal_friction(slip, 0.0, 0.0, c), rel=1e-9
     )
 
 
@@ -182,7 +182,7 @@ def test_friction_by_weather_is_that_of_the_mapping_and_near_the_judged_curve(ro
         snow_accumulation_h=float(row["weather"] == "snow"),
     )
     state = surface_state(weather, load_surface("dense-asphalt"))
-    tyre = surface_response(load_vehicle("paper-reference"), row["weather"], state.friction).tyre
+    tyre = compute_surface_response(load_vehicle("paper-reference"), row["weather"], state.friction).tyre
     assert row["peak"] == pytest.approx(tyre.peak, abs=1e-6)
     assert row["target_slip"] == pytest.approx(tyre.target_slip, abs=1e-5)
     assert row["snow_depth_mm"] == pytest.approx(state.snow_depth_mm)
@@ -190,7 +190,7 @@ def test_friction_by_weather_is_that_of_the_mapping_and_near_the_judged_curve(ro
     curve = (row["peak"], row["slip_stiffness"], row["shape"], row["curvature"])
     slips = np.linspace(0.0, 1.0, 20001)
     own = np.array([magic_formula(x, *curve) for x in slips])
-    judged = np.array([burckhardt_friction(x, 1.0, tyre) for x in slips])
+    judged = np.array([compute_burckhardt_friction(x, 1.0, tyre) for x in slips])
     levels = np.linspace(0.15, 0.9, 16) * tyre.peak
     ratio = np.interp(levels, own[: own.argmax()], slips[: own.argmax()]) / np.interp(
         levels, judged[: judged.argmax()], slips[: judged.argmax()]

@@ -6,9 +6,9 @@ from pathlib import Path
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.vehicle.effects.forms import SHAPES, form_name
+from tasks.vehicle.effects.forms import SHAPES, name_form
 from tasks.vehicle.effects.library import Effect
-from tasks.vehicle.effects.table import parameter_vector
+from tasks.vehicle.effects.table import build_parameter_vector
 
 FOUND = {"score": 50.0, "gain": 60.0, "inflation": 1.0, "held_out_gain": 9.0, "win_share": 1.0}
 
@@ -31,7 +31,7 @@ def found_form(port: str, variable: str, shape: str, scale: float, *coefficients
     """A form of the grammar."""
     assert shape in SHAPES
     return NamedEffect(
-        name=form_name(port, variable, shape, scale), effect_class="form", port=port, variable=variable,
+        name=name_form(port, variable, shape, scale), effect_class="form", port=port, variable=variable,
         parameters=tuple(_parameter(n, v, -2.0, 2.0, "1") for n, v in zip("ab", coefficients, strict=False)),
         **FOUND,
     )  # fmt: skip
@@ -42,7 +42,7 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
     return Verdict(
         verdict="FOUND", effects=effects, rivals=(), tried=(), error={}, manoeuvre_error={}, correlation={},
         session_pulls={}, noise={}, disturbance=Disturbance(), detectable={}, campaign="toy", content_hash="c" * 64,
-        split_hash="d" * 64, theta=parameter_vector({}), slots=(), experiment=None, forked=(), reasons=(),
+        split_hash="d" * 64, theta=build_parameter_vector({}), slots=(), experiment=None, forked=(), reasons=(),
     )  # fmt: skip
 
 

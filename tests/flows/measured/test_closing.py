@@ -21,7 +21,7 @@ from flows.measured.closing_ledger import record_reading
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
-from tasks.identification.benchmark import TOLERANCES, synthetic_campaign
+from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
 
@@ -77,7 +77,7 @@ def write_campaign(campaign: Campaign, folder: Path) -> None:
 
 @pytest.fixture(scope="module")
 def lagging(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = synthetic_campaign(VEHICLE, SURFACE, {"lag": 0.1}, 7, design=SHORT * 2)
+    made = make_synthetic_campaign(VEHICLE, SURFACE, {"lag": 0.1}, 7, design=SHORT * 2)
     runs = tuple(replace(run, held_out=i >= 5) for i, run in enumerate(made.runs))
     folder = tmp_path_factory.mktemp("campaigns") / "lagging"
     write_campaign(replace(made, runs=runs), folder)
@@ -123,7 +123,7 @@ def test_the_report_needs_no_other_file_and_the_split_is_on_disk(closed: Path) -
 
 def judging(seed: int, content_hash: str) -> Campaign:
     """A campaign whose runs but the first only judge."""
-    made = synthetic_campaign(VEHICLE, SURFACE, {}, seed, design=SHORT)
+    made = make_synthetic_campaign(VEHICLE, SURFACE, {}, seed, design=SHORT)
     runs = tuple(replace(run, held_out=k > 0) for k, run in enumerate(made.runs))
     return replace(made, runs=runs, content_hash=content_hash)
 

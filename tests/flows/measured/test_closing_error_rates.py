@@ -6,7 +6,7 @@ import pytest
 
 from catalogs.studies.closing import load_error_rates
 from flows.measured import closing_error_rates
-from flows.measured.closing_benchmark_summary import summary
+from flows.measured.closing_benchmark_summary import summarise_benchmark
 from flows.measured.closing_error_rates import error_rates_html
 
 
@@ -25,7 +25,7 @@ def test_it_names_what_was_right_and_what_was_taken_for_the_effect(monkeypatch: 
         row("library", "brake_lag", "refused", [], 4),
         row("library", "brake_dead_time", "wrong", ["brake_lag"], 5),
     ]
-    rates = summary(rows) | {"engine_sha256": "e" * 64}
+    rates = summarise_benchmark(rows) | {"engine_sha256": "e" * 64}
     monkeypatch.setattr(closing_error_rates, "load_error_rates", lambda: rates)
     monkeypatch.setattr(closing_error_rates, "engine_hash", lambda: "f" * 64)
     page = unescape(error_rates_html(["brake_lag", "headwind"]))

@@ -15,15 +15,15 @@ from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import Run
 from tasks.identification.decision.excitation import find_reached_range
-from tasks.identification.decision.forms import PORT_STEP, RANGE, form_in_range
-from tasks.identification.inference.forward import run_model, simulate_run
+from tasks.identification.decision.forms import PORT_STEP, RANGE, make_form_in_range
+from tasks.identification.inference.forward import prepare_run, simulate_run
 from tasks.surface.road_profile import RoadHazard
 from tasks.surface.weather import Weather, surface_state
-from tasks.vehicle.brake import BrakeCommand, brake_pressure
+from tasks.vehicle.brake import BrakeCommand, compute_brake_pressure
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
-from tasks.vehicle.effects.table import parameter_vector
-from tasks.vehicle.rollout import Controls, rollout
+from tasks.vehicle.effects.table import build_parameter_vector
+from tasks.vehicle.rollout import Controls, simulate_scenario
 from tests.flows.measured.findings import found_effect, found_form, grown_file, verdict_of
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
@@ -55,9 +55,9 @@ def fitted_run(manoeuvre, theta, slots=(), vehicle=VEHICLE):
         name=manoeuvre, held_out=False, weather=weather.kind, precipitation_mm_h=weather.precipitation_mm_h,
         snow_accumulation_h=weather.snow_accumulation_h, direction=1, disc_rise=0.0, hazard_center=12.0,
         hazard_length=3.7, hazard_height=height, interval=0.01,
-        pressure=np.array([brake_pressure(t - 0.5, brake_of(peak).profile) for t in TIME]), response=response,
+        pressure=np.array([compute_brake_pressure(t - 0.5, brake_of(peak).profile) for t in TIME]), response=response,
     )  # fmt: skip
-    model = run_model(run, vehicle, SURFACE)
+    model = prepare_run(run, vehicle, SURFACE)
     return model, simulate_run(model, theta, slots=slots, refinement=4)
 
 
@@ -71,7 +71,7 @@ def difference(manoeuvre, car, theta, slots=()):
     """Largest difference between a dataset's run of a car and the fit's run of the plain car, by channel."""
     weather, speed, peak, height = MANOEUVRES[manoeuvre]
     state = surface_state(weather, SURFACE)
-    made = rollout(
+    made = simulate_scenario(
         car, state,
         Controls(initial_speed=speed, brake=brake_of(peak), hold_speed_until_brake=False),
         RoadHazard(center_m=12.0, length_m=3.7, height_m=height), mode="coupled", duration_s=3.0,
@@ -80,7 +80,7 @@ def difference(manoeuvre, car, theta, slots=()):
     return np.array([np.abs(made[name][:3000:10] - fitted.column(name)).max() for name in CHANNELS])
 
 
-PLAIN = parameter_vector({})
+PLAIN = build_parameter_vector({})
 
 
 def sizes(effect):
@@ -104,7 +104,7 @@ def largest_change(theta, slots=()):
 def test_every_effect_of_the_library_drives_in_a_dataset_as_it_was_fitted(effect, tmp_path):
     values = sizes(effect)
     car = load_vehicle(grown_file(tmp_path / "grown.yaml", found_effect(effect, values), reached={}))
-    theta = parameter_vector(values)
+    theta = build_parameter_vector(values)
     for manoeuvre in MANOEUVRES:
         assert np.all(difference(manoeuvre, car, theta) < ROUNDING), manoeuvre
     assert largest_change(theta) > 0.5, "no manoeuvre shows it"
@@ -132,9 +132,9 @@ def test_a_vehicle_that_calibration_grew_grows_further_and_keeps_what_it_had(tmp
     assert car.effects == {**base.effects, "lag": 0.08, "rolling_coefficient": rolls}
     kept, before = vehicle_provenance(path), vehicle_provenance("multibody-grown")
     assert kept.bounds["stick_above"] == before.bounds["stick_above"]
-    assert difference("hump", car, parameter_vector({"lag": 0.08}))[0] > 0.01
+    assert difference("hump", car, build_parameter_vector({"lag": 0.08}))[0] > 0.01
     model, fitted = fitted_run(
-        "hump", parameter_vector({"lag": 0.08, "rolling_coefficient": 0.004}), (), base
+        "hump", build_parameter_vector({"lag": 0.08, "rolling_coefficient": 0.004}), (), base
     )
     again = simulate_run(replace(model, vehicle=car), PLAIN, refinement=4)
     np.testing.assert_allclose(again.history, fitted.history, atol=ROUNDING)
@@ -160,7 +160,7 @@ def test_a_form_that_was_found_is_in_the_vehicle_with_its_range_and_where_it_com
     assert low == 0.0 and high == pytest.approx(1.6)
     path = grown_file(tmp_path / "grown.yaml", found, reached={"pressure": (low, high)})
     (form,) = load_vehicle(path).forms
-    assert form == form_in_range(found.name, (0.05, 0.2), low, high) and form.name == found.name
+    assert form == make_form_in_range(found.name, (0.05, 0.2), low, high) and form.name == found.name
     provenance = vehicle_provenance(path)
     assert provenance is not None and f"{found.name}: b" in provenance.bounds
     assert "95 % interval 0.18 to 0.22" in " ".join(path.read_text().split())

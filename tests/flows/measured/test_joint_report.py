@@ -22,7 +22,7 @@ from flows.measured.joint_report import joint_report_html, next_steps
 from flows.measured.joint_report_figures import alike_numbers, brake_curve
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.planned_runs import RunPlan
-from tasks.identification.benchmark import synthetic_campaign
+from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
@@ -67,7 +67,7 @@ def facts(trace: JointTrace, **more: Any) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def judged() -> tuple[JointTrace, Campaign]:
     """A campaign of three stops with a lag, whose runs, vehicle and name would like to be more than text."""
-    made = synthetic_campaign(VEHICLE, SURFACE, {"lag": 0.1}, 7, design=STOPS)
+    made = make_synthetic_campaign(VEHICLE, SURFACE, {"lag": 0.1}, 7, design=STOPS)
     runs = tuple(replace(r, name=f"{HOSTILE} {k}", held_out=k == 2) for k, r in enumerate(made.runs))
     campaign = replace(made, runs=runs, name=HOSTILE, vehicle=HOSTILE)
     numbers = [n for n in load_joint_numbers() if n.name in {"pressure_gain", "lag", "dead_time"}]

@@ -14,7 +14,7 @@ from catalogs.references import ReferenceCase
 from catalogs.vehicles import load_vehicle
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Mode, rollout
+from tasks.vehicle.rollout import Mode, simulate_scenario
 
 CONDITIONS = {
     "wet": {"weather": "rain", "surface_coefficient": 0.43415, "initial_speed_km_h": 40.0},
@@ -58,7 +58,7 @@ def make_traces(tmp_path: Path) -> Make:
 
 def _trace(car: Vehicle, case: ReferenceCase, mode: Mode, number: int, noise: float) -> pa.Table:
     surface = SurfaceState(kind=case.weather, friction=case.surface_coefficient)
-    ride = rollout(car, surface, case.controls(), case.hazard(), mode=mode, duration_s=8.0)
+    ride = simulate_scenario(car, surface, case.controls(), case.hazard(), mode=mode, duration_s=8.0)
     model = ride.columns
     end = int(np.argmax(model["speed"] <= 0.0)) or len(model["speed"])
     rng = np.random.Generator(np.random.Philox(key=[7, number]))

@@ -13,7 +13,7 @@ from catalogs.effects import load_effects
 from catalogs.entries import entry_names, find_entry
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
-from flows.measured.calibration import calibrate
+from flows.measured.calibration import calibrate_on_traces
 from flows.studies.vehicle_model import measure_agreement
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
@@ -31,7 +31,7 @@ def frozen(vehicle, make_traces, tmp_path):
     entry["passes"]["value"] = entry["evaluations"]["value"] = 1
     procedure = tmp_path / "short.yaml"
     procedure.write_text(yaml.safe_dump(entry))
-    calibrate(str(traces), out=str(tmp_path / "out"), procedure=str(procedure), name="car")
+    calibrate_on_traces(str(traces), out=str(tmp_path / "out"), procedure=str(procedure), name="car")
     return traces, tmp_path / "out" / "car.yaml"
 
 
@@ -123,7 +123,7 @@ def test_bad_traces_are_one_sentence_and_exit_code_2(vehicle, make_traces, harm,
 def test_a_split_that_is_none_lists_those_that_exist(vehicle, make_traces, tmp_path):
     folder = make_traces(vehicle, "paper", ("wet",))
     with pytest.raises(InputError, match="no case has the split test; there are: development"):
-        calibrate(str(folder), out=str(tmp_path), split="test")
+        calibrate_on_traces(str(folder), out=str(tmp_path), split="test")
 
 
 def test_conditions_may_hold_nulls_and_leave_the_onset_to_the_trace(vehicle, make_traces):
@@ -198,7 +198,7 @@ def test_a_vehicle_that_close_loop_grew_is_calibrated_further_and_keeps_what_it_
     entry["passes"]["value"] = 1
     (tmp_path / "air.yaml").write_text(yaml.safe_dump(entry))
     traces = make_traces(truth, "coupled", ("wet",))
-    calibrate(
+    calibrate_on_traces(
         str(traces),
         out=str(tmp_path / "out"),
         vehicle=str(grown),
@@ -226,7 +226,9 @@ def test_a_vehicle_that_extends_another_is_frozen_whole(vehicle, make_traces, tm
     procedure, base = tmp_path / "short.yaml", tmp_path / "base.yaml"
     procedure.write_text(yaml.safe_dump(entry))
     base.write_text("extends: paper-reference\nsprung_mass: {value: 1210, unit: kg, source: scales}\n")
-    calibrate(str(traces), out=str(tmp_path / "out"), vehicle=str(base), procedure=str(procedure), name="car")
+    calibrate_on_traces(
+        str(traces), out=str(tmp_path / "out"), vehicle=str(base), procedure=str(procedure), name="car"
+    )
     path = tmp_path / "out" / "car.yaml"
     assert load_vehicle(path).sprung_mass == 1210 and b"extends" not in path.read_bytes()
     assert vehicle_provenance(path).base_sha256 != sha256_of_file(base)

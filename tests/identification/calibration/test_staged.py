@@ -8,12 +8,12 @@ import yaml
 from catalogs.calibration import load_procedure
 from catalogs.entries import find_entry
 from catalogs.references import read_reference
-from flows.measured.calibration import calibrate, calibration_case
+from flows.measured.calibration import calibrate_on_traces, calibration_case
 from flows.studies.vehicle_model import agreement_of
-from tasks.identification.calibration.identifiability import knowledge
-from tasks.identification.calibration.scalars import calibration_scalars, scalar_value, with_scalars
-from tasks.identification.calibration.staged import calibrate as run_stages
-from tasks.identification.calibration.staged import run_stage, smoothness, stage_jacobian
+from tasks.identification.calibration.identifiability import summarise_jacobian
+from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
+from tasks.identification.calibration.staged import build_smoothness_rows, compute_stage_jacobian, run_stage
+from tasks.identification.calibration.staged import calibrate_vehicle as run_stages
 
 
 def procedure_file(folder: Path, base: str, stages: list[dict], passes: int = 2) -> str:
@@ -116,9 +116,9 @@ def test_the_sparse_jacobian_is_that_of_differences_of_every_case(vehicle, make_
     procedure, interval = load_procedure("paper-staged")
     slip = next(s for s in procedure.stages if s.groups == ("slip_stiffness",))
     cases = cases_of(make_traces(vehicle, "paper"), vehicle, procedure, interval)
-    scalars = calibration_scalars(vehicle, slip.groups)
-    x = np.array([scalar_value(vehicle, s) for s in scalars])
-    jacobian = stage_jacobian(vehicle, cases, slip, procedure, scalars, x)
+    scalars = list_calibration_scalars(vehicle, slip.groups)
+    x = np.array([read_scalar(vehicle, s) for s in scalars])
+    jacobian = compute_stage_jacobian(vehicle, cases, slip, procedure, scalars, x)
     touched = [
         name for name, column in zip([s.name for s in scalars], jacobian.T, strict=True) if column.any()
     ]
@@ -130,7 +130,7 @@ def test_the_sparse_jacobian_is_that_of_differences_of_every_case(vehicle, make_
 
 def test_neighbouring_knots_of_a_family_are_held_together_and_no_others(vehicle):
     procedure, _ = load_procedure("paper-staged")
-    rows = smoothness(calibration_scalars(vehicle, ("efficiency", "pitch_scale")), procedure)
+    rows = build_smoothness_rows(list_calibration_scalars(vehicle, ("efficiency", "pitch_scale")), procedure)
     pairs = [tuple(np.flatnonzero(row)) for row in rows]
     assert pairs == [(1, 2), (2, 3), (3, 4), (5, 6), (6, 7)]
     assert np.allclose(rows.sum(axis=1), 0)
@@ -139,12 +139,14 @@ def test_neighbouring_knots_of_a_family_are_held_together_and_no_others(vehicle)
 def test_confounded_and_unseen_scalars_are_named():
     scalars = [
         dataclasses.replace(s)
-        for s in calibration_scalars(_any_vehicle(), ("hold_ratio", "coupled_pitch_scale", "static_pitch"))
+        for s in list_calibration_scalars(
+            _any_vehicle(), ("hold_ratio", "coupled_pitch_scale", "static_pitch")
+        )
     ]
     rng = np.random.Generator(np.random.Philox(key=[3, 0]))
     a = rng.normal(size=200)
     jacobian = np.stack([a, a + 1e-3 * rng.normal(size=200), np.zeros(200)], axis=1)
-    report = knowledge(jacobian, scalars, np.zeros(3), ["1", "1", "rad"], np.full(3, np.sqrt(12.0)))
+    report = summarise_jacobian(jacobian, scalars, np.zeros(3), ["1", "1", "rad"], np.full(3, np.sqrt(12.0)))
     assert [pair[:2] for pair in report.confounded] == [("hold_ratio", "coupled_pitch_scale")]
     assert report.confounded[0][2] < -0.99
     unseen = report.scalars[2]
@@ -159,7 +161,7 @@ def test_the_same_traces_give_the_same_bytes(vehicle, make_traces, tmp_path):
     name = procedure_file(tmp_path, "paper-staged", [stage(["efficiency"], ["speed"])], passes=1)
     files = []
     for run in ("one", "two"):
-        calibrate(str(folder), out=str(tmp_path / run), procedure=name, name="car")
+        calibrate_on_traces(str(folder), out=str(tmp_path / run), procedure=name, name="car")
         files.append([(tmp_path / run / file).read_bytes() for file in ("car.yaml", "calibration.json")])
     assert files[0][0] == files[1][0]
     assert files[0][1].replace(b"/one/", b"/two/") == files[1][1]
@@ -172,4 +174,4 @@ def _any_vehicle():
 
 
 def test_with_scalars_of_nothing_is_the_vehicle(vehicle):
-    assert with_scalars(vehicle, {}) == vehicle
+    assert set_scalars(vehicle, {}) == vehicle

@@ -11,7 +11,7 @@ from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
-from tasks.vehicle.effects.table import parameter_vector
+from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
@@ -30,7 +30,9 @@ def campaign_of(
         if engine is not None:
             run = replace(run, drive_torque=np.where(run.pressure > 0.0, engine, 0.0))
         runs.append(
-            own_channels(measured(run, parameter_vector(truth), 70 + i).run, channels, i == len(STOPS) - 1)
+            own_channels(
+                measured(run, build_parameter_vector(truth), 70 + i).run, channels, i == len(STOPS) - 1
+            )
         )
     return Campaign(
         name="known", vehicle="paper-reference", runs=tuple(runs), channels=channels, content_hash="", split_hash="",

@@ -9,10 +9,10 @@ from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.render.composition import encode_8bit, to_linear
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
-from tasks.render.weather.attribution import LAYER_BITS, attribution, paper_picture, snow_on
-from tasks.render.weather.layer import recompose
+from tasks.render.weather.attribution import LAYER_BITS, attribute_pixels, paper_picture, snow_on
+from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import apply_weather, weather_scene
-from tasks.render.weather.scene_light import appended, to_display_unclipped
+from tasks.render.weather.scene_light import append_gaussians, to_display_unclipped
 from tasks.render.weather.snow.layer import GROUND_CLASSES
 from tasks.surface.state import SurfaceState
 from tests.render.weather.conftest import shutter
@@ -43,7 +43,7 @@ def street():
         0.25,
         SemanticClass.BUILDING,
     )
-    return appended(road(), wall)
+    return append_gaussians(road(), wall)
 
 
 def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005):
@@ -62,13 +62,13 @@ def test_dry_weather_changes_no_bit(street, parameters):
     _, drawn, gbuffer, view = frame(street, SurfaceState(kind="dry"), parameters)
     assert drawn.picture is drawn.base
     assert drawn.layers == ()
-    assert attribution(weather, drawn, gbuffer, view).max() == 0
+    assert attribute_pixels(weather, drawn, gbuffer, view).max() == 0
 
 
 @pytest.mark.parametrize("state", [RAIN[25], SNOW[1], ICE], ids=["rain", "snow", "ice"])
 def test_layers_recompose_to_the_picture_bit_for_bit(street, parameters, state):
     _, drawn, _, _ = frame(street, state, parameters)
-    assert recompose(drawn.base, drawn.layers).tobytes() == drawn.picture.tobytes()
+    assert recompose_layers(drawn.base, drawn.layers).tobytes() == drawn.picture.tobytes()
     names = [layer.name for layer in drawn.layers]
     layers = {"rain": ["light", "wet", "air", "particles"], "snow": ["light", "air", "particles"]}
     assert names == layers.get(state.kind, ["light", "wet", "air"])
@@ -120,7 +120,7 @@ def test_particles_hide_more_as_the_rate_rises(street, parameters):
 
 def test_attribution_names_the_layers_that_changed_a_pixel(street, parameters):
     weather, drawn, gbuffer, view = frame(street, RAIN[50], parameters)
-    bits = attribution(weather, drawn, gbuffer, view)
+    bits = attribute_pixels(weather, drawn, gbuffer, view)
     road = gbuffer.class_id == SemanticClass.ROAD
     assert (bits[road] & LAYER_BITS["wet"] > 0).mean() > 0.95
     assert not (bits[~road] & LAYER_BITS["wet"]).any()
@@ -130,7 +130,7 @@ def test_attribution_names_the_layers_that_changed_a_pixel(street, parameters):
     assert (drawn.layers[-1].gain[..., 0][falls] < 1).all()
 
     weather, drawn, gbuffer, view = frame(street, SNOW[1], parameters)
-    snow = attribution(weather, drawn, gbuffer, view) & LAYER_BITS["snow"] > 0
+    snow = attribute_pixels(weather, drawn, gbuffer, view) & LAYER_BITS["snow"] > 0
     white = drawn.base[..., 0] > 0.6
     on_road = gbuffer.class_id == SemanticClass.ROAD
     assert (snow == white)[on_road].mean() > 0.8

@@ -13,10 +13,10 @@ from tasks.render.labels import forward_flow
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.atmosphere import air_layer, light_layer, precipitating_air
 from tasks.render.weather.attribution import snow_on
-from tasks.render.weather.falling.precipitation import population
-from tasks.render.weather.layer import recompose
+from tasks.render.weather.falling.precipitation import make_population
+from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import apply_weather, pixel_rays, weather_scene
-from tasks.render.weather.scene_light import appended
+from tasks.render.weather.scene_light import append_gaussians
 from tasks.render.weather.sky import sky_light
 from tasks.surface.state import SurfaceState
 from tests.render.weather.conftest import shutter
@@ -49,7 +49,7 @@ def street():
         0.3,
         SemanticClass.VEHICLE,
     )
-    return appended(appended(road(), wall), block)
+    return append_gaussians(append_gaussians(road(), wall), block)
 
 
 def rendered(street, state, parameters, time_s=2.0, x=0.0, speed=10.0):
@@ -133,7 +133,7 @@ def test_a_mirrored_street_makes_the_mirrored_frame(street, parameters):
         uneven, means=uneven.means * np.float32((1, -1, 1)), normals=uneven.normals * np.float32((1, -1, 1))
     )
     air = precipitating_air(
-        population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 120.0, 12000.0
+        make_population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 120.0, 12000.0
     )
     sky = sky_light(np.full(3, 1.7), 0.5, air.extinction, 0.1, parameters.sky)
     pictures = []
@@ -143,7 +143,7 @@ def test_a_mirrored_street_makes_the_mirrored_frame(street, parameters):
             light_layer(drawn.base, gbuffer, even_sky(), even_sky(), sky, pixel_rays(view)),
             air_layer(gbuffer, even_sky(), air, sky, pixel_rays(view)),
         ]
-        pictures.append((drawn.base, recompose(drawn.base, layers), gbuffer.depth))
+        pictures.append((drawn.base, recompose_layers(drawn.base, layers), gbuffer.depth))
     assert np.abs(pictures[0][0] - pictures[0][0][:, ::-1]).max() > 0.1
     for straight, turned in zip(*pictures, strict=True):
         close = np.isclose(turned[:, ::-1], straight, atol=2e-4, rtol=1e-3, equal_nan=True)
@@ -155,11 +155,13 @@ def test_koschmieder_at_the_visual_range_leaves_five_percent_of_a_black_target(p
     view = shutter(**SIZE)
     picture, gbuffer = flat_gbuffer(view, shade=0.0)
     air = replace(
-        precipitating_air(population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 120.0, 12000.0),
+        precipitating_air(
+            make_population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 120.0, 12000.0
+        ),
         extinction=2.995732 / 50.0, drawn=np.zeros(65),
     )  # fmt: skip
     sky = sky_light(np.full(3, 1.7), 0.5, air.extinction, 0.1, parameters.sky)
-    veil = recompose(picture, [air_layer(gbuffer, even_sky(), air, sky, pixel_rays(view))])
+    veil = recompose_layers(picture, [air_layer(gbuffer, even_sky(), air, sky, pixel_rays(view))])
     distance = gbuffer.depth * np.linalg.norm(pixel_rays(view), axis=-1)
     for share, at in ((0.05, 50.0), (0.5, 50.0 * np.log(2) / np.log(20)), (0.814, 50.0 * 0.0687)):
         row, column = np.unravel_index(np.nanargmin(np.abs(distance - at)), distance.shape)

@@ -7,7 +7,7 @@ import pytest
 
 from tasks.render.lens import Lens, distort_rays
 from tasks.render.weather.falling.particles import visible_streaks
-from tasks.render.weather.falling.precipitation import drawn_optical_depth, drawn_reach, population
+from tasks.render.weather.falling.precipitation import drawn_optical_depth, drawn_reach, make_population
 from tasks.render.weather.falling.streaks import draw_streaks
 from tests.render.weather.conftest import shutter
 
@@ -16,12 +16,12 @@ CALM = np.zeros(3)
 
 @pytest.fixture
 def rain(parameters):
-    return population(parameters.kinds["rain"].particles, 50.0)
+    return make_population(parameters.kinds["rain"].particles, 50.0)
 
 
 @pytest.fixture
 def snow(parameters):
-    return population(parameters.kinds["snow"].particles, 2.0)
+    return make_population(parameters.kinds["snow"].particles, 2.0)
 
 
 def test_one_class_has_as_many_drops_in_view_as_density_times_volume(parameters, rain):
@@ -69,7 +69,7 @@ def test_heavier_rain_keeps_the_drops_of_lighter_rain(parameters):
         {
             tuple(streak["direction"])
             for streak in visible_streaks(
-                population(parameters.kinds["rain"].particles, rate), near, shutter(), CALM, 3
+                make_population(parameters.kinds["rain"].particles, rate), near, shutter(), CALM, 3
             )
         }
         for rate in (10.0, 25.0)

@@ -12,7 +12,7 @@ from tasks.render.weather.falling.precipitation import (
     drawn_optical_depth,
     drawn_reach,
     exponential_moment,
-    population,
+    make_population,
     power_fall_speed,
 )
 
@@ -22,7 +22,7 @@ SNOW_RATES = (0.5, 1.0, 2.0, 3.0)
 
 @pytest.mark.parametrize("rate", RAIN_RATES)
 def test_drop_counts_are_marshall_palmer_integrals(parameters, rate):
-    rain = population(parameters.kinds["rain"].particles, rate)
+    rain = make_population(parameters.kinds["rain"].particles, rate)
     slope = 4.1 * rate**-0.21
     for low, high, density in zip(rain.edges_mm[:-1], rain.edges_mm[1:], rain.density, strict=True):
         assert density == pytest.approx(quad(lambda D: 8000 * np.exp(-slope * D), low, high)[0])
@@ -30,7 +30,7 @@ def test_drop_counts_are_marshall_palmer_integrals(parameters, rate):
 
 @pytest.mark.parametrize("rate", SNOW_RATES)
 def test_flake_counts_are_sekhon_srivastava_integrals(parameters, rate):
-    snow = population(parameters.kinds["snow"].particles, rate)
+    snow = make_population(parameters.kinds["snow"].particles, rate)
     expected = quad(
         lambda D: 2500 * rate**-0.94 * np.exp(-2.29 * rate**-0.45 * D), snow.edges_mm[0], snow.edges_mm[-1]
     )
@@ -40,7 +40,7 @@ def test_flake_counts_are_sekhon_srivastava_integrals(parameters, rate):
 @pytest.mark.parametrize(("kind", "rates"), [("rain", RAIN_RATES), ("snow", SNOW_RATES)])
 def test_mean_cross_sections_are_those_of_the_distribution(parameters, kind, rates):
     for rate in rates:
-        found = population(parameters.kinds[kind].particles, rate)
+        found = make_population(parameters.kinds[kind].particles, rate)
         low, high = found.edges_mm[2:4]
         weight = quad(lambda D, slope: np.exp(-slope * D), low, high, args=(found.slope_mm,))[0]
         square = (
@@ -54,7 +54,7 @@ def test_mean_cross_sections_are_those_of_the_distribution(parameters, kind, rat
 def test_the_water_that_falls_through_a_level_is_the_rate(parameters, kind, rates):
     """Flux of mass: both distributions were fitted to it, apart from the fall speed used here."""
     for rate in rates:
-        found = population(parameters.kinds[kind].particles, rate)
+        found = make_population(parameters.kinds[kind].particles, rate)
         middle = (found.edges_mm[:-1] + found.edges_mm[1:]) / 2
         flux_mm_h = 3600 * 1e-6 * np.sum(found.density * found.speed * np.pi / 6 * middle**3)
         assert flux_mm_h == pytest.approx(rate, rel=0.3)
@@ -71,7 +71,7 @@ def test_fall_speeds_are_the_published_ones():
 def test_rain_extinction_is_that_of_lowtran(parameters):
     """0.365 R^0.63 km-1 (Shettle 1989)."""
     for rate in RAIN_RATES:
-        assert 1e3 * population(parameters.kinds["rain"].particles, rate).extinction == pytest.approx(
+        assert 1e3 * make_population(parameters.kinds["rain"].particles, rate).extinction == pytest.approx(
             0.365 * rate**0.63, rel=0.02
         )
 
@@ -79,7 +79,7 @@ def test_rain_extinction_is_that_of_lowtran(parameters):
 def test_snow_intensity_classes_have_their_visual_ranges(parameters):
     """Light: 1 km and more; moderate: from 0.5 km; heavy: less (US national weather service)."""
     ranges = [
-        3.0 / population(parameters.kinds["snow"].particles, rate).extinction for rate in (0.3, 1.0, 3.5)
+        3.0 / make_population(parameters.kinds["snow"].particles, rate).extinction for rate in (0.3, 1.0, 3.5)
     ]
     assert ranges[0] > 900
     assert 500 < ranges[1] < 1000
@@ -88,10 +88,10 @@ def test_snow_intensity_classes_have_their_visual_ranges(parameters):
 
 def test_extinction_and_every_rain_class_grow_with_the_rate(parameters):
     rates = np.geomspace(0.5, 80, 30)
-    rain = [population(parameters.kinds["rain"].particles, rate) for rate in rates]
+    rain = [make_population(parameters.kinds["rain"].particles, rate) for rate in rates]
     assert np.all(np.diff([p.extinction for p in rain]) > 0)
     assert np.all(np.diff([p.density for p in rain], axis=0) > 0)
-    snow = [population(parameters.kinds["snow"].particles, rate).extinction for rate in rates]
+    snow = [make_population(parameters.kinds["snow"].particles, rate).extinction for rate in rates]
     assert np.all(np.diff(snow) > 0)
 
 
@@ -99,8 +99,8 @@ def test_what_is_drawn_is_a_part_of_the_whole_extinction(parameters):
     near = parameters.air.near
     distance = np.linspace(0, 20, 81)
     for found in (
-        population(parameters.kinds["rain"].particles, 50.0),
-        population(parameters.kinds["snow"].particles, 3.0),
+        make_population(parameters.kinds["rain"].particles, 50.0),
+        make_population(parameters.kinds["snow"].particles, 3.0),
     ):
         drawn = drawn_optical_depth(found, near, 800.0, distance)
         assert np.all(np.diff(drawn) >= 0)
@@ -110,7 +110,7 @@ def test_what_is_drawn_is_a_part_of_the_whole_extinction(parameters):
 
 
 def test_drawn_optical_depth_is_the_integral_of_the_faded_population(parameters):
-    found, near, focal = population(parameters.kinds["snow"].particles, 2.0), parameters.air.near, 400.0
+    found, near, focal = make_population(parameters.kinds["snow"].particles, 2.0), parameters.air.near, 400.0
     reach = drawn_reach(found, near, focal)
 
     def density(distance: float) -> float:
@@ -132,9 +132,9 @@ def test_moments_of_the_distribution_are_closed_forms():
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])
 def test_a_rate_that_is_none_is_refused(parameters, rate):
     with pytest.raises(InputError, match="rate must be positive"):
-        population(parameters.kinds["rain"].particles, rate)
+        make_population(parameters.kinds["rain"].particles, rate)
 
 
 def test_an_unknown_kind_lists_those_that_exist(parameters):
     with pytest.raises(InputError, match="rain, snow; it is 'hail'"):
-        population(replace(parameters.kinds["rain"].particles, kind="hail"), 1.0)
+        make_population(replace(parameters.kinds["rain"].particles, kind="hail"), 1.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.render.weather.random_streams import lattice_unit, philox, stream_key, unit
+from tasks.render.weather.random_streams import lattice_unit, philox, scale_to_unit, stream_key
 
 
 @pytest.mark.parametrize(
@@ -30,8 +30,8 @@ def test_streams_differ_by_name_and_by_seed():
 
 
 def test_unit_numbers_stay_inside_the_open_interval():
-    assert 0 < unit(np.uint64(0)) < 1e-9
-    assert 1 - 1e-9 < unit(np.uint64(0xFFFFFFFF)) < 1
+    assert 0 < scale_to_unit(np.uint64(0)) < 1e-9
+    assert 1 - 1e-9 < scale_to_unit(np.uint64(0xFFFFFFFF)) < 1
 
 
 def test_lattice_numbers_are_uniform_and_neighbours_are_independent():

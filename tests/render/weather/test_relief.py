@@ -7,7 +7,7 @@ import pytest
 
 from tasks.render.road_edit import RoadRelief, apply_road_profile, measure_road_lift
 from tasks.render.weather.layers import weather_scene
-from tasks.render.weather.relief import ReliefLight, clear_light, relief_ratios, relit, sun_in
+from tasks.render.weather.relief import ReliefLight, clear_light, relief_ratios, relight_gaussians, sun_in
 from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
@@ -149,7 +149,7 @@ def test_a_sun_told_lights_as_the_same_sun_shown(parameters):
 def test_only_the_road_on_the_feature_and_in_its_shadow_changes_colour(parameters):
     relief = relief_of(0.1)
     shaped, _ = apply_road_profile(SCENE.gaussians, relief, 4.0, -4.0)
-    lit = relit(shaped, relief, clear_light(SCENE.gaussians, clear_sky(), parameters.sky))
+    lit = relight_gaussians(shaped, relief, clear_light(SCENE.gaussians, clear_sky(), parameters.sky))
     changed = (lit.sh != shaped.sh).any(axis=(1, 2))
     along = np.abs(SCENE.gaussians.means[:, 0] - 10)
     assert changed.sum() > 100

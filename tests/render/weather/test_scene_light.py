@@ -9,11 +9,11 @@ from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.weather.ground_grid import ground_grid, read_between, window_sums
 from tasks.render.weather.scene_light import (
-    appended,
+    append_gaussians,
     facade_light,
     ground_light,
     mean_colours,
-    recoloured,
+    recolour_gaussians,
     without_sun,
 )
 from tasks.scene.spherical_harmonics import C0
@@ -70,7 +70,7 @@ def test_cloud_lights_the_shaded_side_of_the_street_as_the_sunny_one(half_shaded
     sunny = surfels(points, (0, -1, 0), 0.1, 0.4, SemanticClass.BUILDING)
     shaded = surfels(points, (0, 1, 0), 0.1, 0.1, SemanticClass.BUILDING)
     roof = surfels(points, (0, 0, 1), 0.1, 0.2, SemanticClass.BUILDING)
-    scene = appended(appended(sunny, shaded), roof)
+    scene = append_gaussians(append_gaussians(sunny, shaded), roof)
     light = facade_light(scene)
     n = len(sunny)
     assert light[[0, n, 2 * n]] == pytest.approx([1.0, 0.25, 1.0])
@@ -83,7 +83,7 @@ def test_recolouring_scales_the_whole_colour_in_linear_light(half_shaded):
     for scene in (street, replace(street, display_encoded=True)):
         gain, add = np.full(len(scene), 0.4), np.full((len(scene), 3), 0.05)
         expected = 0.4 * mean_colours(scene) + 0.05
-        assert mean_colours(recoloured(scene, gain, add)) == pytest.approx(expected, rel=1e-4)
+        assert mean_colours(recolour_gaussians(scene, gain, add)) == pytest.approx(expected, rel=1e-4)
 
 
 def test_light_needs_ground_to_be_read_from(half_shaded):

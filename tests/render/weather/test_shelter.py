@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
-from tasks.render.weather.scene_light import appended
+from tasks.render.weather.scene_light import append_gaussians
 from tasks.render.weather.snow.shelter import open_share
 from tests.render.weather.scenes import surfels
 
@@ -28,7 +28,7 @@ def inner(cloud) -> np.ndarray:
 def test_what_reaches_the_lowest_layer_falls_by_its_area_with_every_layer_above(layers):
     cloud = plate(0.0)
     for k in range(layers):
-        cloud = appended(cloud, plate(1.0 + k))
+        cloud = append_gaussians(cloud, plate(1.0 + k))
     share = open_share(cloud)
     low, top = inner(cloud) & (cloud.means[:, 2] == 0), inner(cloud) & (cloud.means[:, 2] == layers)
     density = 2 * np.pi * SIZE**2 * 0.95 / SPACING**2
@@ -38,8 +38,8 @@ def test_what_reaches_the_lowest_layer_falls_by_its_area_with_every_layer_above(
 
 def test_a_wall_above_shades_nothing_and_a_thin_leaf_less_than_a_solid_one():
     low = plate(0.0)
-    wall = appended(low, plate(1.0, (0, 1, 0)))
-    solid, thin = appended(low, plate(1.0)), appended(low, plate(1.0))
+    wall = append_gaussians(low, plate(1.0, (0, 1, 0)))
+    solid, thin = append_gaussians(low, plate(1.0)), append_gaussians(low, plate(1.0))
     thin = replace(thin, opacities=np.where(thin.means[:, 2] == 1, np.float32(0.1), thin.opacities))
     under = [
         open_share(cloud)[inner(cloud) & (cloud.means[:, 2] == 0)].mean() for cloud in (wall, thin, solid)

@@ -12,8 +12,8 @@ from tasks.render.weather.atmosphere import (
     optical_depth,
     precipitating_air,
 )
-from tasks.render.weather.falling.precipitation import population
-from tasks.render.weather.layer import recompose
+from tasks.render.weather.falling.precipitation import make_population
+from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.sky import (
     LUMINANCE,
@@ -32,7 +32,7 @@ WHITE = np.array((1.8, 1.7, 1.5))
 @pytest.fixture
 def air(parameters):
     return precipitating_air(
-        population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 400.0, 12000.0
+        make_population(parameters.kinds["rain"].particles, 25.0), parameters.air.near, 400.0, 12000.0
     )
 
 
@@ -128,7 +128,7 @@ def test_the_sky_is_replaced_and_the_street_relit(parameters, sky, air):
     picture, gbuffer = flat_gbuffer(view)
     clear = clear_sky()
     cloudy = overcast_environment(clear, sky, air.extinction, parameters.sky, 1)
-    lit = recompose(picture, [light_layer(picture, gbuffer, clear, cloudy, sky, pixel_rays(view))])
+    lit = recompose_layers(picture, [light_layer(picture, gbuffer, clear, cloudy, sky, pixel_rays(view))])
     ground = gbuffer.alpha == 1
     assert lit[ground] == pytest.approx(picture[ground] @ sky.relight.T, rel=1e-5)
     assert np.all(lit[~ground] <= cloudy.max(axis=(0, 1)) + 1e-6)
@@ -142,7 +142,7 @@ def test_half_covered_pixels_change_their_own_share_only(parameters, sky, air):
     cloudy = np.full((8, 16, 3), 0.9, np.float32)
     half = replace(gbuffer, alpha=np.full_like(gbuffer.alpha, 0.5))
     picture = np.full((64, 96, 3), 0.5 * 0.2 + 0.5 * 0.6, np.float32)
-    lit = recompose(picture, [light_layer(picture, half, clear, cloudy, sky, pixel_rays(view))])
+    lit = recompose_layers(picture, [light_layer(picture, half, clear, cloudy, sky, pixel_rays(view))])
     assert lit == pytest.approx(np.broadcast_to(0.1 * sky.relight.sum(axis=1) + 0.45, lit.shape), rel=1e-5)
 
 
@@ -152,7 +152,7 @@ def test_contrast_falls_with_distance_as_koschmieder_says(parameters, sky, air):
     cloudy = np.tile(sky.airlight.astype(np.float32), (8, 16, 1))
     air = replace(air, extinction=0.05, drawn=np.linspace(0, 0.3, len(air.drawn)))
     layer = air_layer(gbuffer, cloudy, air, sky, pixel_rays(view))
-    veiled = recompose(picture, [layer])
+    veiled = recompose_layers(picture, [layer])
     distance = gbuffer.depth * np.linalg.norm(pixel_rays(view), axis=-1)
     seen = gbuffer.alpha == 1
     contrast = (veiled[seen] - sky.airlight) / (picture[seen] - sky.airlight)
@@ -163,7 +163,7 @@ def test_contrast_falls_with_distance_as_koschmieder_says(parameters, sky, air):
 
 
 def test_veil_and_drawn_particles_together_take_the_light_once(parameters, air):
-    falling = population(parameters.kinds["rain"].particles, 25.0)
+    falling = make_population(parameters.kinds["rain"].particles, 25.0)
     whole = (falling.extinction + extinction_of_visual_range(12000.0)) * 30.0
     assert optical_depth(air, np.array(30.0)) + air.drawn[-1] == pytest.approx(whole)
     distance = np.linspace(0, 30, 200)
@@ -175,7 +175,10 @@ def test_heavier_weather_veils_more(parameters):
         depths = [
             optical_depth(
                 precipitating_air(
-                    population(parameters.kinds[kind].particles, rate), parameters.air.near, 400.0, 12000.0
+                    make_population(parameters.kinds[kind].particles, rate),
+                    parameters.air.near,
+                    400.0,
+                    12000.0,
                 ),
                 np.array(60.0),
             )

@@ -11,9 +11,9 @@ from tasks.conventions import SemanticClass
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
 from tasks.render.weather.layers import pixel_rays
-from tasks.render.weather.scene_light import appended, mean_colours, without
+from tasks.render.weather.scene_light import append_gaussians, mean_colours, remove_gaussians
 from tasks.render.weather.snow.field import coverage_rank, local_depth_mm, snow_field, tracks_at
-from tasks.render.weather.snow.layer import hidden_share, snow_layer, snowed_over, whitened
+from tasks.render.weather.snow.layer import hidden_share, snow_layer, snowed_over, whiten_gaussians
 from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.scene.route import Route
 from tasks.scene.surroundings import add_surroundings
@@ -125,7 +125,7 @@ def test_what_stands_up_or_floats_is_no_anchor(street, parameters):
     kerb = surfels(np.array([[5.0, 0.0, 0.05]]), (0, 1, 0), 0.04, 0.2, SemanticClass.ROAD)
     floating = surfels(np.array([[6.0, 0.0, 0.3]]), (0, 0, 1), 0.04, 0.2, SemanticClass.ROAD)
     grass = surfels(np.array([[7.0, 0.0, 0.0]]), (0, 0, 1), 0.04, 0.2, SemanticClass.TERRAIN)
-    scene = appended(appended(appended(street, kerb), floating), grass)
+    scene = append_gaussians(append_gaussians(append_gaussians(street, kerb), floating), grass)
     anchors = road_anchors(scene, parameters.kinds["snow"].snow_cover.anchors)
     assert set(range(len(street), len(scene))).isdisjoint(anchors.index.tolist())
     assert len(anchors.index) == len(street)
@@ -152,7 +152,9 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
         field = field_of(street, parameters)
         amount = (coverage, 20.0 * coverage, parameters.kinds["snow"].snow_cover)
         snow = snow_layer(street, field, WHITE, *amount)
-        scene = appended(without(whitened(street, field, WHITE, *amount), snow.buried), snow.gaussians)
+        scene = append_gaussians(
+            remove_gaussians(whiten_gaussians(street, field, WHITE, *amount), snow.buried), snow.gaussians
+        )
         gbuffer = rasterise(prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
         inside = gbuffer.alpha > 0.9
         place = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
@@ -173,9 +175,11 @@ def test_snow_is_as_bright_as_its_albedo_in_the_light(street, parameters):
 def test_snow_settles_on_what_faces_up_and_leaves_walls_bare(street, parameters):
     flat = surfels(np.array([[5.0, 5.0, 0.1]]), (0, 0, 1), 0.1, 0.1, SemanticClass.SIDEWALK)
     wall = surfels(np.array([[5.0, 6.0, 1.0]]), (0, 1, 0), 0.1, 0.1, SemanticClass.BUILDING)
-    scene = appended(appended(street, flat), wall)
+    scene = append_gaussians(append_gaussians(street, flat), wall)
     field = field_of(scene, parameters)
-    colours = mean_colours(whitened(scene, field, WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover))
+    colours = mean_colours(
+        whiten_gaussians(scene, field, WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover)
+    )
     assert colours[-2].mean() > 1.0
     assert colours[-1] == pytest.approx(mean_colours(scene)[-1], rel=1e-5)
 
@@ -187,9 +191,11 @@ def test_under_a_roof_the_ground_is_white_and_what_stands_on_it_is_bare(street, 
         surfels(np.array([[5.0, 6.0, height]]), (0, 0, 1), 0.1, 0.1, kind)
         for height, kind in ((1.0, SemanticClass.OTHER), (0.1, SemanticClass.SIDEWALK))
     )
-    scene = appended(appended(appended(street, roof), table), ground)
+    scene = append_gaussians(append_gaussians(append_gaussians(street, roof), table), ground)
     colours = mean_colours(
-        whitened(scene, field_of(scene, parameters), WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover)
+        whiten_gaussians(
+            scene, field_of(scene, parameters), WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover
+        )
     )
     assert colours[-1].mean() > 1.0 and colours[len(street)].mean() > 1.0
     assert colours[-2].mean() < 0.2

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
-from tasks.render.weather.layer import recompose
+from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.sky import LUMINANCE, sky_light
-from tasks.render.weather.wet.puddles import water_surface, wetness
+from tasks.render.weather.wet.puddles import compute_wetness, water_surface
 from tasks.render.weather.wet.reflection import mirrored_scene
 from tasks.render.weather.wet.wet_road import fresnel_reflectance, wet_albedo_ratio, wet_layer
 from tests.render.weather.conftest import shutter
@@ -70,7 +70,7 @@ def test_the_film_drowns_more_of_the_road_everywhere_as_it_rises(parameters):
     assert np.all(np.diff([share[road].mean() for share in shares]) > 0)
     assert shares[-1][road].min() > 0.99
     assert all(share[~road].max() == 0 for share in shares)
-    assert np.all(np.diff([wetness(film, parameters.kinds["rain"].film.water) for film in FILMS]) > 0)
+    assert np.all(np.diff([compute_wetness(film, parameters.kinds["rain"].film.water) for film in FILMS]) > 0)
 
 
 def test_reflection_grows_and_the_road_darkens_with_the_film(parameters, sky):
@@ -82,9 +82,9 @@ def test_reflection_grows_and_the_road_darkens_with_the_film(parameters, sky):
 
 def test_a_dry_film_changes_nothing_and_a_thin_one_little(parameters, sky):
     picture, _, layer = wet(parameters, sky, 0.0)
-    assert np.array_equal(recompose(picture, [layer]), picture)
+    assert np.array_equal(recompose_layers(picture, [layer]), picture)
     _, _, thin = wet(parameters, sky, 0.001)
-    assert np.abs(recompose(picture, [thin]) - picture).max() < 0.02
+    assert np.abs(recompose_layers(picture, [thin]) - picture).max() < 0.02
 
 
 def test_only_the_road_gets_wet(parameters, sky):
@@ -92,7 +92,7 @@ def test_only_the_road_gets_wet(parameters, sky):
     other = gbuffer.class_id != 1
     assert np.all(layer.gain[other] == 1)
     assert np.all(layer.add[other] == 0)
-    assert np.abs(recompose(picture, [layer])[~other] - picture[~other]).min() > 0
+    assert np.abs(recompose_layers(picture, [layer])[~other] - picture[~other]).min() > 0
 
 
 def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):

@@ -1,9 +1,9 @@
-"""Where drops and flakes are: the streaks that the shutter sees, in any frame, without a frame before it.
+"""Streaks of drops and flakes that the shutter sees, in any frame, independently of other frames.
 
-The air of one size class moves as a whole, so its particles are fixed in a lattice of cells that drifts with
-fall and wind. Philox, keyed by seed and stream and counted by cell, says what a cell holds: nothing is
-carried from frame to frame, a frame drawn alone has the same bits as in a sequence, and a higher rate adds
-particles to those that are there.
+All particles of a size class move with one velocity, so they are at rest in a lattice of cells that drifts with
+fall and wind. The random generator Philox, with seed and stream as key and the cell as counter, gives the particles of
+a cell. No state passes from frame to frame: a frame drawn alone has the same bits as in a sequence, and a higher
+rate adds particles to those of a lower one.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tasks.render.lens import Lens, distort_rays, undistort_points
 from tasks.render.weather.falling.precipitation import NearField, Population, drawn_reach
-from tasks.render.weather.random_streams import philox, stream_key, unit
+from tasks.render.weather.random_streams import philox, scale_to_unit, stream_key
 
 STREAK = np.dtype(
     [
@@ -48,10 +48,10 @@ class Shutter:
     width, height : picture size [px]
     velocity : float64 [3] velocity of the camera in the world [m s-1]
     time_s : time of the middle of the exposure [s]
-    exposure_s : how long the shutter is open [s]
+    exposure_s : time that the shutter is open [s]
     lens : distortion; None for a pinhole
-    line_delay_s : from one row's exposure to the next one's; the pose and time are those of the middle row, about
-        which the camera goes on at its velocity [s]
+    line_delay_s : time from one row's exposure to the next one's; pose and time are those of the middle row, and the
+        camera moves at constant velocity about them [s]
     """
 
     T_world_camera: NDArray[np.float64]
@@ -68,7 +68,7 @@ class Shutter:
 def visible_streaks(
     population: Population, near: NearField, shutter: Shutter, wind: NDArray[np.float64], seed: int
 ) -> NDArray[np.void]:
-    """The near particles in view during one exposure.
+    """Return the near particles in view during one exposure.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def visible_streaks(
     for index in np.flatnonzero(reach):
         velocity = wind - np.array((0.0, 0.0, population.speed[index]))
         cell = float(population.cell_m[index])
-        # in the frame of the falling class it is the camera that moves
+        # in the frame of the falling particles the camera moves
         seat = shutter.T_world_camera[:3, 3] - velocity * shutter.time_s
         hull = np.vstack((np.zeros(3), rays * reach[index])) @ R + seat
         low = np.floor((hull.min(axis=0) - p.flutter_m - near.nearest_m) / cell).astype(np.int64)
@@ -115,7 +115,7 @@ def visible_streaks(
 
 
 def _corner_rays(shutter: Shutter, K: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners [4, 3] of the view, or of the rectangle around what a lens spreads it to, camera z 1."""
+    """Return the corners [4, 3] of the view, or of a rectangle around the distorted view of a lens, at camera z 1."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
     if shutter.lens is not None:
         around = np.vstack((corners, ((0.5, 0.0), (0.5, 1.0), (0.0, 0.5), (1.0, 0.5))))
@@ -128,7 +128,7 @@ def _corner_rays(shutter: Shutter, K: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def _frustum_planes(rays: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inward unit normals of the four side planes of the view, in camera axes, from its corner rays."""
+    """Return inward unit normals of the four side planes of the view, in camera axes, from its corner rays."""
     around = rays[[0, 1, 3, 2]]
     normals = np.cross(around, np.roll(around, -1, axis=0))
     normals *= np.sign(normals @ rays.mean(axis=0))[:, None]
@@ -137,7 +137,7 @@ def _frustum_planes(rays: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @numba.njit(cache=True, nogil=True)
 def _outside(point, planes, radius, reach):  # type: ignore[no-untyped-def]
-    """Whether a sphere lies wholly outside the view or beyond the reach."""
+    """Return whether a sphere lies completely outside the view or beyond the reach."""
     outside = point[0] ** 2 + point[1] ** 2 + point[2] ** 2 > (reach + radius) ** 2
     for plane in planes:
         outside |= plane[0] * point[0] + plane[1] * point[1] + plane[2] * point[2] < -radius
@@ -146,7 +146,7 @@ def _outside(point, planes, radius, reach):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _poisson(chance, mean):  # type: ignore[no-untyped-def]
-    """Poisson number by inversion: it never falls when the mean rises, so populations are nested in the rate."""
+    """Return a Poisson number by inversion; it never falls when the mean rises: populations are nested in the rate."""
     number, share = 0, exp(-mean)
     while chance > share and number < MOST_PER_CELL:
         chance -= share
@@ -163,7 +163,7 @@ def _turn(R, vector, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _sway(offset, moving, amplitude, rate, time, turn_x, turn_y, quickness, size):  # type: ignore[no-untyped-def]
-    """Move a flake sideways along its own slow ellipse, and give it the velocity of that."""
+    """Add a flake's own slow elliptic motion to its position and velocity."""
     amplitude *= 0.3 + 0.7 * size
     rate *= 0.6 + 0.8 * quickness
     for i in range(2):
@@ -175,7 +175,7 @@ def _sway(offset, moving, amplitude, rate, time, turn_x, turn_y, quickness, size
 
 @numba.njit(cache=True, nogil=True)
 def _expose(streak, place, motion, exposure, K):  # type: ignore[no-untyped-def]
-    """Where the picture shows a particle when the shutter opens and when it closes."""
+    """Write the pixels of a particle when the shutter opens and when it closes."""
     z = place[2]
     first = max(z - 0.5 * exposure * motion[2], NEAREST_Z_SHARE * z)
     last = max(z + 0.5 * exposure * motion[2], NEAREST_Z_SHARE * z)
@@ -187,7 +187,7 @@ def _expose(streak, place, motion, exposure, K):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _seen_at(place, motion, time, K, coefficients):  # type: ignore[no-untyped-def]
-    """Where the lens shows a particle at a time from the middle of the frame [px]."""
+    """Return the distorted pixel of a particle at a time from the middle of the frame [px]."""
     z = max(place[2] + time * motion[2], NEAREST_Z_SHARE * place[2])
     x, y = (place[0] + time * motion[0]) / z, (place[1] + time * motion[1]) / z
     x, y = distort_rays(x, y, coefficients)
@@ -198,8 +198,8 @@ def _seen_at(place, motion, time, K, coefficients):  # type: ignore[no-untyped-d
 def _expose_by_rows(streak, place, motion, exposure, K, coefficients, line_delay, height):  # type: ignore[no-untyped-def]
     """`_expose` behind a lens, by a shutter that opens for one row after the other.
 
-    A particle is seen at the time t of the row that it is in, t = line_delay (row(t) - middle). One that falls
-    with the rows stays in them longer, 1 / (1 - line_delay row'), and leaves so much more light.
+    A particle is seen at the time t of its row, t = line_delay (row(t) - middle). A particle that moves in the
+    direction of the readout is exposed longer, by 1 / (1 - line_delay row'), and leaves that much more light.
     """
     half = 0.5 * abs(line_delay) * height
     time = 0.0
@@ -221,7 +221,7 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
     low, high, cell, mean, key, index, sizes, size_scale, velocity, flutter, flutter_rate, time,
     seat, R, planes, K, camera_velocity, exposure, nearest, reach, fade, coefficients, line_delay, height,
 ):  # fmt: skip
-    """The streaks of one size class: cells ``low`` to ``high``, each with its own counter."""
+    """Return the streaks of one size class in the cells ``low`` to ``high``, each with its own counter."""
     streaks = np.empty(256, dtype=STREAK)
     found = 0
     offset, moving, place, motion = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -240,14 +240,14 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
                     continue
                 cx, cy, cz = np.uint64(kx) & word32, np.uint64(ky) & word32, np.uint64(kz) & word32
                 first, _, _, _ = philox(cx, cy, cz, index, key)
-                for j in range(_poisson(unit(first), mean)):
+                for j in range(_poisson(scale_to_unit(first), mean)):
                     block = index + np.uint64(256 * (2 * j + 1))
                     w0, w1, w2, w3 = philox(cx, cy, cz, block, key)
-                    offset[0], offset[1], offset[2] = unit(w0), unit(w1), unit(w2)
+                    offset[0], offset[1], offset[2] = scale_to_unit(w0), scale_to_unit(w1), scale_to_unit(w2)
                     for i in range(3):
                         offset[i] = corner[i] + cell * offset[i]
                         moving[i] = velocity[i] - camera_velocity[i]
-                    diameter = size_scale * log(sizes[0] - unit(w3) * (sizes[0] - sizes[1]))
+                    diameter = size_scale * log(sizes[0] - scale_to_unit(w3) * (sizes[0] - sizes[1]))
                     if flutter > 0:
                         w0, w1, w2, w3 = philox(cx, cy, cz, block + np.uint64(256), key)
                         _sway(
@@ -256,10 +256,10 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
                             flutter,
                             flutter_rate,
                             time,
-                            unit(w0),
-                            unit(w1),
-                            unit(w2),
-                            unit(w3),
+                            scale_to_unit(w0),
+                            scale_to_unit(w1),
+                            scale_to_unit(w2),
+                            scale_to_unit(w3),
                         )
                     distance = sqrt(offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2)
                     if distance < nearest or distance > reach:

@@ -161,7 +161,7 @@ def power_fall_speed(
 FALL_SPEED = {"rain": atlas_fall_speed, "snow": power_fall_speed}
 
 
-def population(parameters: ParticleParameters, rate_mm_h: float) -> Population:
+def make_population(parameters: ParticleParameters, rate_mm_h: float) -> Population:
     """The particles in the air at one precipitation rate.
 
     Parameters

@@ -7,7 +7,12 @@ from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.weather.coverage_field import FieldParameters, height_field
-from tasks.render.weather.scene_light import appended, recoloured, to_display_unclipped, without
+from tasks.render.weather.scene_light import (
+    append_gaussians,
+    recolour_gaussians,
+    remove_gaussians,
+    to_display_unclipped,
+)
 from tasks.render.weather.snow.field import SnowField, coverage_rank, local_depth_mm, tracks_at
 from tasks.render.weather.snow.road_anchors import AnchorParameters, road_anchors
 from tasks.render.weather.snow.shelter import open_share
@@ -183,10 +188,10 @@ def snowed_over(gaussians: Gaussians, snow: SnowLayer) -> Gaussians:
         about = gaussians.surroundings.copy()
         about[snow.anchors, 0] *= (1 + snow.cover).astype(np.float32)
         gaussians = replace(gaussians, surroundings=about)
-    return appended(without(gaussians, snow.buried), snow.gaussians)
+    return append_gaussians(remove_gaussians(gaussians, snow.buried), snow.gaussians)
 
 
-def whitened(
+def whiten_gaussians(
     gaussians: Gaussians,
     field: SnowField,
     white: NDArray[np.floating],
@@ -234,7 +239,7 @@ def whitened(
     damp = np.where(road, p.damp_albedo_ratio, 1.0)
     even = np.zeros(len(gaussians))
     snow = _snow_colour(even, even, white, p)
-    return recoloured(gaussians, (1 - hidden) * damp, hidden[:, None] * snow)
+    return recolour_gaussians(gaussians, (1 - hidden) * damp, hidden[:, None] * snow)
 
 
 def steepest_bearing(parameters: SnowCoverParameters) -> float:

@@ -1,4 +1,4 @@
-"""Where water stands smooth on the road: film level against texture and unevenness, point by point."""
+"""Smooth water on the road: the level of the film against texture and unevenness, at each pixel."""
 
 from dataclasses import dataclass
 from math import erf, exp, sqrt
@@ -13,15 +13,15 @@ from tasks.render.weather.random_streams import stream_key
 
 @dataclass(frozen=True, kw_only=True)
 class RoadWaterParameters:
-    """How a film of water lies on the road.
+    """Parameters of a film of water on the road.
 
     Parameters
     ----------
     wetting_mm : film depth at which 1 - 1/e of the surface is wet [mm]
     texture_depth_mm : mean texture depth; the film is measured from the bottom of the texture [mm]
     texture_spread_mm : standard deviation of the heights of the texture's peaks [mm]
-    unevenness_mm : standard deviation of the road's level over metres; water gathers where it is low [mm]
-    unevenness : its waves
+    unevenness_mm : standard deviation of the road's level over metres; water gathers at low places [mm]
+    unevenness : waves of that level
     ripple_slope : standard deviation of the slope of standing water and smooth film [1]
     ripple_m : length of those ripples [m]
     """
@@ -35,13 +35,13 @@ class RoadWaterParameters:
     ripple_m: float
 
 
-def wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> float:
-    """Share of the road surface that is wet, 0 on a dry road and rising with the film.
+def compute_wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> float:
+    """Return the share of the road surface that is wet, 0 on a dry road and rising with the film [1].
 
     Parameters
     ----------
     film_depth_mm : total film depth h_t [mm]
-    parameters : how the film lies
+    parameters : parameters of the film
 
     Returns
     -------
@@ -53,7 +53,7 @@ def wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class WaterSurface:
-    """The water on the road pixels of one frame; 0 elsewhere.
+    """Smooth water on the road pixels of one frame; 0 elsewhere.
 
     Parameters
     ----------
@@ -78,10 +78,10 @@ def water_surface(
     parameters: RoadWaterParameters,
     seed: int,
 ) -> WaterSurface:
-    """Where the film drowns the road's texture, and how its surface lies.
+    """Return the share of smooth water and the normals of its surface.
 
-    The texture's peaks are normally distributed about the mean texture depth and the water level about the
-    film depth: the smooth share is the probability that a peak is drowned. It rises with the film everywhere.
+    The texture's peaks are normally distributed about the mean texture depth, and the water level varies about the
+    film depth. The smooth share is the probability that a peak is below the water level; it rises with the film.
 
     Parameters
     ----------
@@ -89,10 +89,10 @@ def water_surface(
     rays : float32 [H, W, 3] world directions of the pixels, of camera z 1 [1]
     normal : float32 [H, W, 3] unit normals of the road, world frame [1]
     road : bool [H, W] pixels to compute
-    eye : [3] place of the camera [m]
+    eye : [3] position of the camera [m]
     focal_px : focal length [px]
     film_depth_mm : total film depth h_t [mm]
-    parameters : how the film lies
+    parameters : parameters of the film
     seed : visual seed of the clip [1]
 
     Returns
@@ -107,7 +107,7 @@ def water_surface(
     )
     _water(
         depth, rays, normal, road, np.asarray(eye, dtype=np.float64), focal_px,
-        film_depth_mm, wetness(film_depth_mm, p), p.texture_depth_mm, p.texture_spread_mm,
+        film_depth_mm, compute_wetness(film_depth_mm, p), p.texture_depth_mm, p.texture_spread_mm,
         p.unevenness_mm, p.unevenness.coarsest_m, p.unevenness.octaves, p.unevenness.roughness,
         p.ripple_slope, p.ripple_m, np.uint64(stream_key(seed, "puddles")),
         surface.smooth, surface.normal, surface.cosine,

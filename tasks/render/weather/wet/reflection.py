@@ -1,9 +1,9 @@
 """Reflections in a wet road: marching along the mirrored ray through the picture's own depth.
 
-A ray that meets a surface of the picture takes its colour. A ray that passes behind a surface and does not
-come out again takes that surface's colour: a car's front stands for its underside, and no ray that passes
-under so low an edge comes out. A ray that leaves the picture goes on to the surface at its edge, as far as that
-can be believed, and else to the sky: a facade goes on above the frame.
+A ray that meets a surface of the picture takes its colour. A ray that passes behind a surface and stays hidden takes
+that surface's colour; a car's front thus replaces its underside, and every ray that passes below so low an edge stays
+hidden. A ray that leaves the picture continues to the surface at its edge, extended above the frame like a facade, with
+a weight that falls with the distance; the rest of the weight is the sky's.
 """
 
 from math import exp, sqrt
@@ -21,9 +21,10 @@ HALVINGS = 5
 THICKNESS_M, THICKNESS_SHARE = 0.4, 0.04
 NEAREST_Z_M = 0.2
 UNDERSIDE_M = 1.0
-"""A thing whose lower edge is below this, a car or a bench, is solid from there up; crowns and signs are not [m]."""
+"""Height [m] of a lower edge up to which an object (a car, a bench) hides rays that pass below it; tree crowns and
+signs are higher."""
 EDGE_FADE = 0.35
-"""Share of the picture's height over which the surface at its edge is trusted to go on."""
+"""Share of the picture's height over which the weight of the extended surface at its edge falls to 0."""
 
 
 def mirrored_scene(
@@ -37,7 +38,7 @@ def mirrored_scene(
     extinction: float,
     airlight: NDArray[np.floating],
 ) -> NDArray[np.float32]:
-    """Radiance arriving along the mirrored line of sight of every road pixel.
+    """Return the radiance that arrives along the mirrored line of sight of every road pixel.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def mirrored_scene(
     T_world_camera : [4, 4] camera pose [m]
     K : [3, 3] intrinsics [px]
     extinction : extinction coefficient of the air on the way from the mirrored object [m-1]
-    airlight : [3] radiance of air without end [1]
+    airlight : [3] radiance of an infinitely deep layer of air [1]
 
     Returns
     -------
@@ -67,7 +68,7 @@ def mirrored_scene(
 
 @numba.njit(cache=True, nogil=True)
 def _gap(u, v, z, depth):  # type: ignore[no-untyped-def]
-    """How far a point of the ray lies behind the surface seen at its pixel [m]; negative in front of it."""
+    """Return the distance of a point of the ray behind the surface seen at its pixel [m]; negative in front of it."""
     surface = depth[int(v), int(u)]
     return z - surface if surface == surface else np.float32(-1e9)
 
@@ -87,7 +88,7 @@ def _blend_pixel(picture, u, v, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _place(origin, direction, t, camera):  # type: ignore[no-untyped-def]
-    """Pixel coordinates and camera z of a point of the ray."""
+    """Return pixel coordinates and camera z of a point of the ray."""
     z = origin[2] + t * direction[2]
     u = camera[0] * (origin[0] + t * direction[0]) / z + camera[2]
     v = camera[1] * (origin[1] + t * direction[1]) / z + camera[3]
@@ -96,7 +97,7 @@ def _place(origin, direction, t, camera):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-untyped-def]
-    """Where a ray that left the picture at (u, v) meets the surface at its edge, gone on: u, v, t, belief."""
+    """Return u, v, t and weight where a ray that left the picture meets the extended surface at the edge (u, v)."""
     height, width = depth.shape
     edge_u = min(max(u, np.float32(0.5)), np.float32(width - 0.5))
     edge_v = min(max(v, np.float32(0.5)), np.float32(height - 0.5))
@@ -111,9 +112,9 @@ def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-
 
 @numba.njit(cache=True, nogil=True)
 def _march(origin, direction, climb, depth, camera):  # type: ignore[no-untyped-def]
-    """Follow a ray through the depth picture: pixel (u, v) and length t of what it meets, and how far to believe it.
+    """Follow a ray through the depth picture; return pixel (u, v) and length t where it meets a surface, and a weight.
 
-    ``climb`` is how far the ray rises over the road by its length.
+    ``climb`` is the rise of the ray above the road per length.
     """
     height, width = depth.shape
     step, t = np.float32(FIRST_STEP_M) + np.float32(0.02) * origin[2], np.float32(0)

@@ -18,7 +18,7 @@ from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.layer import Layer
 from tasks.render.weather.sky import LUMINANCE, SkyLight
-from tasks.render.weather.wet.puddles import RoadWaterParameters, water_surface, wetness
+from tasks.render.weather.wet.puddles import RoadWaterParameters, compute_wetness, water_surface
 from tasks.render.weather.wet.reflection import mirrored_scene
 
 
@@ -137,7 +137,7 @@ def wet_layer(
     facing = np.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
     drained = np.where(np.isin(gbuffer.class_id, DRAINED_CLASSES), facing, np.float32(0))
     _wet(
-        picture, road, drained, water.smooth, water.cosine, sharp, rough, wetness(film_depth_mm, p.water),
+        picture, road, drained, water.smooth, water.cosine, sharp, rough, compute_wetness(film_depth_mm, p.water),
         p.water.ripple_slope, p.rough_slope, p.refractive_index, p.diffuse_reflectance,
         LUMINANCE / float(LUMINANCE @ sky.white), gain, add,
     )  # fmt: skip
