@@ -16,15 +16,6 @@ from tasks.vehicle.parameters import Vehicle
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 SPEED_AND_ACCELERATION = ("speed", "longitudinal_acceleration")
-LIBRARY = tuple(
-    effect
-    for effect in load_effects()
-    if effect.name in {
-        "aerodynamic_drag", "brake_dead_time", "brake_lag", "pressure_nonlinearity", "retuned_pressure_gain",
-        "rolling_resistance",
-    }
-)  # fmt: skip
-"""What is found here and what may be taken for it."""
 STOPS = ((27.0, 1.2), (20.0, 2.4), (16.0, 1.5), (22.0, 2.0))
 """Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
 
@@ -53,7 +44,9 @@ def own_channels(run: Run, channels: tuple[str, ...], held_out: bool) -> Run:
 
 
 def judge(campaign: Campaign, vehicle: Vehicle = VEHICLE) -> JointTrace:
-    return judge_jointly(campaign, vehicle, SURFACE, LIBRARY, load_joint_numbers(), load_decision_rules())
+    return judge_jointly(
+        campaign, vehicle, SURFACE, load_effects(), load_joint_numbers(), load_decision_rules()
+    )
 
 
 @cache
