@@ -73,7 +73,7 @@ def first_failure(tree: Path, kernels: Path, tests: list[str]) -> str | None:
     )  # fmt: skip
     try:
         output, _ = running.communicate(timeout=LONGEST_S)
-    except subprocess.TimeoutExpired:
+    except BaseException:  # time is up, or the study is interrupted
         os.killpg(running.pid, signal.SIGKILL)  # with the processes that the tests started
         running.communicate()
         raise
