@@ -42,6 +42,7 @@ class DecisionRulesEntry(CatalogueEntry):
     retune_widening: Level
     error_resamples: Count
     worse_limit: Level
+    noticed_share: Share
     longest_lag: Annotated[Scalar, require_quantity("s", above=0)]
     profile_points: Count
     profile_tolerance: Share

@@ -22,6 +22,30 @@ def own_notes_of_places(tmp_path_factory):
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def compiled_kernels(tmp_path_factory):
+    """Two workers compile the large kernels in turn, each other ones first, so that neither does what the other did."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
+    if not worker:
+        return
+    from tests import kernels
+
+    jobs = [
+        kernels.compile_rasteriser,
+        kernels.compile_vehicle,
+        kernels.compile_double_track,
+        kernels.compile_weather,
+    ]
+    first = int(worker.removeprefix("gw")) % len(jobs)
+    for job in jobs[first:] + jobs[:first]:
+        with (tmp_path_factory.getbasetemp().parent / f"{job.__name__}.lock").open("a+") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            lock.seek(0)
+            if not lock.read():
+                job(tmp_path_factory.mktemp("kernels"))
+                lock.write("done")
+
+
 @pytest.fixture
 def outside_data() -> Path:
     """The folder with reference/ and measured/; skips where it is absent."""
@@ -43,6 +67,4 @@ def toy_dataset(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("toy")
     grid = write_toy_grid(folder, frames=11)
-    with (tmp_path_factory.getbasetemp().parent / "toy.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # of two workers the second finds the kernels compiled
-        return generate_dataset(grid, str(folder / "data"), runner="threads", workers=2).layout
+    return generate_dataset(grid, str(folder / "data"), runner="threads", workers=2).layout

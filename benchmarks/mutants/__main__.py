@@ -1,24 +1,32 @@
 """``python -m benchmarks.mutants [--count 40] [--seed 1] [--under tasks]``: how many changes do the tests catch?
 
-Each change is made in a copy of the tree. The tests of the folder that mirrors the changed one run first, then the test
-files that import the changed module, then those that import its folder; the first failure ends the run.
+Each change is made in a copy of the tree. The test files that import the changed one run first, then those of the
+folder that mirrors its own, then those that import its folder. The first failure ends the run, and so does a group of
+tests after which ``--cpu-s`` are spent. ``--numbers 3 17`` asks again about some of the chosen changes.
 """
 
 import argparse
 import json
 import os
 import random
+import resource
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.mutants.kernels import kernels_of_a_change
+from benchmarks.mutants.nearest_tests import list_nearest_tests
 from benchmarks.mutants.places import Place, places_of
 from manifests.provenance import SOURCE_ROOT
 
-LONGEST_S = 900.0
-"""A change with which a test goes on for ever is caught [s]."""
+LONGEST_S = 600.0
+"""One group of tests may take this long by the clock [s]; what ends in time only without a change has caught it."""
+ENOUGH_CPU_S = 120.0
+"""Work of tests on one change after which no further group is asked [s]: a change that the nearest miss survives."""
+SHARE = 0.9
+"""Least share of the changes that have to be caught [1]."""
 
 
 def chosen_places(tree: Path, under: str, count: int, seed: int) -> list[Place]:
@@ -41,69 +49,86 @@ def chosen_places(tree: Path, under: str, count: int, seed: int) -> list[Place]:
     return random.Random(seed).sample(places, min(count, len(places)))
 
 
-def tests_for(tree: Path, file: Path) -> Iterator[list[str]]:
-    """Yield test files, those nearest to a changed file first; none twice.
+def first_failure(tree: Path, kernels: Path, tests: list[str]) -> str | None:
+    """Return the first test that fails, or None.
 
     Parameters
     ----------
-    tree : root of the sources
-    file : path of the changed file in it
+    tree : sources and tests
+    kernels : folder of compiled kernels
+    tests : files, or names of tests
+
+    Raises
+    ------
+    subprocess.TimeoutExpired
+        If they take longer than `LONGEST_S`.
     """
-    tests = sorted((tree / "tests").rglob("test_*.py"))
-    mirror = tree.joinpath("tests", *file.parts[1:-1])
-    while not mirror.is_dir():
-        mirror = mirror.parent
-    texts = {path: path.read_text(encoding="utf-8") for path in tests}
-    module, folder = ".".join(file.with_suffix("").parts), ".".join(file.parent.parts)
-    seen: set[Path] = set()
-    for group in (
-        [path for path in tests if module in texts[path]],
-        [path for path in tests if path.is_relative_to(mirror) and mirror.name != "tests"],
-        [path for path in tests if f"from {folder}" in texts[path]],
-    ):
-        fresh = [str(path.relative_to(tree)) for path in group if path not in seen]
-        seen.update(group)
-        if fresh:
-            yield fresh
-
-
-def caught_by(tree: Path, place: Place) -> str | None:
-    """Return the first test that fails with a change, or None; the tree is left as it was.
-
-    Parameters
-    ----------
-    tree : a copy of the sources, to change
-    place : the change
-    """
-    file = tree / place.file
-    sound = file.read_text(encoding="utf-8")
-    file.write_text(place.applied(sound), encoding="utf-8")
-    environment = os.environ | {"PYTHONPATH": str(tree), "MUSYNC_CACHE": str(tree / ".cache")}
-    environment.pop("NUMBA_CACHE_DIR", None)
+    environment = os.environ | {
+        "PYTHONPATH": str(tree), "MUSYNC_CACHE": str(kernels.parent / "cache"), "NUMBA_CACHE_DIR": str(kernels)
+    }  # fmt: skip
+    running = subprocess.Popen(
+        [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests],
+        cwd=tree, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        start_new_session=True,
+    )  # fmt: skip
     try:
-        for tests in tests_for(tree, place.file):
-            command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-            done = subprocess.run(
-                command, cwd=tree, env=environment, capture_output=True, text=True, timeout=LONGEST_S
-            )
-            if done.returncode not in (0, 5):
-                failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-                if not failed:
-                    return f"exit code {done.returncode}"
-                name = failed[0].split(" - ")[0].split(" ", 1)[1]
+        output, _ = running.communicate(timeout=LONGEST_S)
+    except BaseException:  # time is up, or the study is interrupted
+        os.killpg(running.pid, signal.SIGKILL)  # with the processes that the tests started
+        running.communicate()
+        raise
+    if running.returncode in (0, 5):
+        return None
+    failed = [line for line in output.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+    return failed[0].split(" - ")[0].split(" ", 1)[1] if failed else f"exit code {running.returncode}"
+
+
+def caught_by(tree: Path, place: Place, enough_cpu_s: float = ENOUGH_CPU_S) -> str | None:
+    """Return the first test that fails with a change and passes without it, or None; the tree is left as it was.
+
+    Parameters
+    ----------
+    tree : a copy of the sources, to change; beside it lie kernels and caches
+    place : the change
+    enough_cpu_s : work after which no further group of tests is asked [s]
+
+    Raises
+    ------
+    RuntimeError
+        If a test fails without the change too.
+    """
+    file, kept = tree / place.file, tree.parent / "kernels"
+    sound, begun = file.read_text(encoding="utf-8"), cpu_of_children()
+    for tests in list_nearest_tests(tree, place.file):
+        if cpu_of_children() - begun > enough_cpu_s:
+            break
+        with kernels_of_a_change(tree, place.file, kept) as kernels:
+            file.write_text(place.applied(sound), encoding="utf-8")
+            try:
+                failed = first_failure(tree, kernels, tests)
+            except subprocess.TimeoutExpired:
+                failed = f"over {LONGEST_S:g} s"
+            finally:
                 file.write_text(sound, encoding="utf-8")
-                again = [*command[: -len(tests)], name]
-                if subprocess.run(again, cwd=tree, env=environment, capture_output=True).returncode:
-                    raise RuntimeError(f"{name} fails without a change too")
-                return name
-    except subprocess.TimeoutExpired:
-        return f"over {LONGEST_S:g} s"
-    finally:
-        file.write_text(sound, encoding="utf-8")
+        if failed is None:
+            continue
+        again = [failed] if failed.startswith("tests/") else tests
+        try:
+            if first_failure(tree, kept, again) is None:
+                return failed
+        except subprocess.TimeoutExpired:
+            return None
+        raise RuntimeError(f"{failed} without a change too")
     return None
 
 
-def copy_of_the_tree(folder: Path) -> Path:
+def cpu_of_children() -> float:
+    """Work of all processes that this one started and that have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def copy_tree(folder: Path) -> Path:
     """Copy what git lists, with changes that are not committed."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
@@ -122,16 +147,20 @@ if __name__ == "__main__":
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--under", default="tasks")
+    parser.add_argument("--cpu-s", type=float, default=ENOUGH_CPU_S)
+    parser.add_argument("--numbers", type=int, nargs="*", help="of the chosen changes, these alone, from 1")
     asked = parser.parse_args()
     survived = []
     with tempfile.TemporaryDirectory() as scratch:
-        tree = copy_of_the_tree(Path(scratch) / "tree")
-        chosen = chosen_places(tree, asked.under, asked.count, asked.seed)
-        for number, place in enumerate(chosen, 1):
-            test = caught_by(tree, place)
+        tree = copy_tree(Path(scratch) / "tree")
+        chosen = list(enumerate(chosen_places(tree, asked.under, asked.count, asked.seed), 1))
+        if asked.numbers:
+            chosen = [chosen[number - 1] for number in asked.numbers]
+        for number, place in chosen:
+            test = caught_by(tree, place, asked.cpu_s)
             what = f"{place.file}:{place.line}: {place.before} -> {place.after}"
-            print(f"{number} of {len(chosen)}: {what}: {test or 'SURVIVED'}", file=sys.stderr, flush=True)
+            print(f"{number}: {what}: {test or 'SURVIVED'}", file=sys.stderr, flush=True)
             survived += [] if test else [what]
     caught = len(chosen) - len(survived)
     print(json.dumps({"places": len(chosen), "caught": caught, "survived": survived}))
-    sys.exit(0 if caught >= 0.9 * len(chosen) else 1)
+    sys.exit(0 if caught >= SHARE * len(chosen) else 1)

@@ -36,6 +36,7 @@ class DecisionRules:
     retune_widening : factor on the session's tolerances when a model is re-tuned without any new effect [1]
     error_resamples : bootstrap resamples of the held-out errors [1]
     worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
+    noticed_share : share of a held-out error below which an effect makes a noticeable difference to it [1]
     longest_lag : longest lag at which residual and brake pressure are correlated [s]
     profile_points : points of the profile likelihood tried on each side of an estimate [1]
     profile_tolerance : relative error of the root deviance at which the profile is followed no further [1]
@@ -69,6 +70,7 @@ class DecisionRules:
     retune_widening: float
     error_resamples: int
     worse_limit: float
+    noticed_share: float
     longest_lag: float
     profile_points: int
     profile_tolerance: float

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tasks.eval.motion_agreement import rms
 from tasks.eval.negative_controls import (
     Claim,
     claims_differ,
@@ -57,6 +58,9 @@ def test_a_sign_flip_and_a_late_frame_are_seen() -> None:
 
 def test_relative_figures_are_left_out_without_a_response() -> None:
     assert "pitch_relative_error" not in score_claims(scale_claimed_pitch(CLAIM, 0.0))
+    least = rms(PITCH - PITCH[0])
+    assert "pitch_relative_error" in score_claim(EXACT, CLAIM, least, TIMES, 2.2)
+    assert "pitch_relative_error" not in score_claim(EXACT, CLAIM, 1.001 * least, TIMES, 2.2)
 
 
 def test_a_copy_that_says_the_same_is_no_fault() -> None:

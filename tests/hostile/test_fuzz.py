@@ -48,9 +48,9 @@ def outcome(documents: Documents, file: str, content: bytes, folder: Path) -> tu
     return read_input(documents, made, folder / document)
 
 
-def test_five_hundred_inputs_are_refused_in_a_sentence_or_sound(shelf):
-    readings = list(read_watched(plan_inputs(list(PARSERS), 500), shelf, seed=12, workers=1))
-    assert len(readings) >= 500 and {reading.parser for reading in readings} == set(BY_NAME)
+def test_two_hundred_inputs_are_refused_in_a_sentence_or_sound(shelf):
+    readings = list(read_watched(plan_inputs(list(PARSERS), 200), shelf, seed=12, workers=1))
+    assert len(readings) >= 200 and {reading.parser for reading in readings} == set(BY_NAME)
     told = [f"{r.parser} {r.number}: {r.outcome}: {r.detail}" for r in readings if r.outcome in FINDINGS]
     assert told == [], "python -m benchmarks.fuzzing --seed 12 --parser P --input N makes one of them again"
 

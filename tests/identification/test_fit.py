@@ -22,7 +22,7 @@ from tasks.identification.decision.screening import screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import differentiate_run, list_second_values
-from tasks.identification.inference.fit import fit_hypotheses
+from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import (
     RunModel,
     compute_starting_speed,
@@ -106,6 +106,22 @@ def test_a_threshold_of_what_starts_at_nothing_is_fitted_once_that_has_moved() -
         iterations=12,
     )  # fmt: skip
     assert fitted.values == pytest.approx([250.0, 5.0], rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("values", "at_bound"), [((0.0, 5.0), True), ((250.0, 0.0), False), ((250.0, 5.0), False), ((250.0, 9.0), True)]
+)  # fmt: skip
+def test_a_second_parameter_at_nothing_is_not_at_its_bound(
+    values: tuple[float, float], at_bound: bool
+) -> None:
+    creep = replace(
+        make_library_hypothesis(LIBRARY["idle_creep"]), lower=np.zeros(2), upper=np.array([600.0, 9.0])
+    )
+    fitted = Fit(
+        parts=(creep,), values=np.array(values), session=np.zeros(7), session_sigma=np.ones(7), objective=0.0,
+        by_run=np.zeros(1), covariance=np.eye(2), residuals=(), offsets=(),
+    )  # fmt: skip
+    assert fitted.at_bound is at_bound
 
 
 def test_the_screen_sees_an_effect_whose_threshold_is_far_from_its_first_value() -> None:

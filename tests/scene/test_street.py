@@ -23,6 +23,22 @@ K = np.array([[400.0, 0, WIDTH / 2], [0, 400.0, HEIGHT / 2], [0, 0, 1]])
 STATIONS = (0.0, 20.0, 60.0, 120.0, 180.0)
 SHORT = StreetLayout(route_length=12.0, behind=5.0, beyond=20.0, crossing_station=4.0)
 
+LOOKED_AT = {
+    "ROAD": (18123, 7.5016008, 0.18857596, 0.94390475, 1.2369227),
+    "MARKING": (2204, 5.1586022, 0.17521527, 0.94, 0.89649423),
+    "KERB": (888, 10.522475, 0.14534356, 0.98500001, 1.2733638),
+    "SIDEWALK": (2486, 10.844647, 0.24825399, 0.98500001, 1.1096402),
+    "BUILDING": (26224, 15.287372, 0.25149393, 0.98500001, 1.205462),
+    "VEGETATION": (5817, 11.996096, 0.096362646, 0.93953006, 1.6193624),
+    "VEHICLE": (740, 11.977965, 0.12019313, 0.98500001, 1.5855928),
+    "POLE": (2148, 7.3199104, 0.065430267, 0.98500001, 1.5649259),
+    "TERRAIN": (68, 13.174334, 0.22201016, 0.98500001, 1.4559844),
+    "OTHER": (369, 6.4211465, 0.058384994, 0.98500001, 1.5205898),
+}
+"""Count of each class of `SHORT` with seed 7, root mean square of its places [m], sizes [m], opacity and colour [1]."""
+ENVIRONMENT = 0.28777942
+"""Its mean radiance [1]."""
+
 
 @pytest.fixture(scope="module")
 def street() -> Scene:
@@ -63,9 +79,29 @@ def road_coordinates(
     return scene.route.station[nearest] + along, np.einsum("ij,ij->i", offset, poses[nearest, :3, 1])
 
 
-def test_bytes_follow_the_seed_alone_whatever_the_global_random_state() -> None:
+@pytest.fixture(scope="module")
+def short() -> Scene:
     np.random.seed(1)  # noqa: NPY002
-    first = every_byte(build_street(7, SHORT))
+    return build_street(7, SHORT)
+
+
+def test_the_street_is_the_one_that_was_looked_at(short: Scene) -> None:
+    """After a change that is meant, and looked at: print what is found and put it here."""
+    gaussians = short.gaussians
+    found = {}
+    for number in np.unique(gaussians.class_id):
+        chosen = gaussians.class_id == number
+        arrays = (gaussians.means, gaussians.scales, gaussians.opacities, gaussians.sh)
+        sizes = (float(np.sqrt(np.mean(np.square(array[chosen], dtype=float)))) for array in arrays)
+        found[SemanticClass(number).name] = (chosen.sum(), *sizes)
+    assert found.keys() == LOOKED_AT.keys()
+    for name, values in LOOKED_AT.items():
+        assert found[name] == pytest.approx(values, rel=1e-6), name
+    assert float(np.mean(short.environment)) == pytest.approx(ENVIRONMENT, rel=1e-6)
+
+
+def test_bytes_follow_the_seed_alone_whatever_the_global_random_state(short: Scene) -> None:
+    first = every_byte(short)
     np.random.seed(2)  # noqa: NPY002
     again, other = every_byte(build_street(7, SHORT)), every_byte(build_street(8, SHORT))
     assert first == again

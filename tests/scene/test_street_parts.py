@@ -40,6 +40,14 @@ def test_course_has_unit_speed_and_the_bend_its_radius() -> None:
     assert np.allclose(1 / curvature[bent], LAYOUT.bend_radius, rtol=1e-4)
 
 
+def test_no_tree_stands_at_a_lamp_of_its_side() -> None:
+    plan = plan_street(replace(LAYOUT, tree_spacing=3.0), 1)
+    assert len(plan.trees) > 50
+    for tree in plan.trees:
+        away = [abs(station - tree.station) for station, side in plan.lamps if side * tree.lateral > 0]
+        assert min(away) >= 2.0
+
+
 def test_world_position_keeps_the_lateral_offset() -> None:
     line = integrate_course(LAYOUT)
     s = np.linspace(0, LAYOUT.route_length, 50)
@@ -102,14 +110,18 @@ def test_open_floor_is_lit_by_lamberts_law_and_loses_the_sun_under_a_roof() -> N
     assert (shaded > 0.1).all()
 
 
-def test_leaves_dim_the_sun_by_the_length_of_the_path_through_them() -> None:
-    line, floor = integrate_course(LAYOUT), white_floor()
-    on_the_way = floor.centre[0] + 10 * sun_direction(LAYOUT)
-    ball = np.array([[[*on_the_way, 1.5]]])
-    sunless = lit_radiance(floor, replace(LAYOUT, sun_rgb=(0.0, 0.0, 0.0)), line, OPEN)
-    full = lit_radiance(floor, LAYOUT, line, OPEN) - sunless
-    dimmed = lit_radiance(floor, LAYOUT, line, replace(OPEN, balls=ball)) - sunless
-    assert np.allclose(dimmed / full, np.exp(-0.9 * 3.0), rtol=1e-3)
+@pytest.mark.parametrize(("azimuth", "distance", "radius"), [(35.0, 10.0, 1.5), (-100.0, 2.0, 0.5)])
+def test_leaves_dim_the_sun_by_the_length_of_the_path_through_them(
+    azimuth: float, distance: float, radius: float
+) -> None:
+    layout = replace(LAYOUT, sun_azimuth_deg=azimuth)
+    line, floor = integrate_course(layout), white_floor()
+    on_the_way = floor.centre[0] + distance * sun_direction(layout)
+    ball = np.array([[[*on_the_way, radius]]])
+    sunless = lit_radiance(floor, replace(layout, sun_rgb=(0.0, 0.0, 0.0)), line, OPEN)
+    full = lit_radiance(floor, layout, line, OPEN) - sunless
+    dimmed = lit_radiance(floor, layout, line, replace(OPEN, balls=ball)) - sunless
+    assert np.allclose(dimmed / full, np.exp(-0.9 * 2 * radius), rtol=2e-3)
 
 
 def test_parked_car_darkens_the_ground_beside_it() -> None:
@@ -126,6 +138,9 @@ def test_crossing_beyond_the_route_is_refused() -> None:
 def test_nearest_depth_is_where_the_point_enters_the_picture() -> None:
     # half the picture is 0.6 wide and 0.4 high at unit depth; the eye is 1.4 m above the road
     assert nearest_depth(LAYOUT, 50.0, 0.0) == pytest.approx(3.5)
+    assert nearest_depth(LAYOUT, 50.0, 0.0, 1.4) == pytest.approx(3.5), (
+        "no cell is smaller than those of the road"
+    )
     assert nearest_depth(LAYOUT, 50.0, -6.0) == pytest.approx(10.0)
     assert nearest_depth(LAYOUT, 50.0, 0.0, 9.4) == pytest.approx(20.0)
     assert nearest_depth(LAYOUT, LAYOUT.route_length + 40, 1.0) == pytest.approx(40.0)

@@ -42,6 +42,19 @@ def test_a_command_and_its_pressure_at_the_samples_drive_alike(run):
         np.testing.assert_allclose(measured.history, commanded.history, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize(("axle", "sign"), [("f", -1.0), ("r", 1.0)])
+def test_a_struts_travel_is_the_body_over_the_wheel_and_its_rate_is_that_of_the_travel(
+    run, vehicle, axle, sign
+):
+    ride = run()
+    arm = vehicle.cg_to_front_axle if axle == "f" else vehicle.cg_to_rear_axle
+    travel, rate = (ride.column(f"suspension_{name}_{axle}") for name in ("travel", "rate"))
+    body = ride.column("heave") + sign * arm * ride.column("pitch")
+    np.testing.assert_allclose(travel, body - ride.column(f"unsprung_heave_{axle}"), atol=1e-12)
+    between = 0.5 * (rate[1:] + rate[:-1])
+    np.testing.assert_allclose(np.diff(travel) / 0.01, between, atol=0.02 * np.abs(rate).max())
+
+
 @pytest.mark.parametrize("effects", [{}, EFFECTS], ids=["plain", "states of effects"])
 def test_a_run_goes_on_from_a_stored_state_bit_by_bit(run, effects):
     whole = run(effects=effects, keep_states=True)

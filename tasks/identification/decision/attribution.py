@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.screening import compute_inflation, find_look_alikes, screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses, sum_misfit_falls
+from tasks.identification.inference.fit import (
+    Fit,
+    compute_misfit_by_run,
+    fit_hypotheses,
+    sum_misfit_falls,
+)
 from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
 from tasks.identification.rules import DecisionRules
 
@@ -73,16 +78,19 @@ def judge_hypothesis(
     # have not absorbed the effect yet.
     free = hypothesis.names[0] in SESSION
     none = hypothesis.start * (~first if hypothesis.effect_class != "form" and not free else free)
-    starts = ((none, base.offsets), (hypothesis.start, None))
+    starts = [(none, base.offsets, base.session), (hypothesis.start, None, base.session)]
+    if not free and np.any(np.abs(base.session) > rules.retune_pull * evidence.session_sigma):
+        # a session that bends to make up for what is missing holds the fit in a valley of its own
+        starts.insert(0, (hypothesis.start, None, np.zeros_like(base.session)))
     trials: list[Fit] = []
-    for begin, offsets in starts:
+    for begin, offsets, session in starts:
         trials.append(
             fit_hypotheses(
                 evidence.train,
                 (*base.parts, hypothesis),
                 evidence.session_sigma,
                 values=np.concatenate((base.values, begin)),
-                session=base.session,
+                session=session,
                 offsets=offsets,
                 # parameters that can be traded for each other are found along a valley, in more steps
                 iterations=4 + 4 * len(hypothesis.names),

@@ -27,6 +27,12 @@ from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_h
 from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
 from tasks.identification.rules import DecisionRules
 
+PORT_OF_NUMBER = {
+    "pressure_gain": "brake_torque", "mass": "longitudinal_force", "slope": "longitudinal_force",
+    "pitch_gain": "pitch_moment", "damping": "suspension_force", "stiffness": "suspension_force",
+}  # fmt: skip
+"""Where a wrong number of the session acts: a form there may stand behind it."""
+
 
 class ForeignCarError(Exception):
     """The runs disagree about every direction even with the best effects: the model's equations do not fit the car."""
@@ -81,7 +87,7 @@ def search_forms(
             alone is not None
             and alone.passes
             and not same_effect
-            and (ahead > rules.rival_span or (retuned and disagreeing))
+            and (ahead > rules.rival_span or (disagreeing and _acts_where(alone, state.rounds)))
         ):
             reasons.append(f"a single form explains more than the library: {alone.hypothesis.name}")
             state = SearchState(
@@ -89,7 +95,11 @@ def search_forms(
                 base=alone.fitted,
                 rounds=(Round(base=null.base, tried=(), accepted=alone, evidence=null.evidence),),
             )
-        elif alone is not None and ahead > (0.0 if retuned else -rules.rival_span):
+        elif (
+            alone is not None
+            and ahead > -rules.rival_span
+            and (not retuned or _acts_where(alone, state.rounds))
+        ):
             elsewhere = alone.hypothesis.port != first.port
             near = alone if (ahead > rules.rival_span if same_effect else elsewhere or disagreeing) else None
     if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
@@ -100,6 +110,12 @@ def search_forms(
             rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left, evidence=state.evidence)),
         )
     return state, near
+
+
+def _acts_where(form: Candidate, rounds: tuple[Round, ...]) -> bool:
+    """Whether a form acts at the port of every number that was found to be wrong, and nothing else was found."""
+    ports = {PORT_OF_NUMBER.get(name) for r in rounds for name in r.accepted.hypothesis.names}
+    return ports == {form.hypothesis.port}
 
 
 def _pulls_session(fitted: Fit, base: Fit, rules: DecisionRules) -> bool:

@@ -90,6 +90,20 @@ def summarise_errors(
     return errors
 
 
+def is_noticed(error: Mapping[str, ChannelError], without: Mapping[str, ChannelError], share: float) -> bool:
+    """Whether any channel of the held-out runs is predicted noticeably better with an effect than without it.
+
+    The equations of another car differ a little everywhere: what the likelihood finds there, but no prediction feels,
+    is no discovery.
+
+    Parameters
+    ----------
+    error, without : by channel or figure, of the model with the effect and without it
+    share : of the error without the effect below which the error is noticeably smaller [1]
+    """
+    return any(error[name].after < share * e.after for name, e in without.items())
+
+
 def find_worse_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:
     """Return the channels that effects predict worse than the frozen model, if that outweighs what they predict better.
 

@@ -1,6 +1,6 @@
 """The decision: what is missing, how sure, and what it does to the error on runs that no fit has seen."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
 from tasks.identification.decision.answer import (
+    ChannelError,
     NamedEffect,
     Verdict,
     VerdictName,
@@ -17,7 +18,7 @@ from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.correlation import correlate_residual_with_pressure
 from tasks.identification.decision.discovery import search_library_and_forms
 from tasks.identification.decision.experiment import plan_next_experiment
-from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels
+from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels, is_noticed
 from tasks.identification.decision.intervals import (
     compute_curvature_interval,
     compute_profile_interval,
@@ -93,12 +94,8 @@ def find_missing_effects(
     progress("held-out error")
     error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     tried = list(found.tried)
-    while compared and (worse := find_worse_channels(error, rules.worse_limit)):
-        # the marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought
-        reasons.append(
-            f"{', '.join(c.own.hypothesis.name for c in compared)} would fit, but predicts {', '.join(worse)} of the"
-            " held-out runs worse than the frozen model: not named"
-        )
+    while compared and (objection := _object_to_last(found, start, error)):
+        reasons.append(objection)
         last, near_form = found.rounds[-1], None
         tried = [last.accepted, *tried]
         found = replace(
@@ -177,6 +174,28 @@ def find_missing_effects(
         reasons=tuple(reasons),
     )
     return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
+
+
+def _object_to_last(found: SearchState, start: SearchState, error: Mapping[str, ChannelError]) -> str | None:
+    """Return why held-out runs contradict what was named last; None if they do not.
+
+    The marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought.
+    """
+    rules, last = found.evidence.rules, found.rounds[-1]
+    worse = find_worse_channels(error, rules.worse_limit)
+    if worse:
+        return (
+            f"{', '.join(r.accepted.hypothesis.name for r in found.rounds)} would fit, but predicts"
+            f" {', '.join(worse)} of the held-out runs worse than the frozen model: not named"
+        )
+    if last.accepted.hypothesis.effect_class == "form":
+        without, _ = compute_held_out_errors(start.evidence, start.base, last.base)
+        if not is_noticed(error, without, rules.noticed_share):
+            return (
+                f"{last.accepted.hypothesis.name} would fit, but makes no difference of"
+                f" {1.0 - rules.noticed_share:.0%} to the error of any channel of the held-out runs: not named"
+            )
+    return None
 
 
 def _is_fixed(effect: Effect, vehicle: Vehicle) -> bool:

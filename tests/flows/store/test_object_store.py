@@ -14,6 +14,7 @@ from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
 from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import collect_garbage, verify_dataset
+from flows.cli import main
 from flows.making.clip import make_clip
 from flows.making.generate import generate_dataset, prepare_dataset
 from flows.making.plan import make_plan
@@ -244,9 +245,11 @@ def test_faults_of_the_store_are_one_sentence_each(server, machine, grid, monkey
     assert "pip install 'musync[s3]'" in told("s3://data/nothing")
 
 
-def test_a_command_whose_output_must_be_a_folder_says_so(machine):
-    run = start(["verify", "s3://data/sets/toy", "--out", "s3://data/reports"], machine)
-    _, errors = run.communicate(timeout=60)
+def test_a_command_whose_output_must_be_a_folder_says_so(stored, machine, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["musync", "verify", stored, "--out", "s3://data/reports"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    errors = capsys.readouterr().err
     assert (
-        run.returncode == 2 and "--out s3://data/reports: must be a folder or file of this machine" in errors
+        end.value.code == 2 and "--out s3://data/reports: must be a folder or file of this machine" in errors
     )

@@ -16,7 +16,7 @@ from tasks.vehicle.parameters import Vehicle
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 SPEED_AND_ACCELERATION = ("speed", "longitudinal_acceleration")
-STOPS = ((27.0, 1.2), (20.0, 2.4), (24.0, 1.8), (16.0, 1.5), (22.0, 2.0))
+STOPS = ((27.0, 1.2), (20.0, 2.4), (16.0, 1.5), (22.0, 2.0))
 """Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
 
 
@@ -92,7 +92,7 @@ def test_a_car_that_is_as_its_file_says_lacks_nothing():
 
 
 def test_a_number_of_the_file_is_wrong_only_beyond_its_tolerance():
-    near, far = (judge(campaign_of({"pressure_gain": gain, "lag": 0.09})) for gain in (0.1, 0.9))
+    near, far = slow_brakes(), judge(campaign_of({"pressure_gain": 0.9, "lag": 0.09}))
     assert [e.name for e in near.verdict.effects] == ["brake_lag"]
     assert [e.name for e in near.calibrated] == ["retuned_pressure_gain"]
     assert {e.name for e in far.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}

@@ -1,0 +1,49 @@
+"""Calls after which the kernels that most tests use are compiled and kept."""
+
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.double_track.campaign import draw_session, measure_run
+from benchmarks.double_track.effects import Truth
+from catalogs.vehicles import load_vehicle
+from flows.making.generate import generate_dataset
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.surface.road_profile import FLAT_ROAD
+from tasks.surface.state import SurfaceState
+from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.rollout import Controls, rollout
+from tests.toy_street import toy_street, write_toy_grid
+
+
+def compile_rasteriser(_: Path) -> None:
+    """Draw a picture."""
+    K = np.array([[80.0, 0.0, 48.0], [0.0, 80.0, 32.0], [0.0, 0.0, 1.0]])
+    rasterise(prepare_gaussians(toy_street().gaussians), np.eye(4), K, 96, 64)
+
+
+def compile_vehicle(_: Path) -> None:
+    """Drive in both modes."""
+    brake = BrakeCommand(
+        peak_pressure_mpa=2.3, onset_s=0.1, ramp_s=0.5, onset_station_m=None, hold_s=None, release_s=0.5
+    )
+    controls = Controls(initial_speed=10.0, brake=brake, hold_speed_until_brake=False)
+    surface = SurfaceState(kind="dry", friction=0.82)
+    for mode in ("coupled", "paper"):
+        rollout(
+            load_vehicle("paper-reference"), surface, controls, FLAT_ROAD, mode=mode, duration_s=0.2,
+            step_s=0.0005,
+        )  # fmt: skip
+
+
+def compile_weather(folder: Path) -> None:
+    """Make a dataset with snow."""
+    generate_dataset(write_toy_grid(folder, frames=2), str(folder / "data"), runner="threads", workers=1)
+
+
+def compile_double_track(_: Path) -> None:
+    """Drive the car of the double-track campaigns."""
+    name = "null-01"
+    measure_run(
+        {"speed": 9.0, "duration": 0.1}, "run-01", Truth(name=name), draw_session(1, name), (1, name, 0), True
+    )
