@@ -12,7 +12,7 @@ from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.rollout import Controls, rollout
+from tasks.vehicle.rollout import Controls, simulate_scenario
 from tests.toy_street import toy_street, write_toy_grid
 
 
@@ -30,7 +30,7 @@ def compile_vehicle(_: Path) -> None:
     controls = Controls(initial_speed=10.0, brake=brake, hold_speed_until_brake=False)
     surface = SurfaceState(kind="dry", friction=0.82)
     for mode in ("coupled", "paper"):
-        rollout(
+        simulate_scenario(
             load_vehicle("paper-reference"), surface, controls, FLAT_ROAD, mode=mode, duration_s=0.2,
             step_s=0.0005,
         )  # fmt: skip
