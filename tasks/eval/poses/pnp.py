@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners, track_corners
+from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners, least_strength, track_corners
 from tasks.eval.poses.depth_chain import Attempt, invert_depth, place_frames_by_depth, prepare_on_demand
 from tasks.eval.poses.links import Link, chained_poses, link_placements
 from tasks.eval.poses.motion import (
@@ -74,11 +74,12 @@ class PnpSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class _Frame:
-    """One frame: grey levels [H, W] [1], inverse depth [H, W] [1/m] and corner strength [H, W] [1]."""
+    """One frame: grey levels [H, W] [1], inverse depth [H, W] [1/m], corner strength [H, W] and its least value [1]."""
 
     grey: NDArray[np.uint8]
     inverse_depth: NDArray[np.float32]
     strength: NDArray[np.float32]
+    least_strength: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +128,7 @@ def recover_motion_pnp(
     check_clip(frames, K, T_rig_camera, depth, unusable, route_rotations)
     chosen = settings or PnpSettings()
     prepared = prepare_on_demand(
-        lambda k: _prepare_frame(frames[k], depth[k], None if unusable is None else unusable[k])
+        lambda k: _prepare_frame(frames[k], depth[k], None if unusable is None else unusable[k], chosen)
     )
 
     def attempt_step(earlier: _Frame, later: _Frame, guess: Floats, levels: int) -> Attempt:
@@ -152,10 +153,19 @@ def recover_motion_pnp(
 
 
 def _prepare_frame(
-    rgb: NDArray[np.uint8], depth: NDArray[np.float32], hidden: NDArray[np.bool_] | None
+    rgb: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    hidden: NDArray[np.bool_] | None,
+    settings: PnpSettings,
 ) -> _Frame:
     grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-    return _Frame(grey=grey, inverse_depth=invert_depth(depth, hidden), strength=corner_strength(grey))
+    strength = corner_strength(grey)
+    return _Frame(
+        grey=grey,
+        inverse_depth=invert_depth(depth, hidden),
+        strength=strength,
+        least_strength=least_strength(strength, settings.corner_quality),
+    )
 
 
 def _find_smooth_corners(
@@ -163,7 +173,7 @@ def _find_smooth_corners(
 ) -> NDArray[np.int64]:
     """Return the corners whose patch lies on one smooth surface, [N, 2] as x, y [px]."""
     reach, q_map = settings.window // 2, frame.inverse_depth
-    corners = grid_corners(frame.strength, settings.cells_across, reach, settings.corner_quality, hidden)
+    corners = grid_corners(frame.strength, settings.cells_across, reach, frame.least_strength, hidden)
     x, y = corners.T
     q = q_map[y, x]
     # 1/z of a plane is linear in the picture, so any bend is an edge or a curve
