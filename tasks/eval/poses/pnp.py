@@ -41,7 +41,8 @@ class PnpSettings:
     forward_backward : largest distance between a point and its track there and back [px]
     depth_kink : largest relative bend of inverse depth across a patch: more is an edge, where the depth
         of the point and that of its neighbours belong to different things [1]
-    near_prediction : mean shift below which the prediction was good enough for one pass [px]
+    near_prediction : mean shift below which the prediction is good enough to track all corners from [px]
+    coarse_stride : every how many corners the prediction is corrected by [1]
     crowded : share of points that disagree above which something moves in front of the scene [1]
     crowded_contrast : difference of grey levels, of 255, to the warped earlier frame that shows such a thing [1]
     min_points : fewest points that carry a pose [1]
@@ -60,7 +61,8 @@ class PnpSettings:
     search_advances: tuple[float, ...] = (0.0, 1.0, 2.0, 4.0)
     forward_backward: float = 0.3
     depth_kink: float = 0.1
-    near_prediction: float = 0.2
+    near_prediction: float = 0.4
+    coarse_stride: int = 4
     crowded: float = 0.4
     crowded_contrast: int = 40
     min_points: int = 30
@@ -185,8 +187,35 @@ def _find_smooth_corners(
 def _place_frame(
     anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats, levels: int, settings: PnpSettings
 ) -> FrameStep:
-    """Track and solve; again from the step found where the prediction was far off or things fly by."""
+    """Find the way to the frame by every fourth corner, then place it by all of them, less what things fly before."""
     corners = _find_smooth_corners(frame, settings)
+    for some in (corners[:: settings.coarse_stride], corners):
+        view, step = _follow_prediction(anchor, frame, some, predicted, K, levels, settings)
+        if not step.failure:
+            break
+    else:
+        return step
+    if step.inliers < (1 - settings.crowded) * len(some):
+        strange = (cv2.absdiff(view.grey, frame.grey) > settings.crowded_contrast).astype(np.uint8)
+        hidden = cv2.dilate(strange, np.ones((settings.window, settings.window), np.uint8)) > 0
+        unhidden = _find_smooth_corners(frame, settings, hidden)
+        placed = _track_and_solve(anchor, frame, unhidden, view, K, 0, settings)
+        if placed.inliers > settings.coarse_stride * step.inliers and not placed.failure:
+            return placed
+    placed = _track_and_solve(anchor, frame, corners, view, K, 0, settings)
+    return step if placed.failure else placed
+
+
+def _follow_prediction(
+    anchor: _Frame,
+    frame: _Frame,
+    corners: NDArray[np.int64],
+    predicted: Floats,
+    K: Floats,
+    levels: int,
+    settings: PnpSettings,
+) -> tuple[_WarpedAnchor, FrameStep]:
+    """Track and solve; again from the step found where the prediction was far off. Returns the view it ended with."""
     for _ in range(levels + 1):
         view = _warp_anchor(anchor, frame, predicted, K)
         step = _track_and_solve(anchor, frame, corners, view, K, levels, settings)
@@ -194,17 +223,9 @@ def _place_frame(
             step.failure
             or _mean_shift(frame, corners, predicted, step.T_earlier_later, K) <= settings.near_prediction
         ):
-            break
+            return view, step
         predicted = step.T_earlier_later
-    if step.inliers < (1 - settings.crowded) * len(corners) and not step.failure:
-        view = _warp_anchor(anchor, frame, step.T_earlier_later, K)
-        strange = (cv2.absdiff(view.grey, frame.grey) > settings.crowded_contrast).astype(np.uint8)
-        hidden = cv2.dilate(strange, np.ones((settings.window, settings.window), np.uint8)) > 0
-        unhidden = _find_smooth_corners(frame, settings, hidden)
-        again = _track_and_solve(anchor, frame, unhidden, view, K, 0, settings)
-        if again.inliers > step.inliers and not again.failure:
-            return again
-    return step
+    return _warp_anchor(anchor, frame, predicted, K), step
 
 
 def _warp_anchor(anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats) -> _WarpedAnchor:
