@@ -61,8 +61,8 @@ class PnpSettings:
     search_advances: tuple[float, ...] = (0.0, 1.0, 2.0, 4.0)
     forward_backward: float = 0.3
     depth_kink: float = 0.1
-    near_prediction: float = 0.4
-    coarse_stride: int = 4
+    near_prediction: float = 0.2
+    coarse_stride: int = 2
     crowded: float = 0.4
     crowded_contrast: int = 40
     min_points: int = 30
@@ -187,7 +187,7 @@ def _find_smooth_corners(
 def _place_frame(
     anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats, levels: int, settings: PnpSettings
 ) -> FrameStep:
-    """Find the way to the frame by every fourth corner, then place it by all of them, less what things fly before."""
+    """Find the way to the frame by every second corner, then place it by all of them, less what things fly before."""
     corners = _find_smooth_corners(frame, settings)
     for some in (corners[:: settings.coarse_stride], corners):
         view, step = _follow_prediction(anchor, frame, some, predicted, K, levels, settings)
@@ -202,7 +202,7 @@ def _place_frame(
         placed = _track_and_solve(anchor, frame, unhidden, view, K, 0, settings)
         if placed.inliers > settings.coarse_stride * step.inliers and not placed.failure:
             return placed
-    placed = _track_and_solve(anchor, frame, corners, view, K, 0, settings)
+    placed = _track_and_solve(anchor, frame, corners, view, K, levels, settings)
     return step if placed.failure else placed
 
 
