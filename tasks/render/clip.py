@@ -102,7 +102,9 @@ def render_clip(
     frames: list[dict[str, NDArray[np.generic]]] = []
     for frame, pose in enumerate(T_world_camera):
         view = world_to_camera(pose)
-        gbuffer = backend.rasterise(prepared, view, field.K, field.width, field.height)
+        gbuffer = backend.rasterise(
+            prepared, view, field.K, field.width, field.height, normals=labels or weather.reads_normals
+        )
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         shutter = Shutter(
             T_world_camera=pose,

@@ -1,8 +1,78 @@
 """The sky and far field behind the Gaussians, from an equirectangular panorama."""
 
-import cv2
+from math import floor, pi, sqrt
+
+import numba
 import numpy as np
 from numpy.typing import NDArray
+
+_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_QUARTER_TURN, _HALF_TURN = np.float32(pi / 2), np.float32(pi)
+_PER_TURN, _PER_HALF_TURN = np.float32(1 / (2 * pi)), np.float32(1 / pi)
+_SMALLEST = np.float32(1e-30)
+# Least squares in Chebyshev points for arctan(x) / x over x^2 in [0, 1]; with single precision's rounding, to 6e-7 rad.
+_A0, _A1, _A2, _A3, _A4, _A5, _A6 = (
+    np.float32(c)
+    for c in (0.99999933, -0.33326375, 0.19879872, -0.13480406, 0.083741557, -0.036898629, 0.0078254829)
+)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def direction_angle(y, x):  # type: ignore[no-untyped-def]
+    """Return the angle of the vector (x, y) from +x to +y, in single precision and without a branch.
+
+    A tenth of the time of the library's function, and the same bits with every library.
+
+    Parameters
+    ----------
+    y, x : float32, not both 0 [1]
+
+    Returns
+    -------
+    float32 in [-pi, pi] [rad]
+    """
+    across, along = abs(y), abs(x)
+    steep = across > along
+    slope = min(across, along) / max(max(across, along), _SMALLEST)
+    q = slope * slope
+    angle = slope * (_A0 + q * (_A1 + q * (_A2 + q * (_A3 + q * (_A4 + q * (_A5 + q * _A6))))))
+    angle = _QUARTER_TURN - angle if steep else angle
+    angle = _HALF_TURN - angle if x < _ZERO else angle
+    return -angle if y < _ZERO else angle
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def find_on_panorama(x, y, z, rows, columns):  # type: ignore[no-untyped-def]
+    """Return row and column of an equirectangular picture in the direction (x, y, z), float32 of any length [px]."""
+    row = (_HALF - direction_angle(z, np.float32(sqrt(x * x + y * y))) * _PER_HALF_TURN) * np.float32(
+        rows
+    ) - _HALF
+    column = (_HALF - direction_angle(y, x) * _PER_TURN) * np.float32(columns) - _HALF
+    return row, column
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def blend_panorama(panorama, row, column, out):  # type: ignore[no-untyped-def]
+    """Write the picture [H, W, 3] at a place of `find_on_panorama` into ``out`` [3]: bilinear, wrapped in azimuth."""
+    height, width = panorama.shape[:2]
+    r0, c0 = floor(row), floor(column)
+    tr, tc = row - np.float32(r0), column - np.float32(c0)
+    top, bottom = min(max(r0, 0), height - 1), min(max(r0 + 1, 0), height - 1)
+    left = width - 1 if c0 < 0 else min(c0, width - 1)
+    right = left + 1 if left + 1 < width else 0
+    for c in range(3):
+        above = (_ONE - tc) * panorama[top, left, c] + tc * panorama[top, right, c]
+        below = (_ONE - tc) * panorama[bottom, left, c] + tc * panorama[bottom, right, c]
+        out[c] = (_ONE - tr) * above + tr * below
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def sample_panorama(panorama, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Bilinear look-up of an equirectangular picture in the direction (x, y, z), any length, into ``out`` [3]."""
+    row, column = find_on_panorama(
+        np.float32(x), np.float32(y), np.float32(z), panorama.shape[0], panorama.shape[1]
+    )
+    blend_panorama(panorama, row, column, out)
 
 
 def environment_view(
@@ -25,19 +95,33 @@ def environment_view(
     -------
     float32 [height, width, 3] [1]
     """
-    rows, columns = environment.shape[:2]
-    u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    rays = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)], axis=-1)
-    x, y, z = np.moveaxis(rays @ viewmat[:3, :3], -1, 0)
-    column = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * columns - 0.5
-    row = (0.5 - np.arctan2(z, np.hypot(x, y)) / np.pi) * rows - 0.5
-    return cv2.remap(
-        np.concatenate([environment[:, -1:], environment, environment[:, :1]], axis=1),
-        (np.mod(column, columns) + 1).astype(np.float32),
-        np.clip(row, 0, rows - 1).astype(np.float32),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
+    across = (np.arange(width) + 0.5 - K[0, 2]) / K[0, 0]
+    down = (np.arange(height) + 0.5 - K[1, 2]) / K[1, 1]
+    seen = np.empty((height, width, 3), dtype=np.float32)
+    _view_panorama(
+        np.ascontiguousarray(environment),
+        np.ascontiguousarray(viewmat[:3, :3], dtype=np.float64),
+        across,
+        down,
+        seen,
     )
+    return seen
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _view_panorama(panorama, rotation, across, down, seen):  # type: ignore[no-untyped-def]
+    rows, columns = panorama.shape[:2]
+    right, below, ahead = rotation[0], rotation[1], rotation[2]
+    row, column = np.empty(len(across), dtype=np.float32), np.empty(len(across), dtype=np.float32)
+    for i in range(len(down)):
+        # a loop of its own, without gathers, that the compiler turns into vector code
+        for j in range(len(across)):
+            x = np.float32(across[j] * right[0] + down[i] * below[0] + ahead[0])
+            y = np.float32(across[j] * right[1] + down[i] * below[1] + ahead[1])
+            z = np.float32(across[j] * right[2] + down[i] * below[2] + ahead[2])
+            row[j], column[j] = find_on_panorama(x, y, z, rows, columns)
+        for j in range(len(across)):
+            blend_panorama(panorama, row[j], column[j], seen[i, j])
 
 
 def plain_sky(rows: int = 64) -> NDArray[np.float32]:

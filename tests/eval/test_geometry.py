@@ -23,7 +23,7 @@ from tasks.eval.poses.rigid import (
     skew_matrix,
     viewing_rays,
 )
-from tasks.eval.poses.solve_pnp import PnpLimits, solve_pnp
+from tasks.eval.poses.solve_pnp import PnpLimits, _measure_residuals, _sum_normal_equations, solve_pnp
 from tasks.eval.poses.warp import bilinear_taps, view_from, warp_map
 
 K = camera_matrix()
@@ -60,6 +60,25 @@ def test_the_adjoint_carries_a_twist_to_the_other_frame() -> None:
     twist = 1e-3 * np.arange(1.0, 7.0)
     carried = pose_from_twist(adjoint_matrix(MOTION) @ twist)
     np.testing.assert_allclose(carried, MOTION @ pose_from_twist(twist) @ invert_pose(MOTION), atol=1e-12)
+
+
+def test_the_solver_s_sums_are_those_of_its_numpy_twin() -> None:
+    points, weight, share = cloud(60), np.linspace(0, 1, 60), 0.3
+    pixels = project_points(points, K) + np.random.default_rng(4).normal(size=(60, 2))
+    moved = points @ MOTION[:3, :3].T + MOTION[:3, 3]
+    J, residual = projection_jacobian(moved, K), pixels - project_points(moved, K)
+    a = np.einsum("nij,nj->ni", J[:, :, :3], moved - MOTION[:3, 3]) * share
+    inverse = np.linalg.inv(np.eye(2) + a[:, :, None] * a[:, None, :])
+    H, gradient = _sum_normal_equations(points, pixels, MOTION, K, share, weight)
+    np.testing.assert_allclose(H, np.einsum("n,nai,nab,nbj->ij", weight, J, inverse, J), rtol=1e-9)
+    np.testing.assert_allclose(
+        gradient, np.einsum("n,nai,nab,nb->i", weight, J, inverse, residual), rtol=1e-8
+    )
+    size = np.empty(60)
+    assert _measure_residuals(points, pixels, MOTION, K, share, size) == 60
+    np.testing.assert_allclose(size**2, np.einsum("na,nab,nb->n", residual, inverse, residual), rtol=1e-9)
+    points[7, 2] = -5.0
+    assert _measure_residuals(points, pixels, MOTION, K, share, size) == 59 and np.isinf(size[7])
 
 
 def test_an_advance_is_along_the_rig_s_axis_whatever_the_mount() -> None:

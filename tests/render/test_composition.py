@@ -3,7 +3,7 @@ import pytest
 
 from tasks.render.composition import compose_over_sky, encode_8bit, round_depth, to_display, to_linear
 from tasks.render.contact_sheet import CAPTION, CURVE_COLOURS, MARGIN, draw_contact_sheet, encode_png
-from tasks.render.environment import environment_view, plain_sky
+from tasks.render.environment import direction_angle, environment_view, plain_sky, sample_panorama
 from tasks.render.rasterise.gbuffer import GBuffer
 
 K = np.array([[40.0, 0, 24], [0, 40.0, 16], [0, 0, 1]])
@@ -85,6 +85,38 @@ def test_there_is_no_seam_behind():
     panorama = plain_sky()
     view = environment_view(panorama, look_along([-1, 0, 0], [0, 0, -1]), K, 48, 32)
     assert np.abs(np.diff(view, axis=1)).max() < 0.02
+
+
+def test_panorama_columns_turn_left_from_plus_x():
+    panorama = np.zeros((8, 16, 3), np.float32)
+    panorama[3:5, 7:9] = (1, 0, 0)
+    panorama[3:5, 3:5] = (0, 1, 0)
+    panorama[0] = (0, 0, 1)
+    out = np.zeros(3, np.float32)
+    for direction, colour in (((1, 0, 0), 0), ((0, 1, 0), 1), ((0, 0, 1), 2)):
+        sample_panorama(panorama, *(5.0 * c for c in direction), out)
+        assert out.argmax() == colour
+        assert out[colour] == pytest.approx(1.0)
+
+
+def test_angles_are_those_of_the_library_all_round():
+    angle = np.linspace(-np.pi, np.pi, 4001)[1:-1]
+    for y, x in zip(np.sin(angle), np.cos(angle), strict=True):
+        assert direction_angle(np.float32(5 * y), np.float32(5 * x)) == pytest.approx(
+            np.arctan2(y, x), abs=1.2e-6
+        )
+    assert direction_angle(np.float32(1), np.float32(0)) == pytest.approx(np.pi / 2)
+    assert direction_angle(np.float32(0), np.float32(-1)) == pytest.approx(np.pi)
+
+
+def test_a_view_is_the_panorama_sampled_pixel_by_pixel():
+    panorama = np.random.default_rng(2).random((64, 128, 3), np.float32)
+    view = look_along([-0.8, 0.5, 0.2], [0, 0, -1])
+    seen, out = environment_view(panorama, view, K, 48, 32), np.zeros(3, np.float32)
+    for row, column in ((0, 0), (31, 47), (11, 30)):
+        ray = np.linalg.inv(K) @ (column + 0.5, row + 0.5, 1.0) @ view[:3, :3]
+        sample_panorama(panorama, *ray, out)
+        np.testing.assert_allclose(seen[row, column], out, atol=1e-4)
 
 
 def test_a_contact_sheet_has_a_row_a_clip_and_decodes():

@@ -203,6 +203,15 @@ def test_normals_face_the_camera() -> None:
     assert away.mean() < -0.4
 
 
+def test_without_normals_every_other_buffer_keeps_its_bits() -> None:
+    prepared = prepare_gaussians(random_cloud(800, 4, 5))
+    with_normals, flat = (rasterise(prepared, np.eye(4), K, WIDTH, HEIGHT, normals=n) for n in (True, False))
+    assert not flat.normal.any() and with_normals.normal.any()
+    for field in fields(GBuffer):
+        if field.name != "normal":
+            np.testing.assert_array_equal(getattr(flat, field.name), getattr(with_normals, field.name))
+
+
 @pytest.mark.parametrize("place", ["nowhere", "behind", "beside", "too close", "too faint"])
 def test_nothing_in_view_gives_an_empty_picture(place: str) -> None:
     gaussians = {

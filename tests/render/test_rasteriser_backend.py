@@ -45,7 +45,9 @@ def test_cpu_draws_the_probe_as_gsplats_own_torch_code_does() -> None:
 def test_probe_names_what_a_wrong_backend_draws_wrong() -> None:
     class Mirrored(CpuBackend):
         @staticmethod
-        def rasterise(prepared: Any, viewmat: NDArray, K: NDArray, width: int, height: int) -> GBuffer:
+        def rasterise(
+            prepared: Any, viewmat: NDArray, K: NDArray, width: int, height: int, normals: bool = True
+        ) -> GBuffer:
             drawn = CpuBackend.rasterise(prepared, viewmat, K, width, height)
             return replace(drawn, rgb=drawn.rgb[:, ::-1], class_id=np.roll(drawn.class_id, 5))
 

@@ -13,6 +13,11 @@ def corner_strength(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
     return cv2.cornerMinEigenVal(grey, blockSize=5)
 
 
+def least_strength(strength: NDArray[np.float32], quality: float) -> float:
+    """Return that share of the 95th percentile of a picture's corner strength [H, W] [1]."""
+    return quality * float(np.percentile(strength, 95))
+
+
 def cell_size(width: int, cells_across: int) -> int:
     """Return the side of the grid cells over a picture of that width [px]."""
     return max(width // cells_across, 4)
@@ -22,7 +27,7 @@ def grid_corners(
     strength: NDArray[np.float32],
     cells_across: int,
     margin: int,
-    quality: float,
+    least: float,
     hidden: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int64]:
     """Return the strongest corner of each grid cell.
@@ -32,7 +37,7 @@ def grid_corners(
     strength : float32 [H, W] corner strength [1]
     cells_across : cells over the picture's width, none smaller than 4 px [1]
     margin : least distance from the picture's edge [px]
-    quality : least strength as a share of the picture's 95th percentile [1]
+    least : strength from which on a corner counts [1]
     hidden : bool [H, W] pixels that may not be chosen [1]
 
     Returns
@@ -49,7 +54,7 @@ def grid_corners(
     inside = (
         (y >= margin) & (y < strength.shape[0] - margin) & (x >= margin) & (x < strength.shape[1] - margin)
     )
-    good = inside & (allowed[y, x] > quality * np.percentile(strength, 95))
+    good = inside & (allowed[y, x] > least)
     return np.stack([x[good], y[good]], axis=-1)
 
 

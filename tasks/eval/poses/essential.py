@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners
+from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners, least_strength
 from tasks.eval.poses.epipolar import (
     fit_rotation,
     five_point_pose,
@@ -147,9 +147,9 @@ def recover_motion_essential(
 
 def _make_key_frame(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> _KeyFrame:
     grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-    corners = grid_corners(
-        corner_strength(grey), settings.cells_across, settings.window // 2, settings.corner_quality
-    )
+    strength = corner_strength(grey)
+    least = least_strength(strength, settings.corner_quality)
+    corners = grid_corners(strength, settings.cells_across, settings.window // 2, least)
     unknown = np.zeros(len(corners))
     return _KeyFrame(
         index=index,

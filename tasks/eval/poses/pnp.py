@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners, track_corners
+from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners, least_strength, track_corners
 from tasks.eval.poses.depth_chain import Attempt, invert_depth, place_frames_by_depth, prepare_on_demand
 from tasks.eval.poses.links import Link, chained_poses, link_placements
 from tasks.eval.poses.motion import (
@@ -41,7 +41,8 @@ class PnpSettings:
     forward_backward : largest distance between a point and its track there and back [px]
     depth_kink : largest relative bend of inverse depth across a patch: more is an edge, where the depth
         of the point and that of its neighbours belong to different things [1]
-    near_prediction : mean shift below which the prediction was good enough for one pass [px]
+    near_prediction : mean shift below which the prediction is good enough to track all corners from [px]
+    coarse_stride : every how many corners the prediction is corrected by [1]
     crowded : share of points that disagree above which something moves in front of the scene [1]
     crowded_contrast : difference of grey levels, of 255, to the warped earlier frame that shows such a thing [1]
     min_points : fewest points that carry a pose [1]
@@ -61,6 +62,7 @@ class PnpSettings:
     forward_backward: float = 0.3
     depth_kink: float = 0.1
     near_prediction: float = 0.2
+    coarse_stride: int = 2
     crowded: float = 0.4
     crowded_contrast: int = 40
     min_points: int = 30
@@ -74,11 +76,12 @@ class PnpSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class _Frame:
-    """One frame: grey levels [H, W] [1], inverse depth [H, W] [1/m] and corner strength [H, W] [1]."""
+    """One frame: grey levels [H, W] [1], inverse depth [H, W] [1/m], corner strength [H, W] and its least value [1]."""
 
     grey: NDArray[np.uint8]
     inverse_depth: NDArray[np.float32]
     strength: NDArray[np.float32]
+    least_strength: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +130,7 @@ def recover_motion_pnp(
     check_clip(frames, K, T_rig_camera, depth, unusable, route_rotations)
     chosen = settings or PnpSettings()
     prepared = prepare_on_demand(
-        lambda k: _prepare_frame(frames[k], depth[k], None if unusable is None else unusable[k])
+        lambda k: _prepare_frame(frames[k], depth[k], None if unusable is None else unusable[k], chosen)
     )
 
     def attempt_step(earlier: _Frame, later: _Frame, guess: Floats, levels: int) -> Attempt:
@@ -152,10 +155,19 @@ def recover_motion_pnp(
 
 
 def _prepare_frame(
-    rgb: NDArray[np.uint8], depth: NDArray[np.float32], hidden: NDArray[np.bool_] | None
+    rgb: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    hidden: NDArray[np.bool_] | None,
+    settings: PnpSettings,
 ) -> _Frame:
     grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-    return _Frame(grey=grey, inverse_depth=invert_depth(depth, hidden), strength=corner_strength(grey))
+    strength = corner_strength(grey)
+    return _Frame(
+        grey=grey,
+        inverse_depth=invert_depth(depth, hidden),
+        strength=strength,
+        least_strength=least_strength(strength, settings.corner_quality),
+    )
 
 
 def _find_smooth_corners(
@@ -163,7 +175,7 @@ def _find_smooth_corners(
 ) -> NDArray[np.int64]:
     """Return the corners whose patch lies on one smooth surface, [N, 2] as x, y [px]."""
     reach, q_map = settings.window // 2, frame.inverse_depth
-    corners = grid_corners(frame.strength, settings.cells_across, reach, settings.corner_quality, hidden)
+    corners = grid_corners(frame.strength, settings.cells_across, reach, frame.least_strength, hidden)
     x, y = corners.T
     q = q_map[y, x]
     # 1/z of a plane is linear in the picture, so any bend is an edge or a curve
@@ -175,8 +187,35 @@ def _find_smooth_corners(
 def _place_frame(
     anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats, levels: int, settings: PnpSettings
 ) -> FrameStep:
-    """Track and solve; again from the step found where the prediction was far off or things fly by."""
+    """Find the way to the frame by every second corner, then place it by all of them, less what things fly before."""
     corners = _find_smooth_corners(frame, settings)
+    for some in (corners[:: settings.coarse_stride], corners):
+        view, step = _follow_prediction(anchor, frame, some, predicted, K, levels, settings)
+        if not step.failure:
+            break
+    else:
+        return step
+    if step.inliers < (1 - settings.crowded) * len(some):
+        strange = (cv2.absdiff(view.grey, frame.grey) > settings.crowded_contrast).astype(np.uint8)
+        hidden = cv2.dilate(strange, np.ones((settings.window, settings.window), np.uint8)) > 0
+        unhidden = _find_smooth_corners(frame, settings, hidden)
+        placed = _track_and_solve(anchor, frame, unhidden, view, K, 0, settings)
+        if placed.inliers > settings.coarse_stride * step.inliers and not placed.failure:
+            return placed
+    placed = _track_and_solve(anchor, frame, corners, view, K, levels, settings)
+    return step if placed.failure else placed
+
+
+def _follow_prediction(
+    anchor: _Frame,
+    frame: _Frame,
+    corners: NDArray[np.int64],
+    predicted: Floats,
+    K: Floats,
+    levels: int,
+    settings: PnpSettings,
+) -> tuple[_WarpedAnchor, FrameStep]:
+    """Track and solve; again from the step found where the prediction was far off. Returns the view it ended with."""
     for _ in range(levels + 1):
         view = _warp_anchor(anchor, frame, predicted, K)
         step = _track_and_solve(anchor, frame, corners, view, K, levels, settings)
@@ -184,17 +223,9 @@ def _place_frame(
             step.failure
             or _mean_shift(frame, corners, predicted, step.T_earlier_later, K) <= settings.near_prediction
         ):
-            break
+            return view, step
         predicted = step.T_earlier_later
-    if step.inliers < (1 - settings.crowded) * len(corners) and not step.failure:
-        view = _warp_anchor(anchor, frame, step.T_earlier_later, K)
-        strange = (cv2.absdiff(view.grey, frame.grey) > settings.crowded_contrast).astype(np.uint8)
-        hidden = cv2.dilate(strange, np.ones((settings.window, settings.window), np.uint8)) > 0
-        unhidden = _find_smooth_corners(frame, settings, hidden)
-        again = _track_and_solve(anchor, frame, unhidden, view, K, 0, settings)
-        if again.inliers > step.inliers and not again.failure:
-            return again
-    return step
+    return _warp_anchor(anchor, frame, predicted, K), step
 
 
 def _warp_anchor(anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats) -> _WarpedAnchor:

@@ -34,9 +34,15 @@ class Backend(Protocol):
         """Pack a cloud the way this backend draws it; see `tasks.render.rasterise.rasteriser.prepare`."""
 
     def rasterise(
-        self, prepared: Any, viewmat: NDArray[np.floating], K: NDArray[np.floating], width: int, height: int
+        self,
+        prepared: Any,
+        viewmat: NDArray[np.floating],
+        K: NDArray[np.floating],
+        width: int,
+        height: int,
+        normals: bool = True,
     ) -> GBuffer:
-        """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise`."""
+        """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise`; normals may be there unasked."""
 
 
 class CpuBackend:

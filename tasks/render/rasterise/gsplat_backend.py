@@ -82,8 +82,9 @@ class GsplatBackend:
         K: NDArray[np.floating],
         width: int,
         height: int,
+        normals: bool = True,
     ) -> GBuffer:
-        """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise`."""
+        """Draw one view, always with its normals; see `tasks.render.rasterise.rasteriser.rasterise`."""
         view = view_of(viewmat, K, width, height)
         direction = prepared.means - self._to_tensor(view.eye.astype(np.float32))
         degree = int(prepared.sh.shape[1] ** 0.5) - 1

@@ -20,6 +20,7 @@ def rasterise(
     K: NDArray[np.floating],
     width: int,
     height: int,
+    normals: bool = True,
 ) -> GBuffer:
     """Blend the cloud front to back as seen by one pinhole camera.
 
@@ -29,6 +30,7 @@ def rasterise(
     viewmat : [4, 4] world to camera; camera axes x right, y down, z forward [m]
     K : [3, 3] intrinsics; the top left pixel's centre is (0.5, 0.5) [px]
     width, height : picture size [px]
+    normals : False leaves them 0, for a picture that nobody lights
 
     Returns
     -------
@@ -50,5 +52,5 @@ def rasterise(
         normal=np.empty((height, width, 3), dtype=np.float32),
         class_id=np.empty((height, width), dtype=np.uint8),
     )
-    blend_tiles(records, view.rays.astype(np.float32), starts, splats, buffers)
+    blend_tiles(records, view.rays.astype(np.float32), starts, splats, normals, buffers)
     return GBuffer(**buffers._asdict())

@@ -7,10 +7,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.environment import sample_panorama
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.precipitation import NearField, Population, drawn_optical_depth
 from tasks.render.weather.layer import Layer
-from tasks.render.weather.sky import SkyLight, sample_panorama
+from tasks.render.weather.sky import SkyLight
 
 CONTRAST_THRESHOLD = 0.05
 """Contrast at the limit of the meteorological optical range (WMO-No. 8, 2018, part I, chapter 9)."""

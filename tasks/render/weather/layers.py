@@ -84,6 +84,11 @@ class ClipWeather:
     clear_environment: NDArray[np.float32]
     overcast: Overcast | None
 
+    @property
+    def reads_normals(self) -> bool:
+        """Whether `apply_weather` reads the normals of a rasterisation: only a film on the road mirrors."""
+        return self.overcast is not None and self.overcast.look.film is not None
+
 
 @dataclass(frozen=True, kw_only=True)
 class WeatherFrame:

@@ -6,9 +6,8 @@ light loses its sun, keeps a share of its strength, and comes from the whole sky
 """
 
 from dataclasses import dataclass
-from math import asin, atan2, floor, pi, sqrt
+from math import pi
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -228,20 +227,3 @@ def _sky_share(luminance: NDArray[np.float32], elevation: NDArray[np.float64]) -
     bright = np.clip((luminance / max(float(typical), 1e-6) - 0.35) / 0.35, 0, 1)
     high = np.clip((elevation - 0.6) / 0.3, 0, 1)[:, None]
     return np.maximum(bright, high).astype(np.float32)
-
-
-@numba.njit(cache=True, nogil=True)
-def sample_panorama(panorama, x, y, z, out):  # type: ignore[no-untyped-def]
-    """Bilinear look-up of an equirectangular picture in the direction (x, y, z), any length, into ``out`` [3]."""
-    height, width = panorama.shape[:2]
-    norm = sqrt(x * x + y * y + z * z)
-    row = (0.5 - asin(min(1.0, max(-1.0, z / norm))) / pi) * height - 0.5
-    column = (0.5 - atan2(y, x) / (2 * pi)) * width - 0.5
-    r0, c0 = floor(row), floor(column)
-    tr, tc = row - r0, column - c0
-    top, bottom = min(max(r0, 0), height - 1), min(max(r0 + 1, 0), height - 1)
-    left, right = c0 % width, (c0 + 1) % width
-    for c in range(3):
-        above = (1 - tc) * panorama[top, left, c] + tc * panorama[top, right, c]
-        below = (1 - tc) * panorama[bottom, left, c] + tc * panorama[bottom, right, c]
-        out[c] = (1 - tr) * above + tr * below

@@ -4,10 +4,11 @@ import sys
 import time
 from pathlib import Path
 
+import dask
 import pytest
 
 from flows.running.orchestration import run_as_stage
-from flows.running.runner import open_executor, run_unordered
+from flows.running.runner import ALLOCATOR, SPAWNED, open_executor, run_unordered
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 
@@ -60,6 +61,17 @@ def test_a_running_dask_cluster_is_used_by_its_address():
         n_workers=1, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", protocol="tcp"
     ) as cluster, open_executor("dask", None, cluster.scheduler_address) as executor:  # fmt: skip
         assert executor.submit(square_or_fail, 7).result() == 49
+
+
+def memory_settings() -> dict[str, str | None]:
+    return {name: os.environ.get(name) for name in ALLOCATOR}
+
+
+def test_local_workers_keep_the_memory_that_the_next_frame_needs():
+    before = dask.config.get(SPAWNED)
+    with open_executor("dask", 1) as executor:
+        assert executor.submit(memory_settings).result() == {k: str(v) for k, v in ALLOCATOR.items()}
+    assert dask.config.get(SPAWNED) == before
 
 
 def test_two_runs_on_one_machine_do_not_quarrel_about_a_port(recwarn):

@@ -77,6 +77,13 @@ def test_layers_recompose_to_the_picture_bit_for_bit(street, parameters, state):
     assert drawn.picture.dtype == np.float32
 
 
+def test_a_picture_without_normals_is_the_same_where_the_weather_reads_none(street, parameters):
+    for state in (SurfaceState(kind="dry"), RAIN[10], SNOW[2], ICE):
+        weather, drawn, gbuffer, view = frame(street, state, parameters)
+        flat = apply_weather(weather, drawn.base, replace(gbuffer, normal=np.ones_like(gbuffer.normal)), view)
+        assert np.array_equal(flat.picture, drawn.picture) != weather.reads_normals, state.kind
+
+
 @pytest.mark.parametrize("state", [RAIN[25], SNOW[1]], ids=["rain", "snow"])
 def test_the_same_inputs_give_the_same_bytes(street, parameters, state):
     first, second = (frame(street, state, parameters)[1].picture for _ in range(2))

@@ -20,7 +20,6 @@ from tasks.render.weather.sky import (
     cloud_transmittance,
     light_from,
     overcast_environment,
-    sample_panorama,
     sky_light,
 )
 from tests.render.weather.conftest import shutter
@@ -103,18 +102,6 @@ def test_ground_below_the_horizon_is_as_near_as_the_eye_is_high_and_white_under_
     white = overcast_environment(dark, sky, air.extinction, parameters.sky, 1, snow=1.0)
     np.testing.assert_allclose(white[-1, 0], sky.ground, rtol=0.05)
     np.testing.assert_array_equal(white[:32], bare[:32])
-
-
-def test_panorama_columns_turn_left_from_plus_x():
-    panorama = np.zeros((8, 16, 3), np.float32)
-    panorama[3:5, 7:9] = (1, 0, 0)
-    panorama[3:5, 3:5] = (0, 1, 0)
-    panorama[0] = (0, 0, 1)
-    out = np.zeros(3, np.float32)
-    for direction, colour in (((1, 0, 0), 0), ((0, 1, 0), 1), ((0, 0, 1), 2)):
-        sample_panorama(panorama, *(5.0 * c for c in direction), out)
-        assert out.argmax() == colour
-        assert out[colour] == pytest.approx(1.0)
 
 
 def test_light_from_above_is_sky_and_from_below_is_ground(parameters, sky):

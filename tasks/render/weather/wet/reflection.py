@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.weather.sky import sample_panorama
+from tasks.render.environment import sample_panorama
 
 STEPS = 26
 FIRST_STEP_M = 0.15

@@ -185,9 +185,17 @@ def _wet(  # type: ignore[no-untyped-def]
 
 def _road_normals(normal: NDArray[np.float32], road: NDArray[np.bool_], window: int) -> NDArray[np.float32]:
     """Road normals averaged over a window of the road alone; up where there is no road."""
-    mean = cv2.blur(np.where(road[..., None], normal, np.float32(0)), (window, window))
-    mean[~road] = (0, 0, 1)
-    return mean / np.sqrt((mean * mean).sum(axis=-1, keepdims=True))
+    mean = np.zeros(normal.shape, dtype=np.float32)
+    mean[..., 2] = 1
+    rows = np.flatnonzero(road.any(axis=1))
+    if len(rows):
+        # the window reaches no further than this; a road fills half of the picture at most
+        near = slice(max(rows[0] - window, 0), rows[-1] + window + 1)
+        blurred = cv2.blur(np.where(road[near, :, None], normal[near], np.float32(0)), (window, window))
+        within = road[near]
+        up = blurred[within]
+        mean[near][within] = up / np.sqrt((up * up).sum(axis=-1, keepdims=True))
+    return mean
 
 
 def _column_mean(light: NDArray[np.float32], road: NDArray[np.bool_], reach: int) -> NDArray[np.float32]:
