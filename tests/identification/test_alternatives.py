@@ -11,9 +11,11 @@ from tasks.campaign.campaign import CHANNELS
 from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
-from tasks.identification.decision.held_out import find_worse_channels
-from tasks.identification.decision.rivals import RivalComparison
+from tasks.identification.decision.forms import ResidualSpline, is_session_number, make_form_hypotheses
+from tasks.identification.decision.held_out import find_worse_channels, is_noticed
+from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals
 from tasks.identification.decision.search import Round, SearchState
+from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import differentiate_run
@@ -98,3 +100,49 @@ class TestHeldOutChannels:
     def test_channels_that_are_worse_on_the_whole_do(self) -> None:
         error = {"speed": replace(self.ERROR, after=0.99), "pitch": self.WORSE}
         assert find_worse_channels(error, 1.05) == ["pitch"]
+
+    def test_what_no_prediction_feels_is_not_noticed(self) -> None:
+        before = {"speed": replace(self.ERROR, after=1.0), "pitch": replace(self.ERROR, after=0.5)}
+        assert not is_noticed(before | {"pitch": replace(self.ERROR, after=0.495)}, before, 0.98)
+        assert is_noticed(before | {"pitch": replace(self.ERROR, after=0.485)}, before, 0.98)
+
+
+def test_what_was_named_first_goes_where_a_later_name_explains_it() -> None:
+    evidence, null = evidence_of({"drag_area": 0.8})
+    rolling = named(evidence, null, "rolling_resistance_speed")[0]
+    later = judge_hypothesis(
+        evidence, rolling.base, None, make_library_hypothesis(LIBRARY["aerodynamic_drag"])
+    )
+    rounds = (*rolling.rounds, Round(base=rolling.base, tried=(), accepted=later, evidence=evidence))
+    both = SearchState(evidence=evidence, base=later.fitted, rounds=rounds)
+    left = drop_superseded(both, compare_with_rivals(evidence, both.base, rounds))
+    assert left is not None and [p.name for p in left.base.parts] == ["aerodynamic_drag"]
+    assert left.base.values == pytest.approx([0.8], rel=0.2)
+    assert left.rounds[0].base.parts == () and left.rounds[0].accepted.score > evidence.rules.accept_score
+    assert drop_superseded(left, compare_with_rivals(evidence, left.base, left.rounds)) is None
+
+
+@pytest.mark.parametrize(
+    ("port", "variable", "slope", "is_number"),
+    [
+        ("suspension_force", "suspension_speed", 1.0, True), ("suspension_force", "suspension_speed", 0.0, False),
+        ("pitch_moment", "deceleration", 1.0, False),
+    ],
+)  # fmt: skip
+def test_a_force_in_proportion_to_the_suspensions_speed_is_damping_and_no_form(
+    port: str, variable: str, slope: float, is_number: bool
+) -> None:
+    grid = np.linspace(-0.6, 0.6, 5)
+    values = 400.0 * (slope * grid / 0.6 + (1.0 - slope) * np.abs(grid))
+    spline = ResidualSpline(
+        port=port, variable=variable, grid=grid, values=values, covariance=np.eye(5), gain=100.0, score=50.0
+    )
+    assert is_session_number(make_form_hypotheses(spline, 10_000)[0]) is is_number
+
+
+def test_a_fit_starts_again_where_the_session_bends_to_make_up_for_what_is_missing() -> None:
+    evidence, null = evidence_of({"fade": 0.3})
+    bent = replace(null, session=null.session + 12.0 * evidence.session_sigma * (np.arange(7) == 0))
+    found = judge_hypothesis(evidence, bent, None, make_library_hypothesis(LIBRARY["brake_fade"]))
+    straight = judge_hypothesis(evidence, null, None, make_library_hypothesis(LIBRARY["brake_fade"]))
+    assert found.fitted.objective == pytest.approx(straight.fitted.objective, abs=2.0)

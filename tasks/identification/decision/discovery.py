@@ -10,6 +10,7 @@ from tasks.identification.decision.forms import (
     differentiate_by_splines,
     fit_residual_splines,
     is_constant,
+    is_session_number,
     make_form_hypotheses,
 )
 from tasks.identification.decision.screening import compute_inflation
@@ -87,7 +88,7 @@ def search_forms(
             alone is not None
             and alone.passes
             and not same_effect
-            and (ahead > rules.rival_span or (disagreeing and _acts_where(alone, state.rounds)))
+            and (disagreeing and _acts_where(alone, state.rounds) if retuned else ahead > rules.rival_span)
         ):
             reasons.append(f"a single form explains more than the library: {alone.hypothesis.name}")
             state = SearchState(
@@ -136,6 +137,8 @@ def find_best_form(
 ) -> Candidate | None:
     """Return the form that explains most of the residual of a fit, refined and judged; None if no form passes.
 
+    A force that grows with the suspension's speed is its damping: what a number of the session carries is no form.
+
     Parameters
     ----------
     evidence : the runs
@@ -156,7 +159,8 @@ def find_best_form(
         for x in leftovers
         for h in make_form_hypotheses(x, evidence.samples)
     ]
-    return relinearise_candidate(evidence, base, max(judged, key=lambda c: c.score))[1]
+    best = max(judged, key=lambda c: c.score)
+    return None if is_session_number(best.hypothesis) else relinearise_candidate(evidence, base, best)[1]
 
 
 def search_library_and_forms(

@@ -211,6 +211,20 @@ def make_form_in_range(name: str, coefficients: tuple[float, ...], low: float, h
     raise InputError(f"form {name}: no port, variable and shape of the grammar have that name")
 
 
+def is_session_number(form: Hypothesis) -> bool:
+    """Return whether a form is a number that every session may be off by: damping, stiffness or brake gain.
+
+    Parameters
+    ----------
+    form : hypothesis of `make_form_hypotheses`
+    """
+    x, y = sample_form(form)
+    line = bool(np.allclose(y, np.interp(0.0, x, y) + (y[-1] - y[0]) / (x[-1] - x[0]) * x))
+    if form.port == "brake_torque":
+        return is_constant(form)
+    return form.port == "suspension_force" and line and abs(float(np.interp(0.0, x, y))) < 1e-9
+
+
 def is_constant(form: Hypothesis) -> bool:
     """Return whether a form does not depend on its variable.
 

@@ -26,6 +26,7 @@ from tasks.identification.decision.intervals import (
 )
 from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals, find_detectable_sizes
 from tasks.identification.decision.search import SearchState
+from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import prepare_evidence
@@ -91,6 +92,9 @@ def find_missing_effects(
     start, found, near_form = search_library_and_forms(evidence, null, reasons)
     progress("rivals")
     compared = compare_with_rivals(found.evidence, found.base, found.rounds)
+    while again := drop_superseded(found, compared):
+        found = again
+        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
     progress("held-out error")
     error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     tried = list(found.tried)
@@ -106,9 +110,9 @@ def find_missing_effects(
         error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     progress("intervals")
     if compared:
-        here, settled, again = refit_named(found.evidence, found.base, [c.own for c in compared])
+        here, settled, refitted = refit_named(found.evidence, found.base, [c.own for c in compared])
         found = replace(found, evidence=here, base=settled)
-        compared = [replace(c, own=own) for c, own in zip(compared, again, strict=True)]
+        compared = [replace(c, own=own) for c, own in zip(compared, refitted, strict=True)]
         error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     named = [
         make_named_effect(c.own, c.share, compute_profile_interval(c.own, found.evidence)) for c in compared
