@@ -1,6 +1,7 @@
 """Explanations that no search of one effect at a time meets: a wrong number beside it, two effects together."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import CHANNELS
+from tasks.identification.decision import attribution
 from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
@@ -140,9 +142,20 @@ def test_a_force_in_proportion_to_the_suspensions_speed_is_damping_and_no_form(
     assert is_session_number(make_form_hypotheses(spline, 10_000)[0]) is is_number
 
 
-def test_a_fit_starts_again_where_the_session_bends_to_make_up_for_what_is_missing() -> None:
-    evidence, null = evidence_of({"fade": 0.3})
-    bent = replace(null, session=null.session + 12.0 * evidence.session_sigma * (np.arange(7) == 0))
-    found = judge_hypothesis(evidence, bent, None, make_library_hypothesis(LIBRARY["brake_fade"]))
-    straight = judge_hypothesis(evidence, null, None, make_library_hypothesis(LIBRARY["brake_fade"]))
-    assert found.fitted.objective == pytest.approx(straight.fitted.objective, abs=2.0)
+def test_a_fit_also_starts_from_a_session_at_rest_where_it_bends_to_make_up_for_what_is_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    evidence, null = evidence_of({})
+    begun: list[float] = []
+
+    def follow(*arguments: Any, session: np.ndarray, **options: Any) -> Fit:
+        begun.append(float(np.abs(session).max()))
+        return fit_hypotheses(*arguments, session=session, **options)
+
+    monkeypatch.setattr(attribution, "fit_hypotheses", follow)
+    fade = make_library_hypothesis(LIBRARY["brake_fade"])
+    judge_hypothesis(evidence, null, None, fade, 100.0)
+    assert 0.0 not in begun
+    bent = replace(null, session=null.session + 5.0 * evidence.session_sigma)
+    judge_hypothesis(evidence, bent, None, fade, 100.0)
+    assert 0.0 in begun
