@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test check study study-schedule study-crash study-fuzz study-faults study-mutants freeze bench lock clean
+.PHONY: demo test check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -57,6 +57,10 @@ study-fuzz: $(READY)
 
 study-faults: $(READY)
 	$(BIN)/python -m benchmarks.store_faults
+
+study-double-track: $(READY)
+	$(BIN)/python -m benchmarks.double_track --make datasets/double-track
+	$(BIN)/python -m benchmarks.double_track --judge datasets/double-track
 
 study-mutants: $(READY)
 	$(BIN)/python -m benchmarks.mutants

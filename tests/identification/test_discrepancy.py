@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.discrepancy import widen_noise
+from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import differentiate_run
 from tasks.identification.inference.fit import fit_hypotheses
@@ -44,7 +44,8 @@ def plain(seed: int, peak: float = 1.5) -> RunModel:
 @pytest.fixture(scope="module")
 def widened() -> Evidence:
     evidence = evidence_of(plain(1), cycling(plain(2)), cycling(plain(3)))
-    return widen_noise(evidence, fit_hypotheses(evidence.train, (), evidence.session_sigma))
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    return set_run_noise(evidence, estimate_run_noise(evidence, null))
 
 
 def test_runs_that_the_model_follows_keep_the_noise_of_their_sensors(widened: Evidence) -> None:
@@ -70,7 +71,7 @@ def test_what_a_better_fit_follows_again_has_its_sensors_noise_again() -> None:
         evidence, train=(evidence.train[0], replace(evidence.train[1], sigma=8.0 * NOISE)),
         held_out=(replace(evidence.held_out[0], sigma=8.0 * NOISE),),
     )  # fmt: skip
-    again = widen_noise(wide, null)
+    again = set_run_noise(wide, estimate_run_noise(wide, null))
     assert np.array_equal(again.train[1].sigma, NOISE) and np.array_equal(again.held_out[0].sigma, NOISE)
     # its derivatives were whitened by the sensors' noise and are read as of the wide one: eight times larger now
     assert again.train[1].nuisance == pytest.approx(8.0 * evidence.train[1].nuisance)

@@ -23,7 +23,7 @@ from tasks.identification.decision.search import (
     search_library,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.discrepancy import widen_noise
+from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
 from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
 from tasks.identification.rules import DecisionRules
@@ -186,11 +186,19 @@ def search_library_and_forms(
     if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
         evidence = differentiate_at(evidence, null, library=True)
         null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
-    evidence = widen_noise(evidence, null)
+    evidence = set_run_noise(evidence, estimate_run_noise(evidence, null))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search_library(SearchState(evidence=evidence, base=null), gated=False)
     if compute_inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
         raise ForeignCarError
+    # what the best effects follow again is no noise
+    noise = estimate_run_noise(explored.evidence, explored.base)
+    evidence = set_run_noise(evidence, noise)
+    explored = replace(
+        explored,
+        evidence=set_run_noise(explored.evidence, noise),
+        rounds=tuple(replace(r, evidence=set_run_noise(r.evidence, noise)) for r in explored.rounds),
+    )
     splines = differentiate_by_splines(explored.evidence, explored.base)
     scales = scale_disturbances(explored, splines)
     evidence = rescale_disturbances(evidence, scales)

@@ -5,7 +5,8 @@ whole campaign it drowns what the other runs show (model discrepancy, Kennedy an
 doi:10.1111/1467-9868.00294).
 """
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,21 @@ LONGEST_MEMORY = 0.98
 """Correlation from sample to sample beyond which more is not told apart [1]."""
 
 
-def widen_noise(evidence: Evidence, at: Fit) -> Evidence:
-    """Return the runs with the noise of each channel as wide as what a fit and its disturbances leave over.
+@dataclass(frozen=True, kw_only=True)
+class RunNoise:
+    """Noise of one run's channels.
+
+    Parameters
+    ----------
+    rho, sigma : float64 [7] AR(1) coefficient [1] and standard deviation [unit of the channel]
+    """
+
+    rho: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+
+
+def estimate_run_noise(evidence: Evidence, at: Fit) -> dict[str, RunNoise]:
+    """Return by run the noise of each channel: its sensor's, or what a fit and its disturbances leave over.
 
     Held-out runs too: their noise is read at the same fit, and is the same for every explanation.
 
@@ -30,42 +44,55 @@ def widen_noise(evidence: Evidence, at: Fit) -> Evidence:
     evidence : the runs
     at : fit whose leftover is taken
     """
-    train = linearise_at(evidence.train, at.parts, at.values, at.session, at.offsets)
-    held_out = linearise_runs(evidence.held_out, at.parts, at.values, at.session)
+    runs = (*evidence.train, *evidence.held_out)
+    points = (
+        *linearise_at(evidence.train, at.parts, at.values, at.session, at.offsets),
+        *linearise_runs(evidence.held_out, at.parts, at.values, at.session),
+    )
+    return {
+        run.model.run.name: _estimate_noise(run, point, evidence)
+        for run, point in zip(runs, points, strict=True)
+    }
 
-    def widened(run: RunEvidence, point: LinearisedRun) -> RunEvidence:
-        fresh = _widened(run, point, evidence.sensors, evidence.rules.discrepancy_limit)
-        return set_disturbance_prior(fresh, evidence.tolerances, evidence.disturbance)
+
+def set_run_noise(evidence: Evidence, noise: Mapping[str, RunNoise]) -> Evidence:
+    """Return the runs under other noise.
+
+    Parameters
+    ----------
+    evidence : the runs
+    noise : by name of the run
+    """
+
+    def rewhiten(run: RunEvidence) -> RunEvidence:
+        own = noise[run.model.run.name]
+        nuisance, session, library, others = (
+            whiten_channels(unwhiten_channels(columns, run.rho, run.sigma), own.rho, own.sigma)
+            for columns in (run.nuisance, run.session, run.library, run.others)
+        )
+        changed = replace(
+            run, rho=own.rho, sigma=own.sigma, nuisance=nuisance, session=session, library=library, others=others,
+            information=nuisance.T @ nuisance,
+        )  # fmt: skip
+        return set_disturbance_prior(changed, evidence.tolerances, evidence.disturbance)
 
     return replace(
         evidence,
-        train=tuple(widened(*pair) for pair in zip(evidence.train, train, strict=True)),
-        held_out=tuple(widened(*pair) for pair in zip(evidence.held_out, held_out, strict=True)),
+        train=tuple(rewhiten(run) for run in evidence.train),
+        held_out=tuple(rewhiten(run) for run in evidence.held_out),
     )
 
 
-def _widened(
-    run: RunEvidence,
-    point: LinearisedRun,
-    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
-    limit: float,
-) -> RunEvidence:
-    """Return a run under the noise that its leftover asks for, which is nowhere below its sensors'."""
+def _estimate_noise(run: RunEvidence, point: LinearisedRun, evidence: Evidence) -> RunNoise:
+    """Return the noise that a run's leftover asks for, which is nowhere below its sensors'."""
     left = point.residual - run.nuisance @ run.estimate_offsets(point.projected)
     error = unwhiten_channels(left, run.rho, run.sigma)
-    white = whiten_channels(error, *sensors).reshape(error.shape)
-    rho, sigma = sensors[0].copy(), sensors[1].copy()
-    for c in np.flatnonzero(np.isfinite(sensors[1])):
-        if float(np.mean(white[:, c] ** 2)) > limit:
+    white = whiten_channels(error, *evidence.sensors).reshape(error.shape)
+    rho, sigma = evidence.sensors[0].copy(), evidence.sensors[1].copy()
+    for c in np.flatnonzero(np.isfinite(sigma)):
+        if float(np.mean(white[:, c] ** 2)) > evidence.rules.discrepancy_limit:
             e = error[:, c]
             power = float(e @ e)
             rho[c] = min(max(float(e[1:] @ e[:-1]) / power, rho[c]), LONGEST_MEMORY)
             sigma[c] = max(float(np.sqrt(power / len(e))), sigma[c])
-    nuisance, session, library, others = (
-        whiten_channels(unwhiten_channels(columns, run.rho, run.sigma), rho, sigma)
-        for columns in (run.nuisance, run.session, run.library, run.others)
-    )
-    return replace(
-        run, rho=rho, sigma=sigma, nuisance=nuisance, session=session, library=library, others=others,
-        information=nuisance.T @ nuisance,
-    )  # fmt: skip
+    return RunNoise(rho=rho, sigma=sigma)
