@@ -46,6 +46,12 @@ class Candidate:
     rules: DecisionRules
 
     @property
+    def pulls_session(self) -> bool:
+        """Return whether the fit pulls a number of the session beyond belief."""
+        pulls = np.abs(self.fitted.session) / self.fitted.session_sigma
+        return bool(np.max(pulls) > self.rules.retune_pull)
+
+    @property
     def passes(self) -> bool:
         """Return whether score, held-out test and bounds all hold."""
         enough = self.score > self.rules.accept_score and self.held_out_gain > self.rules.held_out_gain

@@ -65,7 +65,8 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             if c.score > 0.0
             and is_close(own, share, c, wins)
             and not is_nested(own.hypothesis, c.hypothesis)
-            and _is_credible(c, own, evidence)
+            # an explanation that bends the session beyond belief is none beside one that does not
+            and (own.pulls_session or not c.pulls_session)
         )
         compared.append(
             RivalComparison(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
@@ -85,12 +86,6 @@ def is_close(own: Candidate, share: float, other: Candidate, wins: float) -> boo
     if other.gain > own.rules.rival_gain_share * own.gain:
         return True
     return other.score > own.score - own.rules.rival_span or (share < needed and wins > 0.5 * (1.0 - needed))
-
-
-def _is_credible(other: Candidate, own: Candidate, evidence: Evidence) -> bool:
-    """Return whether the other explanation keeps the session within belief, unless the named one does not either."""
-    bent, straight = (float(np.max(np.abs(c.fitted.session) / evidence.session_sigma)) for c in (other, own))
-    return bent <= evidence.rules.retune_pull or straight > evidence.rules.retune_pull
 
 
 def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:

@@ -122,7 +122,11 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
         passing = [c for c in tried if (c.passes if gated else c.score > rules.accept_score)]
         if not passing:
             return replace(state, tried=tuple(tried))
-        best = passing[0]
+        # an explanation that pulls a number of the session beyond belief gives way to one that does not
+        credible = [
+            c for c in passing if not c.pulls_session and c.gain > rules.lone_form_share * passing[0].gain
+        ]
+        best = credible[0] if credible else passing[0]
         simpler = [
             c
             for c in passing

@@ -118,7 +118,7 @@ def find_missing_effects(
         make_named_effect(c.own, c.share, compute_profile_interval(c.own, found.evidence)) for c in compared
     ]
     near = [
-        (c.own.hypothesis.name, make_named_effect(o, wins, compute_profile_interval(o, found.evidence)))
+        (c.own.hypothesis.name, make_named_effect(o, wins, compute_curvature_interval(o)))
         for c in compared
         for o, wins in c.near
     ]
@@ -130,7 +130,7 @@ def find_missing_effects(
         near.append(
             (
                 named[0].name,
-                make_named_effect(near_form, 0.0, compute_profile_interval(near_form, start.evidence)),
+                make_named_effect(near_form, 0.0, compute_curvature_interval(near_form)),
             )
         )
     kind = _verdict_name(named, near)
