@@ -9,7 +9,7 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import CHANNELS
-from tasks.identification.decision import attribution
+from tasks.identification.decision import attribution, search
 from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
@@ -159,3 +159,26 @@ def test_a_fit_also_starts_from_a_session_at_rest_where_it_bends_to_make_up_for_
     bent = replace(null, session=null.session + 5.0 * evidence.session_sigma)
     judge_hypothesis(evidence, bent, None, fade, 100.0)
     assert 0.0 in begun
+
+
+@pytest.mark.parametrize(
+    ("gain", "chosen"), [(200.0, "rolling_resistance_speed"), (20.0, "aerodynamic_drag")]
+)
+def test_what_pulls_the_session_beyond_belief_gives_way_to_what_does_not_and_explains_enough(
+    gain: float, chosen: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    evidence, null = evidence_of({})
+
+    def passing(name: str, score: float, gain: float, pull: float) -> Candidate:
+        judged = judge_hypothesis(evidence, null, None, make_library_hypothesis(LIBRARY[name]))
+        bent = replace(judged.fitted, values=np.array([0.0005]), session=pull * evidence.session_sigma)
+        return replace(judged, fitted=bent, score=score, gain=gain, held_out_gain=50.0)
+
+    tried = [
+        passing("aerodynamic_drag", 200.0, 250.0, 5.0),
+        passing("rolling_resistance_speed", 100.0, gain, 1.0),
+    ]
+    left = iter((tried, []))
+    monkeypatch.setattr(search, "refine_candidates", lambda *arguments, **options: next(left))
+    found = search.search_library(SearchState(evidence=evidence, base=null), gated=True)
+    assert [r.accepted.hypothesis.name for r in found.rounds] == [chosen]
