@@ -104,7 +104,10 @@ def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_ru
     assert {"brake_lag", "aerodynamic_drag"} <= named_intervals(everywhere).keys()
     contradicted = judge(replace(windy, runs=(*windy.runs[:-1], calm.runs[-1])))
     assert "aerodynamic_drag" not in named_intervals(contradicted)
-    assert any("drag_area" in reason and "not named" in reason for reason in contradicted.verdict.reasons)
+    assert any(
+        "suggest that the air holds" in reason and "not named" in reason
+        for reason in contradicted.verdict.reasons
+    )
 
 
 def test_an_engine_that_was_measured_is_an_input_and_no_effect():
@@ -129,5 +132,8 @@ def test_a_joint_fit_is_for_few_runs_and_for_files_that_hardly_know_the_car():
     campaign = campaign_of({})
     sure = replace(campaign, tolerances=TOLERANCES)
     enough = tuple(replace(run, held_out=i % 2 == 0) for i, run in enumerate(campaign.runs * 2))
-    assert needs_joint_fit(sure) and needs_joint_fit(replace(campaign, runs=enough))
-    assert not needs_joint_fit(replace(sure, runs=enough))
+    rules = load_decision_rules().joint
+    assert needs_joint_fit(sure, rules) and needs_joint_fit(replace(campaign, runs=enough), rules)
+    assert not needs_joint_fit(replace(sure, runs=enough), rules)
+    assert needs_joint_fit(replace(sure, runs=enough), replace(rules, fewest_runs=5))
+    assert not needs_joint_fit(replace(campaign, runs=enough), replace(rules, unknown_gain_tolerance=0.3))
