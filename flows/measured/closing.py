@@ -26,7 +26,6 @@ from tasks.identification.decision.answer import ChannelError, NamedEffect, Para
 from tasks.identification.decision.discovery import ForeignCarError
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.verdict import Trace, find_missing_effects
-from tasks.identification.joint.elimination import standard_errors
 from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import PARAMETERS
@@ -118,7 +117,7 @@ def session_tolerances(vehicle: str) -> dict[str, float]:
 def _judge(measured: Campaign, model: Vehicle, road: SurfaceParameters) -> Trace | JointTrace:
     """Look for one effect at a time where the file knows its car; fit all numbers at once where it does not."""
     effects, rules = load_effects(), load_decision_rules()
-    if not needs_joint_fit(measured):
+    if not needs_joint_fit(measured, rules.joint):
         with suppress(ForeignCarError):
             return find_missing_effects(measured, model, road, effects, rules)
     return judge_jointly(measured, model, road, effects, load_joint_numbers(), rules)
@@ -148,7 +147,7 @@ def joint_facts(trace: JointTrace) -> dict[str, Any]:
         "numbers": {
             number.name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[number.name].unit}
             for number, value, error in zip(
-                trace.fitted.numbers, trace.fitted.values, standard_errors(trace.fitted), strict=True
+                trace.fitted.numbers, trace.fitted.values, trace.errors, strict=True
             )
         },
         "starts_agreeing": {"agreeing": trace.agreeing[0], "of": trace.agreeing[1]},

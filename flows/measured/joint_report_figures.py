@@ -10,7 +10,8 @@ from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.joint.fit import JointFit, lead_offsets
 from tasks.identification.joint.numbers import SMOOTHED, JointNumber
 from tasks.identification.joint.stops import Stop, predict_stop
-from tasks.identification.joint.verdict import SEPARATE, JointTrace
+from tasks.identification.joint.verdict import JointTrace
+from tasks.identification.joint.words import SEPARATE
 
 MODELS = ("frozen", "retuned", "after")
 """The models of which residuals are shown, in the order of ``JointTrace.predicted``."""

@@ -4,6 +4,51 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
+class JointRules:
+    """Thresholds and counts of the joint fit of a car that its vehicle file hardly knows.
+
+    Parameters
+    ----------
+    unknown_gain_tolerance : tolerance of the brake gain from which a vehicle file hardly knows its car [1]
+    fewest_runs : training or held-out runs below which effects cannot be screened one by one [1]
+    brake_onset_share : share of a run's largest pressure from which the driver brakes [1]
+    braking_deceleration : deceleration above which a run brakes hard enough to show something of the brake [m s-2]
+    fewest_curve_stops : braking runs from which the shape of the brake's curve can be read [1]
+    saturation_ratio : peak deceleration over that of the model's tyres above which they grip better than it says [1]
+    least_pressure_range : brake pressure that a campaign is taken to reach at least, for its priors [MPa]
+    delay_interval : interval between samples up to which a log tells a lag from a dead time [s]
+    coasted_share : share of its speed that a run must lose for its resistances to be told apart [1]
+    closed_throttle : share of the throttle up to which it is closed [1]
+    false_name_chance : chance that a number which is 0 is named for one sign [1]
+    fewest_scatter_runs : runs from which their scatter says how certain a number is [1]
+    most_residual_correlation : correlation of residuals from sample to sample beyond which more is not told apart [1]
+    better_prediction_share : share of the held-out speed error below which a fit without a number predicts better [1]
+    equal_prediction_share : share of the held-out misfit of all channels up to which a fit without a number is as
+        good [1]
+    same_fit_errors : standard errors within which the numbers of two fits are the same [1]
+    wrong_number_tolerances : tolerances from which a number of the vehicle file is wrong [1]
+    """
+
+    unknown_gain_tolerance: float
+    fewest_runs: int
+    brake_onset_share: float
+    braking_deceleration: float
+    fewest_curve_stops: int
+    saturation_ratio: float
+    least_pressure_range: float
+    delay_interval: float
+    coasted_share: float
+    closed_throttle: float
+    false_name_chance: float
+    fewest_scatter_runs: int
+    most_residual_correlation: float
+    better_prediction_share: float
+    equal_prediction_share: float
+    same_fit_errors: float
+    wrong_number_tolerances: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class DecisionRules:
     """Thresholds and counts of a decision; values, units and reasons stand in catalogs/decision_rules.yaml.
 
@@ -42,6 +87,7 @@ class DecisionRules:
     profile_tolerance : relative error of the root deviance at which the profile is followed no further [1]
     forked_misfit : misfit by halving the step from which a run counts as sensitive to the step and is left out [1]
     fewest_runs : number of other runs below which runs that are sensitive to the step are used too [1]
+    joint : of the joint fit
     """
 
     accept_score: float
@@ -76,3 +122,4 @@ class DecisionRules:
     profile_tolerance: float
     forked_misfit: float
     fewest_runs: int
+    joint: JointRules

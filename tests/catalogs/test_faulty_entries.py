@@ -43,6 +43,18 @@ Change = Callable[[Any], None]
         ("decision_rules.yaml", load_decision_rules, lambda c: c.pop("rival_span"), "rival_span is missing"),
         ("decision_rules.yaml", load_decision_rules, lambda c: c["win_share"].update(value=2), "win_share"),
         ("decision_rules.yaml", load_decision_rules, lambda c: c["longest_lag"].update(unit="ms"), "longest_lag"),
+        (
+            "decision_rules.yaml",
+            load_decision_rules,
+            lambda c: c["joint"].pop("coasted_share"),
+            "joint.coasted_share is missing",
+        ),
+        (
+            "decision_rules.yaml",
+            load_decision_rules,
+            lambda c: c["joint"]["delay_interval"].update(unit="ms"),
+            "joint.delay_interval: unit must be s",
+        ),
         ("effects/truths.yaml", load_truths, lambda c: c.pop("outside"), "outside is missing"),
         ("effects/truths.yaml", load_truths, lambda c: c["library"].update(magic={"a": 1}), "magic: the library"),
         ("effects/truths.yaml", load_sizes, lambda c: c["sizes"].update(idle_creep=[1]), "sizes.idle_creep: must be"),

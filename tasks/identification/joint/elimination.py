@@ -10,13 +10,7 @@ from scipy.stats import t as student
 from tasks.identification.joint.fit import JointFit, fit_jointly
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.stops import Stop
-
-TAIL = 0.00135
-"""Chance that a number which is 0 is named for one sign: three standard errors of a normal distribution."""
-FEWEST_RUNS = 4
-"""Runs from which their scatter says how certain a number is; with fewer, the residuals' correlation does."""
-LONGEST_MEMORY = 0.98
-"""Correlation from sample to sample beyond which more is not told apart [1]."""
+from tasks.identification.rules import JointRules
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,22 +29,23 @@ class Substitute:
     fitted: JointFit
 
 
-def standard_errors(fitted: JointFit) -> NDArray[np.float64]:
+def standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
     """Return the standard error of each number, float64 [K] [unit of the table].
 
     Misfit of a model is no white noise. The larger of two answers is taken: the curvature widened by the residuals'
-    correlation from sample to sample; and, from `FEWEST_RUNS` runs on, the jackknife over runs, linear about the fit
-    (Efron 1982, doi:10.1137/1.9781611970319).
+    correlation from sample to sample; and, from `fewest_scatter_runs` runs on, the jackknife over runs, linear about
+    the fit (Efron 1982, doi:10.1137/1.9781611970319).
 
     Parameters
     ----------
     fitted : the fit
+    rules : of the joint fit
     """
     inverse = np.linalg.inv(fitted.information)
-    wide = max(_lag_inflation(r) * float(np.mean(r**2)) for r in fitted.residuals)
+    wide = max(_lag_inflation(r, rules) * float(np.mean(r**2)) for r in fitted.residuals)
     error = np.sqrt(np.diag(inverse) * max(wide, 1.0))
     runs = len(fitted.residuals)
-    if runs < FEWEST_RUNS:
+    if runs < rules.fewest_scatter_runs:
         return error
     moves = []
     for residual, slope in zip(fitted.residuals, fitted.slopes, strict=True):
@@ -65,15 +60,16 @@ def _softened(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     return residual / np.sqrt(1.0 + residual**2)
 
 
-def _lag_inflation(residual: NDArray[np.float64]) -> float:
+def _lag_inflation(residual: NDArray[np.float64], rules: JointRules) -> float:
     """Return how many samples count as one: (1 + rho) / (1 - rho) of first-order autoregressive misfit."""
     a, b = residual[1:], residual[:-1]
     power = float(residual @ residual)
-    rho = min(max(float(a @ b) / power, 0.0), LONGEST_MEMORY) if power > 0.0 else 0.0
+    most = rules.most_residual_correlation
+    rho = min(max(float(a @ b) / power, 0.0), most) if power > 0.0 else 0.0
     return (1.0 + rho) / (1.0 - rho)
 
 
-def quantile(fitted: JointFit) -> float:
+def compute_interval_quantile(fitted: JointFit) -> float:
     """Return the number of standard errors of a 95 % interval: Student's t with the runs less one.
 
     Parameters
@@ -83,73 +79,78 @@ def quantile(fitted: JointFit) -> float:
     return float(student.ppf(0.975, max(len(fitted.residuals) - 1, 2)))
 
 
-def certain_from(fitted: JointFit) -> float:
+def certain_from(fitted: JointFit, rules: JointRules) -> float:
     """Return the standard errors from 0 from which a number is named: Student's t, for few runs tell their scatter ill.
 
     Parameters
     ----------
     fitted : the fit
+    rules : of the joint fit
     """
-    return float(student.ppf(1.0 - TAIL, max(len(fitted.residuals), FEWEST_RUNS) - 1))
+    runs = max(len(fitted.residuals), rules.fewest_scatter_runs)
+    return float(student.ppf(1.0 - rules.false_name_chance, runs - 1))
 
 
-def certainty(fitted: JointFit) -> NDArray[np.float64]:
+def count_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
     """Return by how many standard errors each number differs from the vehicle file's, float64 [K].
 
     Parameters
     ----------
     fitted : the fit
+    rules : of the joint fit
     """
-    return np.asarray(np.abs(fitted.values) / standard_errors(fitted))
+    return np.asarray(np.abs(fitted.values) / standard_errors(fitted, rules))
 
 
-def certain_numbers(fitted: JointFit) -> list[tuple[JointNumber, float]]:
+def certain_numbers(fitted: JointFit, rules: JointRules) -> list[tuple[JointNumber, float]]:
     """Return the numbers that earned their place for certain, and by how many standard errors.
 
     Parameters
     ----------
     fitted : the fit
+    rules : of the joint fit
     """
     return [
         (number, float(sure))
-        for number, sure in zip(fitted.numbers, certainty(fitted), strict=True)
-        if number.removable and sure >= certain_from(fitted)
+        for number, sure in zip(fitted.numbers, count_standard_errors(fitted, rules), strict=True)
+        if number.removable and sure >= certain_from(fitted, rules)
     ]
 
 
-def eliminate(stops: Sequence[Stop], fitted: JointFit) -> JointFit:
+def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: JointRules) -> JointFit:
     """Return the fit of what is left when every number that may go and is not certain has gone.
 
-    What is named must not hang on one run: from `FEWEST_RUNS` runs on, a number goes that elimination about the same
-    fit would take away without any one of them (stability selection, Meinshausen and Buehlmann 2010,
+    What is named must not hang on one run: from `fewest_scatter_runs` runs on, a number goes that elimination about the
+    same fit would take away without any one of them (stability selection, Meinshausen and Buehlmann 2010,
     doi:10.1111/j.1467-9868.2010.00740.x).
 
     Parameters
     ----------
     stops : training runs
     fitted : with every number free
+    rules : of the joint fit
     """
-    unstable = {n.name for n in fitted.numbers if n.removable} - _stable_names(fitted)
+    unstable = {n.name for n in fitted.numbers if n.removable} - _stable_names(fitted, rules)
     if unstable:
-        fitted = refit(stops, fitted, tuple(n for n in fitted.numbers if n.name not in unstable))
+        fitted = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n.name not in unstable))
     while True:
-        sure = certainty(fitted)
+        sure = count_standard_errors(fitted, rules)
         weak = [(float(here), n.name) for n, here in zip(fitted.numbers, sure, strict=True) if n.removable]
-        if not weak or min(weak)[0] >= certain_from(fitted):
+        if not weak or min(weak)[0] >= certain_from(fitted, rules):
             return fitted
-        fitted = refit(stops, fitted, tuple(n for n in fitted.numbers if n.name != min(weak)[1]))
+        fitted = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n.name != min(weak)[1]))
 
 
-def _stable_names(fitted: JointFit) -> set[str]:
+def _stable_names(fitted: JointFit, rules: JointRules) -> set[str]:
     """Return the removable numbers that a linear elimination keeps with all runs, and without any one of them."""
     runs = range(len(fitted.residuals))
     samples = [tuple(runs)]
-    if len(samples[0]) >= FEWEST_RUNS:
+    if len(samples[0]) >= rules.fewest_scatter_runs:
         samples += [tuple(i for i in runs if i != gone) for gone in runs]
-    return set.intersection(*(_kept_linearly(fitted, sample) for sample in samples))
+    return set.intersection(*(_kept_linearly(fitted, sample, rules) for sample in samples))
 
 
-def _kept_linearly(fitted: JointFit, runs: tuple[int, ...]) -> set[str]:
+def _kept_linearly(fitted: JointFit, runs: tuple[int, ...], rules: JointRules) -> set[str]:
     """Return the removable numbers that backward elimination keeps on some runs, linear about the fit."""
     residual = [_softened(fitted.residuals[i]) for i in runs]
     slopes = [fitted.slopes[i] for i in runs]
@@ -160,19 +161,19 @@ def _kept_linearly(fitted: JointFit, runs: tuple[int, ...]) -> set[str]:
         information @ fitted.values - sum(a.T @ r for a, r in zip(slopes, residual, strict=True))
     )
     right -= prior * fitted.values
-    wide = max(_lag_inflation(r) * float(np.mean(r**2)) for r in residual)
+    wide = max(_lag_inflation(r, rules) * float(np.mean(r**2)) for r in residual)
     left = list(range(len(fitted.numbers)))
     while True:
         inverse = np.linalg.inv(information[np.ix_(left, left)])
         values = inverse @ right[left]
         sure = np.abs(values) / np.sqrt(np.diag(inverse) * max(wide, 1.0))
         weak = [(float(s), j) for s, j in zip(sure, left, strict=True) if fitted.numbers[j].removable]
-        if not weak or min(weak)[0] >= certain_from(fitted):
+        if not weak or min(weak)[0] >= certain_from(fitted, rules):
             return {fitted.numbers[j].name for j in left if fitted.numbers[j].removable}
         left.remove(min(weak)[1])
 
 
-def refit(
+def refit_numbers(
     stops: Sequence[Stop],
     fitted: JointFit,
     numbers: tuple[JointNumber, ...],
@@ -213,10 +214,10 @@ def find_substitutes(
         if not number.removable or not others:
             continue
         rest = tuple(n for n in fitted.numbers if n is not number)
-        without = refit(stops, fitted, rest)
+        without = refit_numbers(stops, fitted, rest)
         worth = without.cost - fitted.cost
         for other in others:
-            instead = refit(stops, without, (*rest, other), {other.name: 0.5 * other.sigma})
+            instead = refit_numbers(stops, without, (*rest, other), {other.name: 0.5 * other.sigma})
             if instead.cost < fitted.cost + (1.0 - share) * worth:
                 found.append(Substitute(of=number.name, name=other.name, fitted=instead))
     return found

@@ -9,19 +9,14 @@ from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.held_out import summarise_errors
-from tasks.identification.joint.elimination import certain_numbers, eliminate, refit
+from tasks.identification.joint.elimination import certain_numbers, eliminate_uncertain_numbers, refit_numbers
 from tasks.identification.joint.fit import JointFit, lead_offsets
 from tasks.identification.joint.stops import Stop, predict_stop
-from tasks.identification.rules import DecisionRules
-
-PREDICTS_BETTER = 0.75
-"""Share of the held-out error below which a model without a number predicts better than with it [1]."""
-PREDICTS_NO_WORSE = 1.02
-"""Share of the held-out misfit of all channels up to which a model without a number is as good [1]."""
+from tasks.identification.rules import DecisionRules, JointRules
 
 
 def drop_what_predicts_worse(
-    train: Sequence[Stop], held_out: Sequence[Stop], fitted: JointFit, reasons: list[str]
+    train: Sequence[Stop], held_out: Sequence[Stop], fitted: JointFit, rules: JointRules, reasons: list[str]
 ) -> JointFit:
     """Return the fit without the numbers whose absence predicts the speed of held-out runs better, and say so.
 
@@ -31,25 +26,29 @@ def drop_what_predicts_worse(
     ----------
     train, held_out : the runs
     fitted : after elimination
+    rules : of the joint fit
     reasons : is added to
     """
     there = _held_out_misfit(held_out, fitted)
     trials = []
-    for number, _ in certain_numbers(fitted):
-        without = refit(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
+    for number, _ in certain_numbers(fitted, rules):
+        without = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
         gone = _held_out_misfit(held_out, without)
         # a number earns its name by what it does to any channel, and not against the speed
-        if gone[0] < PREDICTS_BETTER * there[0] or gone[1] < PREDICTS_NO_WORSE * there[1]:
+        better = gone[0] < rules.better_prediction_share * there[0]
+        if better or gone[1] < rules.equal_prediction_share * there[1]:
             trials.append((gone, number, without))
     if not trials:
         return fitted
     gone, number, without = min(trials, key=lambda trial: trial[0][0] + trial[0][1])
     reasons.append(
-        f"{number.name} = {fitted.by_name[number.name]:.3g} would fit, but without it the held-out runs are predicted"
-        f" as well or better (speed {gone[0]:.3g} against {there[0]:.3g} m/s, all channels {gone[1]:.3g} against"
-        f" {there[1]:.3g}): not named"
+        f"the training runs suggest that {number.say(fitted.by_name[number.name])}, but the held-out runs are predicted"
+        f" as well or better without that (speed {gone[0]:.3g} against {there[0]:.3g} m/s, all channels {gone[1]:.3g}"
+        f" against {there[1]:.3g}): not named"
     )
-    return drop_what_predicts_worse(train, held_out, eliminate(train, without), reasons)
+    return drop_what_predicts_worse(
+        train, held_out, eliminate_uncertain_numbers(train, without, rules), rules, reasons
+    )
 
 
 def _held_out_misfit(held_out: Sequence[Stop], fitted: JointFit) -> tuple[float, float]:

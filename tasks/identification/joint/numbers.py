@@ -7,23 +7,10 @@ import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.inference.forward import RunModel
+from tasks.identification.rules import JointRules
 
-SATURATING = 1.05
-"""Share of the model's peak friction beyond which a stop shows that the tyres grip better than it says."""
-STOPS_OF_A_CURVE = 3
-"""Stops from which the shape of the brake's curve can be read."""
-BRAKES = 1.5
-"""Deceleration from which a run brakes [m/s2]."""
 CALIBRATED = ("gain", "friction", "radius")
 """Groups of numbers that re-tuning moves."""
-QUICK = 0.012
-"""Interval between samples up to which a log tells a lag from a dead time [s]."""
-COASTED = 0.3
-"""Share of its speed that a coast-down loses [1]."""
-CLOSED = 0.05
-"""Share of the throttle up to which it is closed [1]."""
-LEAST_PRESSURE = 1.0
-"""Brake pressure that a campaign is taken to reach at least [MPa]."""
 SMOOTHED = 0.3
 """Time over which a deceleration is averaged before its peak is taken [s]."""
 
@@ -66,7 +53,7 @@ class JointNumber:
 
 
 def choose_numbers(
-    numbers: Sequence[JointNumber], campaign: Campaign, models: Sequence[RunModel]
+    numbers: Sequence[JointNumber], campaign: Campaign, models: Sequence[RunModel], rules: JointRules
 ) -> tuple[JointNumber, ...]:
     """Return the numbers that the channels and manoeuvres of a campaign can show.
 
@@ -75,25 +62,31 @@ def choose_numbers(
     numbers : of the catalogue
     campaign : measured runs
     models : of its training runs
+    rules : of the joint fit
     """
     chosen = []
+    stops = sum(shows_brake_curve(model, rules) for model in models)
     for number in numbers:
         if not any(need in campaign.channels for need in number.needs):
             continue
         if number.name == "engine_torque" and any(run.drive_torque is not None for run in campaign.runs):
             continue  # an input, and no unknown
-        if number.group == "curve" and sum(brakes(model) for model in models) < STOPS_OF_A_CURVE:
+        if number.group == "curve" and stops < rules.fewest_curve_stops:
             continue  # one stop gives a gain and a delay, and no curve
-        if number.name == "friction" and not any(saturates(model) for model in models):
+        if number.name == "friction" and not any(saturates_tyres(model, rules) for model in models):
             continue
         if number.of_pressure:
             largest = max(float(model.run.pressure.max()) for model in models)
-            number = replace(number, sigma=number.sigma * max(largest, LEAST_PRESSURE), of_pressure=False)
+            number = replace(
+                number, sigma=number.sigma * max(largest, rules.least_pressure_range), of_pressure=False
+            )
         chosen.append(number)
     return tuple(chosen)
 
 
-def free_numbers(shown: Sequence[JointNumber], models: Sequence[RunModel]) -> tuple[JointNumber, ...]:
+def free_numbers(
+    shown: Sequence[JointNumber], models: Sequence[RunModel], rules: JointRules
+) -> tuple[JointNumber, ...]:
     """Return those of the numbers that a fit may move together; others only stand in for one of them.
 
     Resistances are one lump until a car has coasted down, and a lag and a dead time are one delay until a log is quick
@@ -103,9 +96,10 @@ def free_numbers(shown: Sequence[JointNumber], models: Sequence[RunModel]) -> tu
     ----------
     shown : that the campaign can show
     models : of its training runs
+    rules : of the joint fit
     """
-    lumped = {"delay"} if models[0].run.interval > QUICK else set()
-    if not any(coasts_down(model) for model in models):
+    lumped = {"delay"} if models[0].run.interval > rules.delay_interval else set()
+    if not any(coasts_down(model, rules) for model in models):
         lumped.add("resistance")
     first: dict[str, str] = {}
     for number in shown:
@@ -113,36 +107,41 @@ def free_numbers(shown: Sequence[JointNumber], models: Sequence[RunModel]) -> tu
     return tuple(n for n in shown if n.group not in lumped or first[n.group] == n.name)
 
 
-def coasts_down(model: RunModel) -> bool:
+def coasts_down(model: RunModel, rules: JointRules) -> bool:
     """Whether a run loses speed without brake and throttle, over so wide a range that resistances differ.
 
     Parameters
     ----------
     model : the run
+    rules : of the joint fit
     """
     run, speed = model.run, model.measured[:, CHANNELS.index("speed")]
-    driven = run.throttle is not None and bool(np.max(run.throttle) > CLOSED)
-    return not run.pressure.any() and not driven and float(speed[0] - speed[-1]) > COASTED * float(speed[0])
+    driven = run.throttle is not None and bool(np.max(run.throttle) > rules.closed_throttle)
+    lost = float(speed[0] - speed[-1]) > rules.coasted_share * float(speed[0])
+    return not run.pressure.any() and not driven and lost
 
 
-def brakes(model: RunModel) -> bool:
+def shows_brake_curve(model: RunModel, rules: JointRules) -> bool:
     """Whether a run brakes hard enough to show something of the brake's curve.
 
     Parameters
     ----------
     model : the run
+    rules : of the joint fit
     """
-    return peak_deceleration(model) > BRAKES
+    return peak_deceleration(model) > rules.braking_deceleration
 
 
-def saturates(model: RunModel) -> bool:
+def saturates_tyres(model: RunModel, rules: JointRules) -> bool:
     """Whether a run decelerates harder than the tyres of the model allow.
 
     Parameters
     ----------
     model : the run
+    rules : of the joint fit
     """
-    return peak_deceleration(model) > SATURATING * model.surface_friction * model.vehicle.gravity
+    limit = model.surface_friction * model.vehicle.gravity
+    return peak_deceleration(model) > rules.saturation_ratio * limit
 
 
 def peak_deceleration(model: RunModel) -> float:

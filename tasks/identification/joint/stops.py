@@ -14,6 +14,7 @@ from tasks.identification.inference.forward import (
     prepare_run,
     simulate_run,
 )
+from tasks.identification.rules import JointRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
@@ -25,8 +26,6 @@ OFFSETS = ("initial_speed", "drive", "acceleration_bias")
 OFFSET_SIGMA = np.array([0.3, 2.0, 0.3])
 """Their priors."""
 OFFSET_LIMIT = np.array([3.0, 8.0, 3.0])
-BRAKED = 0.1
-"""Share of a run's largest pressure from which the driver brakes [1]."""
 LIFT = 0.2
 """Time in which a driver lifts the throttle, centred on the brake where no throttle was measured [s]."""
 
@@ -54,7 +53,9 @@ class Stop:
         return self.model.measured[:, self.channels]
 
 
-def make_stop(run: Run, vehicle: Vehicle, surface: SurfaceParameters, channels: tuple[str, ...]) -> Stop:
+def make_stop(
+    run: Run, vehicle: Vehicle, surface: SurfaceParameters, channels: tuple[str, ...], rules: JointRules
+) -> Stop:
     """Return a run ready for a joint fit.
 
     Parameters
@@ -62,11 +63,16 @@ def make_stop(run: Run, vehicle: Vehicle, surface: SurfaceParameters, channels: 
     run : measured
     vehicle, surface : the model as it stands
     channels : that were measured
+    rules : of the joint fit
     """
     model = prepare_run(run, vehicle, surface)
     pressure = model.run.pressure[: model.samples]
     peak = float(pressure.max())
-    pressed = np.flatnonzero(pressure > BRAKED * peak) if peak > 0.0 else np.empty(0, dtype=np.int64)
+    pressed = (
+        np.flatnonzero(pressure > rules.brake_onset_share * peak)
+        if peak > 0.0
+        else np.empty(0, dtype=np.int64)
+    )
     onset = int(pressed[0]) if pressed.size else model.samples
     seen = [
         name

@@ -12,19 +12,19 @@ from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.elimination import (
     Substitute,
     certain_numbers,
-    certainty,
-    eliminate,
+    compute_interval_quantile,
+    count_standard_errors,
+    eliminate_uncertain_numbers,
     find_substitutes,
-    quantile,
-    refit,
+    refit_numbers,
     standard_errors,
 )
 from tasks.identification.joint.fit import JointFit, fit_jointly, misfit_scales, suggest_starts
 from tasks.identification.joint.held_out import drop_what_predicts_worse, predict_held_out, summarise_held_out
 from tasks.identification.joint.numbers import CALIBRATED, JointNumber, choose_numbers, free_numbers
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
-from tasks.identification.joint.words import SEPARATE, tell_verdict, tell_what_was_used
-from tasks.identification.rules import DecisionRules
+from tasks.identification.joint.words import tell_rivals, tell_verdict, tell_what_was_used
+from tasks.identification.rules import DecisionRules, JointRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
@@ -34,12 +34,6 @@ FIRST = ("lag", "drag_area", "speed_delay")
 """Numbers that are free beside those of every car while the best start is looked for."""
 GRIPS = (0.0, 0.2, 0.5)
 """Friction from which the last fits start, where runs saturate the tyres [1]."""
-WRONG = 3.0
-"""Tolerances beyond which a number of the vehicle file is wrong."""
-UNKNOWN_GAIN = 0.1
-"""Tolerance of the brake gain from which a vehicle file hardly knows its car [1]."""
-FEW_RUNS = 3
-"""Training or held-out runs below which their scatter says too little to screen effects one by one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +45,7 @@ class JointTrace:
     verdict : the answer
     calibrated : numbers that the prediction rests on and that differ from the file by no more than its tolerances
     fitted : the fit that it rests on
+    errors : float64 [K] standard errors of its numbers
     train, held_out : the runs
     predicted : by held-out run, float64 [3, N, 7] readings of the frozen, the re-tuned and the grown model
     substitutes : what explains nearly as much as a named number
@@ -61,6 +56,7 @@ class JointTrace:
     verdict: Verdict
     calibrated: tuple[NamedEffect, ...]
     fitted: JointFit
+    errors: NDArray[np.float64]
     train: tuple[Stop, ...]
     held_out: tuple[Stop, ...]
     predicted: tuple[NDArray[np.float64], ...]
@@ -69,15 +65,16 @@ class JointTrace:
     sentence: str
 
 
-def needs_joint_fit(campaign: Campaign) -> bool:
+def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:
     """Whether a campaign says too little, or its vehicle file knows too little, to look for one effect at a time.
 
     Parameters
     ----------
     campaign : measured runs with their tolerances
+    rules : of the joint fit
     """
-    few = min(len(campaign.train), len(campaign.held_out)) < FEW_RUNS
-    return few or campaign.tolerances.session[SESSION.index("pressure_gain")] >= UNKNOWN_GAIN
+    few = min(len(campaign.train), len(campaign.held_out)) < rules.fewest_runs
+    return few or _is_gain_unknown(campaign, rules)
 
 
 def judge_jointly(
@@ -98,40 +95,36 @@ def judge_jointly(
     vehicle, surface : the model that is judged
     library : names of effects
     numbers : that a fit may move
-    rules : by which errors are summarised and compared
+    rules : of the decision
     progress : called with the name of each stage as it begins
     """
-    stops = [make_stop(run, vehicle, surface, campaign.channels) for run in campaign.runs]
+    joint = rules.joint
+    stops = [make_stop(run, vehicle, surface, campaign.channels, joint) for run in campaign.runs]
     train = tuple(stop for stop in stops if not stop.model.run.held_out)
     held_out = tuple(stop for stop in stops if stop.model.run.held_out)
-    shown = choose_numbers(numbers, campaign, [stop.model for stop in train])
+    shown = choose_numbers(numbers, campaign, [stop.model for stop in train], joint)
     progress("starts")
-    known = campaign.tolerances.session[SESSION.index("pressure_gain")] < UNKNOWN_GAIN
-    starts = [{}] if known else suggest_starts(train)
-    everything = _fit_everything(train, starts, free_numbers(shown, [stop.model for stop in train]))
+    starts = suggest_starts(train) if _is_gain_unknown(campaign, joint) else [{}]
+    everything = _fit_everything(train, starts, free_numbers(shown, [stop.model for stop in train], joint))
     progress("elimination")
-    settled, agreeing = _settle(train, eliminate(train, everything), starts)
-    fitted = eliminate(train, settled)  # at a better fit a number may be no longer certain
+    settled, agreeing = _settle(train, eliminate_uncertain_numbers(train, everything, joint), starts, joint)
+    # at a better fit a number may be no longer certain
+    fitted = eliminate_uncertain_numbers(train, settled, joint)
     progress("held-out error")
     reasons: list[str] = []
-    fitted = drop_what_predicts_worse(train, held_out, fitted, reasons)
-    retuned = refit(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
+    fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
+    retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
     predicted = predict_held_out(held_out, retuned, fitted)
     error, manoeuvres = summarise_held_out(held_out, predicted, rules)
     progress("rivals")
     substitutes = tuple(find_substitutes(train, fitted, shown, rules.rival_gain_share))
-    effects, rivals = _named(fitted, substitutes, library)
+    effects, rivals = _named(fitted, substitutes, library, joint)
     tolerances = _tolerances(campaign)
-    calibrated = tuple(e for e in effects if _is_within(e, tolerances))
+    calibrated = tuple(e for e in effects if _is_within(e, tolerances, joint))
     effects = [e for e in effects if e not in calibrated]
     kind = _kind(effects, rivals)
-    reasons += tell_what_was_used(campaign, train, agreeing)
-    groups = {n.name: n.group for n in shown}
-    of_effect = {e.name: groups[e.parameters[0].name] for e in effects}
-    reasons += [
-        f"{rival.name} explains the runs nearly as well as {of}: {SEPARATE[of_effect[of]]}"
-        for of, rival in rivals
-    ]
+    reasons += tell_what_was_used(campaign, train, agreeing, joint)
+    reasons += tell_rivals(effects, rivals, shown)
     verdict = Verdict(
         verdict=kind,
         effects=tuple(effects),
@@ -157,13 +150,18 @@ def judge_jointly(
         verdict=verdict,
         calibrated=calibrated if effects else (),
         fitted=fitted,
+        errors=standard_errors(fitted, joint),
         train=train,
         held_out=held_out,
         predicted=predicted,
         substitutes=substitutes,
         agreeing=agreeing,
-        sentence=tell_verdict(fitted, kind, error, manoeuvres),
+        sentence=tell_verdict(fitted, kind, error, manoeuvres, joint),
     )
+
+
+def _is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
+    return campaign.tolerances.session[SESSION.index("pressure_gain")] >= rules.unknown_gain_tolerance
 
 
 def _fit_everything(
@@ -177,43 +175,44 @@ def _fit_everything(
 
 
 def _settle(
-    train: Sequence[Stop], fitted: JointFit, starts: Sequence[Mapping[str, float]]
+    train: Sequence[Stop], fitted: JointFit, starts: Sequence[Mapping[str, float]], rules: JointRules
 ) -> tuple[JointFit, tuple[int, int]]:
     """Return the best fit of the numbers left from several starts, and how many of these reach it."""
     grips = GRIPS if "friction" in fitted.by_name else (0.0,)
     begins = [fitted.by_name, *({**starts[0], "friction": grip} for grip in grips), *starts[1:]]
     fits = fit_jointly(train, fitted.numbers, begins, scales=fitted.scales)
-    error = standard_errors(fits[0])
-    same = sum(bool(np.all(np.abs(f.values - fits[0].values) < 2.0 * error)) for f in fits)
+    near = rules.same_fit_errors * standard_errors(fits[0], rules)
+    same = sum(bool(np.all(np.abs(f.values - fits[0].values) < near)) for f in fits)
     return fits[0], (same, len(fits))
 
 
 def _named(
-    fitted: JointFit, substitutes: Sequence[Substitute], library: Sequence[Effect]
+    fitted: JointFit, substitutes: Sequence[Substitute], library: Sequence[Effect], rules: JointRules
 ) -> tuple[list[NamedEffect], list[tuple[str, NamedEffect]]]:
     """Return what is named, new physics first, and its rivals."""
     by_number = {e.parameters[0].name: e for e in reversed(library)}
     # what every car needs anew is told whatever its size: the prediction rests on it
-    named = [n for n, _ in certain_numbers(fitted)] + [n for n in fitted.numbers if not n.removable]
-    effects = [_named_effect(fitted, n, by_number[n.name]) for n in named]
+    named = [n for n, _ in certain_numbers(fitted, rules)] + [n for n in fitted.numbers if not n.removable]
+    effects = [_named_effect(fitted, n, by_number[n.name], rules) for n in named]
     order = {"effect": 0, "sensor": 1, "retune": 2}
     effects.sort(key=lambda e: order[e.effect_class])
     rivals = []
     for other in substitutes:
         number = next(n for n in other.fitted.numbers if n.name == other.name)
-        rivals.append((by_number[other.of].name, _named_effect(other.fitted, number, by_number[other.name])))
+        rival = _named_effect(other.fitted, number, by_number[other.name], rules)
+        rivals.append((by_number[other.of].name, rival))
     friction = next((n for n in fitted.numbers if n.group == "friction"), None)
     if friction is not None:  # tyres at their limit bend the brake's curve too
-        grip = _named_effect(fitted, friction, by_number[friction.name])
+        grip = _named_effect(fitted, friction, by_number[friction.name], rules)
         rivals += [(by_number[n.name].name, grip) for n in named if n.group == "curve"]
     return effects, rivals
 
 
-def _named_effect(fitted: JointFit, number: JointNumber, effect: Effect) -> NamedEffect:
+def _named_effect(fitted: JointFit, number: JointNumber, effect: Effect, rules: JointRules) -> NamedEffect:
     place = fitted.numbers.index(number)
-    value, error = float(fitted.values[place]), float(standard_errors(fitted)[place])
-    reach, row = quantile(fitted) * error, PARAMETERS[number.name]
-    sure = float(certainty(fitted)[place])
+    value, error = float(fitted.values[place]), float(standard_errors(fitted, rules)[place])
+    reach, row = compute_interval_quantile(fitted) * error, PARAMETERS[number.name]
+    sure = float(count_standard_errors(fitted, rules)[place])
     return NamedEffect(
         name=effect.name,
         effect_class=effect.effect_class,
@@ -240,13 +239,13 @@ def _tolerances(campaign: Campaign) -> dict[str, float]:
     return {name: session[name] for name in names} | {"friction": campaign.tolerances.friction}
 
 
-def _is_within(effect: NamedEffect, tolerances: Mapping[str, float]) -> bool:
+def _is_within(effect: NamedEffect, tolerances: Mapping[str, float], rules: JointRules) -> bool:
     """Whether a number of the file is off by no more than its tolerance and its own error allow."""
     number = effect.parameters[0]
     if number.name not in tolerances:
         return False
     error = 0.25 * (number.ci_high - number.ci_low)
-    return abs(number.value) < WRONG * float(np.hypot(tolerances[number.name], error))
+    return abs(number.value) < rules.wrong_number_tolerances * float(np.hypot(tolerances[number.name], error))
 
 
 def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:

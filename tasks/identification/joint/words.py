@@ -5,11 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Campaign
-from tasks.identification.decision.answer import ChannelError, VerdictName
+from tasks.identification.decision.answer import ChannelError, NamedEffect, VerdictName
 from tasks.identification.joint.elimination import certain_numbers
 from tasks.identification.joint.fit import JointFit
-from tasks.identification.joint.numbers import saturates
+from tasks.identification.joint.numbers import JointNumber, saturates_tyres
 from tasks.identification.joint.stops import Stop
+from tasks.identification.rules import JointRules
 
 SEPARATE = {
     "resistance": "coast down from the highest speed to 5 m/s with the clutch open, and once in gear",
@@ -20,7 +21,9 @@ SEPARATE = {
 """The run that tells numbers of one group apart."""
 
 
-def tell_what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tuple[int, int]) -> list[str]:
+def tell_what_was_used(
+    campaign: Campaign, train: Sequence[Stop], agreeing: tuple[int, int], rules: JointRules
+) -> list[str]:
     """Return sentences on channels, inputs, range and stability.
 
     Parameters
@@ -28,6 +31,7 @@ def tell_what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tupl
     campaign : measured runs
     train : those that were fitted
     agreeing : starts that reach the same fit, of all
+    rules : of the joint fit
     """
     runs = campaign.runs
     inputs = ["brake pressure"]
@@ -39,7 +43,7 @@ def tell_what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tupl
     seen = [CHANNELS[c].replace("_", " ") for c in train[0].channels]
     grip = (
         ""
-        if any(saturates(stop.model) for stop in train)
+        if any(saturates_tyres(stop.model, rules) for stop in train)
         else "; no run passed the limit of the model's tyres"
     )
     return [
@@ -51,11 +55,35 @@ def tell_what_was_used(campaign: Campaign, train: Sequence[Stop], agreeing: tupl
     ]
 
 
+def tell_rivals(
+    effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]], shown: Sequence[JointNumber]
+) -> list[str]:
+    """Return a sentence for each rival: what these runs cannot tell apart, and the run that would.
+
+    Parameters
+    ----------
+    effects : that are named
+    rivals : of them, each with the name of the effect that it stands in for
+    shown : numbers that the campaign can show
+    """
+    numbers = {n.name: n for n in shown}
+    named = {effect.name: effect.parameters[0] for effect in effects}
+    sentences = []
+    for of, rival in rivals:
+        one, other = named[of], rival.parameters[0]
+        sentences.append(
+            f"these runs cannot tell whether {numbers[one.name].say(one.value)} or"
+            f" {numbers[other.name].say(other.value)}: {SEPARATE[numbers[one.name].group]}"
+        )
+    return sentences
+
+
 def tell_verdict(
     fitted: JointFit,
     kind: VerdictName,
     error: Mapping[str, ChannelError],
     manoeuvres: Mapping[str, ChannelError],
+    rules: JointRules,
 ) -> str:
     """Return the verdict in plain words, with what it does to the error.
 
@@ -64,8 +92,9 @@ def tell_verdict(
     fitted : the fit that it rests on
     kind : of the verdict
     error, manoeuvres : on runs that no fit has seen
+    rules : of the joint fit
     """
-    news = [n for n, _ in certain_numbers(fitted)]
+    news = [n for n, _ in certain_numbers(fitted, rules)]
     told = [n.say(fitted.by_name[n.name]) for n in news or fitted.numbers]
     if kind == "NOTHING" or not told:
         return "Nothing is missing that these runs can show."

@@ -10,12 +10,15 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.identification.joint.held_out import drop_what_predicts_worse
 from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
+from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 SPEED_AND_ACCELERATION = ("speed", "longitudinal_acceleration")
+RULES = load_decision_rules()
 STOPS = ((27.0, 1.2), (20.0, 2.4), (16.0, 1.5), (22.0, 2.0))
 """Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
 
@@ -45,10 +48,8 @@ def own_channels(run: Run, channels: tuple[str, ...], held_out: bool) -> Run:
     return replace(run, response=np.where(seen, run.response, 0.0), held_out=held_out)
 
 
-def judge(campaign: Campaign, vehicle: Vehicle = VEHICLE) -> JointTrace:
-    return judge_jointly(
-        campaign, vehicle, SURFACE, load_effects(), load_joint_numbers(), load_decision_rules()
-    )
+def judge(campaign: Campaign, vehicle: Vehicle = VEHICLE, rules: DecisionRules = RULES) -> JointTrace:
+    return judge_jointly(campaign, vehicle, SURFACE, load_effects(), load_joint_numbers(), rules)
 
 
 @cache
@@ -98,13 +99,34 @@ def test_a_number_of_the_file_is_wrong_only_beyond_its_tolerance():
     assert {e.name for e in far.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}
 
 
+def test_the_rules_say_how_far_off_a_wrong_number_is_and_which_fits_are_the_same():
+    strict = replace(RULES.joint, wrong_number_tolerances=1.0, same_fit_errors=1e-12)
+    trace = judge(campaign_of({"pressure_gain": 0.3, "lag": 0.09}), rules=replace(RULES, joint=strict))
+    assert {e.name for e in trace.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}
+    assert trace.agreeing[0] == 1 < slow_brakes().agreeing[0]
+
+
+@pytest.mark.parametrize("share", ["better_prediction_share", "equal_prediction_share"])
+def test_the_rules_say_from_which_held_out_error_a_number_is_not_named(share: str):
+    found, reasons = slow_brakes(), list[str]()
+    rules = replace(RULES.joint, **{share: 1000.0})
+    left = drop_what_predicts_worse(found.train, found.held_out, found.fitted, rules, reasons)
+    assert "lag" in found.fitted.by_name and "lag" not in left.by_name
+    assert reasons[0].startswith(
+        "the training runs suggest that the brakes follow the pressure with a lag of 0.0"
+    )
+
+
 def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_run_contradicts_it():
     windy, calm = campaign_of({"lag": 0.09, "drag_area": 3.0}), campaign_of({"lag": 0.09})
     everywhere = judge(windy)
     assert {"brake_lag", "aerodynamic_drag"} <= named_intervals(everywhere).keys()
     contradicted = judge(replace(windy, runs=(*windy.runs[:-1], calm.runs[-1])))
     assert "aerodynamic_drag" not in named_intervals(contradicted)
-    assert any("drag_area" in reason and "not named" in reason for reason in contradicted.verdict.reasons)
+    assert any(
+        "suggest that the air holds" in reason and "not named" in reason
+        for reason in contradicted.verdict.reasons
+    )
 
 
 def test_an_engine_that_was_measured_is_an_input_and_no_effect():
@@ -129,5 +151,8 @@ def test_a_joint_fit_is_for_few_runs_and_for_files_that_hardly_know_the_car():
     campaign = campaign_of({})
     sure = replace(campaign, tolerances=TOLERANCES)
     enough = tuple(replace(run, held_out=i % 2 == 0) for i, run in enumerate(campaign.runs * 2))
-    assert needs_joint_fit(sure) and needs_joint_fit(replace(campaign, runs=enough))
-    assert not needs_joint_fit(replace(sure, runs=enough))
+    rules = RULES.joint
+    assert needs_joint_fit(sure, rules) and needs_joint_fit(replace(campaign, runs=enough), rules)
+    assert not needs_joint_fit(replace(sure, runs=enough), rules)
+    assert needs_joint_fit(replace(sure, runs=enough), replace(rules, fewest_runs=5))
+    assert not needs_joint_fit(replace(campaign, runs=enough), replace(rules, unknown_gain_tolerance=0.3))

@@ -1,0 +1,22 @@
+"""Reasons of a joint verdict are sentences, in the plain words of the catalogue."""
+
+from catalogs.joint_numbers import load_joint_numbers
+from tasks.identification.decision.answer import NamedEffect, Parameter
+from tasks.identification.joint.words import tell_rivals
+
+
+def named_effect(effect: str, number: str, value: float) -> NamedEffect:
+    p = Parameter(name=number, value=value, ci_low=0.0, ci_high=1.0, lower=0.0, upper=1.0, unit="s")
+    return NamedEffect(
+        name=effect, effect_class="effect", port="", variable="", parameters=(p,), score=0.0, gain=0.0,
+        inflation=1.0, held_out_gain=0.0, win_share=1.0,
+    )  # fmt: skip
+
+
+def test_a_rival_is_told_in_plain_words_with_the_run_that_separates_the_two():
+    lag, dead = named_effect("brake_lag", "lag", 0.056), named_effect("brake_dead_time", "dead_time", 0.05)
+    (sentence,) = tell_rivals([lag], [("brake_lag", dead)], load_joint_numbers())
+    assert sentence == (
+        "these runs cannot tell whether the brakes follow the pressure with a lag of 0.056 s or the brakes answer"
+        " 0.05 s late: press the brake in steps from constant speed, logging at 100 Hz or more"
+    )
