@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
@@ -51,14 +52,16 @@ def open_answer_file(dataset: str, to: str | None, out: str | None) -> Outputs |
 
 
 def format_csv(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Return CSV: numbers in the shortest form that reads back to the same double, NULL empty, lists as JSON.
+    """Return CSV: numbers in the shortest form that reads back to the same double, lists as JSON.
+
+    NULL and numbers that are not finite are empty.
 
     Text that a spreadsheet would take for a formula gets an apostrophe in front, as in the CSV of ``musync report``.
 
     Parameters
     ----------
     names : of the columns
-    rows : of plain values, as `flows.reading.query.make_plain` gives them
+    rows : values as DuckDB gives them
     """
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -74,9 +77,18 @@ def format_parquet(table: pa.Table) -> memoryview:
     return memoryview(buffer.getvalue())
 
 
+def make_plain(value: Any) -> Any:
+    """Return a value that JSON has; other values as text."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, list | tuple):
+        return [make_plain(entry) for entry in value]
+    return value if isinstance(value, bool | int | float | str | None) else str(value)
+
+
 def _format_cell(value: Any) -> Any:
-    if isinstance(value, list):
-        return json.dumps(value)
+    if isinstance(value, bool | list | tuple):
+        return json.dumps(make_plain(value))
     if isinstance(value, str) and value.startswith(_FORMULA):
         return f"'{value}"
-    return value
+    return make_plain(value)

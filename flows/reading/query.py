@@ -1,6 +1,5 @@
 """A dataset as five SQL views, and what its columns mean."""
 
-import math
 import re
 import threading
 from collections.abc import Callable
@@ -11,7 +10,7 @@ import duckdb
 import pyarrow as pa
 
 from catalogs.sentences import shorten
-from flows.reading.answer_files import format_csv, format_parquet, open_answer_file
+from flows.reading.answer_files import format_csv, format_parquet, make_plain, open_answer_file
 from flows.reading.connection import connect_views
 from flows.store.arrays import arrays_of
 from tasks.conventions import (
@@ -83,19 +82,26 @@ def query_dataset(
         except duckdb.Error as error:
             raise refused_query(query, error, "--allow-files") from None
     if file is None:
-        return {"columns": names, "rows": [dict(zip(names, row, strict=True)) for row in rows]}
+        return {
+            "columns": names,
+            "rows": [dict(zip(names, map(make_plain, row), strict=True)) for row in rows],
+        }
+    if not names:
+        raise InputError(f"--- {shorten(query)}: must have an answer to write to a file; it has none")
     (name,) = file.names
     file.write(name, format_parquet(rows) if to == "parquet" else format_csv(names, rows))
     return {"file": str(file.path(name)), "columns": names, "row_count": len(rows)}
 
 
 def _fetch_rows(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], Any]:
-    """Names of the columns, and rows of plain values."""
+    """Names of the columns, and tuples."""
     answer = connection.execute(query)
+    if answer is None:  # nothing but a comment
+        return [], []
     names = [column[0] for column in answer.description or ()]
-    rows: list[list[Any]] = []
+    rows: list[tuple[Any, ...]] = []
     while some := answer.fetchmany(_FETCHED_AT_ONCE):
-        rows += [[_make_plain(value) for value in row] for row in some]
+        rows += some
         _bound_answer(query, len(rows), len(names))
     return names, rows
 
@@ -104,15 +110,14 @@ def _fetch_table(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[lis
     """Names of the columns, and an Arrow table."""
     relation = connection.sql(query)
     if relation is None:
-        raise InputError(f"--- {shorten(query)}: must have an answer to write to a file; it has none")
+        return [], None
     count, batches = 0, []
-    with relation.to_arrow_reader(_FETCHED_AT_ONCE) as reader:
-        for batch in reader:
-            batches.append(batch)
-            count += batch.num_rows
-            _bound_answer(query, count, batch.num_columns)
-        table = pa.Table.from_batches(batches, reader.schema)
-    return table.column_names, table
+    reader = pa.RecordBatchReader.from_stream(relation)
+    for batch in reader:
+        batches.append(batch)
+        count += batch.num_rows
+        _bound_answer(query, count, batch.num_columns)
+    return reader.schema.names, pa.Table.from_batches(batches, reader.schema)
 
 
 def _bound_answer(query: str, rows: int, columns: int) -> None:
@@ -203,12 +208,3 @@ def _describe_channel(channel: Channel) -> dict[str, Any]:
         "standard_name": channel.standard_name,
         "description": channel.description,
     }
-
-
-def _make_plain(value: Any) -> Any:
-    """A value that JSON has."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, list | tuple):
-        return [_make_plain(entry) for entry in value]
-    return value if isinstance(value, bool | int | float | str | None) else str(value)

@@ -32,17 +32,20 @@ def test_the_file_holds_the_answer_to_the_last_bit(toy_dataset, tmp_path, to):
 def test_parquet_keeps_types_and_csv_writes_null_empty_lists_as_json_and_formulas_as_text(
     toy_dataset, tmp_path
 ):
-    query = "SELECT NULL::DOUBLE AS n, [1.5, NULL] AS l, DATE '2025-01-01' AS d, true AS b, '=1+1' AS \"+f\", 'a,\"b' AS t"
+    query = (
+        "SELECT NULL::DOUBLE AS n, [1.5::DOUBLE, 'nan'] AS l, -1.5 AS m, DATE '2025-01-01' AS d, true AS b,"
+        """ '=1+1' AS "+f", 'a,"b' AS t"""
+    )
     for to in ("csv", "parquet"):
         query_dataset(str(toy_dataset.root), query, to=to, out=str(tmp_path / to))
     with (tmp_path / "csv").open(newline="") as stream:
         names, row = csv.reader(stream)
-    assert names == ["n", "l", "d", "b", "'+f", "t"]
-    assert row == ["", "[1.5, null]", "2025-01-01", "True", "'=1+1", 'a,"b']
+    assert names == ["n", "l", "m", "d", "b", "'+f", "t"]
+    assert row == ["", "[1.5, null]", "-1.5", "2025-01-01", "true", "'=1+1", 'a,"b']
     schema = pq.read_schema(tmp_path / "parquet")
     kinds = [str(kind).split("<")[0] for kind in schema.types]
-    assert kinds == ["double", "list", "date32[day]", "bool", "string", "string"]
-    assert schema.names[4] == "+f"
+    assert kinds == ["double", "list", "decimal128(2, 1)", "date32[day]", "bool", "string", "string"]
+    assert schema.names[5] == "+f"
 
 
 def test_its_own_file_is_written_again_and_a_strangers_never(toy_dataset, tmp_path):
@@ -89,9 +92,17 @@ def test_an_answer_too_large_or_none_leaves_no_file(toy_dataset, tmp_path, monke
     assert not list(tmp_path.iterdir())
 
 
-def test_a_statement_without_an_answer_makes_no_file(toy_dataset, tmp_path):
-    with pytest.raises(InputError, match="must have an answer"):
-        query_dataset(str(toy_dataset.root), "CREATE TABLE t (a INT)", to="parquet", out=str(tmp_path / "a"))
+@pytest.mark.parametrize("to", ["csv", "parquet"])
+def test_a_query_that_fails_or_has_no_answer_leaves_no_file(toy_dataset, tmp_path, to):
+    told = {
+        "-- nothing": "must have an answer",
+        "SELECT label::INT FROM ticks": "Could not convert",
+        "SELEC": "syntax",
+    }
+    for query, sentence in told.items():
+        with pytest.raises(InputError, match=sentence):
+            query_dataset(str(toy_dataset.root), query, to=to, out=str(tmp_path / "a"))
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_command_prints_where_the_answer_lies(toy_dataset, tmp_path, monkeypatch, capsys):
