@@ -16,7 +16,7 @@ _PANELS: tuple[tuple[str, float, tuple[tuple[str, str, str], ...]], ...] = (
     ("braking slip [1]", 1.0, (("braking_slip_f", "front", _FRONT), ("braking_slip_r", "rear", _REAR))),
     # half of the half-car's axle load rests on each wheel
     ("wheel load [kN]", 0.5e-3, (("axle_load_f", "front", _FRONT), ("axle_load_r", "rear", _REAR))),
-    ("pitch, nose down [deg]", 180 / np.pi, (("pitch", "", _FRONT),)),
+    ("pitch [deg]", 180 / np.pi, (("pitch", "", _FRONT),)),
 )
 """Title, shown value over the column's, and lines: column, name in the legend, colour."""
 COLUMNS = ("t_ns", "brake_pressure_mpa", *(column for _, _, lines in _PANELS for column, _, _ in lines))

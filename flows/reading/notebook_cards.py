@@ -62,7 +62,7 @@ def clip_card(clip: "Clip") -> str:
         ("weather", f"{scenario['weather']}, {scenario['precipitation_mm_h']:g} mm/h"),
         ("initial speed", f"{scenario['initial_speed_km_h']:g} km/h"),
         ("surface friction", _format_figure(figures["surface_friction"], "{:.3f}")),
-        ("stopping distance", _format_figure(figures["stopping_distance"], "{:.1f} m")),
+        ("stopping distance", _format_figure(figures["stopping_distance"], "{:.1f} m", none="no stop in the clip")),
         ("largest nose-down pitch", _format_figure(figures["peak_pitch"], "{:.2f} deg", degrees(1))),
         ("pose check", {True: "passed", False: "failed: in quarantine"}.get(clip.record["verdict"]["passed"], "none")),
         ("clip id", clip.clip_id),
@@ -71,8 +71,8 @@ def clip_card(clip: "Clip") -> str:
     return _render_card(clip.label, pictures, rows)
 
 
-def _format_figure(value: float | None, form: str, factor: float = 1.0) -> str:
-    return "not represented" if value is None else form.format(value * factor)
+def _format_figure(value: float | None, form: str, factor: float = 1.0, none: str = "not represented") -> str:
+    return none if value is None else form.format(value * factor)
 
 
 def _format_range(stops: Sequence[float], clips: int) -> str:
