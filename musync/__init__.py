@@ -2,13 +2,14 @@
 
 from typing import TYPE_CHECKING, Any
 
+from flows.reading.clips import Clip
 from flows.reading.opening import Dataset, open
 from tasks.errors import InputError
 
 if TYPE_CHECKING:
     from flows.reading.windows import ClipWindows, SeededOrder
 
-__all__ = ["ClipWindows", "Dataset", "InputError", "SeededOrder", "open"]
+__all__ = ["Clip", "ClipWindows", "Dataset", "InputError", "SeededOrder", "open"]
 
 
 def __getattr__(name: str) -> Any:

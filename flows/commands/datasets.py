@@ -10,7 +10,6 @@ from flows.commands.command import (
     Command,
     define_argument,
     define_option,
-    select_keys,
 )
 
 GROUP = "Datasets"
@@ -24,6 +23,11 @@ def list_quarantined_clips(result: dict[str, Any]) -> dict[str, Any]:
     rows = result["quarantined"].items()
     listed = [{"clip": label, "why": "; ".join(reasons)} for label, reasons in rows]
     return result | ({"quarantined": listed} if listed else {})
+
+
+def select_answer(result: dict[str, Any]) -> dict[str, Any]:
+    """Return the rows of an answer, or the file that holds them and how many they are."""
+    return {key: result[key] for key in ("file", "row_count", "rows") if key in result}
 
 
 COMMANDS = (
@@ -133,8 +137,21 @@ COMMANDS = (
                 " reads the dataset alone.",
                 False,
             ),
+            define_option(
+                "to",
+                str | None,
+                "Write the answer to the file of --out as csv or parquet, and print where.",
+                None,
+                known=("csv", "parquet"),
+            ),
+            define_option(
+                "out",
+                str | None,
+                "File for --to; one that musync sql has not written is never replaced.",
+                None,
+            ),
         ),
-        brief=select_keys("rows"),
+        brief=select_answer,
     ),
     Command(
         name="schema",

@@ -1,6 +1,6 @@
 """A finished dataset for people who analyse it: the same tables in the library of their choice."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import duckdb
 import pyarrow as pa
-import pyarrow.dataset
 import pyarrow.parquet as pq
 
 from catalogs.sentences import shorten
+from flows.reading.clips import Clip, find_clip
 from flows.reading.connection import connect_sealed, quote_identifier
 from flows.reading.query import VIEWS, list_columns, refused_query
+from flows.reading.suggestions import suggest_names
 from flows.reading.table_files import table_files
 from flows.store.address import frames_store, open_for_reading, want_telemetry
 from flows.store.frame_metadata import check_frames, read_local_metadata
@@ -25,6 +26,7 @@ from tasks.errors import InputError
 
 if TYPE_CHECKING:  # each takes its time to import, and few people need all of them
     import pandas as pd
+    import pyarrow.dataset
     import zarr
 
     from flows.reading.windows import ClipWindows
@@ -51,9 +53,39 @@ class Dataset:
     allow_files: bool = False
 
     def __repr__(self) -> str:
-        return f"Dataset({self.origin or str(self.root)!r}, {len(self.manifest['clips'])} clips)"
+        return f"Dataset({self.place!r}, {len(self)} clips)"
 
-    def telemetry(self, table: str = "ticks") -> pyarrow.dataset.Dataset:
+    def _repr_html_(self) -> str:
+        from flows.reading.notebook_cards import dataset_card
+
+        return dataset_card(self)
+
+    def __len__(self) -> int:
+        return len(self.manifest["clips"])
+
+    def __iter__(self) -> Iterator[str]:
+        """The labels of the clips, in the order of their index."""
+        return (clip["label"] for clip in self.manifest["clips"])
+
+    def __contains__(self, name: object) -> bool:
+        return any(name in (clip["label"], clip["clip_id"]) for clip in self.manifest["clips"])
+
+    def __getitem__(self, name: str) -> Clip:
+        """Return the clip of this label or id.
+
+        Raises
+        ------
+        InputError
+            If there is none, with the labels that come near.
+        """
+        return Clip(dataset=self, record=find_clip(self.manifest["clips"], name, self.place))
+
+    @property
+    def place(self) -> str:
+        """Its folder, or its address in an object store."""
+        return self.origin or str(self.root)
+
+    def telemetry(self, table: str = "ticks") -> "pyarrow.dataset.Dataset":
         """Return a stored table as a pyarrow dataset: clips, ticks, frames or pairs; its schema has the units.
 
         Raises
@@ -62,14 +94,16 @@ class Dataset:
             If there is no such table.
         """
         _check_names(table, STORED)
+        from pyarrow import dataset  # it imports pandas, which takes a third of a second
+
         paths = list(table_files(self._layout, self.manifest)[table].values())
         try:
             # without the metadata of the whole: libraries read settings for other libraries there
             schema = pq.read_schema(paths[0]).remove_metadata()
             if table in {"clips", "pairs"}:
-                return pyarrow.dataset.dataset(paths, schema=schema)
-            partitioning = pyarrow.dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
-            return pyarrow.dataset.dataset(
+                return dataset.dataset(paths, schema=schema)
+            partitioning = dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
+            return dataset.dataset(
                 paths, schema=schema.append(pa.field("family", pa.string())), partitioning=partitioning
             )
         except (pa.ArrowException, OSError) as error:
@@ -93,43 +127,83 @@ class Dataset:
         except duckdb.Error as error:
             raise refused_query(query, error, "musync.open(..., allow_files=True)") from None
 
-    def pandas(self, table: str = "clips", columns: Sequence[str] | None = None) -> "pd.DataFrame":
+    def pandas(
+        self, table: str = "clips", columns: str | Sequence[str] | None = None, *, clip: str | None = None
+    ) -> "pd.DataFrame":
         """Return a view as a pandas frame; values not represented are NaN.
+
+        ``attrs["units"]`` and ``attrs["long_name"]`` of the frame map its columns to their unit and meaning.
 
         Parameters
         ----------
         table : clips, ticks, frames, verdicts or pairs
         columns : those to read; None takes all
-        """
-        return self._evaluated(table, columns, lambda relation: relation.df())
-
-    def polars(self, table: str = "clips", columns: Sequence[str] | None = None) -> Any:
-        """A view as a Polars frame; needs the package polars.
+        clip : label or id of the clip whose rows are read; None takes those of all
 
         Raises
         ------
         InputError
-            If Polars is not installed, or there is no such view.
+            If there is no such view, clip or column, with the names that come near.
+        """
+        frame = self._evaluated(table, columns, clip, lambda relation: relation.df())
+        known = {name: CHANNELS_BY_NAME[name] for name in frame.columns if name in CHANNELS_BY_NAME}
+        frame.attrs["units"] = {name: channel.unit for name, channel in known.items() if channel.unit}
+        frame.attrs["long_name"] = {name: channel.description for name, channel in known.items()}
+        return frame
+
+    def polars(
+        self, table: str = "clips", columns: str | Sequence[str] | None = None, *, clip: str | None = None
+    ) -> Any:
+        """A view as a Polars frame, as `pandas`; needs the package polars. Polars keeps no units.
+
+        Raises
+        ------
+        InputError
+            If Polars is not installed, or there is no such view, clip or column.
         """
         try:
             import polars as pl
         except ImportError:
             raise InputError("Polars is not installed: pip install 'musync[analysts]'") from None
-        return self._evaluated(table, columns, lambda relation: pl.from_arrow(relation.to_arrow_table()))
+        return self._evaluated(
+            table, columns, clip, lambda relation: pl.from_arrow(relation.to_arrow_table())
+        )
 
     def _evaluated(
         self,
         table: str,
-        columns: Sequence[str] | None,
+        columns: str | Sequence[str] | None,
+        clip: str | None,
         evaluate: Callable[[duckdb.DuckDBPyRelation], _Answer],
     ) -> _Answer:
         _check_names(table, tuple(VIEWS))
-        chosen = "*" if columns is None else ", ".join(map(quote_identifier, columns))
-        relation = self.sql(f"SELECT {chosen} FROM {table}")
+        chosen = "*" if columns is None else ", ".join(self._quote_columns(table, columns))
+        relation = self.sql(f"SELECT {chosen} FROM {table}{self._select_clip(table, clip)}")
         try:
             return evaluate(relation)
         except (duckdb.Error, pa.ArrowException, ValueError, OverflowError) as error:
             raise self._unreadable(error) from None
+
+    def _quote_columns(self, table: str, columns: str | Sequence[str]) -> list[str]:
+        """Columns of a view as SQL takes them; DuckDB does not mind the case of a name."""
+        asked = [columns] if isinstance(columns, str) else list(columns)
+        if not asked:
+            raise InputError(f"columns of {table}: must name one or more; None takes all")
+        known = self.sql(f"SELECT * FROM {table}").columns
+        folded = {name.casefold() for name in known}
+        wrong = [name for name in asked if not isinstance(name, str) or name.casefold() not in folded]
+        if wrong:
+            raise suggest_names(f"{table}: column", wrong, known, "data.schema()")
+        return [quote_identifier(name) for name in asked]
+
+    def _select_clip(self, table: str, clip: str | None) -> str:
+        if clip is None:
+            return ""
+        if table == "pairs":
+            raise InputError("table 'pairs': has two clips a row; ask for it without a clip and filter it")
+        return (
+            f" WHERE clip_id = '{self[clip].clip_id}'"  # an id is hexadecimal: the manifest's door saw to it
+        )
 
     @property
     def _layout(self) -> Layout:

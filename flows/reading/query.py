@@ -1,6 +1,5 @@
 """A dataset as five SQL views, and what its columns mean."""
 
-import math
 import re
 import threading
 from collections.abc import Callable
@@ -8,8 +7,10 @@ from concurrent.futures import Future
 from typing import Any, TypeVar
 
 import duckdb
+import pyarrow as pa
 
 from catalogs.sentences import shorten
+from flows.reading.answer_files import format_csv, format_parquet, make_plain, open_answer_file
 from flows.reading.connection import connect_views
 from flows.store.arrays import arrays_of
 from tasks.conventions import (
@@ -48,7 +49,9 @@ _REACHED = re.compile(
 _Result = TypeVar("_Result")
 
 
-def query_dataset(dataset: str, query: str, *, allow_files: bool = False) -> dict[str, Any]:
+def query_dataset(
+    dataset: str, query: str, *, allow_files: bool = False, to: str | None = None, out: str | None = None
+) -> dict[str, Any]:
     """Answer an SQL query over the views clips, ticks, frames, verdicts and pairs; Ctrl-C ends it.
 
     Parameters
@@ -57,39 +60,72 @@ def query_dataset(dataset: str, query: str, *, allow_files: bool = False) -> dic
     query : DuckDB SQL, one statement
     allow_files : the query may read and write files of this machine, and load extensions; else it reaches the views
         alone
+    to : csv or parquet writes the answer to a file; None returns it
+    out : that file; one that ``musync sql`` has not written is never overwritten
 
     Returns
     -------
-    ``columns[]`` and ``rows[]``, each a mapping of column to value; NULL is None.
+    ``columns[]`` and ``rows[]``, each a mapping of column to value; NULL is None. With ``to``: ``file``, ``columns[]``
+    and the number of rows, ``row_count``.
 
     Raises
     ------
     InputError
         The folder is no sealed dataset, the query is none that DuckDB answers, it asks for files without
-        ``allow_files``, or its answer is too large to be returned.
+        ``allow_files``, its answer is too large to be returned, or the file cannot be written.
     """
+    file = open_answer_file(dataset, to, out)
+    fetch = _fetch_table if to == "parquet" else _fetch_rows
     with connect_views(dataset, allow_files=allow_files) as connection:
         try:
-            names, rows = run_interruptibly(connection, lambda: _fetch_answer(connection, query))
+            names, rows = run_interruptibly(connection, lambda: fetch(connection, query))
         except duckdb.Error as error:
             raise refused_query(query, error, "--allow-files") from None
-    return {"columns": names, "rows": [dict(zip(names, map(_make_plain, row), strict=True)) for row in rows]}
+    if file is None:
+        return {
+            "columns": names,
+            "rows": [dict(zip(names, map(make_plain, row), strict=True)) for row in rows],
+        }
+    if not names:
+        raise InputError(f"--- {shorten(query)}: must have an answer to write to a file; it has none")
+    (name,) = file.names
+    file.write(name, format_parquet(rows) if to == "parquet" else format_csv(names, rows))
+    return {"file": str(file.path(name)), "columns": names, "row_count": len(rows)}
 
 
-def _fetch_answer(
-    connection: duckdb.DuckDBPyConnection, query: str
-) -> tuple[list[str], list[tuple[Any, ...]]]:
+def _fetch_rows(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], Any]:
+    """Names of the columns, and tuples."""
     answer = connection.execute(query)
+    if answer is None:  # nothing but a comment
+        return [], []
     names = [column[0] for column in answer.description or ()]
     rows: list[tuple[Any, ...]] = []
     while some := answer.fetchmany(_FETCHED_AT_ONCE):
         rows += some
-        if len(rows) * len(names) > MOST_VALUES:
-            raise InputError(
-                f"--- {shorten(query)}: the answer must have at most {MOST_VALUES:,} values (rows times columns); it"
-                " has more: add LIMIT, or take it in parts with musync.open(...).sql(...).to_arrow_reader()"
-            )
+        _bound_answer(query, len(rows), len(names))
     return names, rows
+
+
+def _fetch_table(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], Any]:
+    """Names of the columns, and an Arrow table."""
+    relation = connection.sql(query)
+    if relation is None:
+        return [], None
+    count, batches = 0, []
+    reader = pa.RecordBatchReader.from_stream(relation)
+    for batch in reader:
+        batches.append(batch)
+        count += batch.num_rows
+        _bound_answer(query, count, batch.num_columns)
+    return reader.schema.names, pa.Table.from_batches(batches, reader.schema)
+
+
+def _bound_answer(query: str, rows: int, columns: int) -> None:
+    if rows * columns > MOST_VALUES:
+        raise InputError(
+            f"--- {shorten(query)}: the answer must have at most {MOST_VALUES:,} values (rows times columns); it"
+            " has more: add LIMIT, or take it in parts with musync.open(...).sql(...).to_arrow_reader()"
+        )
 
 
 def run_interruptibly(connection: duckdb.DuckDBPyConnection, work: Callable[[], _Result]) -> _Result:
@@ -172,12 +208,3 @@ def _describe_channel(channel: Channel) -> dict[str, Any]:
         "standard_name": channel.standard_name,
         "description": channel.description,
     }
-
-
-def _make_plain(value: Any) -> Any:
-    """A value that JSON has."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, list | tuple):
-        return [_make_plain(entry) for entry in value]
-    return value if isinstance(value, bool | int | float | str | None) else str(value)

@@ -61,7 +61,7 @@ def check_frames(
     InputError
         Listing what breaks a rule.
     """
-    problems = _group_problems(read(METADATA), place)
+    problems = _group_problems(read, members, place)
     shapes = {}
     for name in sorted(members):
         if name not in arrays_of(labels=True):
@@ -115,19 +115,46 @@ def check_array(read: ReadMetadata, name: str, place: object) -> tuple[int, ...]
     return tuple(shape)
 
 
-def _group_problems(content: bytes | None, place: object) -> list[str]:
-    where = f"{place}/{METADATA}"
+def _group_problems(read: ReadMetadata, members: Collection[str], place: object) -> list[str]:
+    where, content = f"{place}/{METADATA}", read(METADATA)
     if content is None:
         return [f"{where}: missing: musync repair makes it again"]
     try:
         metadata = parse_json(content, where, "group's metadata")
     except InputError as error:
         return list(error.problems)
-    if not isinstance(metadata, dict) or {k: v for k, v in metadata.items() if k != "attributes"} != _GROUP:
+    free = {"attributes", "consolidated_metadata"}
+    if not isinstance(metadata, dict) or {k: v for k, v in metadata.items() if k not in free} != _GROUP:
+        return [f"{where}: must be the metadata of a Zarr 3 group and hold nothing else"]
+    # datasets of earlier versions have no copies; where there are some, other readers take them for the arrays' own
+    if "consolidated_metadata" in metadata and not _are_copies(
+        metadata["consolidated_metadata"], read, members
+    ):
         return [
-            f"{where}: must be the metadata of a Zarr 3 group and hold nothing else, no copies of its arrays' either"
+            f"{where}: its copies of the arrays' metadata must be equal to these and hold nothing else; they differ:"
+            " musync repair makes it again"
         ]
     return []
+
+
+def _are_copies(found: Any, read: ReadMetadata, members: Collection[str]) -> bool:
+    """Whether the group holds what stands in the arrays' own files, and no other array."""
+    known = arrays_of(labels=True)
+    match found:
+        case {"kind": "inline", "must_understand": False, "metadata": dict(copies)} if len(found) == 3:
+            names = copies.keys() | (known.keys() & set(members))
+            return names <= known.keys() and all(
+                name in copies and copies[name] == _parse_member(read, name) for name in names
+            )
+    return False
+
+
+def _parse_member(read: ReadMetadata, name: str) -> Any:
+    """Return the metadata of an array as JSON has them; NaN, which equals nothing, where there are none."""
+    try:
+        return parse_json(read(f"{name}/{METADATA}") or b"", name, "array's metadata")
+    except InputError:
+        return float("nan")
 
 
 def _shape_problems(shape: Any, array: PixelArray) -> list[str]:

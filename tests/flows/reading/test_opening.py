@@ -77,6 +77,20 @@ def test_xarray_reads_frames_lazily_with_named_dimensions(data, toy_dataset):
     np.testing.assert_array_equal(same.values, picture.values)
     assert str(same.clip_id.values) == data.manifest["clips"][1]["clip_id"]
     assert (float(same.t), same.t.attrs["units"]) == (0.3, "s")
+    assert data.xarray()["depth"].attrs["units"] == "m"
+
+
+def test_xarray_by_itself_opens_the_frames_without_a_warning(toy_dataset, recwarn):
+    """It looks for copies of the arrays' metadata in the group's first."""
+    xarray = pytest.importorskip("xarray", reason="xarray is optional")
+    assert xarray.open_zarr(toy_dataset.frames, chunks=None, decode_cf=False)["rgb"].shape == (
+        4,
+        11,
+        64,
+        96,
+        3,
+    )
+    assert not [str(warning.message) for warning in recwarn if "consolidated" in str(warning.message)]
 
 
 def test_the_schema_of_the_arrays_is_that_of_the_zarr_store(data):
@@ -88,7 +102,7 @@ def test_the_schema_of_the_arrays_is_that_of_the_zarr_store(data):
         assert array.dtype == listed[name]["dtype"]
 
 
-def test_the_python_of_the_analysts_page_runs_as_it_stands(data, toy_dataset):
+def test_the_python_of_the_analysts_page_runs_as_it_stands(data, toy_dataset, tmp_path):
     """But for the dataset's name, and for windows that fit the toy's 11 frames, all of them in quarantine."""
     pytest.importorskip("polars", reason="polars is optional")
     pytest.importorskip("xarray", reason="xarray is optional")
@@ -96,8 +110,9 @@ def test_the_python_of_the_analysts_page_runs_as_it_stands(data, toy_dataset):
     blocks = re.findall(r"```python\n(.*?)```", page, flags=re.S)
     code = "\n".join(blocks).replace("datasets/demo", str(toy_dataset.root))
     code = code.replace("window=16, stride=8", "window=4, stride=4, quarantined=True")
+    code = code.replace("picture(40)", "picture(5)").replace("clip.html", str(tmp_path / "clip.html"))
     code = code.replace("[3, 40]", "[3, 5]").replace("rain-50/flat-braking", "snow-3/flat")
-    assert len(blocks) == 5
+    assert len(blocks) == 6
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=SOURCE_ROOT)
     assert done.returncode == 0, done.stderr
 

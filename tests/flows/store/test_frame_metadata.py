@@ -4,6 +4,7 @@ import json
 import shutil
 
 import pytest
+import zarr
 
 import musync
 from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
@@ -79,7 +80,43 @@ def test_every_fault_of_an_array_is_told_at_once(copy):
     assert len(caught.value.problems) == 3
 
 
-def test_a_group_holds_its_arrays_and_no_copies_of_their_metadata(copy):
+def test_a_group_copies_the_metadata_of_all_its_arrays_for_readers_that_look_there_first(toy_dataset):
+    group = json.loads((toy_dataset.frames / "zarr.json").read_text())
+    copies = group["consolidated_metadata"]["metadata"]
+    assert copies.keys() == {"rgb", "depth", "class"}
+    for name, metadata in copies.items():
+        assert metadata == json.loads((toy_dataset.frames / name / "zarr.json").read_text())
+    group = zarr.open_group(toy_dataset.frames, mode="r", use_consolidated=True)
+    assert group["rgb"].shape == (4, 11, 64, 96, 3)
+
+
+def test_a_dataset_of_an_earlier_version_has_no_copies_and_is_read(copy):
+    edit(copy, "", lambda m: m.pop("consolidated_metadata"))
+    assert musync.open(copy.root).frames["rgb"].shape == (4, 11, 64, 96, 3)
+
+
+COPIED = {
+    "a codec of pickles": lambda c: shard(c["metadata"]["rgb"])["codecs"].append(
+        {"name": "numcodecs.pickle"}
+    ),
+    "another array": lambda c: c["metadata"].update(evil=c["metadata"]["rgb"]),
+    "an array above": lambda c: c["metadata"].update({"../class": c["metadata"]["class"]}),
+    "an array that is not there": lambda c: c["metadata"].update(flow=c["metadata"]["rgb"]),
+    "one array less": lambda c: c["metadata"].pop("rgb"),
+    "another kind": lambda c: c.update(kind="reference"),
+    "one more key": lambda c: c.update(url="file:///etc/passwd"),
+    "a list": lambda c: c.update(metadata=[]),
+}
+
+
+@pytest.mark.parametrize("oddity", COPIED)
+def test_copies_that_differ_from_the_arrays_are_refused(copy, oddity):
+    edit(copy, "", lambda m: COPIED[oddity](m["consolidated_metadata"]))
+    with pytest.raises(InputError, match="copies of the arrays' metadata must be equal to these"):
+        _ = musync.open(copy.root).frames
+
+
+def test_a_group_holds_its_arrays_and_no_other_copies_of_their_metadata(copy):
     metadata = json.loads((copy.frames / "rgb" / "zarr.json").read_text())
     edit(
         copy, "", lambda m: m.update(consolidated_metadata={"kind": "inline", "metadata": {"rgb": metadata}})
@@ -90,7 +127,11 @@ def test_a_group_holds_its_arrays_and_no_copies_of_their_metadata(copy):
         _ = musync.open(copy.root).frames
     told = "\n".join(caught.value.problems)
     assert len(caught.value.problems) == 3
-    assert "hold nothing else" in told and "evil" in told and "depth/zarr.json: missing" in told
+    assert (
+        "must be equal to these and hold nothing else" in told
+        and "evil" in told
+        and "depth/zarr.json: missing" in told
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,118 @@
+"""One clip of an opened dataset: its tables, its plot, and how a notebook shows it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from catalogs.sentences import shorten
+from flows.reading.suggestions import suggest_names
+from tasks.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    import plotly.graph_objects as go
+    from numpy.typing import NDArray
+
+    from flows.reading.opening import Dataset
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clip:
+    """A clip of a dataset.
+
+    Parameters
+    ----------
+    dataset : that it belongs to
+    record : what the manifest says of it: scenario, figures, verdict
+    """
+
+    dataset: "Dataset" = field(repr=False)
+    record: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def label(self) -> str:
+        """The clip's levels of the grid's axes."""
+        label: str = self.record["label"]
+        return label
+
+    @property
+    def clip_id(self) -> str:
+        """Content id, the join key of every table."""
+        clip_id: str = self.record["clip_id"]
+        return clip_id
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """Figures of the clip such as ``stopping_distance``, by column name; not represented is None."""
+        figures: Mapping[str, Any] = self.record["figures"]
+        return figures
+
+    def __repr__(self) -> str:
+        return f"Clip({self.label!r} of {self.dataset.place!r})"
+
+    def pandas(self, table: str = "ticks", columns: str | Sequence[str] | None = None) -> "pd.DataFrame":
+        """Return the clip's rows of a view as a pandas frame, as `Dataset.pandas` does.
+
+        Parameters
+        ----------
+        table : clips, ticks, frames or verdicts
+        columns : those to read; None takes all
+        """
+        return self.dataset.pandas(table, columns, clip=self.label)
+
+    def picture(self, frame: int | None = None) -> "NDArray[np.uint8]":
+        """Return one frame, sRGB [H, W, 3]; no other is read.
+
+        Parameters
+        ----------
+        frame : its number from 0; None takes the middle one
+
+        Raises
+        ------
+        InputError
+            If the dataset has no frames, the clip no such frame, or the picture is damaged.
+        """
+        rgb: Any = self.dataset.frames["rgb"]
+        chosen = rgb.shape[1] // 2 if frame is None else frame
+        if not 0 <= chosen < rgb.shape[1]:
+            raise InputError(f"frame {frame}: must be one of the {rgb.shape[1]} frames of the clip, from 0")
+        try:
+            picture: NDArray[np.uint8] = rgb[self.record["index"], chosen]
+        except (ValueError, RuntimeError, OSError) as error:
+            raise InputError(
+                f"{self.dataset.place}/frames.zarr/rgb: clip {self.label} must be readable; {shorten(error)}:"
+                " musync repair makes it again"
+            ) from None
+        return picture
+
+    def plot(self) -> "go.Figure":
+        """Return speed, slip, wheel load and pitch over time as a Plotly figure."""
+        from flows.reading.clip_figure import COLUMNS, draw_clip
+
+        return draw_clip(self.label, self.pandas("ticks", COLUMNS))
+
+    def _repr_html_(self) -> str:
+        from flows.reading.notebook_cards import clip_card
+
+        return clip_card(self)
+
+
+def find_clip(rows: Sequence[Mapping[str, Any]], name: object, place: object) -> Mapping[str, Any]:
+    """Return the record of the clip of this label or id.
+
+    Parameters
+    ----------
+    rows : all clips of a dataset
+    name : label or id
+    place : what messages call the dataset
+
+    Raises
+    ------
+    InputError
+        If there is none, with the labels that come near.
+    """
+    found = next((row for row in rows if name in (row["label"], row["clip_id"])), None)
+    if found is None:
+        raise suggest_names(f"{place}: clip", [name], [row["label"] for row in rows], "list(data)")
+    return found

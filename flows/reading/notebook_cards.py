@@ -1,0 +1,109 @@
+"""How a notebook shows a dataset and a clip: small pictures and the figures that tell them from others."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from math import degrees
+from typing import TYPE_CHECKING, Any
+
+from catalogs.sentences import shorten
+from tasks.errors import InputError
+
+if TYPE_CHECKING:
+    from flows.reading.clips import Clip
+    from flows.reading.opening import Dataset
+
+THUMBNAIL_WIDTH = 160
+"""Of a picture in a card [px]; as JPEG it takes some 5 kB, which a saved notebook holds."""
+MOST_PICTURES = 6
+_CARD = """\
+<div class="musync-card">
+<p><b>{{ title }}</b></p>
+{% if pictures %}<div style="display:flex;flex-wrap:wrap;gap:6px">
+{% for caption, source in pictures %}<figure style="margin:0"><img src="{{ source }}" alt="{{ caption }}">\
+<figcaption style="font-size:smaller;max-width:{{ width }}px;overflow-wrap:anywhere">{{ caption }}</figcaption></figure>
+{% endfor %}</div>
+{% endif %}<table>
+{% for name, value in rows %}<tr><th style="text-align:left">{{ name }}</th>\
+<td style="text-align:left">{{ value }}</td></tr>
+{% endfor %}</table>
+</div>
+"""
+
+
+def dataset_card(data: "Dataset") -> str:
+    """Return HTML with a picture of each kind of weather, counts, and the range of the stopping distances."""
+    clips, grid = data.manifest["clips"], data.manifest["grid"]
+    first: dict[str, Mapping[str, Any]] = {}
+    for clip in clips:
+        first.setdefault(clip["scenario"]["weather"], clip)
+    stops = [clip["figures"]["stopping_distance"] for clip in clips]
+    stops = [stop for stop in stops if stop is not None]
+    counts = {kind: sum(clip["scenario"]["weather"] == kind for clip in clips) for kind in first}
+    failed = sum(clip["verdict"]["passed"] is False for clip in clips)
+    pictures, fault = _draw_pictures(data, list(first.values())[:MOST_PICTURES])
+    rows = [
+        ("clips", f"{len(clips)}, of {grid['frames']} frames at {grid['frame_rate_hz']:g} Hz"),
+        ("frames", fault or f"{len(clips) * grid['frames']}"),
+        ("weather", ", ".join(f"{kind} ({count})" for kind, count in counts.items())),
+        ("stopping distance", _format_range(stops, len(clips))),
+        ("in quarantine", f"{failed} clips, whose pose check failed" if failed else "no clip"),
+        ("scene", grid["scene"]),
+        ("vehicle", f"{grid['vehicle']}, {grid['vehicle_mode']} mode"),
+        ("run", data.manifest["run_id"]),
+    ]
+    return _render_card(f"muSync dataset {grid['name']}: {data.place}", pictures, rows)
+
+
+def clip_card(clip: "Clip") -> str:
+    """Return HTML with the clip's middle frame and its figures."""
+    scenario, figures = clip.record["scenario"], clip.figures
+    pictures, fault = _draw_pictures(clip.dataset, [clip.record])
+    rows = [
+        ("weather", f"{scenario['weather']}, {scenario['precipitation_mm_h']:g} mm/h"),
+        ("initial speed", f"{scenario['initial_speed_km_h']:g} km/h"),
+        ("surface friction", _format_figure(figures["surface_friction"], "{:.3f}")),
+        ("stopping distance", _format_figure(figures["stopping_distance"], "{:.1f} m", none="no stop in the clip")),
+        ("largest nose-down pitch", _format_figure(figures["peak_pitch"], "{:.2f} deg", degrees(1))),
+        ("pose check", {True: "passed", False: "failed: in quarantine"}.get(clip.record["verdict"]["passed"], "none")),
+        ("clip id", clip.clip_id),
+        *([("frames", fault)] if fault else []),
+    ]  # fmt: skip
+    return _render_card(clip.label, pictures, rows)
+
+
+def _format_figure(value: float | None, form: str, factor: float = 1.0, none: str = "not represented") -> str:
+    return none if value is None else form.format(value * factor)
+
+
+def _format_range(stops: Sequence[float], clips: int) -> str:
+    if not stops:
+        return "no clip stops"
+    return f"{min(stops):.1f} to {max(stops):.1f} m ({len(stops)} of {clips} clips stop)"
+
+
+def _draw_pictures(
+    data: "Dataset", rows: Sequence[Mapping[str, Any]]
+) -> tuple[list[tuple[str, str]], str | None]:
+    """Caption and data URI of the middle frame of each clip; without frames none, and the reason."""
+    try:
+        return [(row["label"], _encode_thumbnail(data[row["label"]].picture())) for row in rows], None
+    except InputError as error:
+        # a card is shown unasked: a fault of the pictures must not hide the figures
+        return [], shorten("; ".join(error.problems))
+
+
+def _encode_thumbnail(picture: Any) -> str:
+    import cv2
+
+    height, width = picture.shape[:2]
+    size = (THUMBNAIL_WIDTH, max(1, round(height * THUMBNAIL_WIDTH / width)))
+    small = cv2.resize(picture[:, :, ::-1], size, interpolation=cv2.INTER_AREA)
+    content = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
+    return f"data:image/jpeg;base64,{base64.b64encode(content).decode()}"
+
+
+def _render_card(title: str, pictures: list[tuple[str, str]], rows: list[tuple[str, str]]) -> str:
+    from jinja2 import Environment, StrictUndefined
+
+    card = Environment(autoescape=True, undefined=StrictUndefined).from_string(_CARD)
+    return card.render(title=title, pictures=pictures, rows=rows, width=THUMBNAIL_WIDTH)
