@@ -153,3 +153,13 @@ RUNNER = (
     ),
     define_option("scheduler", str | None, "tcp:// or tls:// address of a running Dask scheduler.", None),
 )
+GENERATING_RUNNER = (
+    define_option(
+        "runner",
+        str,
+        "auto, threads, processes or dask; auto takes dask for frames, and threads without them.",
+        "auto",
+        known=("auto", "threads", "processes", "dask"),
+    ),
+    *RUNNER[1:],
+)

@@ -5,6 +5,7 @@ from typing import Any
 from flows.commands.command import (
     BACKEND,
     DATASET,
+    GENERATING_RUNNER,
     GRID,
     RUNNER,
     Command,
@@ -51,7 +52,7 @@ COMMANDS = (
                 None,
                 known="manifests/frozen/*.json",
             ),
-            *RUNNER,
+            *GENERATING_RUNNER,
             BACKEND,
             define_option(
                 "vehicle",

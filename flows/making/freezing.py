@@ -14,7 +14,7 @@ from flows.making.generate import RunReport, generate_dataset
 from flows.making.places import find_scene
 from flows.making.plan import Plan, freeze_grid
 from flows.running.progress import progress_bar
-from flows.running.runner import RunnerName
+from flows.running.runner import RunnerChoice
 from flows.store.layout import write_atomically
 from flows.store.outputs import refuse_link
 from flows.store.sealed import read_manifest, recorded_grid
@@ -149,7 +149,7 @@ def reproduce_run(
     manifest: str,
     out: str,
     *,
-    runner: RunnerName = "dask",
+    runner: RunnerChoice = "auto",
     workers: int | None = None,
     scheduler: str | None = None,
     backend: str = "auto",

@@ -10,12 +10,12 @@ from catalogs.grids import Grid
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs
 from flows.making.places import find_scene
-from flows.making.plan import Plan, make_plan, plan_differences, read_plan
+from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
 from flows.making.seal import needed_to_seal, seal_dataset
 from flows.running.failures import ClipsFailed, disk_full_sentence
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
-from flows.running.runner import RunnerName, open_executor, run_unordered
+from flows.running.runner import RunnerChoice, choose_runner, open_executor, run_unordered
 from flows.store.address import (
     fetch_files,
     forget_begun,
@@ -28,6 +28,7 @@ from flows.store.address import (
 from flows.store.frames import create_arrays
 from flows.store.layout import Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
+from flows.store.pieces import write_pieces
 from flows.store.sealed import is_committed, read_manifest
 from flows.store.staging import BEGUN, is_of_begun_run, left_overs, remove_left_overs
 from manifests.manifest import is_quarantined
@@ -63,7 +64,7 @@ def generate_dataset(
     grid: str | Grid,
     out: str,
     *,
-    runner: RunnerName = "dask",
+    runner: RunnerChoice = "auto",
     workers: int | None = None,
     scheduler: str | None = None,
     backend: str = "auto",
@@ -72,7 +73,8 @@ def generate_dataset(
 ) -> RunReport:
     """Make the dataset of ``grid`` in ``out``, or what is missing of it; ``vehicle`` takes the grid's place.
 
-    Without ``pictures`` nothing is rendered: telemetry alone, of the same clips.
+    Without ``pictures`` nothing is rendered: telemetry alone, of the same clips. The runner ``auto`` is that of
+    `flows.running.runner.choose_runner`.
 
     Raises
     ------
@@ -83,6 +85,7 @@ def generate_dataset(
     """
     missing: list[int] = []
     cost: dict[str, dict[str, float]] = {}
+    quarantined: dict[str, list[str]] | None = None
     with open_for_writing(out, want_progress) as layout:
         plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
         _refuse_other_content(layout)
@@ -96,8 +99,16 @@ def generate_dataset(
                     missing = [clip.index for clip in plan.clips if not is_committed(layout, clip.clip_id)]
                     cost = run_as_stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
                     fetch_files(layout, needed_to_seal(layout, plan))
-                    run_as_stage(seal_dataset)(layout, plan)
-    return _make_report(open_for_reading(out, is_preview), plan, len(missing), cost)
+                    quarantined = run_as_stage(seal_dataset)(layout, plan)
+    finished = open_for_reading(out, is_preview)
+    return RunReport(
+        layout=finished,
+        run_id=plan.run_id,
+        clips=len(plan.clips),
+        made=len(missing),
+        quarantined=_read_quarantined(finished) if quarantined is None else quarantined,
+        cost=cost,
+    )
 
 
 def _clear_up(layout: Layout) -> None:
@@ -112,16 +123,9 @@ def is_preview(name: str) -> bool:
     return name.startswith("previews/")
 
 
-def _make_report(layout: Layout, plan: Plan, made: int, cost: dict[str, dict[str, float]]) -> RunReport:
+def _read_quarantined(layout: Layout) -> dict[str, list[str]]:
     clips = read_manifest(layout)["clips"]
-    return RunReport(
-        layout=layout,
-        run_id=plan.run_id,
-        clips=len(plan.clips),
-        made=made,
-        quarantined={clip["label"]: clip["verdict"]["reasons"] for clip in clips if is_quarantined(clip)},
-        cost=cost,
-    )
+    return {clip["label"]: clip["verdict"]["reasons"] for clip in clips if is_quarantined(clip)}
 
 
 def prepare_dataset(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
@@ -155,7 +159,7 @@ def prepare_dataset(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> 
         path for folder in (layout.inputs, layout.frames) for path in folder.rglob("*") if path.is_file()
     ]
     # last: where the plan exists, the folder is ready to be filled
-    write_json(layout.plan, plan.as_json())
+    write_pieces(layout.plan, plan.file_pieces())
     send_files(layout, prepared)
     send_first(layout, layout.plan)
 
@@ -173,6 +177,8 @@ def _refuse_other_content(layout: Layout) -> None:
 
 
 def _refuse_other_plan(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
+    if _holds_plan(layout, plan):
+        return
     existing = read_plan(layout.root)
     if existing.as_json() == plan.as_json():
         return
@@ -182,6 +188,12 @@ def _refuse_other_plan(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) 
         [f"{layout}: holds the dataset of another run: {difference}" for difference in differences[:SHOWN]]
         + [f"{layout}: give an empty folder, or go on there with what made it"]
     )
+
+
+def _holds_plan(layout: Layout, plan: Plan) -> bool:
+    """Whether the plan's file has just the bytes of this plan; one that differs in its form may still be equal."""
+    with layout.plan.open("rb") as stream:
+        return all(stream.read(len(piece)) == piece for piece in plan.file_pieces()) and not stream.read(1)
 
 
 def create_frame_arrays(layout: Layout, plan: Plan) -> None:
@@ -216,30 +228,31 @@ def fan_out(
     layout: Layout,
     plan: Plan,
     indices: list[int],
-    runner: RunnerName,
+    runner: RunnerChoice,
     workers: int | None,
     scheduler: str | None,
 ) -> dict[str, dict[str, float]]:
     """Make the clips on the runner; returns what each cost (CPU and wall seconds, peak memory)."""
     cost: dict[str, dict[str, float]] = {}
     failures: dict[str, BaseException] = {}
-    labels = {clip.index: clip.label for clip in plan.clips}
     scene = find_scene(plan.scene)
-    jobs = [(layout, index, scene) for index in indices]
+    jobs = ((layout, index, scene) for index in indices)
+    chosen = choose_runner(runner, plan.settings.pictures, scheduler)
     with (
-        open_executor(runner, workers, scheduler, partial(warm_up, layout, scene)) as executor,
+        hold_plan(layout.root, plan),
+        open_executor(chosen, workers, scheduler, partial(warm_up, layout, scene)) as executor,
         progress_bar("clips", len(indices)) as advance,
     ):
         for (_, index, _), future in run_unordered(executor, make_clip, jobs):
-            error = future.exception()
+            label, error = plan.clips[index].label, future.exception()
             if error is None:
-                cost[labels[index]] = future.result()["cost"]
-                advance(labels[index])
+                cost[label] = future.result()["cost"]
+                advance(label)
             elif (told := disk_full_sentence(error)) is not None:
                 raise InputError(f"{layout}: {len(cost)} of {len(indices)} clips are committed; {told}")
             else:
-                failures[labels[index]] = error
-                advance(f"{labels[index]} failed")
+                failures[label] = error
+                advance(f"{label} failed")
     wrong = [
         problem for error in failures.values() if isinstance(error, InputError) for problem in error.problems
     ]

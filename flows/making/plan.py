@@ -1,6 +1,8 @@
 """From a grid to a frozen plan: every clip with its content id and seed, before anything is made."""
 
+import json
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
@@ -20,6 +22,9 @@ from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
 
 TICK_RATE_HZ = 1000
+_AS_WRITTEN: dict[str, Any] = {"indent": 1, "sort_keys": True, "allow_nan": False, "ensure_ascii": False}
+_HELD: dict[Path, "Plan"] = {}
+"""Plans of the runs of this process, which it need not read again."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +63,10 @@ class Plan:
         return (self.settings.frames - 1) / self.settings.frame_rate_hz
 
     def as_json(self) -> dict[str, Any]:
+        return self.head_as_json() | {"clips": [clip.as_json() for clip in self.clips]}
+
+    def head_as_json(self) -> dict[str, Any]:
+        """The plan without its clips: the same few kilobytes whatever their number."""
         return {
             "format": PLAN_FORMAT,
             "run_id": self.run_id,
@@ -66,8 +75,19 @@ class Plan:
             "backend": self.backend,
             "inputs": dict(self.inputs),
             "made_with": {key: dict(value) for key, value in self.made_with.items()},
-            "clips": [clip.as_json() for clip in self.clips],
         }
+
+    def file_pieces(self) -> Iterator[bytes]:
+        """Yield the bytes that `flows.store.layout.write_json` writes of `as_json`, a clip at a time."""
+        empty = json.dumps(self.head_as_json() | {"clips": []}, **_AS_WRITTEN)
+        # only a key of the plan itself stands behind a single space
+        before, after = empty.split('\n "clips": []')
+        yield f'{before}\n "clips": ['.encode()
+        mark = "\n  "
+        for clip in self.clips:
+            yield (mark + json.dumps(clip.as_json(), **_AS_WRITTEN).replace("\n", "\n  ")).encode()
+            mark = ",\n  "
+        yield f"\n ]{after}\n".encode()
 
     @classmethod
     def of(cls, content: PlanRecord | Manifest, place: object) -> "Plan":
@@ -163,6 +183,25 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
     return plan, inputs
 
 
+@contextmanager
+def hold_plan(root: Path, plan: Plan) -> Iterator[None]:
+    """Have `read_plan` return this plan for the length of a run, to every thread of this process.
+
+    Parameters
+    ----------
+    root : of the dataset, whose ``plan.json`` holds the plan
+    plan : that was written there
+    """
+    before = _HELD.get(root)
+    _HELD[root] = plan
+    try:
+        yield
+    finally:
+        del _HELD[root]
+        if before is not None:
+            _HELD[root] = before
+
+
 @lru_cache(maxsize=4)
 def read_plan(root: Path) -> Plan:
     """The plan of a dataset.
@@ -172,6 +211,8 @@ def read_plan(root: Path) -> Plan:
     InputError
         If there is none, or one of another format, or one that breaks a rule.
     """
+    if (held := _HELD.get(root)) is not None:
+        return held
     place = Layout(root).plan
     return Plan.of(read_plan_record(Layout(root)), place)
 

@@ -1,46 +1,64 @@
 """Sealing: staged clips become the dataset's tables, preview and frozen manifest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
-from flows.making.plan import Plan
+from flows.making.plan import ClipPlan, Plan
 from flows.store.address import remove_files, send_files
 from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_atomically
+from flows.store.pieces import write_pieces
 from flows.store.sealed import read_receipt
 from flows.store.staging import remove_staged, remove_staging, staged_files
 from flows.store.telemetry import labelled_table, read_columns, read_table, write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.environment import environment_bom
-from manifests.manifest import freeze_manifest, is_quarantined
+from manifests.freezing import freeze_pieces
+from manifests.manifest import is_quarantined
 from manifests.provenance import describe_processor, git_commit
 from manifests.records import Receipt
-from manifests.siblings import sibling_pairs
+from manifests.sibling_rows import iterate_pairs
+from manifests.siblings import FIGURES
 from tasks.conventions import PAIR_CHANNELS
 from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
+BATCH = 1000
+"""Rows and files that are held at once where there is one a clip or a pair [1]."""
 PREVIEW_FRAMES = (0, 20, 40, 80)
 PREVIEW_CLIPS = 24
 
+Item = TypeVar("Item")
 
-def seal_dataset(layout: Layout, plan: Plan) -> None:
-    """Collect the staged tables, draw the contact sheet, and freeze the manifest last."""
-    receipts = [read_receipt(layout, clip.clip_id) for clip in plan.clips]
+
+def seal_dataset(layout: Layout, plan: Plan) -> dict[str, list[str]]:
+    """Collect the staged tables, draw the contact sheet, and freeze the manifest last.
+
+    Receipts are read one at a time, once for the tables and once for the manifest: memory grows by the numbers of a
+    clip's row, not by its record.
+
+    Returns
+    -------
+    Why the pose check failed, by label of the clip that it failed for.
+    """
     tables = [
         write_part(layout, table, path, clip_ids)
         for table in STAGED_TABLES
         for path, clip_ids in table_parts(plan, table).items()
     ]
-    write_parquet(clips_table(receipts), layout.telemetry / "clips.parquet")
-    write_parquet(pairs_table(receipts), layout.telemetry / "pairs.parquet")
+    clips = clips_table(_read_receipts(layout, plan.clips))
+    write_parquet(clips, layout.telemetry / "clips.parquet")
+    write_parquet(pairs_table(Outcomes(plan.clips, clips)), layout.telemetry / "pairs.parquet")
     sheet = layout.previews / "contact_sheet.png"
     if plan.settings.pictures:
-        write_atomically(sheet, preview_sheet(layout, layout.frames, plan, receipts))
+        shown = list(_read_receipts(layout, pick_evenly(plan.clips, PREVIEW_CLIPS)))
+        write_atomically(sheet, preview_sheet(layout, layout.frames, plan, shown))
     made = [
         *tables,
         layout.telemetry / "clips.parquet",
@@ -55,23 +73,50 @@ def seal_dataset(layout: Layout, plan: Plan) -> None:
     ]
     artifacts = {layout.relative(path): sha256_of_file(path) for path in shared}
     made_on = {"processor": describe_processor(), "git": git_commit(), "environment": environment_bom()}
-    write_atomically(layout.manifest, freeze_manifest(plan.as_json(), receipts, artifacts, made_on))
+    quarantined: dict[str, list[str]] = {}
+    receipts = _note_quarantined(_read_receipts(layout, plan.clips), quarantined)
+    write_pieces(layout.manifest, freeze_pieces(plan.head_as_json(), receipts, artifacts, made_on))
     send_files(layout, made, last=layout.manifest)
-    staged = staged_files(layout)
-    remove_files(layout, staged)
-    remove_staged(staged)
+    for clips in batched(plan.clips):
+        staged = [path for clip in clips for path in _staged_by(layout, clip.clip_id)]
+        remove_files(layout, staged)
+        remove_staged(staged)
+    others = staged_files(layout)
+    remove_files(layout, others)
+    remove_staged(others)
     remove_staging(layout)
+    return quarantined
 
 
-def needed_to_seal(layout: Layout, plan: Plan) -> list[Path]:
+def _read_receipts(layout: Layout, clips: Iterable[ClipPlan]) -> Iterator[Receipt]:
+    return (read_receipt(layout, clip.clip_id) for clip in clips)
+
+
+def _note_quarantined(receipts: Iterable[Receipt], into: dict[str, list[str]]) -> Iterator[Receipt]:
+    for receipt in receipts:
+        if is_quarantined(receipt):
+            into[receipt["label"]] = receipt["verdict"]["reasons"]
+        yield receipt
+
+
+def _staged_by(layout: Layout, clip_id: str) -> list[Path]:
+    return [layout.receipt(clip_id), *(layout.staged(clip_id, table) for table in STAGED_TABLES)]
+
+
+def batched(items: Iterable[Item], size: int = BATCH) -> Iterator[list[Item]]:
+    """Yield the items in lists of at most ``size`` [1]."""
+    left = iter(items)
+    while batch := list(islice(left, size)):
+        yield batch
+
+
+def needed_to_seal(layout: Layout, plan: Plan) -> Iterator[Path]:
     """The files of finished clips that sealing reads."""
-    ids = [clip.clip_id for clip in plan.clips]
     shown = pick_evenly(plan.clips, PREVIEW_CLIPS) if plan.settings.pictures else []
-    return [
-        *(layout.receipt(clip_id) for clip_id in ids),
-        *(layout.staged(clip_id, table) for clip_id in ids for table in STAGED_TABLES),
-        *(layout.frame_shard("rgb", clip.index) for clip in shown),
-    ]
+    for clip in plan.clips:
+        yield from _staged_by(layout, clip.clip_id)
+    for clip in shown:
+        yield layout.frame_shard("rgb", clip.index)
 
 
 def table_parts(plan: Plan, table: str) -> dict[str, list[str]]:
@@ -95,30 +140,79 @@ def write_part(layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -
     return layout.root / path
 
 
-def clips_table(receipts: Sequence[Receipt]) -> pa.Table:
+def clips_table(receipts: Iterable[Receipt]) -> pa.Table:
     """One row a clip: controls, surface, outcome and verdict."""
-    rows = [
+    columns: dict[str, list[Any]] = {}
+    for batch in batched(receipts):
+        rows = [_clip_row(receipt) for receipt in batch]
+        for name in rows[0]:
+            columns.setdefault(name, []).append(_pack([row[name] for row in rows]))
+    return labelled_table({name: _join(parts) for name, parts in columns.items()})
+
+
+def _clip_row(r: Receipt) -> dict[str, Any]:
+    return (
         {name: r[name] for name in ("clip_id", "index", "label", "seed", "split", "calibration")}
         | r["scenario"]
         | r["figures"]
         | {"quarantined": is_quarantined(r)}
         | {f"check_{key}": value for key, value in r["verdict"].items() if key != "reasons"}
-        for r in receipts
-    ]
-    columns: dict[str, Any] = {}
-    for name in rows[0]:
-        values = [row[name] for row in rows]
-        numeric = any(isinstance(value, float) for value in values) or all(value is None for value in values)
-        columns[name] = np.array([np.nan if v is None else v for v in values], float) if numeric else values
-    return labelled_table(columns)
+    )
 
 
-def pairs_table(receipts: Sequence[Receipt]) -> pa.Table:
+def _pack(values: list[Any]) -> Any:
+    """Values of some rows as an array where one is a float, with NaN for None; else as they are."""
+    return _as_floats(values) if any(isinstance(value, float) for value in values) else values
+
+
+def _join(parts: list[Any]) -> Any:
+    """The packed parts of one column: floats where any part is, or where nothing is represented."""
+    if any(isinstance(part, np.ndarray) for part in parts) or all(v is None for part in parts for v in part):
+        return np.concatenate([part if isinstance(part, np.ndarray) else _as_floats(part) for part in parts])
+    return [value for part in parts for value in part]
+
+
+def _as_floats(values: list[Any]) -> NDArray[np.float64]:
+    return np.array([np.nan if value is None else value for value in values], float)
+
+
+class Outcomes(Sequence[Mapping[str, Any]]):
+    """What `manifests.siblings` asks of each clip, made when it asks.
+
+    Parameters
+    ----------
+    clips : of the plan
+    table : of the same clips
+    """
+
+    def __init__(self, clips: Sequence[ClipPlan], table: pa.Table):
+        self.clips = clips
+        self.figures = {name: table[name].to_numpy() for name in FIGURES}
+
+    def __len__(self) -> int:
+        return len(self.clips)
+
+    def __getitem__(self, place: Any) -> Any:
+        clip = self.clips[place]
+        figures = {name: values[place] for name, values in self.figures.items()}
+        return {
+            "clip_id": clip.clip_id,
+            "label": clip.label,
+            "scenario": vars(clip.scenario),
+            "figures": figures,
+        }
+
+
+def pairs_table(receipts: Sequence[Mapping[str, Any]]) -> pa.Table:
     """One row a pair of clips that differ in exactly one control: what that control changes."""
-    rows = sibling_pairs(receipts)
     kinds = {channel.name: float if channel.name.endswith("_change") else str for channel in PAIR_CHANNELS}
-    columns = {name: np.array([row[name] for row in rows], kind) for name, kind in kinds.items()}
-    return labelled_table(columns)
+    batches = chain(
+        batched(iterate_pairs(receipts)), [[]]
+    )  # the last one: a table without rows has columns too
+    return pa.concat_tables(
+        labelled_table({name: np.array([row[name] for row in rows], kind) for name, kind in kinds.items()})
+        for rows in batches
+    ).combine_chunks()
 
 
 def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Sequence[Receipt]) -> bytes:

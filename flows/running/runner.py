@@ -3,15 +3,20 @@
 import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from itertools import islice
 from multiprocessing import get_context, parent_process
+from queue import SimpleQueue
 from threading import Thread
 from typing import Any, Literal
 
 from tasks.errors import InputError
 
 RunnerName = Literal["threads", "processes", "dask"]
+RunnerChoice = RunnerName | Literal["auto"]
+IN_FLIGHT = 1000
+"""Calls submitted and not yet returned [1]: two for each worker of the largest cluster that the project plans for."""
 CONNECT_TIMEOUT = "10s"
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """One frame per worker, one thread each: measured faster than threads within a frame, and repeatable."""
@@ -121,14 +126,54 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
         yield client
 
 
+def choose_runner(asked: RunnerChoice, pictures: bool, scheduler: str | None = None) -> RunnerName:
+    """The runner of a run: the one asked for, and of ``auto`` the quickest for what is made.
+
+    A clip without frames takes some 20 ms of processor time and then waits for the disk: threads make it while other
+    runners still start. Frames take seconds of Python and NumPy each, which threads of one process make in turns.
+
+    Parameters
+    ----------
+    asked : by the user
+    pictures : whether frames are made
+    scheduler : address of a running Dask scheduler, which only Dask takes
+    """
+    if asked != "auto":
+        return asked
+    return "dask" if pictures or scheduler is not None else "threads"
+
+
 def run_unordered(
     executor: Executor, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]
 ) -> Iterator[tuple[tuple[Any, ...], Future[Any]]]:
-    """Submit every call, and yield its arguments and finished future as the calls end."""
-    futures = {executor.submit(function, *call): call for call in arguments}
+    """Submit the calls, `IN_FLIGHT` of them at once, and yield the arguments and the finished future of each.
+
+    Nothing is kept of a call that was yielded, so that memory does not grow with their number.
+    """
+    calls = iter(arguments)
+    ended: SimpleQueue[Future[Any]] = SimpleQueue()
+    pending: dict[Future[Any], tuple[Any, ...]] = {}
+
+    def submit(count: int) -> None:
+        for call in islice(calls, count):
+            try:
+                future = executor.submit(function, *call)
+            except (
+                BrokenExecutor
+            ) as error:  # the workers died: the calls that are left fail as those under way do
+                future = Future()
+                future.set_exception(error)
+            pending[future] = call
+            future.add_done_callback(ended.put)
+
     try:
-        for future in as_completed(futures):
-            yield futures[future], future
+        submit(IN_FLIGHT)
+        while pending:
+            future = ended.get()
+            call = pending.pop(future)
+            submit(1)
+            yield call, future
+            del future
     finally:
-        for future in futures:
+        for future in pending:
             future.cancel()
