@@ -66,7 +66,15 @@ def test_the_evaluation_takes_labels_as_text(hostile):
 @pytest.mark.parametrize("hostile", HOSTILE)
 def test_the_close_loop_report_takes_names_as_text(monkeypatch, hostile):
     drawn = dict.fromkeys(
-        ("residual_force", "spline", "leftovers", "correlations", "traces", "pulls"), lambda trace: ""
+        (
+            "residual_force",
+            "draw_residual_spline",
+            "draw_spline_gains",
+            "draw_correlations",
+            "draw_traces",
+            "draw_session_pulls",
+        ),
+        lambda trace: "",
     )
     monkeypatch.setattr(closing_report, "figures", SimpleNamespace(**drawn))
     monkeypatch.setattr(closing_report, "residuals_over_time", lambda trace: "")
