@@ -29,7 +29,7 @@ from tasks.conventions import PAIR_CHANNELS
 from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
-BATCH = 1000
+BATCH = 200
 """Rows and files that are held at once where there is one a clip or a pair [1]."""
 PREVIEW_FRAMES = (0, 20, 40, 80)
 PREVIEW_CLIPS = 24
