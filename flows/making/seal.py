@@ -103,10 +103,10 @@ def _staged_by(layout: Layout, clip_id: str) -> list[Path]:
     return [layout.receipt(clip_id), *(layout.staged(clip_id, table) for table in STAGED_TABLES)]
 
 
-def batched(items: Iterable[Item], size: int = BATCH) -> Iterator[list[Item]]:
-    """Yield the items in lists of at most ``size`` [1]."""
+def batched(items: Iterable[Item], size: int | None = None) -> Iterator[list[Item]]:
+    """Yield the items in lists of at most ``size`` [1], by default `BATCH`."""
     left = iter(items)
-    while batch := list(islice(left, size)):
+    while batch := list(islice(left, size or BATCH)):
         yield batch
 
 
