@@ -16,7 +16,7 @@ from flows.store.layout import Layout
 
 FEW, MANY = 300, 900
 LARGEST_GROWTH = 4096
-"""Of the peak with every further clip [B]: plan, row of numbers, pairs; 3.1 KB measured, 5.2 where receipts are kept."""
+"""Of the peak with every further clip [B]: plan, row of numbers, pairs; 3.1 KB, 5.2 where receipts are kept."""
 
 
 def write_grid(folder: Path, clips: int) -> str:
