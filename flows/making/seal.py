@@ -29,7 +29,7 @@ from tasks.conventions import PAIR_CHANNELS
 from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
 CLIPS_PER_FILE = 100
-BATCH = 1000
+BATCH = 200
 """Rows and files that are held at once where there is one a clip or a pair [1]."""
 PREVIEW_FRAMES = (0, 20, 40, 80)
 PREVIEW_CLIPS = 24
@@ -103,10 +103,10 @@ def _staged_by(layout: Layout, clip_id: str) -> list[Path]:
     return [layout.receipt(clip_id), *(layout.staged(clip_id, table) for table in STAGED_TABLES)]
 
 
-def batched(items: Iterable[Item], size: int = BATCH) -> Iterator[list[Item]]:
-    """Yield the items in lists of at most ``size`` [1]."""
+def batched(items: Iterable[Item], size: int | None = None) -> Iterator[list[Item]]:
+    """Yield the items in lists of at most ``size`` [1], by default `BATCH`."""
     left = iter(items)
-    while batch := list(islice(left, size)):
+    while batch := list(islice(left, size or BATCH)):
         yield batch
 
 

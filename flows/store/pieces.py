@@ -3,8 +3,9 @@
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from threading import get_native_id
 
-from flows.store.layout import PARTIAL, write_atomically
+from flows.store.layout import PARTIAL
 
 
 def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
@@ -12,14 +13,14 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
 
     Parameters
     ----------
-    path : of the file
+    path : of the file, in a folder that is there
     pieces : its content, in order
     """
-    # claims the name, its folder and the folders above it on the disk, as for every other file
-    partial = path.with_name(f"{path.name}.{os.getpid()}{PARTIAL}")
-    write_atomically(partial, b"")
+    # the form of `flows.store.layout.write_atomically`, by which what a killed run left is known
+    partial = path.with_name(f"{path.name}.{os.getpid()}-{get_native_id()}{PARTIAL}")
+    partial.unlink(missing_ok=True)
     try:
-        with partial.open("r+b") as stream:
+        with partial.open("xb") as stream:  # exclusive: a link that lies there is not followed
             for piece in pieces:
                 stream.write(piece)
             stream.flush()

@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from manifests.canonical import canonical_bytes, sha256_of
+from manifests.freezing import freeze_pieces
 from manifests.manifest import MANIFEST_FORMAT, damaged_files, freeze_manifest
 
 
@@ -41,3 +42,11 @@ def test_a_missing_shared_file_is_named_without_a_clip(sealed):
     root, manifest = sealed
     (root / "shared.bin").unlink()
     assert damaged_files(root, manifest) == [{"path": "shared.bin", "clip_id": None, "damage": "missing"}]
+
+
+def test_a_manifest_frozen_in_pieces_has_the_same_bytes():
+    plan = {"run_id": "r", "grid": {"name": "ü"}, "zone": 1.5, "clips": "left out"}
+    made_on = {"processor": {"cpu": "x"}, "git": None}
+    for clips in ([], [{"clip_id": "a", "speed": 2.0}], [{"clip_id": "a"}, {"b": 0.1, "a": None}]):
+        whole = freeze_manifest(plan, clips, {"b.bin": "2", "a.bin": "1"}, made_on)
+        assert b"".join(freeze_pieces(plan, iter(clips), {"b.bin": "2", "a.bin": "1"}, made_on)) == whole

@@ -6,6 +6,7 @@ from math import isnan
 import pytest
 
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
+from manifests.sibling_rows import iterate_pairs
 from manifests.siblings import ALL_PAIRS_UP_TO, CONTROLS, sibling_pairs
 from tasks.conventions import PAIR_CHANNELS
 
@@ -67,3 +68,12 @@ def test_a_long_sweep_has_about_as_many_pairs_as_clips():
     count = 40 * ALL_PAIRS_UP_TO
     clips = [clip(f"{i:05d}", initial_speed_km_h=20 + 0.01 * i) for i in range(count)]
     assert len(sibling_pairs(clips)) == 2 * (count - 1) - 1
+
+
+def test_pairs_one_after_the_other_are_those_of_the_list():
+    clips = [
+        clip(f"{k}", initial_speed_km_h=40 + k % 40, peak_pressure_mpa=k % 3, **(RAIN if k % 2 else {}))
+        for k in range(200)
+    ]
+    assert list(iterate_pairs(clips)) == sibling_pairs(clips)
+    assert len(sibling_pairs(clips)) > len(clips)

@@ -100,15 +100,11 @@ def test_a_run_that_was_begun_can_be_begun_anew_with_another_grid(grid, tmp_path
 
 
 def test_a_run_that_is_killed_while_it_writes_its_plan_goes_on(grid, whole, tmp_path, monkeypatch):
-    real = flows.making.generate.write_json
-
-    def write_half(path: Path, value: object) -> None:
-        if path.name != "plan.json":
-            return real(path, value)
+    def write_half(path: Path, pieces: object) -> None:
         path.with_name(HALF_A_PLAN).write_bytes(b"{")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(flows.making.generate, "write_json", write_half)
+    monkeypatch.setattr(flows.making.generate, "write_pieces", write_half)
     with pytest.raises(KeyboardInterrupt):
         make(grid, tmp_path / "data")
     monkeypatch.undo()

@@ -13,10 +13,11 @@ from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import verify_dataset
 from flows.judging.physics import audit_physics
 from flows.making.generate import generate_dataset
+from flows.making.plan import read_plan
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.query import query_dataset
-from flows.store.layout import Layout
+from flows.store.layout import Layout, write_json
 from tasks.errors import InputError
 
 
@@ -67,3 +68,17 @@ def test_a_broken_table_is_repaired(bare):
     path.write_bytes(before[:-9])
     assert repair_dataset(str(bare.root), runner="threads", workers=1)["repaired"]
     assert path.read_bytes() == before
+
+
+def test_any_runner_freezes_the_manifest_that_the_default_one_does(toy_dataset, bare, tmp_path):
+    grid = str(toy_dataset.root.parent / "grid.yaml")
+    alone = generate_dataset(grid, str(tmp_path / "default"), pictures=False, workers=2).layout
+    other = generate_dataset(grid, str(tmp_path / "p"), runner="processes", workers=2, pictures=False).layout
+    assert alone.manifest.read_bytes() == other.manifest.read_bytes() == bare.manifest.read_bytes()
+    assert alone.plan.read_bytes() == other.plan.read_bytes()
+
+
+def test_a_plan_is_written_as_json_of_the_whole(bare, tmp_path):
+    plan = read_plan(bare.root)
+    write_json(tmp_path / "plan.json", plan.as_json())
+    assert b"".join(plan.file_pieces()) == (tmp_path / "plan.json").read_bytes() == bare.plan.read_bytes()

@@ -2,13 +2,14 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import dask
 import pytest
 
 from flows.running.orchestration import run_as_stage
-from flows.running.runner import ALLOCATOR, SPAWNED, open_executor, run_unordered
+from flows.running.runner import ALLOCATOR, SPAWNED, choose_runner, open_executor, run_unordered
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 
@@ -38,6 +39,50 @@ def test_every_runner_returns_each_result_and_keeps_going_past_a_failure(runner)
             5: 25,
         }
         assert isinstance(ended[3].exception(), ValueError)
+
+
+def test_only_so_many_calls_are_submitted_at_once(monkeypatch):
+    monkeypatch.setattr("flows.running.runner.IN_FLIGHT", 4)
+    asked = []
+
+    def calls():
+        for number in range(40):
+            asked.append(number)
+            yield (number,)
+
+    with ThreadPoolExecutor(2) as executor:
+        for ended, _ in enumerate(run_unordered(executor, process_id, calls()), start=1):
+            assert len(asked) <= ended + 4
+    assert asked == list(range(40))
+
+
+def test_a_run_that_stops_asks_for_no_further_calls(monkeypatch):
+    monkeypatch.setattr("flows.running.runner.IN_FLIGHT", 4)
+    calls = iter([(number,) for number in range(40)])
+    with ThreadPoolExecutor(2) as executor:
+        running = run_unordered(executor, process_id, calls)
+        next(running)
+        running.close()
+    assert len(list(calls)) >= 35
+
+
+def end_worker(_: int) -> None:
+    os._exit(1)
+
+
+def test_calls_that_are_left_when_the_workers_die_fail_one_by_one(monkeypatch):
+    monkeypatch.setattr("flows.running.runner.IN_FLIGHT", 2)
+    with open_executor("processes", 1) as executor:
+        ended = list(run_unordered(executor, end_worker, [(number,) for number in range(6)]))
+    assert len(ended) == 6
+    assert all(isinstance(future.exception(), BrokenExecutor) for _, future in ended)
+
+
+def test_without_frames_the_run_is_on_threads_unless_a_runner_is_named():
+    assert choose_runner("auto", pictures=True) == "dask"
+    assert choose_runner("auto", pictures=False) == "threads"
+    assert choose_runner("auto", pictures=False, scheduler="tcp://host:8786") == "dask"
+    assert choose_runner("processes", pictures=False) == "processes"
 
 
 def test_processes_are_other_processes():
