@@ -1,9 +1,10 @@
 """Repair of a finished dataset: damaged and missing files are made again byte for byte, or a sentence says why not."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flows.auditing.verify import compare_files
@@ -27,7 +28,10 @@ from manifests.manifest import recorded_files
 from manifests.records import Manifest
 from tasks.errors import InputError
 
-SUMMARIES = {"telemetry/clips.parquet": clips_table, "telemetry/pairs.parquet": pairs_table}
+SUMMARIES: Mapping[str, Callable[[list[Any]], pa.Table]] = {
+    "telemetry/clips.parquet": clips_table,
+    "telemetry/pairs.parquet": pairs_table,
+}
 """Tables that follow from the clips' records."""
 
 
