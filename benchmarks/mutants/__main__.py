@@ -64,6 +64,8 @@ def first_failure(tree: Path, kernels: Path, tests: list[str]) -> str | None:
         If they take longer than `LONGEST_S`.
     """
     environment = os.environ | {
+        # a change of one character within a second has the same size and time as what was compiled before it
+        "PYTHONDONTWRITEBYTECODE": "1",
         "PYTHONPATH": str(tree), "MUSYNC_CACHE": str(kernels.parent / "cache"), "NUMBA_CACHE_DIR": str(kernels)
     }  # fmt: skip
     running = subprocess.Popen(

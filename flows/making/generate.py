@@ -26,9 +26,8 @@ from flows.store.address import (
     want_progress,
 )
 from flows.store.frames import create_arrays
-from flows.store.layout import Layout, write_atomically, write_json
+from flows.store.layout import Layout, write_atomically, write_json, write_pieces
 from flows.store.lock import sole_writer
-from flows.store.pieces import write_pieces
 from flows.store.sealed import is_committed, read_manifest
 from flows.store.staging import BEGUN, is_of_begun_run, left_overs, remove_left_overs
 from manifests.manifest import is_quarantined
@@ -177,8 +176,6 @@ def _refuse_other_content(layout: Layout) -> None:
 
 
 def _refuse_other_plan(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> None:
-    if _holds_plan(layout, plan):
-        return
     existing = read_plan(layout.root)
     if existing.as_json() == plan.as_json():
         return
@@ -188,12 +185,6 @@ def _refuse_other_plan(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) 
         [f"{layout}: holds the dataset of another run: {difference}" for difference in differences[:SHOWN]]
         + [f"{layout}: give an empty folder, or go on there with what made it"]
     )
-
-
-def _holds_plan(layout: Layout, plan: Plan) -> bool:
-    """Whether the plan's file has just the bytes of this plan; one that differs in its form may still be equal."""
-    with layout.plan.open("rb") as stream:
-        return all(stream.read(len(piece)) == piece for piece in plan.file_pieces()) and not stream.read(1)
 
 
 def create_frame_arrays(layout: Layout, plan: Plan) -> None:

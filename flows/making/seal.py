@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from flows.making.plan import ClipPlan, Plan
 from flows.store.address import remove_files, send_files
 from flows.store.frames import read_clip
-from flows.store.layout import STAGED_TABLES, Layout, write_atomically
-from flows.store.pieces import write_pieces
+from flows.store.layout import STAGED_TABLES, Layout, write_atomically, write_pieces
 from flows.store.sealed import read_receipt
 from flows.store.staging import remove_staged, remove_staging, staged_files
 from flows.store.telemetry import labelled_table, read_columns, read_table, write_parquet

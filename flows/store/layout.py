@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from threading import get_native_id
@@ -82,12 +83,18 @@ def write_atomically(path: Path, content: bytes | memoryview) -> None:
 
     Folders are flushed too: what was written before this file is on the disk when this file is.
     """
+    write_pieces(path, [content])
+
+
+def write_pieces(path: Path, pieces: Iterable[bytes | memoryview]) -> None:
+    """Write pieces in their order as `write_atomically` does; the file is never whole in memory."""
     _make_folder(path.parent)
     partial = path.with_name(f"{path.name}.{os.getpid()}-{get_native_id()}{PARTIAL}")
     partial.unlink(missing_ok=True)
     try:
         with partial.open("xb") as stream:  # exclusive: a link that lies there is not followed
-            stream.write(content)
+            for piece in pieces:
+                stream.write(piece)
             stream.flush()
             os.fsync(stream.fileno())
         partial.replace(path)
