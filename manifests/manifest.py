@@ -1,6 +1,8 @@
 """The frozen manifest of a dataset: the request, the tools that made it, and every hash."""
 
-from collections.abc import Mapping, Sequence
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -16,27 +18,49 @@ MANIFEST_FORMAT = "musync-manifest/3"
 
 def freeze_manifest(
     plan: Mapping[str, Any],
-    clips: Sequence[Mapping[str, Any]],
+    clips: Iterable[Mapping[str, Any]],
     artifacts: Mapping[str, str],
     made_on: Mapping[str, Any],
-) -> bytes:
-    """The manifest's one byte string (RFC 8785).
+) -> Iterator[bytes]:
+    """Yield the one byte string of the manifest (RFC 8785) in pieces, its seal among them; one record is held at a time.
 
     Parameters
     ----------
     plan : the run's plan as JSON; its clips are replaced by ``clips``
-    clips : one record a clip: id, scenario, seed, artifacts, content hashes, figures, verdict
+    clips : one record a clip, read once and in order: id, scenario, seed, artifacts, content hashes, figures, verdict
     artifacts : relative path to SHA-256 of the files that several clips share
     made_on : processor, git and environment: they decide nothing, and explain a difference
     """
-    manifest = {
-        **plan,
-        "format": MANIFEST_FORMAT,
-        "clips": list(clips),
-        "artifacts": dict(artifacts),
-        **made_on,
-    }
-    return canonical_bytes(manifest | {"seal": seal_of(manifest)})
+    head = {**plan, "format": MANIFEST_FORMAT, "artifacts": artifacts, **made_on}
+    unsealed = hashlib.sha256()
+    mark = b"{"
+    # RFC 8785 sorts the keys, and the seal covers all but itself
+    for name in sorted({*head, "clips", "seal"}):
+        if name == "seal":
+            # what follows it is hashed before it is written
+            rest = [(key, head[key]) for key in sorted(head) if key > name]
+            for key, value in rest:
+                unsealed.update(b"," + canonical_bytes(key) + b":" + canonical_bytes(value))
+            unsealed.update(b"}")
+            yield mark + canonical_bytes(name) + b":" + canonical_bytes(unsealed.hexdigest())
+            continue
+        start = mark + canonical_bytes(name) + b":"
+        for piece in chain(
+            [start], _list_pieces(clips) if name == "clips" else [canonical_bytes(head[name])]
+        ):
+            if name < "seal":
+                unsealed.update(piece)
+            yield piece
+        mark = b","
+    yield b"}"
+
+
+def _list_pieces(clips: Iterable[Mapping[str, Any]]) -> Iterator[bytes]:
+    mark = b"["
+    for clip in clips:
+        yield mark + canonical_bytes(clip)
+        mark = b","
+    yield b"[]" if mark == b"[" else b"]"
 
 
 def is_quarantined(clip: Mapping[str, Any]) -> bool:

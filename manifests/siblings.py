@@ -1,9 +1,12 @@
 """Counterfactual pairs: clips of one dataset that differ in exactly one control, and the changes it causes."""
 
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, pairwise
 from math import nan
 from typing import Any
+
+import numpy as np
 
 CONTROLS: dict[str, tuple[str, ...]] = {
     "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h"),
@@ -25,25 +28,28 @@ ALL_PAIRS_UP_TO = 32
 """Larger groups of siblings pair each clip with the first and with the next, so that pairs stay as many as clips."""
 
 
-def sibling_pairs(clips: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Every pair that differs in exactly one control, in the order of the dataset; visual seeds make no pair.
+def iterate_pairs(clips: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield every pair that differs in exactly one control, in the order of the dataset; visual seeds make no pair.
+
+    Rows have the keys of ``PAIR_CHANNELS``; a change is b minus a, NaN where either has no such figure.
 
     Parameters
     ----------
     clips : records with ``clip_id``, ``label``, ``scenario`` and ``figures``
-
-    Returns
-    -------
-    Rows with the keys of ``PAIR_CHANNELS``; a change is b minus a, NaN where either has no such figure.
     """
-    places = [
-        (i, j, control)
-        for control in CONTROLS
-        for group in _group_clips(clips, control)
-        for i, j in _choose_pairs(group)
-        if _list_differing(clips[i], clips[j], control)
-    ]
-    return [_make_pair(clips[i], clips[j], control) for i, j, control in sorted(places)]
+    # places in compact arrays: a million pairs as tuples would outweigh the clips
+    first, second, turned = array("i"), array("i"), array("b")
+    names = sorted(CONTROLS)
+    for code, control in enumerate(names):
+        for group in _group_clips(clips, control):
+            for i, j in _choose_pairs(group):
+                first.append(i)
+                second.append(j)
+                turned.append(code)
+    for place in np.lexsort((np.asarray(turned), np.asarray(second), np.asarray(first))):
+        a, b, control = clips[first[place]], clips[second[place]], names[turned[place]]
+        if _list_differing(a, b, control):
+            yield _make_pair(a, b, control)
 
 
 def _group_clips(clips: Sequence[Mapping[str, Any]], control: str) -> Iterator[list[int]]:

@@ -18,12 +18,10 @@ from flows.store.staging import remove_staged, remove_staging, staged_files
 from flows.store.telemetry import labelled_table, read_columns, read_table, write_parquet
 from manifests.canonical import sha256_of_file
 from manifests.environment import environment_bom
-from manifests.freezing import freeze_pieces
-from manifests.manifest import is_quarantined
+from manifests.manifest import freeze_manifest, is_quarantined
 from manifests.provenance import describe_processor, git_commit
 from manifests.records import Receipt
-from manifests.sibling_rows import iterate_pairs
-from manifests.siblings import FIGURES
+from manifests.siblings import FIGURES, iterate_pairs
 from tasks.conventions import PAIR_CHANNELS
 from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
@@ -74,7 +72,7 @@ def seal_dataset(layout: Layout, plan: Plan) -> dict[str, list[str]]:
     made_on = {"processor": describe_processor(), "git": git_commit(), "environment": environment_bom()}
     quarantined: dict[str, list[str]] = {}
     receipts = _note_quarantined(_read_receipts(layout, plan.clips), quarantined)
-    write_pieces(layout.manifest, freeze_pieces(plan.head_as_json(), receipts, artifacts, made_on))
+    write_pieces(layout.manifest, freeze_manifest(plan.head_as_json(), receipts, artifacts, made_on))
     send_files(layout, made, last=layout.manifest)
     for clips in batched(plan.clips):
         staged = [path for clip in clips for path in _staged_by(layout, clip.clip_id)]
@@ -176,7 +174,7 @@ def _as_floats(values: list[Any]) -> NDArray[np.float64]:
 
 
 class Outcomes(Sequence[Mapping[str, Any]]):
-    """What `manifests.siblings` asks of each clip, made when it asks.
+    """Records of clips as `manifests.siblings` reads them, each made when it is read.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from flows.store.layout import Layout
 from flows.store.outputs import Outputs, read_marker
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
-from manifests.siblings import sibling_pairs
+from manifests.siblings import iterate_pairs
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.render.traces import TRACES
@@ -121,7 +121,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
             }
             for row in rows
         ],
-        "pairs": [[place[p["clip_id_a"]], place[p["clip_id_b"]], p["control"]] for p in sibling_pairs(rows)],
+        "pairs": [[place[p["clip_id_a"]], place[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
         "manifest": _manifest_facts(manifest),
     }  # fmt: skip
 

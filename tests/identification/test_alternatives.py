@@ -48,14 +48,14 @@ def evidence_of(truth: dict[str, float]) -> tuple[Evidence, Fit]:
     return evidence, fit_hypotheses(derived, (), evidence.session_sigma)
 
 
-def named(evidence: Evidence, null: Fit, name: str) -> tuple[SearchState, list[RivalComparison]]:
+def name_effect(evidence: Evidence, null: Fit, name: str) -> tuple[SearchState, list[RivalComparison]]:
     """One name as if it had been found, beside the two resistances that were tried in its place."""
 
-    def judged(other: str) -> Candidate:
+    def judge_effect(other: str) -> Candidate:
         return judge_hypothesis(evidence, null, None, make_library_hypothesis(LIBRARY[other]))
 
-    own = judged(name)
-    others = tuple((judged(other), 0.0) for other in ("aerodynamic_drag", "pad_drag") if other != name)
+    own = judge_effect(name)
+    others = tuple((judge_effect(other), 0.0) for other in ("aerodynamic_drag", "pad_drag") if other != name)
     rounds = (Round(base=null, tried=(), accepted=own, evidence=evidence),)
     found = SearchState(evidence=evidence, base=own.fitted, rounds=rounds)
     return found, [RivalComparison(own=own, share=1.0, others=others, near=())]
@@ -63,25 +63,25 @@ def named(evidence: Evidence, null: Fit, name: str) -> tuple[SearchState, list[R
 
 def test_two_effects_that_together_explain_as_much_stand_beside_the_one_that_is_named() -> None:
     evidence, null = evidence_of({"drag_area": 0.8, "pad_drag": 60.0})
-    pairs = find_pairs(*named(evidence, null, "rolling_resistance_speed"))
+    pairs = find_pairs(*name_effect(evidence, null, "rolling_resistance_speed"))
     assert {other.candidate.hypothesis.name for other in pairs} == {"aerodynamic_drag", "pad_drag"}
     assert "together" in pairs[0].reason
 
 
 def test_two_effects_do_not_stand_beside_the_truth() -> None:
     evidence, null = evidence_of({"rolling_speed": 0.0009})
-    assert find_pairs(*named(evidence, null, "rolling_resistance_speed")) == []
+    assert find_pairs(*name_effect(evidence, null, "rolling_resistance_speed")) == []
 
 
 def test_a_number_that_stays_pulled_beyond_belief_stands_beside_what_is_named() -> None:
     evidence, null = evidence_of({"pressure_gain": 0.15})
-    found, _ = named(evidence, null, "brake_fade")
+    found, _ = name_effect(evidence, null, "brake_fade")
     (other,) = [
         a for a in find_pulled_numbers(found) if a.candidate.hypothesis.name == "retuned_pressure_gain"
     ]
     assert other.candidate.fitted.values[-1] == pytest.approx(0.15, abs=0.03)
     plain, null = evidence_of({})
-    assert find_pulled_numbers(named(plain, null, "brake_fade")[0]) == []
+    assert find_pulled_numbers(name_effect(plain, null, "brake_fade")[0]) == []
 
 
 class TestHeldOutChannels:
@@ -111,7 +111,7 @@ class TestHeldOutChannels:
 
 def test_what_was_named_first_goes_where_a_later_name_explains_it() -> None:
     evidence, null = evidence_of({"drag_area": 0.8})
-    rolling = named(evidence, null, "rolling_resistance_speed")[0]
+    rolling = name_effect(evidence, null, "rolling_resistance_speed")[0]
     later = judge_hypothesis(
         evidence, rolling.base, None, make_library_hypothesis(LIBRARY["aerodynamic_drag"])
     )

@@ -20,7 +20,7 @@ QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
 NOTHING = np.zeros(len(EFFECT_TABLE))
 
 
-def cycling(run: RunModel) -> RunModel:
+def make_wheel_cycle(run: RunModel) -> RunModel:
     """The run with a front wheel that cycles as under a brake's anti-lock, eight times the noise, at 6 Hz."""
     response = run.run.response.copy()
     response[:, FRONT] += (
@@ -37,35 +37,37 @@ def evidence_of(*runs: RunModel) -> Evidence:
     )  # fmt: skip
 
 
-def plain(seed: int, peak: float = 1.5) -> RunModel:
+def make_plain_run(seed: int, peak: float = 1.5) -> RunModel:
     return measured(plain_run(25.0, peak, name=str(seed)), NOTHING, seed)
 
 
 @pytest.fixture(scope="module")
-def widened() -> Evidence:
-    evidence = evidence_of(plain(1), cycling(plain(2)), cycling(plain(3)))
+def widened_evidence() -> Evidence:
+    evidence = evidence_of(
+        make_plain_run(1), make_wheel_cycle(make_plain_run(2)), make_wheel_cycle(make_plain_run(3))
+    )
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     return set_run_noise(evidence, estimate_run_noise(evidence, null))
 
 
-def test_runs_that_the_model_follows_keep_the_noise_of_their_sensors(widened: Evidence) -> None:
-    assert np.array_equal(widened.train[0].sigma, NOISE) and not widened.train[0].rho.any()
+def test_runs_that_the_model_follows_keep_the_noise_of_their_sensors(widened_evidence: Evidence) -> None:
+    assert np.array_equal(widened_evidence.train[0].sigma, NOISE) and not widened_evidence.train[0].rho.any()
 
 
-def test_a_channel_that_cycles_is_widened_where_it_cycles_alone(widened: Evidence) -> None:
-    run = widened.train[1]
+def test_a_channel_that_cycles_is_widened_evidence_where_it_cycles_alone(widened_evidence: Evidence) -> None:
+    run = widened_evidence.train[1]
     others = np.arange(7) != FRONT
     assert np.array_equal(run.sigma[others], NOISE[others])
     assert run.sigma[FRONT] == pytest.approx(8.0 / np.sqrt(2.0) * NOISE[FRONT], rel=0.2)
     assert run.rho[FRONT] > 0.8, "a cycle of sixteen samples is no white noise"
 
 
-def test_held_out_runs_are_widened_alike(widened: Evidence) -> None:
-    assert widened.held_out[0].sigma[FRONT] > 4.0 * NOISE[FRONT]
+def test_held_out_runs_are_widened_evidence_alike(widened_evidence: Evidence) -> None:
+    assert widened_evidence.held_out[0].sigma[FRONT] > 4.0 * NOISE[FRONT]
 
 
 def test_what_a_better_fit_follows_again_has_its_sensors_noise_again() -> None:
-    evidence = evidence_of(plain(1), plain(2), plain(3))
+    evidence = evidence_of(make_plain_run(1), make_plain_run(2), make_plain_run(3))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     wide = replace(
         evidence, train=(evidence.train[0], replace(evidence.train[1], sigma=8.0 * NOISE)),

@@ -4,7 +4,6 @@ from pathlib import Path
 import pytest
 
 from manifests.canonical import canonical_bytes, sha256_of
-from manifests.freezing import freeze_pieces
 from manifests.manifest import MANIFEST_FORMAT, damaged_files, freeze_manifest
 
 
@@ -14,13 +13,15 @@ def sealed(tmp_path: Path) -> tuple[Path, dict]:
         (tmp_path / name).write_bytes(name.encode() * 100)
     digest = {name: sha256_of([name.encode() * 100]) for name in ("a.bin", "b.bin", "shared.bin")}
     clips = [{"clip_id": c, "artifacts": {f"{c}.bin": digest[f"{c}.bin"]}} for c in "ab"]
-    manifest = json.loads(freeze_manifest({"run_id": "r"}, clips, {"shared.bin": digest["shared.bin"]}, {}))
+    manifest = json.loads(
+        b"".join(freeze_manifest({"run_id": "r"}, clips, {"shared.bin": digest["shared.bin"]}, {}))
+    )
     return tmp_path, manifest
 
 
 def test_a_manifest_is_its_own_canonical_form(sealed):
     _, manifest = sealed
-    frozen = freeze_manifest(manifest, manifest["clips"], manifest["artifacts"], {})
+    frozen = b"".join(freeze_manifest(manifest, manifest["clips"], manifest["artifacts"], {}))
     assert frozen == canonical_bytes(manifest)
     assert manifest["format"] == MANIFEST_FORMAT
 
@@ -44,9 +45,11 @@ def test_a_missing_shared_file_is_named_without_a_clip(sealed):
     assert damaged_files(root, manifest) == [{"path": "shared.bin", "clip_id": None, "damage": "missing"}]
 
 
-def test_a_manifest_frozen_in_pieces_has_the_same_bytes():
+def test_a_manifest_is_canonical_json_sealed_by_the_hash_of_all_else():
     plan = {"run_id": "r", "grid": {"name": "ü"}, "zone": 1.5, "clips": "left out"}
     made_on = {"processor": {"cpu": "x"}, "git": None}
+    shared = {"b.bin": "2", "a.bin": "1"}
     for clips in ([], [{"clip_id": "a", "speed": 2.0}], [{"clip_id": "a"}, {"b": 0.1, "a": None}]):
-        whole = freeze_manifest(plan, clips, {"b.bin": "2", "a.bin": "1"}, made_on)
-        assert b"".join(freeze_pieces(plan, iter(clips), {"b.bin": "2", "a.bin": "1"}, made_on)) == whole
+        content = {**plan, "format": MANIFEST_FORMAT, "clips": clips, "artifacts": shared, **made_on}
+        whole = canonical_bytes(content | {"seal": sha256_of([canonical_bytes(content)])})
+        assert b"".join(freeze_manifest(plan, iter(clips), shared, made_on)) == whole

@@ -38,9 +38,8 @@ def find_pulled_numbers(found: SearchState) -> list[Alternative]:
     """
     evidence, base = found.evidence, found.base
     free = {name for part in base.parts for name in part.names}
-    pulls = base.session / evidence.session_sigma
     alternatives = []
-    for place in np.flatnonzero(np.abs(pulls) > evidence.rules.retune_pull):
+    for place in np.flatnonzero(base.pulls > evidence.rules.retune_pull):
         if SESSION[place] in free:
             continue
         effect = next(
@@ -50,7 +49,7 @@ def find_pulled_numbers(found: SearchState) -> list[Alternative]:
         alternatives.append(
             Alternative(
                 candidate=judge_hypothesis(evidence, base, None, hypothesis),
-                reason=f"{effect.parameters[0].name} is pulled by {abs(pulls[place]):.1f} of its tolerances beside what"
+                reason=f"{effect.parameters[0].name} is pulled by {base.pulls[place]:.1f} of its tolerances beside what"
                 " is named: the vehicle's own number may be wrong",
             )
         )

@@ -48,8 +48,7 @@ class Candidate:
     @property
     def pulls_session(self) -> bool:
         """Return whether the fit pulls a number of the session beyond belief."""
-        pulls = np.abs(self.fitted.session) / self.fitted.session_sigma
-        return bool(np.max(pulls) > self.rules.retune_pull)
+        return bool(np.max(self.fitted.pulls) > self.rules.retune_pull)
 
     @property
     def passes(self) -> bool:
@@ -85,7 +84,7 @@ def judge_hypothesis(
     free = hypothesis.names[0] in SESSION
     none = hypothesis.start * (~first if hypothesis.effect_class != "form" and not free else free)
     starts = [(none, base.offsets, base.session), (hypothesis.start, None, base.session)]
-    if not free and np.any(np.abs(base.session) > rules.retune_pull * evidence.session_sigma):
+    if not free and np.max(base.pulls) > rules.retune_pull:
         # a session that bends to make up for what is missing holds the fit in a valley of its own
         starts.insert(0, (hypothesis.start, None, np.zeros_like(base.session)))
     trials: list[Fit] = []

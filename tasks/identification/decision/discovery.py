@@ -124,8 +124,7 @@ def _pulls_session(fitted: Fit, base: Fit, rules: DecisionRules) -> bool:
 
     A damping force that is undone by a wrong damping is no discovery.
     """
-    after, before = (np.abs(f.session / f.session_sigma) for f in (fitted, base))
-    return bool(np.any((after > rules.retune_pull) & (before <= rules.retune_pull)))
+    return bool(np.any((fitted.pulls > rules.retune_pull) & (base.pulls <= rules.retune_pull)))
 
 
 def find_best_form(
@@ -183,7 +182,7 @@ def search_library_and_forms(
     ForeignCarError
         If the model's own misfit exceeds any effect that could be found.
     """
-    if np.any(np.abs(null.session) > evidence.rules.relinearisation_pull * evidence.session_sigma):
+    if np.max(null.pulls) > evidence.rules.relinearisation_pull:
         evidence = differentiate_at(evidence, null, library=True)
         null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     evidence = set_run_noise(evidence, estimate_run_noise(evidence, null))

@@ -190,7 +190,7 @@ def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
     reasons : list to which sentences are appended
     """
     evidence, null = start.evidence, start.base
-    pulls = np.abs(null.session / evidence.session_sigma)
+    pulls = null.pulls
     judged = []
     for place in np.flatnonzero(pulls > evidence.rules.retune_pull):
         reasons.append(f"session nuisance {SESSION[place]} is pulled by {pulls[place]:.1f} sigma")

@@ -1,4 +1,4 @@
-"""What was named early and no longer earns its place beside what was named later."""
+"""Effects that were named early and no longer earn their place beside those named later."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -108,6 +108,8 @@ def find_missing_effects(
         )  # fmt: skip
         compared = compare_with_rivals(found.evidence, found.base, found.rounds)
         error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
+    # before derivatives are taken anew: gains compare only about the same ones
+    others = (*find_pairs(found, compared), *find_pulled_numbers(found)) if compared else ()
     progress("intervals")
     if compared:
         here, settled, refitted = refit_named(found.evidence, found.base, [c.own for c in compared])
@@ -122,7 +124,7 @@ def find_missing_effects(
         for c in compared
         for o, wins in c.near
     ]
-    for other in (*find_pairs(found, compared), *(find_pulled_numbers(found) if compared else ())):
+    for other in others:
         interval = compute_curvature_interval(other.candidate)
         near.append((named[0].name, make_named_effect(other.candidate, 0.0, interval)))
         reasons.append(other.reason)
@@ -134,9 +136,9 @@ def find_missing_effects(
             )
         )
     kind = _verdict_name(named, near)
-    if kind == "SET":
+    if kind == "SET" and len(near) > len(others):
         reasons.append(
-            f"{len(near)} other explanation(s) lie within {rules.rival_span:g} units, make good"
+            f"{len(near) - len(others)} other explanation(s) lie within {rules.rival_span:g} units, make good"
             f" {rules.rival_gain_share:.0%} of the gain or win too many resamples"
         )
     if not named and not reasons:

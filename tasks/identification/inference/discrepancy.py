@@ -1,4 +1,4 @@
-"""What no effect can follow: a channel of a run that the model misses beyond its sensor's noise weighs less.
+"""Discrepancy: a channel weighs less in a run in which the model misses it by more than its sensor's noise.
 
 An anti-lock brake cycles, a bus drops samples: such misfit belongs to one channel of some runs. Within the noise of the
 whole campaign it drowns what the other runs show (model discrepancy, Kennedy and O'Hagan 2001,
@@ -15,10 +15,7 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import RunEvidence, set_disturbance_prior
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.linearisation_points import LinearisedRun, linearise_at, linearise_runs
-from tasks.identification.inference.noise import unwhiten_channels, whiten_channels
-
-LONGEST_MEMORY = 0.98
-"""Correlation from sample to sample beyond which more is not told apart [1]."""
+from tasks.identification.inference.noise import correlate_with_next, unwhiten_channels, whiten_channels
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +89,6 @@ def _estimate_noise(run: RunEvidence, point: LinearisedRun, evidence: Evidence) 
     for c in np.flatnonzero(np.isfinite(sigma)):
         if float(np.mean(white[:, c] ** 2)) > evidence.rules.discrepancy_limit:
             e = error[:, c]
-            power = float(e @ e)
-            rho[c] = min(max(float(e[1:] @ e[:-1]) / power, rho[c]), LONGEST_MEMORY)
-            sigma[c] = max(float(np.sqrt(power / len(e))), sigma[c])
+            rho[c] = max(correlate_with_next(e, evidence.rules.joint.most_residual_correlation), rho[c])
+            sigma[c] = max(float(np.sqrt(np.mean(e**2))), sigma[c])
     return RunNoise(rho=rho, sigma=sigma)

@@ -56,6 +56,11 @@ class Fit:
     offsets: tuple[NDArray[np.float64], ...]
 
     @property
+    def pulls(self) -> NDArray[np.float64]:
+        """Return how far each number of the session is pulled, in its prior sigmas and either way, float64 [7]."""
+        return np.asarray(np.abs(self.session) / self.session_sigma)
+
+    @property
     def at_bound(self) -> bool:
         """Return whether a parameter sits on its bound, other than at 0 for a second parameter."""
         lower = np.concatenate([p.lower for p in self.parts]) if self.parts else np.empty(0)

@@ -144,3 +144,15 @@ def unwhiten_channels(
         driven[1:] *= np.sqrt(1.0 - rho[c] ** 2)
         x[:, c] = lfilter([1.0], [1.0, -rho[c]], driven, axis=0)
     return x
+
+
+def correlate_with_next(x: NDArray[np.float64], most: float) -> float:
+    """Return the correlation of each sample with the next, from 0 to ``most`` [1].
+
+    Parameters
+    ----------
+    x : float64 [N] of mean 0
+    most : beyond which more is not told apart
+    """
+    power = float(x @ x)
+    return min(max(float(x[1:] @ x[:-1]) / power, 0.0), most) if power > 0.0 else 0.0

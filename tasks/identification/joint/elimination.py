@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from tasks.identification.inference.noise import correlate_with_next
 from tasks.identification.joint.fit import JointFit, fit_jointly
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.stops import Stop
@@ -62,10 +63,7 @@ def _softened(residual: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _lag_inflation(residual: NDArray[np.float64], rules: JointRules) -> float:
     """Return how many samples count as one: (1 + rho) / (1 - rho) of first-order autoregressive misfit."""
-    a, b = residual[1:], residual[:-1]
-    power = float(residual @ residual)
-    most = rules.most_residual_correlation
-    rho = min(max(float(a @ b) / power, 0.0), most) if power > 0.0 else 0.0
+    rho = correlate_with_next(residual, rules.most_residual_correlation)
     return (1.0 + rho) / (1.0 - rho)
 
 

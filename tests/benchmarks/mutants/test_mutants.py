@@ -1,4 +1,4 @@
-"""What the mutation study changes, which tests it asks first, and which kernels it compiles again."""
+"""The mutation study: the places that it changes, which tests it asks first, and which kernels it compiles again."""
 
 from pathlib import Path
 
