@@ -22,7 +22,7 @@ def freeze_manifest(
     artifacts: Mapping[str, str],
     made_on: Mapping[str, Any],
 ) -> Iterator[bytes]:
-    """Yield the one byte string of the manifest (RFC 8785) in pieces, its seal among them; one record is held at a time.
+    """Yield the one byte string of the manifest (RFC 8785) in pieces, its seal among them; one record at a time.
 
     Parameters
     ----------

@@ -69,3 +69,7 @@ def test_a_long_sweep_has_about_as_many_pairs_as_clips():
     count = 40 * ALL_PAIRS_UP_TO
     clips = [clip(f"{i:05d}", initial_speed_km_h=20 + 0.01 * i) for i in range(count)]
     assert len(list(iterate_pairs(clips))) == 2 * (count - 1) - 1
+
+
+def test_clips_that_differ_in_nothing_but_what_is_seen_make_no_pair():
+    assert not list(iterate_pairs([clip("a"), clip("b")]))
