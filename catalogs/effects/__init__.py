@@ -1,9 +1,10 @@
 """The library of effects that a vehicle model may lack."""
 
 from pathlib import Path
-from typing import Annotated
+from string import Formatter
+from typing import Annotated, Self
 
-from pydantic import AfterValidator, Field, TypeAdapter, field_validator
+from pydantic import AfterValidator, Field, TypeAdapter, field_validator, model_validator
 
 from catalogs.quantities import CatalogueEntry, Text, read_entries
 from tasks.vehicle.effects.library import Effect, EffectClass
@@ -19,6 +20,7 @@ class EffectEntry(CatalogueEntry):
     effect_class: EffectClass = Field(alias="class")
     variable: Text
     enters: Text
+    says: Text
     parameters: Annotated[tuple[Text, ...], Field(min_length=1, max_length=2)]
 
     @field_validator("parameters")
@@ -29,6 +31,15 @@ class EffectEntry(CatalogueEntry):
                 f"the table of effects has no parameter {', '.join(unknown)}; there are: {', '.join(PARAMETERS)}"
             )
         return names
+
+    @model_validator(mode="after")
+    def _every_number_is_said(self) -> Self:
+        said = {field for _, field, _, _ in Formatter().parse(self.says) if field is not None}
+        if said != set(self.parameters):
+            raise ValueError(
+                f"says of {self.name} must hold {', '.join(self.parameters)} in braces, and no other"
+            )
+        return self
 
 
 def _check_names(entries: list[EffectEntry]) -> list[EffectEntry]:
@@ -60,5 +71,5 @@ def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
 def _make_effect(entry: EffectEntry) -> Effect:
     return Effect(
         name=entry.name, effect_class=entry.effect_class, variable=entry.variable, enters=entry.enters,
-        parameters=tuple(PARAMETERS[name] for name in entry.parameters),
+        says=entry.says, parameters=tuple(PARAMETERS[name] for name in entry.parameters),
     )  # fmt: skip

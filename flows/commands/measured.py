@@ -96,7 +96,7 @@ def shorten_verdict(result: dict[str, Any]) -> dict[str, Any]:
         {"channel": channel, **{key: entry[key] for key in ("frozen", "retuned", "after", "unit")}}
         for channel, entry in result["error"].items()
     ]
-    kept = {key: result[key] for key in ("verdict", "reasons", "vehicle_file", "report")}
+    kept = {key: result[key] for key in ("verdict", "sentence", "reasons", "vehicle_file", "report")}
     return kept | {"effects": effects, "error": error}
 
 

@@ -1,5 +1,6 @@
 """Closing the loop: a measured campaign in, a verdict, a grown vehicle and a report out."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,20 +15,21 @@ from catalogs.joint_numbers import load_joint_numbers
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_content
 from flows.measured.closing_ledger import record_reading
-from flows.measured.closing_report import report_html
-from flows.measured.closing_residuals import residual_rmse
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
-from flows.measured.joint_report import joint_report_html
+from flows.measured.residuals import compute_residual_rmse, predict_runs
+from flows.measured.verdict_report import write_verdict_page
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
-from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
+from tasks.campaign.campaign import SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.discovery import ForeignCarError
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.verdict import Trace, find_missing_effects
+from tasks.identification.decision.words import say_effect, tell_verdict
 from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
 from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
 from tasks.vehicle.parameters import Vehicle
 
@@ -66,10 +68,7 @@ def close_loop(
     earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
     trace = _judge(measured, model, road)
-    if isinstance(trace, JointTrace):
-        result = verdict_json(trace.verdict) | joint_facts(trace)
-    else:
-        result = verdict_json(trace.verdict) | {"search": SEARCHES[0], "residual_rmse": residual_rmse(trace)}
+    result = verdict_json(trace.verdict) | tell_search(trace)
     result["held_out_readings_before"] = earlier
     if earlier:
         result["reasons"].append(
@@ -88,11 +87,7 @@ def close_loop(
         result["vehicle_file"] = str(results.path(grown))
     result["not_carried_by_coupled_mode"] = missing
     results.write_json("verdict.json", result)
-    if isinstance(trace, JointTrace):
-        page = joint_report_html(trace, result, replace(measured, vehicle=name))
-    else:
-        page = report_html(trace, result, measured)
-    results.write("report.html", page)
+    results.write("report.html", write_verdict_page(trace, result, replace(measured, vehicle=name)))
     result["report"] = str(results.path("report.html"))
     return result
 
@@ -132,18 +127,29 @@ def _reached_ranges(trace: Trace | JointTrace) -> dict[str, tuple[float, float]]
     return {variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms}
 
 
-def joint_facts(trace: JointTrace) -> dict[str, Any]:
-    """Return what a joint fit says beside its verdict, as plain values."""
-    residuals: dict[str, dict[str, dict[str, float]]] = {}
-    for stop, predicted in zip(trace.held_out, trace.predicted, strict=True):
-        left = np.sqrt(np.mean((stop.model.measured - predicted) ** 2, axis=1))
-        residuals[stop.model.run.name] = {
-            CHANNELS[c]: {"frozen": float(left[0, c]), "after": float(left[2, c])} for c in stop.channels
+def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
+    """Return what a search says beside its verdict, as plain values: in words, and what is left over.
+
+    Parameters
+    ----------
+    trace : the verdict and what it stands on
+    """
+    library = load_effects()
+    train, held_out = predict_runs(trace)
+    if isinstance(trace, Trace):
+        verdict = trace.verdict
+        rivals = [rival for _, rival in verdict.rivals]
+        return {
+            "search": SEARCHES[0],
+            "sentence": tell_verdict(
+                verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error
+            ),
+            "residual_rmse": compute_residual_rmse((*train, *held_out)),
         }
     return {
         "search": SEARCHES[1],
         "sentence": trace.sentence,
-        "calibrated": [effect_json(effect) for effect in trace.calibrated],
+        "calibrated": [effect_json(effect, library) for effect in trace.calibrated],
         "numbers": {
             number.name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[number.name].unit}
             for number, value, error in zip(
@@ -151,7 +157,7 @@ def joint_facts(trace: JointTrace) -> dict[str, Any]:
             )
         },
         "starts_agreeing": {"agreeing": trace.agreeing[0], "of": trace.agreeing[1]},
-        "residual_rmse": residuals,
+        "residual_rmse": compute_residual_rmse(held_out),
     }  # fmt: skip
 
 
@@ -167,13 +173,13 @@ def split_of(campaign: Campaign) -> dict[str, Any]:
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
-    """A verdict as plain values."""
-    experiment = verdict.experiment
+    """Return a verdict as plain values."""
+    experiment, library = verdict.experiment, load_effects()
     return {
         "campaign": verdict.campaign,
         "verdict": verdict.verdict,
-        "effects": [effect_json(effect) for effect in verdict.effects],
-        "rivals": [{"of": of, **effect_json(effect)} for of, effect in verdict.rivals],
+        "effects": [effect_json(effect, library) for effect in verdict.effects],
+        "rivals": [{"of": of, **effect_json(effect, library)} for of, effect in verdict.rivals],
         "discriminating_experiment": None
         if experiment is None
         else {
@@ -194,7 +200,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
             for channel, c in verdict.correlation.items()
         },
         "reasons": list(verdict.reasons),
-        "tried": [effect_json(effect) for effect in verdict.tried],
+        "tried": [effect_json(effect, library) for effect in verdict.tried],
         "session_pulls_sigma": {
             name: {"before": before, "after": after}
             for name, (before, after) in verdict.session_pulls.items()
@@ -223,10 +229,11 @@ def _error(e: ChannelError) -> dict[str, Any]:
     }
 
 
-def effect_json(effect: NamedEffect) -> dict[str, Any]:
-    """A named effect as plain values."""
+def effect_json(effect: NamedEffect, library: Sequence[Effect]) -> dict[str, Any]:
+    """Return a named effect as plain values."""
     return {
         "name": effect.name,
+        "says": say_effect(effect, library),
         "class": effect.effect_class,
         "port": effect.port,
         "variable": effect.variable,

@@ -1,14 +1,13 @@
 """How often close-loop itself is right, for the page of a verdict: from the benchmark that ships."""
 
-from html import escape
 from typing import Any
 
 from catalogs.studies.closing import load_error_rates
 from flows.measured.closing_benchmark import engine_hash
 
 
-def error_rates_html(named: list[str]) -> str:
-    """Return the benchmark's error rates as HTML: for nulls, library effects, and what this verdict names.
+def tell_error_rates(named: list[str]) -> list[str]:
+    """Return the benchmark's error rates in sentences: for nulls, library effects, and what this verdict names.
 
     Parameters
     ----------
@@ -35,7 +34,7 @@ def error_rates_html(named: list[str]) -> str:
         lines.append(
             f"counted with engine {rates['engine_sha256'][:12]}; this verdict is of {engine_hash()[:12]}"
         )
-    return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
+    return lines
 
 
 def _share(share: dict[str, Any]) -> str:

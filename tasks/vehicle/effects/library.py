@@ -1,5 +1,6 @@
 """Effects that a fit may name; each holds one or two rows of the table."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,6 +19,7 @@ class Effect:
     effect_class : effect, retune or sensor
     variable : variable that it depends on
     enters : its term in words and symbols
+    says : the finding in plain words, with its numbers in braces: {lag}, {fade:percent}, {mass:share}
     parameters : one or two rows of the table; all 0 (or the first 0) is the plain model
     """
 
@@ -25,6 +27,7 @@ class Effect:
     effect_class: EffectClass
     variable: str
     enters: str
+    says: str
     parameters: tuple[EffectParameter, ...]
 
     @property
@@ -36,3 +39,23 @@ class Effect:
     def source(self) -> str:
         """Return the reference for the effect's equation."""
         return self.parameters[0].source
+
+    def say(self, values: Mapping[str, float]) -> str:
+        """Return the finding in plain words.
+
+        Parameters
+        ----------
+        values : numbers of the effect by name [units of the table]
+        """
+        return self.says.format_map({name: _Said(value) for name, value in values.items()})
+
+
+class _Said(float):
+    """A number as a sentence says it: with two digits, as ``percent``, or as a ``share`` above or below another."""
+
+    def __format__(self, spec: str) -> str:
+        if spec == "percent":
+            return f"{float(100.0 * self):.2g} %"
+        if spec == "share":
+            return f"{float(abs(100.0 * self)):.2g} % {'above' if self >= 0.0 else 'below'}"
+        return f"{float(self):.2g}" if abs(self) < 100.0 else f"{float(self):.0f}"

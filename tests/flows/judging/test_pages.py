@@ -9,7 +9,6 @@ import pytest
 from flows.drawing import NO_SCRIPTS
 from flows.judging.evaluation_page import render_page
 from flows.judging.evaluation_rows import figure_row
-from flows.measured import closing_report
 
 HOSTILE = [
     '<img src=x onerror="alert(1)">', "</title></style><script>alert(1)</script>", "\"'><svg onload=alert(1)>",
@@ -61,47 +60,3 @@ def test_the_evaluation_takes_labels_as_text(hostile):
     ]
     found = assert_text_alone(render_page([clip], rows, hostile, hostile), hostile)
     assert sum(text == hostile for text in found.text) > 5
-
-
-@pytest.mark.parametrize("hostile", HOSTILE)
-def test_the_close_loop_report_takes_names_as_text(monkeypatch, hostile):
-    drawn = dict.fromkeys(
-        (
-            "residual_force",
-            "draw_residual_spline",
-            "draw_spline_gains",
-            "draw_correlations",
-            "draw_traces",
-            "draw_session_pulls",
-        ),
-        lambda trace: "",
-    )
-    monkeypatch.setattr(closing_report, "figures", SimpleNamespace(**drawn))
-    monkeypatch.setattr(closing_report, "residuals_over_time", lambda trace: "")
-    number = {
-        "value": 1.0,
-        "ci_low": 0.0,
-        "ci_high": 2.0,
-        "unit": hostile,
-        "lower_bound": 0.0,
-        "upper_bound": 3.0,
-    }
-    effect = {"name": hostile, "class": hostile, "port": hostile, "parameters": {hostile: number}}
-    error = dict.fromkeys(
-        ("frozen", "retuned", "after", "ci_low", "ci_high", "change_ci_low", "change_ci_high"), 1.0
-    )
-    hashes = dict.fromkeys(("content_sha256", "split_sha256", "library_sha256", "source_sha256"), hostile)
-    result = hashes | {
-        "verdict": "FOUND", "effects": [effect], "rivals": [effect | {"of": hostile}], "reasons": [hostile],
-        "runs_left_out": [hostile], "not_carried_by_coupled_mode": [hostile], "manoeuvre_error": {},
-        "error": {hostile: error | {"unit": hostile, "runs_better": hostile, "worst_run": hostile}},
-        "discriminating_experiment": {"plan": hostile, "between": [hostile, hostile], "expected_d2": 1.0},
-        "minimum_detectable": {}, "made_with": hashes, "held_out_readings_before": 0,
-    }  # fmt: skip
-    trace = SimpleNamespace(
-        compared=[], verdict=SimpleNamespace(tried=[]),
-        start=SimpleNamespace(evidence=SimpleNamespace(effects=[])),
-    )  # fmt: skip
-    run = SimpleNamespace(name=hostile)
-    campaign = SimpleNamespace(name=hostile, vehicle=hostile, train=[run], held_out=[run])
-    assert_text_alone(closing_report.report_html(trace, result, campaign), hostile)

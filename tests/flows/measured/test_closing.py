@@ -26,6 +26,7 @@ from tasks.identification.decision.answer import ChannelError, NamedEffect, Para
 from tasks.identification.inference.disturbance import Disturbance
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+HOSTILE = "lagging <img src=x onerror=alert(1)>"
 SHORT = tuple(
     RunPlan(speed=speed, peak=peak, duration=2.6, disc_rise=rise)
     for speed, peak, rise in ((16.0, 1.2, 20.0), (20.0, -1.8, 60.0), (12.0, 0.8, 20.0), (18.0, 1.5, 100.0))
@@ -79,7 +80,7 @@ def write_campaign(campaign: Campaign, folder: Path) -> None:
 def lagging(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = make_synthetic_campaign(VEHICLE, SURFACE, {"lag": 0.1}, 7, design=SHORT * 2)
     runs = tuple(replace(run, held_out=i >= 5) for i, run in enumerate(made.runs))
-    folder = tmp_path_factory.mktemp("campaigns") / "lagging"
+    folder = tmp_path_factory.mktemp("campaigns") / HOSTILE
     write_campaign(replace(made, runs=runs), folder)
     return folder
 
@@ -112,10 +113,37 @@ def test_a_lag_leaves_a_residual_that_goes_with_the_pressure_until_it_is_named(c
     assert frozen > 2.0 * after and frozen > 3.0 * left["band"]
 
 
-def test_the_report_needs_no_other_file_and_the_split_is_on_disk(closed: Path) -> None:
+def test_the_report_needs_no_other_file_and_its_names_are_text(closed: Path) -> None:
     page = (closed / "report.html").read_text()
-    assert "brake_lag" in page and page.count("data:image/png;base64,") == 7
-    assert 'src="http' not in page and "href=" not in page
+    text = page.split('<script type="application/json"')[0]
+    assert "src=" not in text.replace(HOSTILE.replace("<", "&lt;").replace(">", "&gt;"), "")
+    assert text.count("href=") == text.count('href="data:,"') == 1
+    assert HOSTILE not in page and HOSTILE.replace("<", "&lt;").replace(">", "&gt;") in page
+    for heading in (
+        "What was tried",
+        "Where the residual of the training runs lies",
+        "How often this method is right",
+    ):
+        assert heading in text
+    figures = json.loads(page.split('id="figures">')[1].split("</script>")[0])
+    best = figures["gains"][0]
+    assert best["name"] == "brake torque over pressure rate" and best["after"] < 0.2 * best["frozen"]
+    assert figures["runs"][0]["models"] == ["frozen", "after"] and set(figures["correlation"]) == {
+        "longitudinal_acceleration", "pitch",
+    }  # fmt: skip
+
+
+def test_the_verdict_is_told_in_plain_words(closed: Path) -> None:
+    verdict = json.loads((closed / "verdict.json").read_text())
+    sentence, distance = verdict["sentence"], verdict["manoeuvre_error"]["stopping_distance"]
+    assert sentence.startswith(
+        "The brakes follow the pressure with a lag of 0.1 s; that takes the error of the speed"
+    )
+    assert f"of the stopping distance from {distance['frozen']:.2g} to {distance['after']:.2g} m" in sentence
+    assert verdict["effects"][0]["says"] == "the brakes follow the pressure with a lag of 0.1 s"
+
+
+def test_the_split_is_on_disk(closed: Path) -> None:
     split = json.loads((closed / "split.json").read_text())
     assert split["split_sha256"] == json.loads((closed / "verdict.json").read_text())["split_sha256"]
     assert not set(split["train"]) & set(split["held_out"])

@@ -1,13 +1,11 @@
 """The page of a verdict says how often such verdicts are right, by the benchmark that ships."""
 
-from html import unescape
-
 import pytest
 
 from catalogs.studies.closing import load_error_rates
 from flows.measured import closing_error_rates
 from flows.measured.closing_benchmark_summary import summarise_benchmark
-from flows.measured.closing_error_rates import error_rates_html
+from flows.measured.closing_error_rates import tell_error_rates
 
 
 def row(kind: str, truth: str | None, outcome: str, named: list[str], seed: int) -> dict[str, object]:
@@ -28,7 +26,7 @@ def test_it_names_what_was_right_and_what_was_taken_for_the_effect(monkeypatch: 
     rates = summarise_benchmark(rows) | {"engine_sha256": "e" * 64}
     monkeypatch.setattr(closing_error_rates, "load_error_rates", lambda: rates)
     monkeypatch.setattr(closing_error_rates, "engine_hash", lambda: "f" * 64)
-    page = unescape(error_rates_html(["brake_lag", "headwind"]))
+    page = "; ".join(tell_error_rates(["brake_lag", "headwind"]))
     assert "nothing is missing: something named in 1 of 2 (95 % interval 1.3 to 98.7 %)" in page
     assert "named exactly in 1 of 3" in page
     assert "brake_lag in the data: 1 refused, 1 right" in page

@@ -17,9 +17,10 @@ from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.measured.closing import joint_facts, verdict_json
-from flows.measured.joint_report import joint_report_html, next_steps
-from flows.measured.joint_report_figures import alike_numbers, brake_curve
+from flows.measured.closing import tell_search, verdict_json
+from flows.measured.residuals import predict_runs
+from flows.measured.verdict_figures import find_alike_numbers, format_plain_unit, make_brake_curve
+from flows.measured.verdict_report import find_next_steps, write_verdict_page
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import make_synthetic_campaign
@@ -61,7 +62,7 @@ def facts(trace: JointTrace, **more: Any) -> dict[str, Any]:
         "vehicle_file": "out/car-grown.yaml",
         "not_carried_by_coupled_mode": [],
     }
-    return verdict_json(trace.verdict) | joint_facts(trace) | told | more
+    return verdict_json(trace.verdict) | tell_search(trace) | told | more
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,7 @@ def judged() -> tuple[JointTrace, Campaign]:
 @pytest.fixture(scope="module")
 def text(judged: tuple[JointTrace, Campaign]) -> str:
     trace, campaign = judged
-    return joint_report_html(trace, facts(trace), campaign)
+    return write_verdict_page(trace, facts(trace), campaign)
 
 
 def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(
@@ -129,7 +130,9 @@ def test_figures_are_of_residuals_and_have_a_text(text: str, judged: tuple[Joint
 def test_the_curve_follows_what_was_measured_where_the_frozen_model_does_not(
     judged: tuple[JointTrace, Campaign],
 ) -> None:
-    curve = {name: np.array(values, float) for name, values in brake_curve(judged[0]).items()}
+    curve = {
+        name: np.array(values, float) for name, values in make_brake_curve(predict_runs(judged[0])[0]).items()
+    }
     off = {name: np.abs(curve[name] - curve["measured"]).mean() for name in ("frozen", "fitted")}
     assert len(curve["low"]) > 4 and off["fitted"] < 0.5 * off["frozen"]
     assert np.all(curve["low"] <= curve["measured"]) and np.all(curve["measured"] <= curve["high"])
@@ -143,11 +146,11 @@ def test_numbers_that_stand_in_for_each_other_are_told_with_the_run_that_separat
     gain, lag = fitted.numbers
     assert (gain.name, lag.name) == ("pressure_gain", "lag")
     near = replace(fitted, information=np.linalg.inv(np.array([[1.0, -0.095], [-0.095, 0.01]])))
-    (pair,) = alike_numbers(near)
+    (pair,) = find_alike_numbers(near)
     assert pair["names"] == ("lag", "pressure_gain") and pair["correlation"] == pytest.approx(-0.95)
     assert "press the brake in steps" in pair["separate"]
     far = replace(fitted, information=np.linalg.inv(np.array([[1.0, -0.085], [-0.085, 0.01]])))
-    assert alike_numbers(far) == []
+    assert find_alike_numbers(far) == []
 
 
 @pytest.mark.parametrize(
@@ -162,7 +165,7 @@ def test_the_next_step_follows_from_the_verdict(
     judged: tuple[JointTrace, Campaign], more: dict[str, Any], commands: list[str]
 ) -> None:
     trace, campaign = judged
-    steps = next_steps(facts(trace, **more), replace(campaign, vehicle="a car; rm -r x"))
+    steps = find_next_steps(facts(trace, **more), replace(campaign, vehicle="a car; rm -r x"))
     assert [command.split()[1] for _, command in steps] == commands
     assert all("; rm" not in command or "'a car; rm -r x'" in command for _, command in steps)
 
@@ -198,3 +201,11 @@ def test_a_browser_draws_zooms_by_key_and_fetches_nothing(text: str, tmp_path: P
     assert half[1] - half[0] == pytest.approx(0.5 * (whole[1] - whole[0])) and back == pytest.approx(whole)
     assert not any("frozen" in line for line in lines) and any("after" in line for line in lines)
     assert wide <= 400 and wrong == [] and [a for a in asked if not a.startswith(("file:", "data:"))] == []
+
+
+@pytest.mark.parametrize(
+    ("unit", "read"),
+    [("m2", "m²"), ("m/s^2", "m/s²"), ("(100 K)-1", "(100 K)⁻¹"), ("N s2 m-2", "N s² m⁻²"), ("1", "1")],
+)
+def test_a_unit_has_its_powers_raised_and_its_numbers_not(unit: str, read: str) -> None:
+    assert format_plain_unit(unit) == read

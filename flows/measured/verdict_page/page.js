@@ -1,6 +1,6 @@
 /* global Plotly */
 "use strict";
-// Residuals of held-out runs and the brake's curve: drawn in the page's colours, zoomed by pointer, buttons and keys.
+// The figures of a verdict: drawn in the page's colours, zoomed by pointer, buttons and keys.
 
 const FIGURES = JSON.parse(document.getElementById("figures").textContent);
 const PANEL_PX = 150;
@@ -54,7 +54,7 @@ function drawRun(plot, run, shown) {
   run.channels.forEach((channel, k) => {
     layout[`yaxis${k === 0 ? "" : k + 1}`] = yAxis(c, k * PANEL_PX + HEAD_PX, (k + 1) * PANEL_PX - 8, height);
     heads.push([`${words(channel.name)} [${channel.unit}]`, k * PANEL_PX]);
-    for (const model of shown) {
+    for (const model of shown.filter((name) => run.models.includes(name))) {
       lines.push({
         type: "scatter", mode: "lines", name: NAMES[model], xaxis: "x", yaxis: axis("y", k),
         x: run.time_s, y: channel[model], hovertemplate: "%{y:.3g}",
@@ -72,26 +72,76 @@ function drawRun(plot, run, shown) {
   show(plot, lines, layout, whole, heads);
 }
 
-function drawCurve(plot) {
+/** Lines over one axis: each has a name, points, a colour's name and, if it has a band, its lower and upper edge. */
+function drawLines(plot, lines, height, title, head) {
   const c = colours();
+  const points = lines.flatMap((line) => line.x);
+  const width = Math.max(...points) - Math.min(...points) || 1;
+  const whole = [Math.min(...points) - 0.02 * width, Math.max(...points) + 0.03 * width];
+  const layout = baseLayout(c, height, title, plot.layout?.xaxis?.range ?? whole);
+  layout.yaxis = { ...yAxis(c, HEAD_PX, height, height), nticks: 7 };
+  const drawn = lines.flatMap((line) => {
+    const edge = { type: "scatter", mode: "lines", x: line.x, line: { width: 0 }, hoverinfo: "skip", name: "" };
+    const band = line.low ? [
+      { ...edge, y: line.low },
+      { ...edge, y: line.high, fill: "tonexty", fillcolor: `${c[line.colour] === c.ink ? c.soft : c[line.colour]}38` },
+    ] : [];
+    return [...band, {
+      type: "scatter", mode: line.x.length > 40 ? "lines" : "lines+markers", name: line.name, x: line.x, y: line.y,
+      hovertemplate: "%{y:.3g}", marker: { size: 4 }, line: { color: c[line.colour], width: 1.8, dash: DASHES[line.colour] ?? "solid" },
+    }];
+  });
+  show(plot, drawn, layout, whole, [[head, 0]]);
+}
+
+function drawCurve(plot) {
   const curve = FIGURES.curve;
   const x = curve.pressure_mpa;
-  const most = Math.max(...x, 0.1) * 1.03;
-  const whole = [-0.02 * most, most];
-  const layout = baseLayout(c, 320, "brake pressure [MPa], mean over 0.3 s", plot.layout?.xaxis?.range ?? whole);
-  layout.yaxis = { ...yAxis(c, HEAD_PX, 320, 320), nticks: 7 };
-  const line = (key, name, extra) => ({
-    type: "scatter", mode: "lines+markers", name, x, y: curve[key], hovertemplate: "%{y:.3g}", marker: { size: 4 },
-    line: { color: c[key] ?? c.after, width: 1.8 }, ...extra,
-  });
-  const edge = { mode: "lines", line: { width: 0 }, hoverinfo: "skip", hovertemplate: null };
-  show(plot, [
-    line("low", "", edge),
-    line("high", "", { ...edge, fill: "tonexty", fillcolor: `${c.soft}38` }),
-    line("frozen", "frozen", { line: { color: c.frozen, width: 1.6, dash: "dot" } }),
-    line("measured", "measured"),
-    line("fitted", "fitted"),
-  ], layout, whole, [["deceleration [m/s²], decrease of speed over 0.3 s", 0]]);
+  drawLines(plot, [
+    { name: "measured", x, y: curve.measured, low: curve.low, high: curve.high, colour: "measured" },
+    { name: "frozen", x, y: curve.frozen, colour: "frozen" },
+    { name: "fitted", x, y: curve.fitted, colour: "after" },
+  ], 320, "brake pressure [MPa], mean over 0.3 s", "deceleration [m/s²], decrease of speed over 0.3 s");
+}
+
+function drawSpline(plot) {
+  const spline = FIGURES.spline;
+  const line = (of) => ({ name: of, x: spline.x, y: spline[of].values, low: spline[of].low, high: spline[of].high, colour: of });
+  drawLines(plot, [line("frozen"), line("after")], 280, spline.x_name, spline.y_name);
+}
+
+function drawCorrelation(plot) {
+  const c = FIGURES.correlation[plot.dataset.correlation];
+  const flat = (value) => c.lag_s.map(() => value);
+  drawLines(plot, [
+    { name: "band", x: c.lag_s, y: flat(0), low: flat(-c.band), high: flat(c.band), colour: "soft" },
+    { name: "frozen", x: c.lag_s, y: c.frozen, colour: "frozen" },
+    { name: "after", x: c.lag_s, y: c.after, colour: "after" },
+  ], 200, "the residual follows the pressure by [s]", "correlation [1]");
+}
+
+/** Bars over a logarithmic axis, the largest on top; the words stand above their bars, so that a narrow screen has room. */
+function drawGains(plot) {
+  const c = colours();
+  const gains = FIGURES.gains;
+  const height = 40 * gains.length;
+  const most = Math.log10(Math.max(...gains.flatMap((g) => [g.frozen, g.after]))) + 0.1;
+  const whole = [-1, most];
+  const layout = baseLayout(c, height, "gain of a spline / inflation", whole);
+  layout.margin = { ...MARGIN, l: 12 };
+  layout.dragmode = false;
+  layout.hovermode = "closest";
+  layout.bargap = 0.55;
+  layout.xaxis = { ...layout.xaxis, type: "log", fixedrange: true, dtick: 1, range: whole };
+  layout.yaxis = { autorange: "reversed", fixedrange: true, showticklabels: false, type: "category" };
+  layout.annotations = gains.map((g) => ({
+    x: 0, xref: "paper", y: g.name, yshift: 15, text: g.name, showarrow: false, xanchor: "left", font: { size: 11, color: c.soft },
+  }));
+  const bars = ["frozen", "after"].map((of) => ({
+    type: "bar", orientation: "h", name: of, y: gains.map((g) => g.name), x: gains.map((g) => g[of] - 0.1), base: 0.1,
+    customdata: gains.map((g) => g[of]), hovertemplate: "%{customdata:.3g}", marker: { color: c[of] },
+  }));
+  show(plot, bars, layout, whole, []);
 }
 
 function show(plot, lines, layout, whole, heads) {
@@ -118,13 +168,15 @@ function act(plot, what) {
   Plotly.relayout(plot, { "xaxis.range": [start, start + width] });
 }
 
+const DRAWN = [["curve", drawCurve], ["spline", drawSpline], ["correlation", drawCorrelation], ["gains", drawGains]];
 const plots = [...document.querySelectorAll(".plot")];
 const chips = [...document.querySelectorAll("[data-model]")];
 
 function drawAll() {
   const shown = chips.filter((chip) => chip.getAttribute("aria-pressed") === "true").map((chip) => chip.dataset.model);
   for (const plot of plots) {
-    if ("curve" in plot.dataset) drawCurve(plot);
+    const drawn = DRAWN.find(([kind]) => kind in plot.dataset);
+    if (drawn) drawn[1](plot);
     else drawRun(plot, FIGURES.runs[Number(plot.dataset.run)], shown);
   }
 }
@@ -137,11 +189,11 @@ for (const chip of chips) {
 }
 for (const plot of plots) {
   plot.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || !(event.key in KEYS)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || !(event.key in KEYS) || "gains" in plot.dataset) return;
     event.preventDefault();
     act(plot, KEYS[event.key]);
   });
-  plot.closest("figure").querySelector(".zoom").addEventListener("click", (event) => {
+  plot.closest("figure").querySelector(".zoom")?.addEventListener("click", (event) => {
     const button = event.target.closest("[data-act]");
     if (button) act(plot, button.dataset.act);
   });

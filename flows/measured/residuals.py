@@ -1,0 +1,106 @@
+"""What the models of a verdict predict for each measured run, whichever search reached it, and what is left over."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNELS
+from tasks.identification.decision.verdict import Trace
+from tasks.identification.inference.forward import RunModel, predict_channels
+from tasks.identification.inference.hypothesis import compose_parameters
+from tasks.identification.joint.fit import lead_offsets
+from tasks.identification.joint.stops import predict_stop
+from tasks.identification.joint.verdict import JointTrace
+from tasks.vehicle.effects.table import EFFECT_TABLE
+
+MODELS = ("frozen", "retuned", "after")
+"""Models of a verdict: the vehicle file's, with its own numbers fitted, and with what was found."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunPrediction:
+    """A measured run beside what the models predict for it.
+
+    Parameters
+    ----------
+    model : the run
+    channels : indices of the channels that were compared
+    predicted : by name of the model, float64 [N, 7] readings [units of the channels]
+    """
+
+    model: RunModel
+    channels: tuple[int, ...]
+    predicted: Mapping[str, NDArray[np.float64]]
+
+
+def predict_runs(trace: Trace | JointTrace) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
+    """Return the training runs and the held-out runs with the predictions of the frozen and the grown model.
+
+    Parameters
+    ----------
+    trace : the verdict and what it stands on; a joint fit has the re-tuned model too on its held-out runs
+    """
+    if isinstance(trace, JointTrace):
+        return _predict_stops(trace)
+    theta, slots = compose_parameters(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
+    evidence = trace.start.evidence
+    train, held_out = (
+        tuple(
+            RunPrediction(
+                model=run.model,
+                channels=tuple(np.flatnonzero(np.isfinite(run.sigma)).tolist()),
+                predicted={
+                    "frozen": predict_channels(run.model, np.zeros(len(EFFECT_TABLE))),
+                    "after": predict_channels(run.model, theta, slots=slots),
+                },
+            )
+            for run in runs
+        )
+        for runs in (evidence.train, evidence.held_out)
+    )
+    return train, held_out
+
+
+def _predict_stops(trace: JointTrace) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
+    fitted = trace.fitted
+    train = tuple(
+        RunPrediction(
+            model=stop.model,
+            channels=tuple(stop.channels.tolist()),
+            predicted={
+                "frozen": predict_stop(stop, {}, lead_offsets(stop, {}, fitted.scales)),
+                "after": predict_stop(stop, fitted.by_name, offsets),
+            },
+        )
+        for stop, offsets in zip(trace.train, fitted.offsets, strict=True)
+    )
+    held_out = tuple(
+        RunPrediction(
+            model=stop.model,
+            channels=tuple(stop.channels.tolist()),
+            predicted=dict(zip(MODELS, predicted, strict=True)),
+        )
+        for stop, predicted in zip(trace.held_out, trace.predicted, strict=True)
+    )
+    return train, held_out
+
+
+def compute_residual_rmse(runs: Sequence[RunPrediction]) -> dict[str, dict[str, dict[str, float]]]:
+    """Return RMSE by run, channel and model, frozen and after [unit of the channel].
+
+    Parameters
+    ----------
+    runs : measured runs with their predictions
+    """
+    return {
+        run.model.run.name: {
+            CHANNELS[c]: {
+                name: float(np.sqrt(np.mean((run.model.measured - run.predicted[name])[:, c] ** 2)))
+                for name in ("frozen", "after")
+            }
+            for c in run.channels
+        }
+        for run in runs
+    }

@@ -1,0 +1,179 @@
+"""Numbers behind the figures of a verdict: residuals, deceleration by pressure, splines, numbers that are alike."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flows.measured.residuals import MODELS, RunPrediction
+from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
+from tasks.identification.decision.forms import ResidualSpline, fit_residual_splines
+from tasks.identification.decision.verdict import Trace
+from tasks.identification.joint.fit import JointFit
+from tasks.identification.joint.numbers import SMOOTHED, JointNumber
+from tasks.identification.joint.words import SEPARATE
+from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS, format_unit
+
+BINS = 14
+"""Parts of the range of pressure over which a curve is drawn."""
+FEWEST_SAMPLES = 5
+"""Samples from which a part of the range has a median and a band."""
+STANDING = 1.0
+"""Speed below which a deceleration says nothing of the brake [m/s]."""
+ALIKE = 0.9
+"""Correlation from which two numbers stand in for each other [1]."""
+DIGITS = 5
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+LEAST_GAIN = 0.1
+"""Gain of a spline that is drawn, where the axis is logarithmic [1]."""
+
+
+def make_residual_figures(runs: Sequence[RunPrediction]) -> list[dict[str, Any]]:
+    """Return measured less model over time for each run, with the brake pressure.
+
+    Parameters
+    ----------
+    runs : measured runs with their predictions
+    """
+    return [
+        {
+            "name": run.model.run.name,
+            "time_s": _plain(np.arange(run.model.samples) * run.model.run.interval),
+            "pressure_mpa": _plain(run.model.run.pressure[: run.model.samples]),
+            "models": [name for name in MODELS if name in run.predicted],
+            "channels": [
+                {"name": CHANNELS[c], "unit": format_plain_unit(CHANNEL_UNITS[c])}
+                | {name: _plain((run.model.measured - y)[:, c]) for name, y in run.predicted.items()}
+                for c in run.channels
+            ],
+        }
+        for run in runs
+    ]
+
+
+def make_brake_curve(runs: Sequence[RunPrediction]) -> dict[str, list[float | None]]:
+    """Return deceleration against brake pressure over runs: medians by pressure, and the measured band.
+
+    Speeds of the measurement and of both models are treated alike: their decrease over a short time.
+
+    Parameters
+    ----------
+    runs : training runs with their predictions
+    """
+    pressure, measured, frozen, fitted = np.concatenate([_compute_decelerations(run) for run in runs], axis=1)
+    edges = np.linspace(0.0, max(float(pressure.max(initial=0.0)), 1e-9), BINS + 1)
+    place = np.clip(np.digitize(pressure, edges) - 1, 0, BINS - 1)
+    parts = [place == k for k in range(BINS) if np.sum(place == k) >= FEWEST_SAMPLES]
+    return {
+        "pressure_mpa": [_shorten(pressure[part].mean()) for part in parts],
+        "low": [_shorten(np.quantile(measured[part], 0.05)) for part in parts],
+        "measured": [_shorten(np.median(measured[part])) for part in parts],
+        "high": [_shorten(np.quantile(measured[part], 0.95)) for part in parts],
+        "frozen": [_shorten(np.median(frozen[part])) for part in parts],
+        "fitted": [_shorten(np.median(fitted[part])) for part in parts],
+    }
+
+
+def _compute_decelerations(run: RunPrediction) -> NDArray[np.float64]:
+    """Return pressure [MPa] and deceleration measured, of the frozen and the fitted model [m/s2], float64 [4, M]."""
+    speed, model = CHANNELS.index("speed"), run.model
+    readings = (model.measured, run.predicted["frozen"], run.predicted["after"])
+    speeds = np.array([y[:, speed] for y in readings])
+    interval, count = model.run.interval, model.samples
+    lag = min(max(round(SMOOTHED / interval), 1), count - 1)
+    slower = (speeds[:, :-lag] - speeds[:, lag:]) / (lag * interval)
+    pressure = np.convolve(model.run.pressure[:count], np.full(lag + 1, 1.0 / (lag + 1)), "valid")
+    return np.vstack((pressure, slower))[:, np.all(speeds[:, lag:] > STANDING, axis=0)]
+
+
+def make_spline_figures(trace: Trace) -> dict[str, Any]:
+    """Return where the residual of the training runs lies: gains of splines, and the spline at the named port.
+
+    Parameters
+    ----------
+    trace : the verdict and what it stands on
+    """
+    frozen = fit_residual_splines(trace.start.evidence, trace.start.base)
+    after = {(s.port, s.variable): s for s in fit_residual_splines(trace.end.evidence, trace.end.base)}
+    ports = [effect.port for effect in trace.verdict.effects]
+    shown = next((spline for spline in frozen if spline.port in ports), frozen[0])
+    return {
+        "gains": [
+            {
+                "name": f"{s.port} over {s.variable}".replace("_", " "),
+                "frozen": _shorten(max(s.gain, LEAST_GAIN)),
+                "after": _shorten(max(after[s.port, s.variable].gain, LEAST_GAIN)),
+            }
+            for s in frozen
+        ],
+        "spline": {
+            "x_name": f"{shown.variable} [{format_unit(VARIABLE_UNITS[shown.variable])}]".replace("_", " "),
+            "y_name": f"{shown.port} [{PORT_UNITS[shown.port]}]".replace("_", " "),
+            "x": _plain(shown.grid),
+            "frozen": _make_band(shown),
+            "after": _make_band(after[shown.port, shown.variable]),
+        },
+    }
+
+
+def _make_band(spline: ResidualSpline) -> dict[str, list[float | None]]:
+    reach = 1.96 * np.sqrt(np.maximum(np.diag(spline.covariance), 0.0))
+    return {
+        "values": _plain(spline.values),
+        "low": _plain(spline.values - reach),
+        "high": _plain(spline.values + reach),
+    }
+
+
+def find_alike_numbers(fitted: JointFit) -> list[dict[str, Any]]:
+    """Return pairs of fitted numbers that stand in for each other, the most alike first, with what tells them apart.
+
+    Parameters
+    ----------
+    fitted : the fit
+    """
+    inverse = np.linalg.inv(fitted.information)
+    sigma = np.sqrt(np.diag(inverse))
+    correlation = inverse / np.outer(sigma, sigma)
+    pairs = [
+        {
+            "names": (a.name, b.name),
+            "correlation": float(correlation[i, j]),
+            "separate": find_separating_run((a, b)),
+        }
+        for i, a in enumerate(fitted.numbers)
+        for j, b in enumerate(fitted.numbers[:i])
+        if abs(correlation[i, j]) > ALIKE
+    ]
+    return sorted(pairs, key=lambda pair: -abs(pair["correlation"]))
+
+
+def find_separating_run(numbers: Sequence[JointNumber]) -> str | None:
+    """Return the run that tells numbers apart; None where none is known.
+
+    Parameters
+    ----------
+    numbers : that these runs cannot tell apart
+    """
+    return next((SEPARATE[number.group] for number in numbers if number.group in SEPARATE), None)
+
+
+def format_plain_unit(unit: str) -> str:
+    """Return a unit as a reader knows it.
+
+    Parameters
+    ----------
+    unit : of the tables
+    """
+    return re.sub(r"(?<=[A-Za-z)])\^?(-?[0-9])", lambda found: found[1].translate(RAISED), unit)
+
+
+def _plain(values: NDArray[np.floating[Any]]) -> list[float | None]:
+    return [_shorten(value) for value in values]
+
+
+def _shorten(value: float) -> float | None:
+    """Return a number with the digits that a screen can show; JSON has no infinity."""
+    return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None

@@ -1,0 +1,170 @@
+"""The page of a verdict: one HTML file that needs no other."""
+
+import base64
+import hashlib
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from flows.measured.closing_error_rates import tell_error_rates
+from flows.measured.residuals import predict_runs
+from flows.measured.verdict_figures import (
+    find_alike_numbers,
+    find_separating_run,
+    format_plain_unit,
+    make_brake_curve,
+    make_residual_figures,
+    make_spline_figures,
+)
+from flows.reading.report import PAGE as DATASET_PAGE
+from tasks.campaign.campaign import Campaign
+from tasks.identification.decision.verdict import Trace
+from tasks.identification.joint.verdict import JointTrace
+
+PAGE = Path(__file__).parent / "verdict_page"
+IMPORT = "musync import-measurements RECORDINGS --map MAP.yaml --out CAMPAIGN"
+MEANING = {
+    "FOUND": "the model lacks this",
+    "SET": "one of several explanations that these runs cannot tell apart",
+    "UNKNOWN_FORM": "the model lacks a term outside the library: this port, this variable, this shape",
+    "RETUNE": "no physics is missing; a number of the vehicle is wrong",
+    "SENSOR": "no physics is missing; an instrument has an error",
+    "NOTHING": "these runs show nothing that the model lacks",
+}
+
+
+def write_verdict_page(trace: Trace | JointTrace, result: Mapping[str, Any], campaign: Campaign) -> str:
+    """Return the page.
+
+    Scripts run by their hashes alone: one that got in with a name of the campaign would not, and nothing is fetched.
+
+    Parameters
+    ----------
+    trace : the verdict and what it stands on
+    result : the verdict as plain values
+    campaign : measured runs
+    """
+    pages = Environment(loader=FileSystemLoader(PAGE), autoescape=True, undefined=StrictUndefined)
+    pages.filters |= {"digits": _format_digits, "words": _format_name, "unit": format_plain_unit}
+    scripts = (_read_plotly(), (PAGE / "page.js").read_text())
+    style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
+    train, held_out = predict_runs(trace)
+    figures = {"runs": make_residual_figures(held_out), "curve": make_brake_curve(train)}
+    told: dict[str, Any] = {"separate": [None] * len(result["rivals"])}
+    template = "joint_fit.html"
+    if isinstance(trace, JointTrace):
+        told = {"separate": _find_separations(trace), "alike": find_alike_numbers(trace.fitted)}
+    else:
+        template = "one_effect.html"
+        figures |= make_spline_figures(trace) | {"correlation": result["residual_input_correlation"]}
+        told |= {
+            "candidates": _list_candidates(trace),
+            "detectable": [
+                (e.name, e.parameters[0], result["minimum_detectable"].get(e.name))
+                for e in trace.start.evidence.effects
+            ],
+            "error_rates": tell_error_rates([effect["name"] for effect in result["effects"]]),
+        }
+    return pages.get_template(template).render(
+        campaign=campaign, result=result, meaning=MEANING[result["verdict"]], steps=find_next_steps(result, campaign),
+        figures=figures, style=style, scripts=scripts, policy=_make_policy(scripts), **told,
+    )  # fmt: skip
+
+
+def find_next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple[str, str]]:
+    """Return what to do next: a sentence and a command each.
+
+    Parameters
+    ----------
+    result : the verdict as plain values
+    campaign : that was judged
+    """
+    steps = []
+    experiment = result["discriminating_experiment"]
+    if experiment is not None:
+        between = " from ".join(name.replace("_", " ") for name in experiment["between"])
+        steps.append(
+            (f"Record “{experiment['plan']}”, which tells {between}, and import it with the others:", IMPORT)
+        )
+    elif result["rivals"]:
+        steps.append(
+            (
+                "Record the run that tells the explanations apart (above), and import it with the others:",
+                IMPORT,
+            )
+        )
+    elif result["verdict"] == "NOTHING":
+        steps.append(
+            (
+                "Record runs that reach further than these, faster and harder, and import them with the others:",
+                IMPORT,
+            )
+        )
+    grown = result["vehicle_file"]
+    name = grown or campaign.vehicle
+    if grown is not None:
+        steps.append(
+            ("See whether the grown vehicle is plausible:", f"musync vehicle check {shlex.quote(name)}")
+        )
+    car = "the grown vehicle" if grown is not None else "the vehicle as it is"
+    out = shlex.quote(f"datasets/{Path(name).stem}")
+    steps.append(
+        (
+            f"Make a dataset of telemetry with {car}:",
+            f"musync generate demo --vehicle {shlex.quote(name)} --no-frames --out {out}",
+        )
+    )
+    return steps
+
+
+def _find_separations(trace: JointTrace) -> list[str | None]:
+    """Return the run that tells each rival from what is named, in the order of the rivals."""
+    named = {effect.name: effect.parameters[0].name for effect in trace.verdict.effects}
+    return [
+        find_separating_run([n for n in trace.fitted.numbers if n.name == named.get(of)])
+        for of, _ in trace.verdict.rivals
+    ]
+
+
+def _list_candidates(trace: Trace) -> list[dict[str, Any]]:
+    """Return every candidate that was refined, with what became of it."""
+    rows = []
+    for place, compared in enumerate(trace.compared, start=1):
+        near = {id(c) for c, _ in compared.near}
+        for candidate, share in ((compared.own, compared.share), *compared.others):
+            what = "named" if candidate is compared.own else "rival" if id(candidate) in near else ""
+            name = f"{place}. {candidate.hypothesis.name}"
+            rows.append({"name": name, "what": what, "share": share, "of": candidate})
+    rows += [{"name": e.name, "what": "not named", "share": None, "of": e} for e in trace.verdict.tried]
+    return rows
+
+
+def _make_policy(scripts: tuple[str, ...]) -> str:
+    """Return the content-security policy under which these scripts run, and no other."""
+    hashes = " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+        for script in scripts
+    )
+    return (
+        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:;"
+        " base-uri 'none'; form-action 'none'"
+    )
+
+
+def _format_digits(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}"
+
+
+def _format_name(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _read_plotly() -> str:
+    # its import takes a second, which no other verdict should pay
+    from plotly.offline import get_plotlyjs
+
+    source: str = get_plotlyjs()
+    return source

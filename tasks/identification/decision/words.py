@@ -1,0 +1,65 @@
+"""A verdict in plain words: what the car does that the model does not, and what that does to the error."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from tasks.identification.decision.answer import ChannelError, NamedEffect
+from tasks.vehicle.effects.library import Effect
+
+
+def say_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
+    """Return what a named effect says of the car.
+
+    Parameters
+    ----------
+    effect : of the library, or a form outside it
+    library : effects that may be named
+    """
+    known = next((e for e in library if e.name == effect.name), None)
+    if known is not None:
+        return known.say({p.name: p.value for p in effect.parameters})
+    port, variable = (name.replace("_", " ") for name in (effect.port, effect.variable))
+    return f"the {port} depends on {variable} in a way that no effect of the library has"
+
+
+def tell_verdict(
+    effects: Sequence[NamedEffect],
+    rivals: Sequence[NamedEffect],
+    library: Sequence[Effect],
+    error: Mapping[str, ChannelError],
+    manoeuvres: Mapping[str, ChannelError],
+) -> str:
+    """Return the verdict in plain words.
+
+    Parameters
+    ----------
+    effects : that are named
+    rivals : that cannot be told from them
+    library : effects that may be named
+    error, manoeuvres : on runs to which no number was fitted
+    """
+    if not effects:
+        return "These runs show nothing that the model lacks."
+    told = [say_effect(effect, library) for effect in effects]
+    text = join_phrases(told)
+    if rivals:
+        others = [say_effect(rival, library) for rival in rivals]
+        choice = others[0] if len(others) == 1 else f"one of {len(others)} other explanations holds"
+        text += f", or {choice}, which these runs cannot tell apart"
+    figures = {"speed": error["speed"], **manoeuvres}
+    moved = join_phrases(
+        f"of the {name.replace('_', ' ')} from {e.frozen:.2g} to {e.after:.2g} {e.unit}"
+        for name, e in figures.items()
+    )
+    how = "that takes" if len(told) == 1 else "together they take"
+    return f"{text[0].upper()}{text[1:]}; {how} the error {moved}, on runs to which no number was fitted."
+
+
+def join_phrases(phrases: Iterable[str]) -> str:
+    """Return phrases as one: "a, b and c".
+
+    Parameters
+    ----------
+    phrases : at least one
+    """
+    *before, last = phrases
+    return f"{', '.join(before)} and {last}" if before else last
