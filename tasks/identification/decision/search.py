@@ -193,7 +193,7 @@ def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
     pulls = null.pulls
     judged = []
     for place in np.flatnonzero(pulls > evidence.rules.retune_pull):
-        reasons.append(f"session nuisance {SESSION[place]} is pulled by {pulls[place]:.1f} sigma")
+        reasons.append(f"the runs pull {SESSION[place]} by {pulls[place]:.1f} of its tolerances")
         effect = next(
             e for e in evidence.effects if e.parameters[0].name == SESSION[place] and len(e.parameters) == 1
         )

@@ -47,7 +47,7 @@ def tell_verdict(
         text += f", or {choice}, which these runs cannot tell apart"
     figures = {"speed": error["speed"], **manoeuvres}
     moved = join_phrases(
-        f"of the {name.replace('_', ' ')} from {e.frozen:.2g} to {e.after:.2g} {e.unit}"
+        f"of the {name.replace('_', ' ')} from {e.frozen:.2g} (re-tuned {e.retuned:.2g}) to {e.after:.2g} {e.unit}"
         for name, e in figures.items()
     )
     how = "that takes" if len(told) == 1 else "together they take"

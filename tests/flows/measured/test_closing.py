@@ -139,7 +139,8 @@ def test_the_verdict_is_told_in_plain_words(closed: Path) -> None:
     assert sentence.startswith(
         "The brakes follow the pressure with a lag of 0.1 s; that takes the error of the speed"
     )
-    assert f"of the stopping distance from {distance['frozen']:.2g} to {distance['after']:.2g} m" in sentence
+    frozen, retuned, after = (f"{distance[key]:.2g}" for key in ("frozen", "retuned", "after"))
+    assert f"of the stopping distance from {frozen} (re-tuned {retuned}) to {after} m" in sentence
     assert verdict["effects"][0]["says"] == "the brakes follow the pressure with a lag of 0.1 s"
 
 
