@@ -27,8 +27,8 @@ def test_every_command_in_the_documents_exists(command):
     assert result.exit_code == 0, result.output
 
 
-def test_the_readme_lists_every_command():
-    text = (SOURCE_ROOT / "README.md").read_text()
+def test_the_page_of_commands_lists_every_command():
+    text = (SOURCE_ROOT / "docs" / "commands.md").read_text()
     assert not [command.name for command in COMMANDS if f"`musync {command.name}" not in text]
 
 
