@@ -86,14 +86,13 @@ function kept() {
 
 function drawHead() {
   $("clips").tHead.append(el("tr", {}, ...COLUMNS.map(({ head, unit }, k) => {
-    const cell = el("th", { scope: "col", tabIndex: 0 }, head, el("small", { textContent: unit || "\u00a0" }));
-    const sort = () => {
+    const button = el("button", { type: "button" }, head, el("small", { textContent: unit || "\u00a0" }));
+    const cell = el("th", { scope: "col" }, button);
+    button.onclick = () => {
       order = { column: k, rising: order.column === k ? !order.rising : true };
       [...cell.parentNode.cells].forEach((c, i) => c.setAttribute("aria-sort", i !== k ? "none" : order.rising ? "ascending" : "descending"));
       drawRows();
     };
-    cell.onclick = sort;
-    cell.onkeydown = (event) => event.key === "Enter" && sort();
     return cell;
   })));
 }

@@ -93,6 +93,16 @@ def test_a_click_on_a_head_sorts_and_another_turns_the_order(page, toy_dataset):
     assert labels(page) == by_pitch[::-1]
 
 
+def test_the_keyboard_sorts_and_leaves_the_heads(page):
+    page.locator("#clips th:first-child button").focus()
+    page.keyboard.press("Enter")
+    assert page.get_attribute("#clips th:first-child", "aria-sort") in {"ascending", "descending"}
+    for _ in range(page.locator("#clips th").count()):
+        page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.closest('thead')") is None
+    assert page.evaluate("document.activeElement.closest('#clips tbody') !== null")
+
+
 def test_the_sibling_stands_beside_with_its_film_its_traces_and_what_it_changes(page, toy_dataset):
     data = json.loads(toy_dataset.manifest.read_bytes())["clips"]
     clips = {c["label"]: c["figures"] for c in data}
