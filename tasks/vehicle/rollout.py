@@ -156,7 +156,6 @@ def simulate_scenario(
 def _collect_history(run: Simulation) -> History:
     """Return a simulation's columns and events in the form that both modes share."""
     columns = dict(zip(COLUMNS, run.history.T.copy(), strict=True))
-    columns |= {f"axle_load_{axle}": columns[f"tyre_load_{axle}"] for axle in "fr"}
     return History(columns=columns, onset=run.onset, onset_station=run.onset_station, stop_time=run.stop)
 
 

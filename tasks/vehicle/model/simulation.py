@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tasks.vehicle.brake import find_onset_by_position
 from tasks.vehicle.effects.brake_line import compute_line_pressure
 from tasks.vehicle.effects.slots import Slot, SlotTables, pack_slots
+from tasks.vehicle.model.axle_ports import compute_vertical_force
 from tasks.vehicle.model.brake_input import BrakeInput, compute_input_pressure, interpolate_trace
 from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
 from tasks.vehicle.model.ports import compute_ports
@@ -41,6 +42,7 @@ COLUMNS = (
     "unsprung_heave_f", "unsprung_heave_r", "heave_rate", "pitch_rate", "road_height_f", "road_height_r",
     "heave_acceleration", "disc_rise_f", "disc_rise_r", "suspension_travel_f", "suspension_travel_r",
     "suspension_rate_f", "suspension_rate_r", "acting_pressure",
+    "axle_load_f", "axle_load_r",
 )  # fmt: skip
 """Columns of a history, in SI units but for the pressures [MPa]."""
 COLUMN = {name: i for i, name in enumerate(COLUMNS)}
@@ -216,6 +218,7 @@ def integrate_motion(
                 (ports.lift - f.suspension_force - r.suspension_force) / body.sprung_mass, memory.front.disc_rise,
                 memory.rear.disc_rise, x[0] - x[2] - body.to_front * x[1], x[0] - x[3] + body.to_rear * x[1],
                 x[4] - x[6] - body.to_front * x[5], x[4] - x[7] + body.to_rear * x[5], line,
+                compute_vertical_force(f, chassis.effects), compute_vertical_force(r, chassis.effects),
             )  # fmt: skip
         if n == last:
             break
