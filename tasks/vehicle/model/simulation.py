@@ -73,19 +73,39 @@ class Simulation:
         return self.history[:, COLUMN[name]]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """Samples that a simulation returns, and the steps between them.
+
+    Parameters
+    ----------
+    samples : number of samples, the one at the start included
+    interval : time between samples [s]
+    substeps : internal steps between samples
+    keep_states : return the state at each sample
+    """
+
+    samples: int
+    interval: float
+    substeps: int
+    keep_states: bool = False
+
+    @property
+    def step(self) -> float:
+        """Return the internal step [s]."""
+        return self.interval / self.substeps
+
+
 def simulate(
     vehicle: Vehicle,
     surface: SurfaceResponse,
     drive: BrakeInput,
     conditions: Conditions,
+    recording: Recording,
     *,
-    samples: int,
-    substeps: int,
-    interval: float,
     initial_speed: float = 0.0,
     start: NDArray[np.float64] | None = None,
     slots: Sequence[Slot] = (),
-    keep_states: bool = False,
 ) -> Simulation:
     """Simulate one run with the vehicle's effects and forms.
 
@@ -97,13 +117,10 @@ def simulate(
     surface : its tyres on the surface
     drive : input of the driver
     conditions : road feature, snow, grade, direction, disc temperature
-    samples : number of samples, the one at the start included
-    substeps : internal steps between samples
-    interval : time between samples [s]
+    recording : samples and internal steps
     initial_speed : speed at the start of the run, with the body at rest [m/s]
     start : row of an earlier run's states with the same step, to start from; replaces ``initial_speed``
     slots : tables that act in this run only, added to the vehicle's forms
-    keep_states : return the state at each sample
     """
     tables = [form.slot for form in vehicle.forms] + list(slots)
     if start is None:
@@ -115,13 +132,13 @@ def simulate(
         )  # fmt: skip
     else:
         state = unpack_state(start)
-    history = np.empty((samples, _WIDTH))
-    states = np.empty((samples if keep_states else 0, STATE_WIDTH))
+    history = np.empty((recording.samples, _WIDTH))
+    states = np.empty((recording.samples if recording.keep_states else 0, STATE_WIDTH))
     onset, onset_station, stop = integrate_motion(
         state,
-        samples,
-        substeps,
-        interval / substeps,
+        recording.samples,
+        recording.substeps,
+        recording.step,
         drive,
         make_road_feature(conditions.hazard),
         pack_slots(tables) if tables else None,
