@@ -96,7 +96,7 @@ def test_a_tread_gives_every_surface_one_slope_at_no_slip_and_leaves_the_peak_wh
         assert friction(peak * (1 - 1e-9)) == pytest.approx(tyre.peak)
         assert slope(peak * (1 - 1e-9)) == pytest.approx(0.0, abs=1e-6)
         assert friction(2 * peak) == friction(2 * peak, plain)
-        # Eq. 9 at half the slip of the peak
+        # the curve at half the slip of the peak
         steepness = 18.0 * peak / tyre.peak
         assert friction(peak / 2) == pytest.approx(tyre.peak * steepness / (0.5 + steepness), rel=1e-12)
         for slip in (0.1 * peak, 0.7 * peak):

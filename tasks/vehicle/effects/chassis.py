@@ -37,7 +37,7 @@ def compute_tread_curve(slip: float, stiffness: float, tyre: Tyre) -> tuple[floa
     """Return friction [1] and slope [1] of a tyre whose tread has its own stiffness, below the slip of the peak.
 
     The tread deflects in proportion to the force and slides only near the peak, so the slope at slip 0 is that of the
-    rubber on any surface. The curve is the one of TMeasy (Hirschberg, Rill and Weinfurter 2007, Eq. 9) between that
+    rubber on any surface. The curve is the one of TMeasy (Hirschberg, Rill and Weinfurter 2007) between that
     slope and the tyre's own peak: mu = c kappa / (1 + u (u + c kappa* / mu_peak - 2)) with u = kappa / kappa*.
 
     Parameters
