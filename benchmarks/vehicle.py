@@ -16,16 +16,21 @@ from benchmarks.vehicle_modes import simulate_condition
 from catalogs.studies import Condition, load_conditions, load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from tasks.campaign.campaign import CHANNELS, Run
+from tasks.identification.inference.forward import prepare_run, simulate_run
 from tasks.studies.sensitivity import sensitivity_study
 from tasks.surface.road_profile import FLAT_ROAD
+from tasks.surface.state import SurfaceParameters
 from tasks.vehicle import reference
 from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.paper.wheels import build_wheels, simulate_stop
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
 from tasks.vehicle.rollout import INTERNAL_STEP_S
 
 STOPS_PER_CPU_S = 3000.0
 COUPLED_LIMIT_MS = 6.0
+INFERENCE_LIMIT_MS = 1.2
 STUDY_LIMIT_S = 3.0
 FLAT_SURFACES = (
     ("dry", 0.82), ("rain", 0.595585), ("rain", 0.43415), ("rain", 0.369279), ("rain", 0.347126),
@@ -34,6 +39,7 @@ FLAT_SURFACES = (
 """Tyre families and friction of the paper's flat development conditions."""
 LONGEST_STOP = ("snow", 0.24)
 SPEED = 60 / 3.6
+INFERENCE_PRESSURE_MPA = 0.8
 LONGEST = 100_000
 TWIN_STEPS = 200
 REPEATS = 7
@@ -51,6 +57,7 @@ def measure_rows() -> list[dict[str, Any]]:
     conditions = {condition.name: condition for condition in load_conditions()}
     for name in ("flat-dry", "hump-dry"):
         result += _rollout_rows(conditions[name])
+    result.append(_inference_row(vehicle, surface))
     protocol, _ = load_sensitivity_study()
     study_s = _cpu_s(lambda: sensitivity_study(vehicle, surface, protocol), repeats=3)
     limit = f"limit {STUDY_LIMIT_S:g} CPU-s"
@@ -115,6 +122,26 @@ def _rollout_rows(condition: Condition) -> list[dict[str, Any]]:
         _make_row(f"10 s rollout, coupled, {condition.name}", coupled_ms, "CPU-ms", limit, COUPLED_LIMIT_MS),
         _make_row(f"10 s rollout, paper, {condition.name}", paper_ms, "CPU-ms", "coupled", coupled_ms),
     ]
+
+
+def _inference_row(vehicle: Vehicle, surface: SurfaceParameters) -> dict[str, Any]:
+    """One run as a fit simulates it: braked from 60 km/h by a pressure trace of 6 s, sampled each 10 ms."""
+    time = np.arange(601) * 0.01
+    response = np.zeros((len(time), len(CHANNELS)))
+    response[:, CHANNELS.index("speed")] = SPEED
+    run = Run(
+        name="run", held_out=False, weather="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0, direction=1,
+        disc_rise=20.0, hazard_center=0.0, hazard_length=0.0, hazard_height=0.0, interval=0.01,
+        pressure=np.clip((time - 1.0) / 0.3, 0.0, 1.0) * INFERENCE_PRESSURE_MPA, response=response,
+    )  # fmt: skip
+    model, theta = prepare_run(run, vehicle, surface), build_parameter_vector({})
+
+    def work() -> None:
+        for _ in range(20):
+            simulate_run(model, theta)
+
+    limit = f"limit {INFERENCE_LIMIT_MS:g} CPU-ms"
+    return _make_row("6 s run for inference", 1000 * _cpu_s(work) / 20, "CPU-ms", limit, INFERENCE_LIMIT_MS)
 
 
 def _make_row(name: str, value: float, unit: str, peer: str, peer_value: float) -> dict[str, Any]:

@@ -15,8 +15,8 @@ from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.history import History
 from tasks.vehicle.model.brake_input import make_command_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.simulation import COLUMNS, Simulation, simulate
-from tasks.vehicle.paper.paper_mode import run_paper_mode, sample_history
+from tasks.vehicle.model.simulation import COLUMNS, Recording, Simulation, simulate
+from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, sample_history
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 Mode = Literal["paper", "coupled"]
@@ -117,7 +117,7 @@ def simulate_scenario(
     if mode == "paper":
         run = run_paper_mode(
             vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile,
-            hazard, steps=ticks * per_tick, step=step_s,
+            hazard, StepGrid(steps=ticks * per_tick, step=step_s),
         )  # fmt: skip
         history = sample_history(run, step_s, per_tick)
     else:
@@ -125,8 +125,9 @@ def simulate_scenario(
             simulate(
                 vehicle, response,
                 make_command_input(controls.brake.profile, hold_speed=controls.hold_speed_until_brake),
-                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm), samples=ticks + 1, substeps=per_tick,
-                interval=0.001, initial_speed=controls.initial_speed,
+                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm),
+                Recording(samples=ticks + 1, interval=0.001, substeps=per_tick),
+                initial_speed=controls.initial_speed,
             )
         )  # fmt: skip
     columns: dict[str, NDArray[Any]] = dict(history.columns)
@@ -156,7 +157,6 @@ def simulate_scenario(
 def _collect_history(run: Simulation) -> History:
     """Return a simulation's columns and events in the form that both modes share."""
     columns = dict(zip(COLUMNS, run.history.T.copy(), strict=True))
-    columns |= {f"axle_load_{axle}": columns[f"tyre_load_{axle}"] for axle in "fr"}
     return History(columns=columns, onset=run.onset, onset_station=run.onset_station, stop_time=run.stop)
 
 

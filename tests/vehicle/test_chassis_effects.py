@@ -11,6 +11,7 @@ from tasks.vehicle.effects.chassis import (
     compute_effective_slope,
     compute_lateral_reserve,
     compute_stick_share,
+    find_contact,
 )
 from tasks.vehicle.effects.equations import AIR_DENSITY
 from tasks.vehicle.effects.table import pack_effect_values
@@ -77,6 +78,64 @@ def test_the_footprint_feels_the_mean_of_the_road(vehicle):
         height, slope = average_over_footprint(station, road, effects)
         assert height == pytest.approx(np.trapezoid(heights, at) / 0.2, abs=2e-5)
         assert slope == pytest.approx((heights[-1] - heights[0]) / 0.2, rel=1e-9)
+
+
+def test_a_tread_gives_every_surface_one_slope_at_no_slip_and_leaves_the_peak_where_it_is(vehicle):
+    effects, plain = pack_effect_values({"tread_stiffness": 18.0}), pack_effect_values({})
+    for surface in (("dry", 0.82), ("rain", 0.4), ("snow", 0.24)):
+        tyre = compute_surface_response(vehicle, *surface).tyre
+
+        def friction(slip, effects=effects, tyre=tyre):
+            return compute_effective_friction(slip, 4e3, 0.0, tyre, effects)
+
+        def slope(slip, effects=effects, tyre=tyre):
+            return compute_effective_slope(slip, 4e3, 0.0, tyre, effects)
+
+        peak = tyre.target_slip
+        assert slope(0.0) == pytest.approx(18.0)
+        assert friction(peak * (1 - 1e-9)) == pytest.approx(tyre.peak)
+        assert slope(peak * (1 - 1e-9)) == pytest.approx(0.0, abs=1e-6)
+        assert friction(2 * peak) == friction(2 * peak, plain)
+        # the curve at half the slip of the peak
+        steepness = 18.0 * peak / tyre.peak
+        assert friction(peak / 2) == pytest.approx(tyre.peak * steepness / (0.5 + steepness), rel=1e-12)
+        for slip in (0.1 * peak, 0.7 * peak):
+            rise = (friction(slip + 1e-7) - friction(slip - 1e-7)) / 2e-7
+            assert slope(slip) == pytest.approx(rise, rel=1e-5)
+
+
+@pytest.mark.parametrize("station", [18.5, 19.0, 20.6, 21.4])
+def test_a_wheel_with_a_radius_feels_the_height_of_a_disc_that_rolls_over_the_road(station):
+    road, radius = make_road_feature(HUMP), 0.3
+    height, slope = find_contact(station, road, pack_effect_values({"contact_radius": radius}))
+    reach = np.linspace(-0.99 * radius, 0.99 * radius, 20001)
+    disc = np.array([compute_road_height(station + u, road) for u in reach]) + np.sqrt(radius**2 - reach**2)
+    assert abs(disc.max() - radius - compute_road_height(station, road)) > 5e-5
+    assert height == pytest.approx(disc.max() - radius, abs=2e-5)
+    at = station + reach[np.argmax(disc)]
+    assert slope == pytest.approx(
+        (compute_road_height(at + 1e-5, road) - compute_road_height(at - 1e-5, road)) / 2e-5, abs=2e-3
+    )
+
+
+def test_a_tilted_tyre_force_loads_a_braked_wheel_that_climbs_and_leaves_the_vertical_force_on_the_axle(
+    coupled,
+):
+    brake, place = command(1.5), {"speed_km_h": 40, "hazard": HUMP, "duration": 3.5}
+    plain, tilted = (coupled(brake=brake, effects=e, **place).columns for e in ({}, {"force_tilt": 1.0}))
+    front = (tilted["station"] > 18.3) & (tilted["station"] < 21.7) & (tilted["tyre_force_f"] > 1e3)
+    assert front.sum() > 100
+    pulled = (tilted["tyre_load_f"] - tilted["axle_load_f"])[front] / tilted["tyre_force_f"][front]
+    at = np.array(
+        [
+            find_contact(s, make_road_feature(HUMP), pack_effect_values({}))[1]
+            for s in tilted["station"][front]
+        ]
+    )
+    np.testing.assert_allclose(pulled, at, atol=1e-9)
+    assert np.all(plain["axle_load_f"] == plain["tyre_load_f"])
+    climbing = np.argmax(at)
+    assert (tilted["tyre_load_f"] - plain["tyre_load_f"])[front][climbing] > 50
 
 
 def test_with_a_slope_moment_the_whole_ground_force_turns_the_wheels(vehicle, coupled):

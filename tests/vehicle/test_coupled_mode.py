@@ -54,7 +54,7 @@ def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
             make_road_feature(HUMP),
         )
         rates = compute_motion_rates(motion, ports, False, chassis)
-        body = compute_body_rates(tuple(x), ports, chassis.body)
+        body = compute_body_rates(tuple(x), ports, chassis)
         twin = reference.compute_coupled_rates(
             np.array([speed, station, *omega, *x]), pressure, vehicle, "rain", response, HUMP
         )

@@ -10,7 +10,7 @@ from catalogs.surfaces import load_surface
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle import reference
-from tasks.vehicle.paper.paper_mode import run_paper_mode, simulate_body
+from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, simulate_body
 from tasks.vehicle.paper.wheels import build_wheels, simulate_stop
 from tasks.vehicle.parameters import compute_surface_response
 from tests.vehicle.conftest import HUMP, command
@@ -96,7 +96,7 @@ def test_fast_motion_agrees_with_the_twin(vehicle):
     """Down to 5 m/s: below, the last bit of a sum decides which way the wheel chatters."""
     response, steps = compute_surface_response(vehicle, "rain", 0.4), 6000
     run = run_paper_mode(
-        vehicle, response, 60 / 3.6, False, ONSET_NOW.profile, FLAT_ROAD, steps=steps, step=5e-4
+        vehicle, response, 60 / 3.6, False, ONSET_NOW.profile, FLAT_ROAD, StepGrid(steps=steps, step=5e-4)
     )
     weight = vehicle.mass * vehicle.gravity / vehicle.wheelbase
     transfer = vehicle.mass * vehicle.cg_height / vehicle.wheelbase
@@ -123,7 +123,7 @@ def test_fast_motion_agrees_with_the_twin(vehicle):
 def test_road_feature_motion_agrees_with_the_twin(vehicle):
     response, steps = compute_surface_response(vehicle, "dry", 0.82), 4000
     run = run_paper_mode(
-        vehicle, response, 40 / 3.6, False, command(onset=1.5).profile, HUMP, steps=steps, step=5e-4
+        vehicle, response, 40 / 3.6, False, command(onset=1.5).profile, HUMP, StepGrid(steps=steps, step=5e-4)
     )
     twin = reference.simulate_paper_drive(
         vehicle, "dry", response, 40 / 3.6, lambda t: 2.3 * min(max(t - 1.5, 0) / 0.5, 1.0),
@@ -148,7 +148,13 @@ def test_fixed_point_passes_converge(vehicle):
     response = compute_surface_response(vehicle, "dry", 0.82)
     changes = [
         run_paper_mode(
-            vehicle, response, 40 / 3.6, True, command().profile, HUMP, steps=8000, step=5e-4, passes=passes
+            vehicle,
+            response,
+            40 / 3.6,
+            True,
+            command().profile,
+            HUMP,
+            StepGrid(steps=8000, step=5e-4, passes=passes),
         ).last_change
         for passes in (1, 2, 3, 5)
     ]
@@ -159,7 +165,9 @@ def test_fixed_point_passes_converge(vehicle):
 def test_the_body_response_is_that_of_road_and_brake_together(vehicle):
     """Superposition: one integration with both inputs, in the matrix form, for a braked hump."""
     response = compute_surface_response(vehicle, "dry", 0.82)
-    run = run_paper_mode(vehicle, response, 40 / 3.6, True, command().profile, HUMP, steps=6000, step=5e-4)
+    run = run_paper_mode(
+        vehicle, response, 40 / 3.6, True, command().profile, HUMP, StepGrid(steps=6000, step=5e-4)
+    )
     states, road, loads = simulate_body(vehicle, response, HUMP, run.log, run.onset, run.stop, 5e-4)
     assert (loads > 0).all()
     rates = np.gradient(states, 5e-4, axis=0)

@@ -13,7 +13,7 @@ from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE, EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.model.brake_input import make_command_input, make_trace_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.simulation import simulate
+from tasks.vehicle.model.simulation import Recording, simulate
 from tasks.vehicle.model.states import STATE_WIDTH, pack_state, unpack_state
 from tasks.vehicle.parameters import compute_surface_response
 from tests.vehicle.conftest import command
@@ -25,10 +25,13 @@ EFFECTS = {"lag": 0.08, "dead_time": 0.03, "relaxation_length": 0.4, "fade": 0.0
 
 @pytest.fixture
 def run(vehicle):
-    def simulated(drive=None, *, samples=300, effects=None, conditions=HUMP, substeps=5, **options):
+    def simulated(
+        drive=None, *, samples=300, effects=None, conditions=HUMP, substeps=5, keep_states=False, **options
+    ):
         return simulate(
             replace(vehicle, effects=effects or {}), compute_surface_response(vehicle, "rain", 0.5),
-            drive or make_command_input(STOP), conditions, samples=samples, substeps=substeps, interval=0.01,
+            drive or make_command_input(STOP), conditions,
+            Recording(samples=samples, interval=0.01, substeps=substeps, keep_states=keep_states),
             initial_speed=18.0, **options,
         )  # fmt: skip
 

@@ -16,7 +16,7 @@ from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, unpack_parameter_vector
 from tasks.vehicle.model.brake_input import make_trace_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.simulation import Simulation, simulate
+from tasks.vehicle.model.simulation import Recording, Simulation, simulate
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 MASKED_SPEED = 2.0
@@ -145,13 +145,15 @@ def simulate_run(
         compute_surface_response(car, model.run.weather, model.surface_friction),
         make_trace_input(model.run.pressure, model.run.interval, model.run.drive_torque),
         replace(model.conditions, grade=values.get("slope", 0.0)),
-        samples=model.samples - first,
-        substeps=refinement * model.substeps,
-        interval=model.run.interval,
+        Recording(
+            samples=model.samples - first,
+            interval=model.run.interval,
+            substeps=refinement * model.substeps,
+            keep_states=keep_states,
+        ),
         initial_speed=compute_starting_speed(model, theta) if initial_speed is None else initial_speed,
         start=branch[1].states[first] if branch else None,
         slots=(*model.climb, *slots),
-        keep_states=keep_states,
     )
     if branch is None:
         return simulated

@@ -1,4 +1,7 @@
-"""Equations of the sticking tyre, the footprint and the links; with every value 0 they return the plain model."""
+"""Equations of the tyre's tread, its sticking, its contact with the road, and the links.
+
+With every value 0 they return the plain model.
+"""
 
 from math import sqrt
 
@@ -8,7 +11,7 @@ from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.road import RoadFeature, compute_road_height, compute_road_slope
 from tasks.vehicle.tyres.contract import Tyre, compute_tyre_friction, compute_tyre_slope
 
-STICK_SLIP = 0.01
+STICK_SLIP = 0.002
 """Slip over which a sticking tyre builds up its force; any value well below the curve's peak serves [1]."""
 
 
@@ -30,6 +33,71 @@ def compute_stick_share(speed: float, effects: EffectValues) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def compute_tread_curve(slip: float, stiffness: float, tyre: Tyre) -> tuple[float, float]:
+    """Return friction [1] and slope [1] of a tyre whose tread has its own stiffness, below the slip of the peak.
+
+    The tread deflects in proportion to the force and slides only near the peak, so the slope at slip 0 is that of the
+    rubber on any surface. The curve is the one of TMeasy (Hirschberg, Rill and Weinfurter 2007) between that
+    slope and the tyre's own peak: mu = c kappa / (1 + u (u + c kappa* / mu_peak - 2)) with u = kappa / kappa*.
+
+    Parameters
+    ----------
+    slip : braking slip kappa, 0 or more, below the slip of the peak [1]
+    stiffness : slope of the friction at slip 0, c [1]
+    tyre : the tyre on the surface, which gives peak and slip of the peak
+    """
+    u = slip / tyre.target_slip
+    steepness = max(stiffness * tyre.target_slip / tyre.peak, 2.0)
+    below = 1.0 + u * (u + steepness - 2.0)
+    friction = tyre.peak * steepness * u / below
+    return friction, tyre.peak / tyre.target_slip * steepness * (1.0 - u * u) / (below * below)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def compute_rolling_friction(slip: float, load: float, tyre: Tyre, effects: EffectValues) -> float:
+    """Return the friction of a rolling tyre at a braking slip [1].
+
+    Parameters
+    ----------
+    slip : braking slip, 0 or more [1]
+    load : load of the axle [N]
+    tyre : the tyre on the surface
+    effects : numbers of the vehicle's effects
+    """
+    if effects.tread_stiffness > 0.0 and slip < tyre.target_slip:
+        return compute_tread_curve(slip, effects.tread_stiffness, tyre)[0]
+    return compute_tyre_friction(slip, load, tyre)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def compute_rolling_slope(slip: float, load: float, tyre: Tyre, effects: EffectValues) -> float:
+    """Return the derivative of ``compute_rolling_friction`` by slip [1].
+
+    Parameters
+    ----------
+    slip : braking slip, 0 or more [1]
+    load : load of the axle [N]
+    tyre : the tyre on the surface
+    effects : numbers of the vehicle's effects
+    """
+    if effects.tread_stiffness > 0.0 and slip < tyre.target_slip:
+        return compute_tread_curve(slip, effects.tread_stiffness, tyre)[1]
+    return compute_tyre_slope(slip, load, tyre)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def compute_stick_friction(tyre: Tyre, effects: EffectValues) -> float:
+    """Return the friction of a tyre that sticks [1].
+
+    Parameters
+    ----------
+    tyre : the tyre on the surface
+    effects : numbers of the vehicle's effects
+    """
+    return max(effects.stick_ratio * tyre.peak - effects.stick_loss, 0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_effective_friction(
     slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
@@ -43,11 +111,11 @@ def compute_effective_friction(
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
     """
-    rolling = compute_tyre_friction(slip, load, tyre)
+    rolling = compute_rolling_friction(slip, load, tyre, effects)
     if share == 0.0:
         return rolling
     u = slip / STICK_SLIP
-    return (1.0 - share) * rolling + share * effects.stick_ratio * tyre.peak * u / sqrt(1.0 + u * u)
+    return (1.0 - share) * rolling + share * compute_stick_friction(tyre, effects) * u / sqrt(1.0 + u * u)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -64,11 +132,11 @@ def compute_effective_slope(
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
     """
-    rolling = compute_tyre_slope(slip, load, tyre)
+    rolling = compute_rolling_slope(slip, load, tyre, effects)
     if share == 0.0:
         return rolling
     u = slip / STICK_SLIP
-    return (1.0 - share) * rolling + share * effects.stick_ratio * tyre.peak / STICK_SLIP / (
+    return (1.0 - share) * rolling + share * compute_stick_friction(tyre, effects) / STICK_SLIP / (
         1.0 + u * u
     ) ** 1.5
 
@@ -94,6 +162,27 @@ def average_over_footprint(station: float, road: RoadFeature, effects: EffectVal
     return height, (compute_road_height(station + half, road) - compute_road_height(station - half, road)) / (
         2.0 * half
     )
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def find_contact(station: float, road: RoadFeature, effects: EffectValues) -> tuple[float, float]:
+    """Return road height [m] and slope [m/m] that a wheel at a station feels.
+
+    A wheel with a radius touches a slope uphill of its centre. It feels the slope of the road there, and the height of
+    a rigid disc that rolls over the road (Zegelaar 1998), for slopes whose square is small.
+
+    Parameters
+    ----------
+    station : route position of the wheel's centre [m]
+    road : road feature
+    effects : numbers of the vehicle's effects
+    """
+    height, slope = average_over_footprint(station, road, effects)
+    radius = effects.contact_radius
+    if radius == 0.0 or slope == 0.0:
+        return height, slope
+    height, slope = average_over_footprint(station + radius * slope, road, effects)
+    return height - 0.5 * radius * slope * slope, slope
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)

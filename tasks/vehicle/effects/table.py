@@ -26,6 +26,7 @@ DIXON = "Dixon (2007), The Shock Absorber Handbook, doi:10.1002/9780470516430"
 HORNE = "Horne and Dreher (1963), NASA TN D-2056"
 SHOOP = "Shoop et al. (2006), J. Terramechanics 43, doi:10.1016/j.jterra.2005.03.002"
 ZEGELAAR = "Zegelaar (1998), The dynamic response of tyres to brake torque variations and road unevennesses"
+RILL = "Hirschberg, Rill and Weinfurter (2007), Tire model TMeasy, doi:10.1080/00423110701776284"
 DECLARED = "declared, from the residuals of the multibody reference"
 
 
@@ -148,7 +149,9 @@ EFFECT_TABLE = (
     _add_number("wet_speed", "wet friction by speed", "s m-1", "friction", (0.0, 0.04), 0.002, HORNE),
     _add_number("wet_threshold", "wet friction by speed", "m s-1", "friction", (0.0, 25.0), 2.0, HORNE),
     _add_number("friction_speed", "tyre friction by speed", "s m-1", "friction", (-0.02, 0.03), 0.001, PACEJKA),
+    _add_number("tread_stiffness", "tread stiffness", "1", "friction", (0.0, 40.0), 0.5, RILL),
     _add_number("stick_ratio", "sticking tyre", "1", "friction", (0.0, 1.2), 0.05, DECLARED),
+    _add_number("stick_loss", "sticking tyre", "1", "friction", (0.0, 0.2), 0.005, DECLARED),
     _add_number("stick_below", "sticking tyre", "m s-1", "friction", (0.0, 5.0), 0.2, DECLARED),
     _add_number("stick_above", "sticking tyre", "m s-1", "friction", (0.0, 10.0), 0.2, DECLARED),
     # forces between body, axles and road
@@ -165,6 +168,8 @@ EFFECT_TABLE = (
     _add_number("aero_lift", "air's pitch moment and lift", "N s2 m-2", "suspension_force", (-3.0, 3.0), 0.2,
                 GILLESPIE),
     _add_number("enveloping_length", "footprint", "m", "tyre_load", (0.0, 0.6), 0.02, ZEGELAAR),
+    _add_number("contact_radius", "rolling contact", "m", "tyre_load", (0.0, 0.6), 0.02, ZEGELAAR),
+    _add_number("force_tilt", "tyre force along the slope", "1", "tyre_load", (0.0, 2.0), 0.1, ZEGELAAR),
     _add_number("tyre_damping", "tyre damping", "N s m-1", "tyre_load", (0.0, 2000.0), 50.0, PACEJKA),
     _add_number("aero_pitch", "air's pitch moment and lift", "N s2 m-1", "pitch_moment", (-3.0, 3.0), 0.1, GILLESPIE),
     # errors of the instruments

@@ -240,6 +240,20 @@ def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def compute_vertical_force(ports: AxlePorts, effects: EffectValues) -> float:
+    """Return the force that the road passes to the axle upwards [N].
+
+    On a slope the braking force points along the road: it pulls a climbing wheel down and lifts a descending one.
+
+    Parameters
+    ----------
+    ports : ports of the axle
+    effects : numbers of the vehicle's effects
+    """
+    return ports.ground.load - effects.force_tilt * ports.tyre_force * ports.ground.slope
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def compute_axle_lateral_reserve(ports: AxlePorts, tyre: Tyre) -> float:
     """Return the lateral friction that an axle has left; 0 off the road [1].
 

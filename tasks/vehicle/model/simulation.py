@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tasks.vehicle.brake import find_onset_by_position
 from tasks.vehicle.effects.brake_line import compute_line_pressure
 from tasks.vehicle.effects.slots import Slot, SlotTables, pack_slots
+from tasks.vehicle.model.axle_ports import compute_vertical_force
 from tasks.vehicle.model.brake_input import BrakeInput, compute_input_pressure, interpolate_trace
 from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
 from tasks.vehicle.model.ports import compute_ports
@@ -41,6 +42,7 @@ COLUMNS = (
     "unsprung_heave_f", "unsprung_heave_r", "heave_rate", "pitch_rate", "road_height_f", "road_height_r",
     "heave_acceleration", "disc_rise_f", "disc_rise_r", "suspension_travel_f", "suspension_travel_r",
     "suspension_rate_f", "suspension_rate_r", "acting_pressure",
+    "axle_load_f", "axle_load_r",
 )  # fmt: skip
 """Columns of a history, in SI units but for the pressures [MPa]."""
 COLUMN = {name: i for i, name in enumerate(COLUMNS)}
@@ -71,19 +73,39 @@ class Simulation:
         return self.history[:, COLUMN[name]]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """Samples that a simulation returns, and the steps between them.
+
+    Parameters
+    ----------
+    samples : number of samples, the one at the start included
+    interval : time between samples [s]
+    substeps : internal steps between samples
+    keep_states : return the state at each sample
+    """
+
+    samples: int
+    interval: float
+    substeps: int
+    keep_states: bool = False
+
+    @property
+    def step(self) -> float:
+        """Return the internal step [s]."""
+        return self.interval / self.substeps
+
+
 def simulate(
     vehicle: Vehicle,
     surface: SurfaceResponse,
     drive: BrakeInput,
     conditions: Conditions,
+    recording: Recording,
     *,
-    samples: int,
-    substeps: int,
-    interval: float,
     initial_speed: float = 0.0,
     start: NDArray[np.float64] | None = None,
     slots: Sequence[Slot] = (),
-    keep_states: bool = False,
 ) -> Simulation:
     """Simulate one run with the vehicle's effects and forms.
 
@@ -95,13 +117,10 @@ def simulate(
     surface : its tyres on the surface
     drive : input of the driver
     conditions : road feature, snow, grade, direction, disc temperature
-    samples : number of samples, the one at the start included
-    substeps : internal steps between samples
-    interval : time between samples [s]
+    recording : samples and internal steps
     initial_speed : speed at the start of the run, with the body at rest [m/s]
     start : row of an earlier run's states with the same step, to start from; replaces ``initial_speed``
     slots : tables that act in this run only, added to the vehicle's forms
-    keep_states : return the state at each sample
     """
     tables = [form.slot for form in vehicle.forms] + list(slots)
     if start is None:
@@ -113,13 +132,13 @@ def simulate(
         )  # fmt: skip
     else:
         state = unpack_state(start)
-    history = np.empty((samples, _WIDTH))
-    states = np.empty((samples if keep_states else 0, STATE_WIDTH))
+    history = np.empty((recording.samples, _WIDTH))
+    states = np.empty((recording.samples if recording.keep_states else 0, STATE_WIDTH))
     onset, onset_station, stop = integrate_motion(
         state,
-        samples,
-        substeps,
-        interval / substeps,
+        recording.samples,
+        recording.substeps,
+        recording.step,
         drive,
         make_road_feature(conditions.hazard),
         pack_slots(tables) if tables else None,
@@ -216,6 +235,7 @@ def integrate_motion(
                 (ports.lift - f.suspension_force - r.suspension_force) / body.sprung_mass, memory.front.disc_rise,
                 memory.rear.disc_rise, x[0] - x[2] - body.to_front * x[1], x[0] - x[3] + body.to_rear * x[1],
                 x[4] - x[6] - body.to_front * x[5], x[4] - x[7] + body.to_rear * x[5], line,
+                compute_vertical_force(f, chassis.effects), compute_vertical_force(r, chassis.effects),
             )  # fmt: skip
         if n == last:
             break

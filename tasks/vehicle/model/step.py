@@ -9,8 +9,8 @@ from numba import njit
 
 from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, compute_disc_temperature_rate
 from tasks.vehicle.effects.slots import SlotTables
-from tasks.vehicle.half_car import HalfCar, HalfCarState, advance_half_car, compute_half_car_rates
-from tasks.vehicle.model.axle_ports import AxlePorts, compute_relaxation_rate
+from tasks.vehicle.half_car import HalfCarState, advance_half_car, compute_half_car_rates
+from tasks.vehicle.model.axle_ports import AxlePorts, compute_relaxation_rate, compute_vertical_force
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.ports import Ports, compute_ports
 from tasks.vehicle.model.slip_matrix import GAMMA, compute_axle_slope, drop_speed_coupling, solve_slip
@@ -95,24 +95,24 @@ def compute_memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: 
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def compute_body_rates(x: HalfCarState, ports: Ports, body: HalfCar) -> HalfCarState:
+def compute_body_rates(x: HalfCarState, ports: Ports, chassis: Chassis) -> HalfCarState:
     """Return the rate of the half-car state under the forces of the ports (paper, Eq. app_half_car_complete).
 
     Parameters
     ----------
     x : half-car state [m, rad, m/s, rad/s]
     ports : forces and moments in that state
-    body : the half-car
+    chassis : the vehicle on its surface
     """
     return compute_half_car_rates(
         x,
-        ports.front.ground.load,
-        ports.rear.ground.load,
+        compute_vertical_force(ports.front, chassis.effects),
+        compute_vertical_force(ports.rear, chassis.effects),
         ports.front.suspension_force,
         ports.rear.suspension_force,
         ports.pitch_moment,
         ports.lift,
-        body,
+        chassis.body,
     )
 
 
@@ -145,14 +145,14 @@ def take_step(
     -------
     The three states after the step.
     """
-    body, wheels = chassis.body, chassis.wheels
+    wheels = chassis.wheels
     front = compute_axle_slope(ports.front, motion, motion.omega_f, step, wheels.front, chassis, tyre)
     rear = compute_axle_slope(ports.rear, motion, motion.omega_r, step, wheels.rear, chassis, tyre)
     if instant.held:
         front, rear = drop_speed_coupling(front), drop_speed_coupling(rear)
     f1 = compute_motion_rates(motion, ports, instant.standing, chassis)
     k1, m1 = solve_slip(f1, compute_memory_rates(memory, motion, ports, chassis), front, rear, GAMMA * step)
-    h1 = compute_body_rates(x, ports, body)
+    h1 = compute_body_rates(x, ports, chassis)
     ahead, x_ahead = advance_motion(motion, k1, step), advance_half_car(x, h1, step)
     memory_ahead = Memory(
         advance_axle(memory.front, m1.front, step), advance_axle(memory.rear, m1.rear, step)
@@ -170,7 +170,7 @@ def take_step(
         rear,
         GAMMA * step,
     )
-    h2 = compute_body_rates(x_ahead, later, body)
+    h2 = compute_body_rates(x_ahead, later, chassis)
     after = Motion(
         motion.station + step * (1.5 * k1.station + 0.5 * k2.station),
         motion.speed + step * (1.5 * k1.speed + 0.5 * k2.speed),

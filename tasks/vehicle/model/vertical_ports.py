@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from tasks.vehicle.effects.chassis import average_over_footprint
+from tasks.vehicle.effects.chassis import find_contact
 from tasks.vehicle.effects.equations import compute_strut_force
 from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.half_car import HalfCarState, compute_contact_load
@@ -51,7 +51,7 @@ def compute_ground(
     road : road feature
     effects : numbers of the vehicle's effects
     """
-    height, slope = average_over_footprint(station, road, effects)
+    height, slope = find_contact(station, road, effects)
     load = compute_contact_load(height, unsprung_height, stiffness, static_load)
     if load > 0.0:
         load = max(load + effects.tyre_damping * (speed * slope - unsprung_rate), 0.0)

@@ -52,6 +52,22 @@ class PaperRun:
     last_change: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class StepGrid:
+    """Internal grid of a run in paper mode.
+
+    Parameters
+    ----------
+    steps : number of steps
+    step : length of each [s]
+    passes : fixed-point passes on a road feature
+    """
+
+    steps: int
+    step: float
+    passes: int = FIXED_POINT_PASSES
+
+
 def run_paper_mode(
     vehicle: Vehicle,
     response: SurfaceResponse,
@@ -59,10 +75,7 @@ def run_paper_mode(
     hold_speed: bool,
     profile: PressureProfile,
     hazard: RoadHazard,
-    *,
-    steps: int,
-    step: float,
-    passes: int = FIXED_POINT_PASSES,
+    grid: StepGrid,
 ) -> PaperRun:
     """Simulate one run (paper, Appendix B).
 
@@ -74,23 +87,22 @@ def run_paper_mode(
     hold_speed : keep the speed until the brake onset
     profile : brake command
     hazard : road feature
-    steps, step : number and length of the internal steps [s]
-    passes : fixed-point passes on a road feature
+    grid : internal steps, and passes on a road feature
     """
     wheels, road = build_wheels(vehicle), make_road_feature(hazard)
     log, onset, stop = simulate_drive(
-        initial_speed, hold_speed, steps, step, profile, road, ANALYTIC_LOADS, wheels, response.tyre
+        initial_speed, hold_speed, grid.steps, grid.step, profile, road, ANALYTIC_LOADS, wheels, response.tyre
     )
     if hazard.height_m == 0:
-        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, step)
+        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, grid.step)
         return PaperRun(
             log=log, states=states, road=heights, loads=loads, onset=onset, stop=stop, last_change=0.0
         )
-    for _ in range(passes):
+    for _ in range(grid.passes):
         station = log[:, 0]
-        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, step)
+        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, grid.step)
         log, onset, stop = simulate_drive(
-            initial_speed, hold_speed, steps, step, profile, road, loads, wheels, response.tyre
+            initial_speed, hold_speed, grid.steps, grid.step, profile, road, loads, wheels, response.tyre
         )
     return PaperRun(
         log=log,

@@ -15,6 +15,10 @@ PRINTED = {
         "development": (0.1076, 0.150, 0.1065, 79.6),
         "speed_check": (0.1179, 0.147, 0.0701, 117.9),
     },
+    "multibody-grown": {
+        "development": (0.0092, 0.0433, 0.00925, 24.4),
+        "speed_check": (0.0184, 0.0908, 0.0140, 56.0),
+    },
 }
 FIGURES = ("speed_rmse_m_s", "pitch_rmse_deg", "slip_rmse", "wheel_load_rmse_n")
 
