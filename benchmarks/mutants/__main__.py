@@ -1,13 +1,14 @@
 """``python -m benchmarks.mutants [--count 40] [--seed 1] [--under tasks]``: how many changes do the tests catch?
 
 Each change is made in a copy of the tree. The test files that import the changed one run first, then those of the
-folder that mirrors its own, then those that import its folder. The first failure ends the run, and so does a group of
-tests after which ``--cpu-s`` are spent. ``--numbers 3 17`` asks again about some of the chosen changes.
+folder that mirrors its own, then those that import its folder. The first failure ends the run, and so does the end of
+the work that ``--cpu-s`` allows. ``--numbers 3 17`` asks again about some of the chosen changes.
 """
 
 import argparse
 import json
 import random
+import signal
 import subprocess
 import sys
 import tempfile
@@ -22,7 +23,7 @@ from manifests.provenance import SOURCE_ROOT
 LONGEST_S = 600.0
 """One group of tests may take this long by the clock [s]; what ends in time only without a change has caught it."""
 ENOUGH_CPU_S = 60.0
-"""Work of tests on one change after which no further group is asked [s]: a change that the nearest miss survives."""
+"""Work of tests on one change after which no further one is asked [s]: a change that the nearest miss survives."""
 SHARE = 0.9
 """Least share of the changes that have to be caught [1]."""
 
@@ -48,7 +49,7 @@ def chosen_places(tree: Path, under: str, count: int, seed: int) -> list[Place]:
 
 
 def first_failure(
-    python: WarmPython, tree: Path, kernels: Path, tests: list[str]
+    python: WarmPython, tree: Path, kernels: Path, tests: list[str], most_cpu_s: float = LONGEST_S
 ) -> tuple[str | None, float]:
     """Return the first test that fails, or None, and the work of all [s].
 
@@ -58,13 +59,15 @@ def first_failure(
     tree : sources and tests
     kernels : folder of compiled kernels
     tests : files, or names of tests
+    most_cpu_s : work after which no further test is asked [s]
     """
     environment = {
         "PYTHONDONTWRITEBYTECODE": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONPATH": str(tree),
         "MUSYNC_CACHE": str(kernels.parent / "cache"), "NUMBA_CACHE_DIR": str(kernels),
     }  # fmt: skip
-    ended = python.run_tests(tree, ["-x", "-q", "-p", "no:cacheprovider", *tests], environment, LONGEST_S)
-    if ended.code in (0, 5):
+    arguments = ["-x", "-q", "-p", "no:cacheprovider", *tests]
+    ended = python.run_tests(tree, arguments, environment, longest_s=LONGEST_S, most_cpu_s=most_cpu_s)
+    if ended.code in (0, 5, -signal.SIGXCPU):
         return None, ended.cpu_s
     if ended.code is None:
         return f"over {LONGEST_S:g} s", ended.cpu_s
@@ -85,7 +88,7 @@ def caught_by(
     python : what runs the tests
     tree : a copy of the sources, to change; beside it lie kernels and caches
     place : the change
-    enough_cpu_s : work after which no further group of tests is asked [s]
+    enough_cpu_s : work after which no further test is asked [s]
 
     Raises
     ------
@@ -95,12 +98,12 @@ def caught_by(
     file, kept = tree / place.file, tree.parent / "kernels"
     sound, spent = file.read_text(encoding="utf-8"), 0.0
     for tests in list_nearest_tests(tree, place.file):
-        if spent > enough_cpu_s:
+        if spent >= enough_cpu_s - 1.0:
             break
         with kernels_of_a_change(tree, place.file, kept) as kernels:
             file.write_text(place.applied(sound), encoding="utf-8")
             try:
-                failed, cpu_s = first_failure(python, tree, kernels, tests)
+                failed, cpu_s = first_failure(python, tree, kernels, tests, enough_cpu_s - spent)
             finally:
                 file.write_text(sound, encoding="utf-8")
         spent += cpu_s

@@ -6,6 +6,7 @@ the project from its parent, so that it sees the changed sources.
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -33,7 +34,7 @@ class Ended:
 
     Parameters
     ----------
-    code : exit code of pytest; None where the time was up
+    code : exit code of pytest; None where the time was up, -SIGXCPU where the work was spent
     output : what it printed
     cpu_s : work of its processes [s]
     """
@@ -50,7 +51,13 @@ class WarmPython:
         self._process = process
 
     def run_tests(
-        self, tree: Path, arguments: list[str], environment: Mapping[str, str], longest_s: float
+        self,
+        tree: Path,
+        arguments: list[str],
+        environment: Mapping[str, str],
+        *,
+        longest_s: float,
+        most_cpu_s: float,
     ) -> Ended:
         """Run pytest in a tree of sources.
 
@@ -60,6 +67,7 @@ class WarmPython:
         arguments : of pytest
         environment : variables beside those of this process
         longest_s : time after which the tests are killed [s]
+        most_cpu_s : work after which they are ended [s]
 
         Raises
         ------
@@ -71,6 +79,7 @@ class WarmPython:
             "arguments": arguments,
             "environment": dict(environment),
             "longest_s": longest_s,
+            "most_cpu_s": most_cpu_s,
         }
         assert self._process.stdin is not None and self._process.stdout is not None
         self._process.stdin.write(json.dumps(asked) + "\n")
@@ -119,10 +128,14 @@ def _end_with_tests(*_: object) -> None:
     os._exit(0)
 
 
-def _run_in_copy(tree: str, arguments: list[str], environment: dict[str, str], longest_s: float) -> Ended:
+def _run_in_copy(
+    tree: str, arguments: list[str], environment: dict[str, str], longest_s: float, most_cpu_s: float
+) -> Ended:
     with tempfile.TemporaryFile() as output:
         before, copy = os.times(), os.fork()
         if copy == 0:
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            resource.setrlimit(resource.RLIMIT_CPU, (max(1, round(most_cpu_s)), resource.RLIM_INFINITY))
             _become_pytest(tree, arguments, environment, output.fileno())
         _running.add(copy)
         code, deadline = None, time.monotonic() + longest_s

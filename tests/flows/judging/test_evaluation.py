@@ -17,7 +17,7 @@ GRID = """
 name: judged
 scene: {folder}/scene
 camera: {folder}/camera.yaml
-frames: 31
+frames: 21
 frame_rate_hz: 10
 axes:
   weather:
