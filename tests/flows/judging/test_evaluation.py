@@ -17,7 +17,7 @@ GRID = """
 name: judged
 scene: {folder}/scene
 camera: {folder}/camera.yaml
-frames: 21
+frames: 31
 frame_rate_hz: 10
 axes:
   weather:
