@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants freeze bench lock clean
+.PHONY: demo test test-minutes check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -36,6 +36,10 @@ demo: $(READY)
 test: export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
 test: $(READY)
 	$(BIN)/python -m pytest -p xdist --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
+
+# Tests that take minutes, which `make test` leaves out.
+test-minutes: $(READY)
+	$(BIN)/python -m pytest -m minutes
 
 check: $(READY)
 	$(BIN)/ruff check .

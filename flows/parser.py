@@ -139,7 +139,14 @@ def _make_callback(command: Command) -> Callable[..., None]:
 
 
 def _make_parameter(option: Option) -> Parameter:
-    details: dict[str, Any] = {"help": option.help, "min": option.minimum, "max": option.maximum}
+    details: dict[str, Any] = {
+        "help": _keep_brackets(option.help),
+        "show_default": option.shown_default or True,
+        "min": option.minimum,
+        "max": option.maximum,
+    }
+    if option.kind is bool:
+        details["metavar"] = ""  # a flag takes no value
     if option.known:
         details["autocompletion"] = lambda incomplete: _complete_value(option, incomplete)
     word = option.keyword.replace("_", "-")
@@ -153,6 +160,11 @@ def _make_parameter(option: Option) -> Parameter:
     kind: Any = Annotated[option.kind, declared]
     # the option's own name: its spelling may be a word of Python, such as from
     return Parameter(option.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+
+
+def _keep_brackets(text: str) -> str:
+    """Return a text whose units in brackets Rich prints, and does not take for markup."""
+    return text.replace("[", "\\[")
 
 
 def _complete_value(option: Option, incomplete: str) -> list[str]:

@@ -1,15 +1,13 @@
 """``python -m benchmarks.mutants [--count 40] [--seed 1] [--under tasks]``: how many changes do the tests catch?
 
 Each change is made in a copy of the tree. The test files that import the changed one run first, then those of the
-folder that mirrors its own, then those that import its folder. The first failure ends the run, and so does a group of
-tests after which ``--cpu-s`` are spent. ``--numbers 3 17`` asks again about some of the chosen changes.
+folder that mirrors its own, then those that import its folder. The first failure ends the run, and so does the end of
+the work that ``--cpu-s`` allows. ``--numbers 3 17`` asks again about some of the chosen changes.
 """
 
 import argparse
 import json
-import os
 import random
-import resource
 import signal
 import subprocess
 import sys
@@ -19,12 +17,13 @@ from pathlib import Path
 from benchmarks.mutants.kernels import kernels_of_a_change
 from benchmarks.mutants.nearest_tests import list_nearest_tests
 from benchmarks.mutants.places import Place, places_of
+from benchmarks.mutants.warm_python import WarmPython, start_warm_python
 from manifests.provenance import SOURCE_ROOT
 
 LONGEST_S = 600.0
 """One group of tests may take this long by the clock [s]; what ends in time only without a change has caught it."""
-ENOUGH_CPU_S = 120.0
-"""Work of tests on one change after which no further group is asked [s]: a change that the nearest miss survives."""
+ENOUGH_CPU_S = 60.0
+"""Work of tests on one change after which no further one is asked [s]: a change that the nearest miss survives."""
 SHARE = 0.9
 """Least share of the changes that have to be caught [1]."""
 
@@ -49,50 +48,47 @@ def chosen_places(tree: Path, under: str, count: int, seed: int) -> list[Place]:
     return random.Random(seed).sample(places, min(count, len(places)))
 
 
-def first_failure(tree: Path, kernels: Path, tests: list[str]) -> str | None:
-    """Return the first test that fails, or None.
+def first_failure(
+    python: WarmPython, tree: Path, kernels: Path, tests: list[str], most_cpu_s: float = LONGEST_S
+) -> tuple[str | None, float]:
+    """Return the first test that fails, or None, and the work of all [s].
 
     Parameters
     ----------
+    python : what runs the tests
     tree : sources and tests
     kernels : folder of compiled kernels
     tests : files, or names of tests
-
-    Raises
-    ------
-    subprocess.TimeoutExpired
-        If they take longer than `LONGEST_S`.
+    most_cpu_s : work after which no further test is asked [s]
     """
-    environment = os.environ | {
-        # a change of one character within a second has the same size and time as what was compiled before it
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "PYTHONPATH": str(tree), "MUSYNC_CACHE": str(kernels.parent / "cache"), "NUMBA_CACHE_DIR": str(kernels)
+    environment = {
+        "PYTHONDONTWRITEBYTECODE": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONPATH": str(tree),
+        "MUSYNC_CACHE": str(kernels.parent / "cache"), "NUMBA_CACHE_DIR": str(kernels),
     }  # fmt: skip
-    running = subprocess.Popen(
-        [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests],
-        cwd=tree, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        start_new_session=True,
-    )  # fmt: skip
-    try:
-        output, _ = running.communicate(timeout=LONGEST_S)
-    except BaseException:  # time is up, or the study is interrupted
-        os.killpg(running.pid, signal.SIGKILL)  # with the processes that the tests started
-        running.communicate()
-        raise
-    if running.returncode in (0, 5):
-        return None
-    failed = [line for line in output.splitlines() if line.startswith(("FAILED ", "ERROR "))]
-    return failed[0].split(" - ")[0].split(" ", 1)[1] if failed else f"exit code {running.returncode}"
+    arguments = ["-x", "-q", "-p", "no:cacheprovider", *tests]
+    ended = python.run_tests(tree, arguments, environment, longest_s=LONGEST_S, most_cpu_s=most_cpu_s)
+    if ended.code in (0, 5, -signal.SIGXCPU):
+        return None, ended.cpu_s
+    if ended.code is None:
+        return f"over {LONGEST_S:g} s", ended.cpu_s
+    failed = [line for line in ended.output.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+    name = failed[0].split(" - ")[0].split(" ", 1)[1] if failed else f"exit code {ended.code}"
+    return name, ended.cpu_s
 
 
-def caught_by(tree: Path, place: Place, enough_cpu_s: float = ENOUGH_CPU_S) -> str | None:
-    """Return the first test that fails with a change and passes without it, or None; the tree is left as it was.
+def caught_by(
+    python: WarmPython, tree: Path, place: Place, enough_cpu_s: float = ENOUGH_CPU_S
+) -> tuple[str | None, float]:
+    """Return the first test that fails with a change and passes without it, or None, and the work of all tests [s].
+
+    The tree is left as it was.
 
     Parameters
     ----------
+    python : what runs the tests
     tree : a copy of the sources, to change; beside it lie kernels and caches
     place : the change
-    enough_cpu_s : work after which no further group of tests is asked [s]
+    enough_cpu_s : work after which no further test is asked [s]
 
     Raises
     ------
@@ -100,34 +96,27 @@ def caught_by(tree: Path, place: Place, enough_cpu_s: float = ENOUGH_CPU_S) -> s
         If a test fails without the change too.
     """
     file, kept = tree / place.file, tree.parent / "kernels"
-    sound, begun = file.read_text(encoding="utf-8"), cpu_of_children()
+    sound, spent = file.read_text(encoding="utf-8"), 0.0
     for tests in list_nearest_tests(tree, place.file):
-        if cpu_of_children() - begun > enough_cpu_s:
+        if spent >= enough_cpu_s - 1.0:
             break
         with kernels_of_a_change(tree, place.file, kept) as kernels:
             file.write_text(place.applied(sound), encoding="utf-8")
             try:
-                failed = first_failure(tree, kernels, tests)
-            except subprocess.TimeoutExpired:
-                failed = f"over {LONGEST_S:g} s"
+                failed, cpu_s = first_failure(python, tree, kernels, tests, enough_cpu_s - spent)
             finally:
                 file.write_text(sound, encoding="utf-8")
+        spent += cpu_s
         if failed is None:
             continue
-        again = [failed] if failed.startswith("tests/") else tests
-        try:
-            if first_failure(tree, kept, again) is None:
-                return failed
-        except subprocess.TimeoutExpired:
-            return None
+        again, cpu_s = first_failure(python, tree, kept, [failed] if failed.startswith("tests/") else tests)
+        spent += cpu_s
+        if again is None:
+            return failed, spent
+        if again.startswith("over "):
+            return None, spent
         raise RuntimeError(f"{failed} without a change too")
-    return None
-
-
-def cpu_of_children() -> float:
-    """Work of all processes that this one started and that have ended [s]."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    return None, spent
 
 
 def copy_tree(folder: Path) -> Path:
@@ -152,17 +141,18 @@ if __name__ == "__main__":
     parser.add_argument("--cpu-s", type=float, default=ENOUGH_CPU_S)
     parser.add_argument("--numbers", type=int, nargs="*", help="of the chosen changes, these alone, from 1")
     asked = parser.parse_args()
-    survived = []
-    with tempfile.TemporaryDirectory() as scratch:
+    survived, work = [], 0.0
+    with tempfile.TemporaryDirectory() as scratch, start_warm_python() as python:
         tree = copy_tree(Path(scratch) / "tree")
         chosen = list(enumerate(chosen_places(tree, asked.under, asked.count, asked.seed), 1))
         if asked.numbers:
             chosen = [chosen[number - 1] for number in asked.numbers]
         for number, place in chosen:
-            test = caught_by(tree, place, asked.cpu_s)
+            test, spent = caught_by(python, tree, place, asked.cpu_s)
+            work += spent
             what = f"{place.file}:{place.line}: {place.before} -> {place.after}"
-            print(f"{number}: {what}: {test or 'SURVIVED'}", file=sys.stderr, flush=True)
+            print(f"{number}: {what}: {test or 'SURVIVED'} ({spent:.0f} s)", file=sys.stderr, flush=True)
             survived += [] if test else [what]
     caught = len(chosen) - len(survived)
-    print(json.dumps({"places": len(chosen), "caught": caught, "survived": survived}))
+    print(json.dumps({"places": len(chosen), "caught": caught, "survived": survived, "cpu_s": round(work)}))
     sys.exit(0 if caught >= SHARE * len(chosen) else 1)

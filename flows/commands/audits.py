@@ -79,7 +79,7 @@ COMMANDS = (
     Command(
         name="gc",
         group=GROUP,
-        sentence="Remove the files that killed runs left in a dataset and beside it; committed clips stay.",
+        sentence="Remove the files that killed runs left in a dataset and beside it; finished clips stay.",
         function="flows.auditing.verify:collect_garbage",
         options=(
             define_argument(
@@ -130,8 +130,8 @@ COMMANDS = (
         function="flows.making.replay:replay_audit",
         options=(
             define_argument("grid", str, GRID.help, "severity", known=GRID.known),
-            define_option("seeds", int, "Visual seeds of each scenario.", 3),
-            define_option("frames", int, "Frames drawn of each run.", 2),
+            define_option("seeds", int, "Number of visual seeds for each scenario.", 3),
+            define_option("frames", int, "Number of frames drawn from each run.", 2),
             OUT,
         ),
         brief=leave_out_differences,

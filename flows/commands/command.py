@@ -19,6 +19,7 @@ class Option:
     kind : type of the value
     help : sentence of ``--help``
     default : value where the option is not given
+    shown_default : what ``--help`` says of the default, where the value itself says nothing to a reader
     positional : whether it is an argument without ``--``
     spelling : keyword of the command line, where it is not that of the function
     minimum, maximum : bounds of a number
@@ -30,6 +31,7 @@ class Option:
     kind: Any
     help: str
     default: Any = REQUIRED
+    shown_default: str = ""
     positional: bool = False
     spelling: str = ""
     minimum: float | None = None
@@ -120,44 +122,68 @@ def require_key(key: str) -> Callable[[Result], bool]:
 
 DATASET = define_argument("dataset", str, "Folder or s3:// address of a finished dataset.", in_store=True)
 GRID = define_argument(
-    "grid", str, "Grid file, or the name of a grid that ships.", known="catalogs/grids/*.yaml"
+    "grid", str, "Grid: YAML file, or the name of one in catalogs/grids.", known="catalogs/grids/*.yaml"
 )
 CAMPAIGN = define_argument("campaign", str, "Campaign folder: campaign.yaml, runs.csv, runs/*.parquet.")
 TRACES = define_argument("traces", str, "Folder with cases.json and the traces as Parquet files.")
 VEHICLE = define_option(
-    "vehicle", str, "Vehicle name or file.", "paper-reference", known="catalogs/vehicles/*.yaml"
+    "vehicle",
+    str,
+    "Vehicle: YAML file, or the name of one in catalogs/vehicles.",
+    "paper-reference",
+    known="catalogs/vehicles/*.yaml",
 )
 CAMPAIGN_VEHICLE = define_option(
     "vehicle",
     str | None,
-    "Vehicle name or file to start from; by default the campaign's.",
+    "Vehicle to start from: YAML file, or the name of one in catalogs/vehicles; by default the one that the"
+    " campaign names.",
     None,
     known="catalogs/vehicles/*.yaml",
 )
 CAMERA = define_option(
     "camera",
     str,
-    "Camera YAML: a catalogue entry, or fx, fy, cx, cy.",
+    "Camera: YAML file with width, height, and focal_length or fx, fy, cx, cy [px].",
     known="catalogs/cameras/*.yaml",
 )
-OUT = define_option("out", str | None, "Folder for the JSON file that this command writes.", None)
+OUT = define_option(
+    "out", str | None, "Folder for the result as a JSON file; by default no file is written.", None
+)
 BACKEND = define_option(
-    "backend", str, "Rasteriser: auto, cpu or gsplat.", "auto", known=("auto", "cpu", "gsplat")
+    "backend",
+    str,
+    "Rasteriser: cpu, gsplat (needs a CUDA GPU), or auto, which takes gsplat where it works.",
+    "auto",
+    known=("auto", "cpu", "gsplat"),
 )
 RUNNER = (
     define_option(
-        "runner", str, "threads, processes or dask.", "dask", known=("threads", "processes", "dask")
+        "runner",
+        str,
+        "Where clips are made: in threads, in processes, or by dask.",
+        "dask",
+        known=("threads", "processes", "dask"),
     ),
     define_option(
-        "workers", int | None, "Clips made at once; by default one for each processor.", None, minimum=1
+        "workers",
+        int | None,
+        "Number of clips made at once; by default the number of processors.",
+        None,
+        minimum=1,
     ),
-    define_option("scheduler", str | None, "tcp:// or tls:// address of a running Dask scheduler.", None),
+    define_option(
+        "scheduler",
+        str | None,
+        "tcp:// or tls:// address of a running Dask scheduler; by default dask runs on this machine.",
+        None,
+    ),
 )
 GENERATING_RUNNER = (
     define_option(
         "runner",
         str,
-        "auto, threads, processes or dask; auto takes dask for frames, and threads without them.",
+        "Where clips are made: in threads, in processes, or by dask; auto takes dask with frames, and threads without.",
         "auto",
         known=("auto", "threads", "processes", "dask"),
     ),

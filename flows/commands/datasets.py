@@ -15,7 +15,11 @@ from flows.commands.command import (
 
 GROUP = "Datasets"
 CLIPS = define_option(
-    "clips", list[str] | None, "Label or id of a clip; may be given more than once.", None, spelling="clip"
+    "clips",
+    list[str] | None,
+    "Label or id of a clip, by default every clip; may be given more than once.",
+    None,
+    spelling="clip",
 )
 
 
@@ -48,7 +52,7 @@ COMMANDS = (
             define_option(
                 "manifest",
                 str | None,
-                "Instead of a grid: a frozen run to be made again, by name or file.",
+                "Make this frozen run again instead of a grid: JSON file, or the name of one in manifests/frozen.",
                 None,
                 known="manifests/frozen/*.json",
             ),
@@ -57,12 +61,16 @@ COMMANDS = (
             define_option(
                 "vehicle",
                 str | None,
-                "Vehicle name or file instead of the grid's; a frozen vehicle runs in its own mode.",
+                "Vehicle to take instead of the grid's: YAML file, or the name of one in catalogs/vehicles.",
                 None,
                 known="catalogs/vehicles/*.yaml",
             ),
             define_option(
-                "pictures", bool, "Render frames; without them, telemetry alone.", True, spelling="frames"
+                "pictures",
+                bool,
+                "Render the frames; --no-frames makes telemetry alone.",
+                True,
+                spelling="frames",
             ),
         ),
         brief=list_quarantined_clips,
@@ -78,12 +86,13 @@ COMMANDS = (
             define_argument(
                 "grid",
                 str | None,
-                "Grid file or name; without one, every frozen run that ships.",
+                "Grid: YAML file, or the name of one in catalogs/grids; by default those of every run in"
+                " manifests/frozen.",
                 None,
                 known=GRID.known,
             ),
             define_option(
-                "out", str | None, "File to write; by default where the project keeps its own.", None
+                "out", str | None, "JSON file to write; by default manifests/frozen/NAME.json.", None
             ),
         ),
     ),
@@ -103,7 +112,7 @@ COMMANDS = (
             ),
             *RUNNER,
             define_option(
-                "notify", str | None, "Command or http(s) address that is called when a run has failed.", None
+                "notify", str | None, "Command or http(s) address that is called when a run fails.", None
             ),
         ),
         output="nothing",
@@ -148,7 +157,7 @@ COMMANDS = (
             define_option(
                 "out",
                 str | None,
-                "File for --to; one that musync sql has not written is never replaced.",
+                "File that --to writes; an existing file is replaced only where musync sql wrote it.",
                 None,
             ),
         ),
@@ -179,8 +188,8 @@ COMMANDS = (
     Command(
         name="report",
         group=GROUP,
-        sentence="Make a page that opens without a server: clips to filter, films beside traces, siblings, the"
-        " manifest.",
+        sentence="Make a page that opens without a server: clips to filter, films beside traces, pairs of"
+        " clips that differ in one input, the manifest.",
         function="flows.reading.report:make_report",
         options=(
             DATASET,
@@ -193,7 +202,7 @@ COMMANDS = (
     Command(
         name="sheets",
         group=GROUP,
-        sentence="Draw one place in every weather, and each road feature before, at and after contact.",
+        sentence="Draw one place in every weather, and each road feature before, at and after the wheels touch it.",
         function="flows.reading.sheets:draw_sheets",
         options=(
             DATASET,

@@ -32,10 +32,15 @@ COMMANDS = (
             define_option(
                 "trajectories",
                 str | None,
-                "Folder with METHOD/CLIP_ID.txt (TUM format), trajectories to score as well.",
+                "Folder of camera trajectories to judge as well: METHOD/CLIP_ID.txt in the TUM format.",
                 None,
             ),
-            define_option("metric", bool, "The lengths of the trajectories are in metres.", False),
+            define_option(
+                "metric",
+                bool,
+                "Take the lengths in the trajectories as metres; without it, their scale is unknown.",
+                False,
+            ),
             define_option(
                 "learned",
                 str | None,
@@ -70,9 +75,18 @@ COMMANDS = (
         function="flows.judging.foreign:judge_video",
         options=(
             define_argument("video", str, "Any video file, or a trajectory (TUM format, .txt or .tum)."),
-            define_option("claim", str, "Telemetry Parquet with t_ns or time, pitch and station."),
+            define_option(
+                "claim",
+                str,
+                "Parquet file of telemetry: t_ns [ns] or time [s], pitch [rad], and station [m] or speed [m/s].",
+            ),
             CAMERA,
-            define_option("metric", bool, "The lengths of the trajectory are in metres.", False),
+            define_option(
+                "metric",
+                bool,
+                "Take the lengths in the trajectory as metres; without it, their scale is unknown.",
+                False,
+            ),
             OUT,
         ),
         passed=require_key("passed"),
@@ -83,14 +97,16 @@ COMMANDS = (
         sentence="Measure how much of a road event's pitch a video editor kept (the paper's source-motion retention).",
         function="flows.judging.foreign:measure_retention",
         options=(
-            define_argument("source", str, "Input of the editor: the drive over the road feature."),
+            define_argument("source", str, "Video given to the editor: the drive over the road feature."),
             define_argument(
-                "source_braking", str, "Input of the editor: the same drive braking on the flat road."
+                "source_braking", str, "Video given to the editor: the same drive, braking on a flat road."
             ),
-            define_argument("edited", str, "Output of the editor for the first."),
-            define_argument("edited_braking", str, "Output of the editor for the second."),
+            define_argument("edited", str, "What the editor made of the first video."),
+            define_argument("edited_braking", str, "What the editor made of the second video."),
             CAMERA,
-            define_option("event", tuple[int, int], "First and last frame of the event.", (16, 42)),
+            define_option(
+                "event", tuple[int, int], "First and last frame of the road event, counted from 0.", (16, 42)
+            ),
             OUT,
         ),
     ),

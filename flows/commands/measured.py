@@ -115,7 +115,7 @@ COMMANDS = (
             define_option(
                 "map",
                 str | None,
-                "Channel map: YAML file, or the name of one that ships.",
+                "Channel map: YAML file, or the name of one in catalogs/channel_maps.",
                 None,
                 known="catalogs/channel_maps/*.yaml",
             ),
@@ -139,12 +139,12 @@ COMMANDS = (
             define_option(
                 "protocol",
                 str,
-                "Protocol: YAML file, or the name of one.",
+                "Protocol: YAML file, or the name of one in catalogs/protocols.",
                 "brake-dive",
                 known="catalogs/protocols/*.yaml",
             ),
             CAMPAIGN_VEHICLE,
-            define_option("all_events", bool, "Use every candidate, whatever rules it breaks.", False),
+            define_option("all_events", bool, "Use every candidate event, whatever rules it breaks.", False),
             OUT,
         ),
         brief=shorten_brake_protocol,
@@ -159,7 +159,7 @@ COMMANDS = (
             define_option(
                 "study",
                 str,
-                "Stop study: YAML file, or the name of one.",
+                "Stop study: YAML file, or the name of one in catalogs/stop_studies.",
                 "bmw-m8",
                 known="catalogs/stop_studies/*.yaml",
             ),
@@ -178,7 +178,7 @@ COMMANDS = (
             define_option(
                 "study",
                 str,
-                "Bump study: YAML file, or the name of one.",
+                "Bump study: YAML file, or the name of one in catalogs/bump_studies.",
                 "comma2k19",
                 known="catalogs/bump_studies/*.yaml",
             ),
@@ -195,8 +195,8 @@ COMMANDS = (
         options=(
             define_option("out", str, "Folder for one bus log of each drive."),
             define_option("drives", int, "Number of drives.", 3),
-            define_option("events", int, "Brake applications in each drive.", 46),
-            define_option("seed", int, "Seed of the whole set.", 2020),
+            define_option("events", int, "Number of brake applications in each drive.", 46),
+            define_option("seed", int, "Seed of the random numbers.", 2020),
         ),
     ),
     Command(
@@ -210,22 +210,26 @@ COMMANDS = (
     Command(
         name="calibrate",
         group=GROUP,
-        sentence="Calibrate a vehicle in stages on reference traces, freeze it, and say how well each scalar is known.",
+        sentence="Calibrate a vehicle in stages on reference traces, freeze it, and say how well each number is known.",
         function="flows.measured.calibration:calibrate_on_traces",
         options=(
             TRACES,
             define_option("out", str, "Folder for the frozen vehicle and calibration.json."),
             define_option(
-                "vehicle", str, "Vehicle name or file to start from.", VEHICLE.default, known=VEHICLE.known
+                "vehicle",
+                str,
+                "Vehicle to start from: YAML file, or the name of one in catalogs/vehicles.",
+                VEHICLE.default,
+                known=VEHICLE.known,
             ),
             define_option(
                 "procedure",
                 str,
-                "Procedure name or file.",
+                "Procedure: YAML file, or the name of one in catalogs/calibration.",
                 "paper-staged",
                 known="catalogs/calibration/*.yaml",
             ),
-            define_option("split", str, "The split to fit; no other split is read.", "development"),
+            define_option("split", str, "Split of the traces to fit; no other split is read.", "development"),
             define_option("name", str, "Name of the frozen vehicle.", "calibrated"),
         ),
         brief=select_keys("vehicle_file", "vehicle_sha256", "stages", "before", "after"),
@@ -237,7 +241,9 @@ COMMANDS = (
         function="flows.measured.closing:close_loop",
         options=(
             CAMPAIGN,
-            define_option("out", str, "Folder for verdict, report and grown vehicle."),
+            define_option(
+                "out", str, "Folder for the verdict, the report and the vehicle with the effects found."
+            ),
             CAMPAIGN_VEHICLE,
         ),
         brief=shorten_verdict,
@@ -254,17 +260,19 @@ COMMANDS = (
                 str,
                 "Folder for closing-benchmark.json and campaigns.jsonl; a later call continues there.",
             ),
-            define_option("seeds", int, "Campaigns of each known truth.", 10, minimum=0),
-            define_option("nulls", int, "Campaigns of a model that lacks nothing.", 100, minimum=0),
+            define_option("seeds", int, "Number of campaigns for each known truth.", 10, minimum=0),
+            define_option(
+                "nulls", int, "Number of campaigns in which the model lacks nothing.", 100, minimum=0
+            ),
             define_option(
                 "harder",
                 int,
-                "Campaigns of each pair of effects, and of each truth with a poor design.",
+                "Number of campaigns for each pair of effects, and for each truth driven with few kinds of manoeuvre.",
                 1,
                 minimum=0,
             ),
             define_option(
-                "minutes", float, "Stop after this time, with the campaigns done so far [min].", 1e9
+                "minutes", float, "Begin no campaign after this time [min].", 1e9, shown_default="no limit"
             ),
         ),
         brief=select_keys("false_discoveries", "summary", "power", "cpu_s"),

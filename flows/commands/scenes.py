@@ -35,7 +35,7 @@ COMMANDS = (
             SCENE_OUT,
             define_option("camera_height", float, "Height of the route's cameras above the road [m].", 1.5),
             define_option("half_width", float, "Half the carriageway's width [m].", 3.5),
-            define_option("metres_per_unit", float, "Metres in one unit of the files.", 1.0),
+            define_option("metres_per_unit", float, "Length of one unit of the files [m].", 1.0),
             SUN,
         ),
     ),
@@ -46,8 +46,12 @@ COMMANDS = (
         function="flows.making.scenes:render_pose",
         options=(
             define_argument("scene", str, "Scene folder, or the name of a built-in street."),
-            define_option("pose", str, "JSON file: viewmat 4x4, K 3x3, width, height."),
-            define_option("out", str, "Folder for rgb.png and the buffers."),
+            define_option(
+                "pose", str, "JSON file: viewmat (4x4, world to camera), K (3x3) [px], width and height [px]."
+            ),
+            define_option(
+                "out", str, "Folder for rgb.png, and for depth, opacity, normals and classes as .npy files."
+            ),
             BACKEND,
         ),
     ),

@@ -6,7 +6,7 @@ GROUP = "Studies"
 MODE = define_option(
     "mode",
     str | None,
-    "paper or coupled; by default the mode in which a frozen vehicle was fitted, or paper.",
+    "Vehicle model: paper or coupled; by default the one that a frozen vehicle was fitted in, else paper.",
     None,
     known=("paper", "coupled"),
 )
@@ -33,7 +33,7 @@ COMMANDS = (
             define_option(
                 "traces",
                 str | None,
-                "Folder of reference traces, whose pitch is shown as the oracle's.",
+                "Folder of reference traces, whose pitch is drawn beside the model's.",
                 None,
             ),
         ),
@@ -42,9 +42,9 @@ COMMANDS = (
     Command(
         name="bench",
         group=GROUP,
-        sentence="Measure speed and memory beside a peer in the same run.",
+        sentence="Measure speed and memory, beside another implementation in the same run.",
         function="flows.studies.vehicle_model:run_benchmarks",
-        options=(define_argument("name", str | None, "One benchmark; by default all.", None), OUT),
+        options=(define_argument("name", str | None, "Benchmark to run; by default all.", None), OUT),
         is_flow=False,
     ),
 )

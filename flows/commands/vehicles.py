@@ -21,7 +21,7 @@ COMMANDS = (
                 known=VEHICLE.known,
             ),
             define_option(
-                "name", str | None, "What the file calls the car; by default the file's name.", None
+                "name", str | None, "Name of the car in the file; by default the file's name.", None
             ),
         ),
     ),

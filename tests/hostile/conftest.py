@@ -7,17 +7,28 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
+from flows.making.generate import generate_dataset
+from flows.store.layout import Layout
 from tests.hostile.stage import Stage
+from tests.toy_street import write_toy_grid
+
+
+@pytest.fixture(scope="session")
+def sent_dataset(tmp_path_factory) -> Layout:
+    """The toy dataset with the fewest frames that every command can read: most commands run on it a hundred times."""
+    folder = tmp_path_factory.mktemp("sent")
+    grid = write_toy_grid(folder, frames=5)
+    return generate_dataset(grid, str(folder / "data"), runner="threads", workers=1).layout
 
 
 @pytest.fixture
-def stage(toy_dataset, tmp_path) -> Stage:
+def stage(sent_dataset, tmp_path) -> Stage:
     world = tmp_path / "world"
-    shutil.copytree(toy_dataset.root, world / "inbox" / "data")
+    shutil.copytree(sent_dataset.root, world / "inbox" / "data")
     fill_with_files(world / "victim")
     key = Ed25519PrivateKey.from_private_bytes(bytes(32))
     (world / "key.pem").write_bytes(key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
-    return Stage(world=world, original=toy_dataset, grid=toy_dataset.root.parent / "grid.yaml")
+    return Stage(world=world, original=sent_dataset, grid=sent_dataset.root.parent / "grid.yaml")
 
 
 def fill_with_files(victim: Path) -> None:

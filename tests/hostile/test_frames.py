@@ -44,7 +44,7 @@ def zarr_2_with_pickle(stage: Stage) -> None:
     folder = stage.dataset.frames / "rgb"
     (folder / "zarr.json").unlink()
     (folder / ".zarray").write_text(json.dumps({
-        "zarr_format": 2, "shape": [4, 11, 64, 96, 3], "chunks": [4, 11, 64, 96, 3], "dtype": "|O", "order": "C",
+        "zarr_format": 2, "shape": [4, 5, 64, 96, 3], "chunks": [4, 5, 64, 96, 3], "dtype": "|O", "order": "C",
         "compressor": None, "filters": [{"id": "pickle"}], "fill_value": None,
     }))  # fmt: skip
     put_payload(stage, folder / "0.0.0.0.0")

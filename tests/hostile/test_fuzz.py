@@ -48,15 +48,16 @@ def outcome(documents: Documents, file: str, content: bytes, folder: Path) -> tu
     return read_input(documents, made, folder / document)
 
 
-def test_two_hundred_inputs_are_refused_in_a_sentence_or_sound(shelf):
-    readings = list(read_watched(plan_inputs(list(PARSERS), 200), shelf, seed=12, workers=1))
-    assert len(readings) >= 200 and {reading.parser for reading in readings} == set(BY_NAME)
+def test_a_hundred_inputs_are_refused_in_a_sentence_or_sound(shelf):
+    """``make study-fuzz`` reads many thousands."""
+    readings = list(read_watched(plan_inputs(list(PARSERS), 100), shelf, seed=12, workers=1))
+    assert len(readings) >= 100 and {reading.parser for reading in readings} == set(BY_NAME)
     told = [f"{r.parser} {r.number}: {r.outcome}: {r.detail}" for r in readings if r.outcome in FINDINGS]
     assert told == [], "python -m benchmarks.fuzzing --seed 12 --parser P --input N makes one of them again"
 
 
 def test_an_input_can_be_made_again_alone(documents):
-    for name, numbers in plan_inputs(list(PARSERS), 300):
+    for name, numbers in plan_inputs(list(PARSERS), 150):
         first = [make_input(documents[name], 12, number) for number in numbers]
         again = make_input(documents[name], 12, numbers[-1])
         assert dataclasses.asdict(again) == dataclasses.asdict(first[-1]), name

@@ -31,3 +31,7 @@ def test_a_rival_is_near_in_score_or_makes_good_most_of_the_gain(score: float, g
 def test_a_rival_that_wins_many_resamples_is_near_where_the_named_effect_wins_too_few():
     assert is_close(candidate(124.0, 199.0), 0.5, candidate(60.0, 100.0), 0.3)
     assert not is_close(candidate(124.0, 199.0), 0.9, candidate(60.0, 100.0), 0.3)
+
+
+def test_a_named_effect_that_wins_just_the_share_that_is_asked_for_wins_enough():
+    assert not is_close(candidate(124.0, 199.0), RULES.win_share, candidate(60.0, 100.0), 0.3)

@@ -295,6 +295,15 @@ def test_what_stands_still_is_sky_and_what_moves_is_not() -> None:
     assert not mask[52:].any()
 
 
+def test_the_fitted_sky_has_the_light_of_each_direction() -> None:
+    pictures, poses = drive_below_a_sky()
+    sky = fit_sky(pictures, K, poses)
+    assert sky is not None
+    elevation = np.linspace(*sky.elevation, 7)
+    found = sky.radiance_along(np.zeros(7), elevation)
+    np.testing.assert_allclose(found, np.repeat((0.4 - 0.3 * elevation)[:, None], 3, axis=1), atol=0.005)
+
+
 def test_a_drive_without_steady_sky_has_none() -> None:
     pictures, poses = drive_below_a_sky()
     for n, picture in enumerate(pictures):

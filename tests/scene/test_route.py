@@ -34,6 +34,12 @@ def test_a_left_bend_turns_the_rig_to_the_left():
     assert make_arc().T_world_rig[-1, 1, 0] > 0
 
 
+def test_two_points_are_a_straight_route():
+    route = route_from_positions(np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]]))
+    np.testing.assert_allclose(route.T_world_rig[:, :3, 0], [[0.6, 0.8, 0.0]] * 2, atol=1e-12)
+    assert route.length == pytest.approx(5.0)
+
+
 def make_banked() -> Route:
     """The bend again, climbing and leaning ever more into the curve."""
     poses = make_arc().T_world_rig.copy()

@@ -41,6 +41,20 @@ def events() -> tuple[Event, ...]:
     return retained
 
 
+def test_rough_roads_shake_and_bends_turn_a_braking_car_by_the_stated_amounts() -> None:
+    def drive(**shares: float) -> dict[str, np.ndarray]:
+        bus = replace(STRAIGHT, style=replace(STRAIGHT.style, **shares))
+        return drive_motion(VEHICLE, 0.82, bus, events=1, seed=1, drive=1)
+
+    level, rough, curved = drive(), drive(rough_share=1.0), drive(curve_share=1.0)
+    # standard deviations of 1.0 instead of 0.15 m/s^2 and 0.6 instead of 0.15 deg/s, less at both ends of the event
+    for name, more in (("vertical_acceleration", 0.85), ("roll_rate", 0.45)):
+        shaken = (rough[name] - level[name])[rough[name] != level[name]]
+        assert 0.75 * more < shaken.std() < 1.05 * more, name
+    assert np.abs(curved["steering_angle"]).max() == pytest.approx(40.0, rel=0.01)
+    assert np.abs(curved["yaw_rate"]).max() == pytest.approx(8.0, rel=0.01)
+
+
 def test_the_pitch_mode_is_that_of_the_rigid_tyre_half_car() -> None:
     # sqrt((27000 * 1.2^2 + 27000 * 1.5^2) / 1800) / 2 pi, and 3920 * 3.69 / (2 * 1800 * 7.4397)
     assert pitch_mode(VEHICLE) == pytest.approx((1.18407, 0.54007), rel=1e-4)

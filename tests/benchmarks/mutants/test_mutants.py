@@ -8,6 +8,7 @@ from benchmarks.mutants.__main__ import caught_by, chosen_places
 from benchmarks.mutants.kernels import kernels_of_a_change, list_stale_kernels
 from benchmarks.mutants.nearest_tests import list_nearest_tests
 from benchmarks.mutants.places import places_of
+from benchmarks.mutants.warm_python import start_warm_python
 
 SOURCES = {
     "tasks/law.py": "from tasks.level import LEVEL\n\n@njit\ndef height(x):\n    return x + LEVEL\n",
@@ -61,7 +62,8 @@ def test_kernels_that_reach_a_change_are_compiled_again_elsewhere_and_others_kep
 def test_a_change_is_caught_by_a_test_that_passes_without_it_and_the_tree_is_left_as_it_was(tree):
     file = Path("tasks/road/bump.py")
     plus = next(place for place in places_of(file, SOURCES[str(file)]) if place.before == "+")
-    assert caught_by(tree, plus) == "tests/road/test_bump.py::test_rise"
-    assert (tree / file).read_text() == SOURCES[str(file)]
     (unseen,) = places_of(Path("tasks/level.py"), SOURCES["tasks/level.py"])
-    assert caught_by(tree, unseen) is None
+    with start_warm_python(libraries=("pytest",)) as python:
+        assert caught_by(python, tree, plus)[0] == "tests/road/test_bump.py::test_rise"
+        assert (tree / file).read_text() == SOURCES[str(file)]
+        assert caught_by(python, tree, unseen)[0] is None

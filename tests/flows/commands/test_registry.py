@@ -1,5 +1,6 @@
 """A command is registered once: its function, its Prefect flow and its options agree."""
 
+import re
 import subprocess
 import sys
 from inspect import Parameter, signature
@@ -47,6 +48,16 @@ def test_help_lists_every_command_below_the_heading_of_its_users():
         assert any(line.startswith(("│ " + word + " ", word)) for line in text.splitlines()), command.name
     assert {command.group for command in COMMANDS} == set(GROUPS)
     assert len({command.name for command in COMMANDS}) == len(COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
+def test_help_shows_each_text_with_its_units_and_no_default_without_meaning(command):
+    """Rich takes [m] for markup unless it is told not to."""
+    shown = CliRunner().invoke(app, [*command.name.split(), "--help"], env={"COLUMNS": "400"}).output
+    shown = " ".join(shown.replace("│", " ").split())
+    for chosen in command.options:
+        assert chosen.help in shown and chosen.help.endswith("."), chosen.name
+    assert not re.search(r"\d{7}|<bool>(?! Show this message)", shown)
 
 
 def test_version_names_the_package_and_the_commit(monkeypatch):

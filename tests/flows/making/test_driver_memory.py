@@ -14,7 +14,7 @@ from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
 from flows.store.layout import Layout
 
-FEW, MANY = 300, 900
+FEW, MANY = 150, 450
 LARGEST_GROWTH = 4096
 """Of the peak with every further clip [B]: plan, row of numbers, pairs; 3.1 KB, 5.2 where receipts are kept."""
 

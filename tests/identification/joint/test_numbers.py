@@ -1,6 +1,7 @@
 """Which numbers a campaign can show follows from what its runs reach, by the rules of the catalogue."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,10 +17,18 @@ from tasks.vehicle.effects.table import build_parameter_vector
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 RULES = load_decision_rules().joint
-STOPS = [
-    measured(plain_run(v, p), build_parameter_vector({}), 3) for v, p in ((27, 1.2), (20, 2.4), (16, 1.5))
-]
-COAST = measured(plain_run(20.0, 0.0), build_parameter_vector({"rolling_coefficient": 0.1}), 3)
+
+
+@cache
+def stops() -> list[RunModel]:
+    """Three stops; made when a test first asks for them, not while tests are collected."""
+    braked = ((27, 1.2), (20, 2.4), (16, 1.5))
+    return [measured(plain_run(v, p), build_parameter_vector({}), 3) for v, p in braked]
+
+
+@cache
+def coast() -> RunModel:
+    return measured(plain_run(20.0, 0.0), build_parameter_vector({"rolling_coefficient": 0.1}), 3)
 
 
 def chosen_priors(models: list[RunModel], rules: JointRules) -> dict[str, float]:
@@ -32,55 +41,55 @@ def chosen_priors(models: list[RunModel], rules: JointRules) -> dict[str, float]
 
 
 def test_the_curve_of_the_brake_needs_enough_runs_that_brake_hard_enough():
-    slowest = min(map(peak_deceleration, STOPS))
-    assert "pressure_curve" in chosen_priors(STOPS, RULES)
-    assert "pressure_curve" not in chosen_priors(STOPS, replace(RULES, fewest_curve_stops=4))
-    assert "pressure_curve" not in chosen_priors(STOPS, replace(RULES, braking_deceleration=slowest))
+    slowest = min(map(peak_deceleration, stops()))
+    assert "pressure_curve" in chosen_priors(stops(), RULES)
+    assert "pressure_curve" not in chosen_priors(stops(), replace(RULES, fewest_curve_stops=4))
+    assert "pressure_curve" not in chosen_priors(stops(), replace(RULES, braking_deceleration=slowest))
 
 
 def test_friction_is_free_only_where_a_run_passes_the_limit_of_the_models_tyres():
-    hardest = max(peak_deceleration(m) / (m.surface_friction * m.vehicle.gravity) for m in STOPS)
-    assert "friction" in chosen_priors(STOPS, replace(RULES, saturation_ratio=0.99 * hardest))
-    assert "friction" not in chosen_priors(STOPS, replace(RULES, saturation_ratio=hardest))
+    hardest = max(peak_deceleration(m) / (m.surface_friction * m.vehicle.gravity) for m in stops())
+    assert "friction" in chosen_priors(stops(), replace(RULES, saturation_ratio=0.99 * hardest))
+    assert "friction" not in chosen_priors(stops(), replace(RULES, saturation_ratio=hardest))
 
 
 def test_a_prior_is_a_share_of_the_largest_pressure_or_of_the_least_range_of_a_campaign():
     share = next(n.sigma for n in load_joint_numbers() if n.name == "push_out")
-    peak = max(float(m.run.pressure.max()) for m in STOPS)
-    assert chosen_priors(STOPS, RULES)["push_out"] == pytest.approx(share * peak)
-    assert chosen_priors(STOPS, replace(RULES, least_pressure_range=9.0))["push_out"] == pytest.approx(
+    peak = max(float(m.run.pressure.max()) for m in stops())
+    assert chosen_priors(stops(), RULES)["push_out"] == pytest.approx(share * peak)
+    assert chosen_priors(stops(), replace(RULES, least_pressure_range=9.0))["push_out"] == pytest.approx(
         9.0 * share
     )
 
 
 def test_resistances_are_one_number_until_a_car_has_coasted_down():
-    speed = COAST.measured[:, CHANNELS.index("speed")]
+    speed = coast().measured[:, CHANNELS.index("speed")]
     lost = float(1.0 - speed[-1] / speed[0])
     resistances = [n for n in load_joint_numbers() if n.group == "resistance"]
     enough, too_little = (replace(RULES, coasted_share=share * lost) for share in (0.99, 1.01))
-    assert len(resistances) > 1 and len(free_numbers(resistances, [COAST], enough)) == len(resistances)
-    assert len(free_numbers(resistances, [COAST], too_little)) == 1
+    assert len(resistances) > 1 and len(free_numbers(resistances, [coast()], enough)) == len(resistances)
+    assert len(free_numbers(resistances, [coast()], too_little)) == 1
 
 
 def test_a_car_that_is_driven_does_not_coast_down():
-    pedal = replace(COAST, run=replace(COAST.run, throttle=np.full(len(COAST.run.pressure), 0.2)))
+    pedal = replace(coast(), run=replace(coast().run, throttle=np.full(len(coast().run.pressure), 0.2)))
     shut, driven = (replace(RULES, coasted_share=0.01, closed_throttle=most) for most in (0.2, 0.19))
     assert coasts_down(pedal, shut) and not coasts_down(pedal, driven)
 
 
 def test_a_lag_and_a_dead_time_are_one_delay_in_a_slow_log():
     delays = [n for n in load_joint_numbers() if n.group == "delay"]
-    interval = STOPS[0].run.interval
+    interval = stops()[0].run.interval
     quick, slow = (replace(RULES, delay_interval=share * interval) for share in (1.0, 0.99))
-    assert [n.name for n in free_numbers(delays, STOPS, quick)] == ["lag", "dead_time"]
-    assert [n.name for n in free_numbers(delays, STOPS, slow)] == ["lag"]
+    assert [n.name for n in free_numbers(delays, stops(), quick)] == ["lag", "dead_time"]
+    assert [n.name for n in free_numbers(delays, stops(), slow)] == ["lag"]
 
 
 def test_a_driver_brakes_from_a_share_of_the_largest_pressure():
     onsets = []
     for share in (0.1, 0.9):
         rules = replace(RULES, brake_onset_share=share)
-        stop = make_stop(STOPS[0].run, VEHICLE, SURFACE, ("speed",), rules)
+        stop = make_stop(stops()[0].run, VEHICLE, SURFACE, ("speed",), rules)
         pressure = stop.model.run.pressure
         assert pressure[stop.onset - 1] <= share * pressure[: stop.model.samples].max() < pressure[stop.onset]
         onsets.append(stop.onset)
