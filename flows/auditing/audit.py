@@ -59,7 +59,7 @@ def audit_dataset(
     -------
     The audit: ``verdict``, a sentence; ``verified`` (all well); what `flows.auditing.audit_facts.collect_facts` says of
     dataset, tools and machine; ``files``, ``intact``, ``damaged[]`` and ``unrecorded[]`` as of
-    `flows.auditing.verify.compare_files`; ``signed``, ``signature``, ``signers`` and ``key`` as of
+    `flows.auditing.verify.compare_files`; ``signed``, ``signature``, ``signers``, ``key_id`` and ``key_sha256`` as of
     `flows.auditing.signing.signature_findings`; ``rerun[]``, ids of the clips made again, and ``remade[]``, the same
     with label and outcome; ``compared``, how many tables and arrays of them; ``mismatches[]``, each with where it
     differs first and the inputs that can be ``why``; ``differences[]`` of inputs and tools between what made the

@@ -111,7 +111,7 @@ def compare_tools(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[
     recorded, here : ``tools_recorded`` and ``tools_here`` of an audit
     """
     rows = []
-    for part, title in (("code", "musync"), ("git", "git"), ("libraries", ""), ("processor", "processor")):
+    for part, title in (("code", "musync"), ("git", "source"), ("libraries", ""), ("processor", "processor")):
         a, b = recorded[part] or {}, here[part] or {}
         rows += [
             (f"{title} {name}".strip().replace("_", " "), str(a.get(name, ABSENT)), str(b.get(name, ABSENT)))

@@ -1,6 +1,6 @@
 """Which of a clip's numbers move when one catalogue line is changed: the clip is driven again for each line."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,6 +15,7 @@ from catalogs.vehicles import load_vehicle
 from catalogs.weather.grip import GRIP_SECTIONS
 from flows.auditing.kept_lines import Line, is_number, scale_line
 from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures, weather_of
+from flows.running.progress import progress_bar
 from flows.store.layout import write_atomically
 from manifests.explain import REACHES, VEHICLE, kind_of_input
 from tasks.conventions import TICK_CHANNELS
@@ -153,7 +154,7 @@ def is_driven(line: Line) -> bool:
     return line.file in (ASKED, STUDY) or VEHICLE in REACHES.get(kind_of_input(line.file), ())
 
 
-def move_lines(asked: Asked, kept: Mapping[str, bytes], lines: Iterable[Line], before: Drive) -> list[Moved]:
+def move_lines(asked: Asked, kept: Mapping[str, bytes], lines: Sequence[Line], before: Drive) -> list[Moved]:
     """Change each line in turn and drive the clip again.
 
     Parameters
@@ -167,7 +168,12 @@ def move_lines(asked: Asked, kept: Mapping[str, bytes], lines: Iterable[Line], b
         inputs = Path(folder)
         for name, content in kept.items():
             write_atomically(inputs / name, content)
-        return [_move_line(asked, kept, line, before, inputs) for line in lines]
+        moved = []
+        with progress_bar("lineage", len(lines)) as advance:
+            for line in lines:
+                moved.append(_move_line(asked, kept, line, before, inputs))
+                advance(line.key)
+        return moved
 
 
 def _move_line(asked: Asked, kept: Mapping[str, bytes], line: Line, before: Drive, inputs: Path) -> Moved:

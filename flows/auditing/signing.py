@@ -90,8 +90,8 @@ def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
     -------
     ``signed``: True if the key's signature over this very manifest is valid, False if not, None if no key is given;
     ``signature``: the same in a sentence; ``signers``: ids of the keys that the envelope names, which anybody can
-    write there; ``key``: of the key that was asked about its ``key_id`` and its ``sha256``, the hash of its DER form;
-    None if no key is given.
+    write there; ``key_id`` of the key that was asked about, and ``key_sha256``, the hash of its DER form; None if no
+    key is given.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
     """
     if key is None:
         signers, sentence = _describe_unchecked(layout)
-        return {"signed": None, "signature": sentence, "signers": signers, "key": None}
+        return {"signed": None, "signature": sentence, "signers": signers, "key_id": None, "key_sha256": None}
     pem = read_content(Path(key), "public key", LARGEST_KEY)
     verifier = load_verifier(pem, key)
     signers = []
@@ -110,10 +110,7 @@ def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
         signers = _list_signers(envelope)
     except InputError as error:
         problems = list(error.problems)
-    held = {
-        "signers": signers,
-        "key": {"key_id": verifier.keyid, "sha256": hash_public_key(pem)},
-    }
+    held = {"signers": signers, "key_id": verifier.keyid, "key_sha256": hash_public_key(pem)}
     if problems:
         return {"signed": False, "signature": "; ".join(problems), **held}
     return {

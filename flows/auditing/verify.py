@@ -33,7 +33,7 @@ def verify_dataset(dataset: str, *, key: str | None = None, out: str | None = No
     Returns
     -------
     ``verdict``, a sentence; ``verified``; ``files``, ``intact``, ``damaged[]`` and ``unrecorded[]`` as of
-    `compare_files`; ``signed``, ``signature``, ``signers`` and ``key`` as of `signature_findings`.
+    `compare_files`; ``signed``, ``signature``, ``signers``, ``key_id`` and ``key_sha256`` as of `signature_findings`.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def describe_signature(signature: Mapping[str, Any]) -> str:
     """
     if signature["signed"] is None:
         return "no signature was checked"
-    known = f"key {signature['key']['key_id'][:16]}"
+    known = f"key {signature['key_id'][:16]}"
     return f"signed by {known}" if signature["signed"] else f"no valid signature of {known}"
 
 

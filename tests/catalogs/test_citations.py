@@ -20,8 +20,14 @@ from catalogs.citations import find_works, first_clause, join_works
             "fresh snow 0.80 (Oke 1987, table 1.1), falling towards red (Warren 1982, doi:10.1029/RG020i001p00067)",
             {"Oke 1987": "", "Warren 1982": "10.1029/RG020i001p00067"},
         ),
-        ("declared; as Kajikawa 1989 (doi:10.2151/jmsj1965.67.5_731) saw", {"declared": "", "Kajikawa 1989": "10.2151/jmsj1965.67.5_731"}),
-        ("Kasten & Czeplak 1980, doi:10.1016/0038-092X(80)90391-6: 1 - 0.75", {"Kasten & Czeplak 1980": "10.1016/0038-092X(80)90391-6"}),
+        (
+            "declared; as Kajikawa 1989 (doi:10.2151/jmsj1965.67.5_731) saw",
+            {"declared": "", "Kajikawa 1989": "10.2151/jmsj1965.67.5_731"},
+        ),
+        (
+            "Kasten & Czeplak 1980, doi:10.1016/0038-092X(80)90391-6: 1 - 0.75",
+            {"Kasten & Czeplak 1980": "10.1016/0038-092X(80)90391-6"},
+        ),
         ("data sheet, doi:10.5281/zenodo.12345.", {"doi:10.5281/zenodo.12345": "10.5281/zenodo.12345"}),
         ("the paper's snow at its lowest mu_c, 0.24; no reference run on ice", {"paper": ""}),
         ("frozen anchor, +-10 %; Ivan et al. 2010, JHR 10-324", {"Ivan et al. 2010": ""}),

@@ -1,4 +1,4 @@
-"""The lines on which a clip's numbers rest are found from what the dataset keeps, by changing each and driving again."""
+"""The lines on which a clip's numbers rest follow from what the dataset keeps: each is changed, the clip driven."""
 
 import csv
 import json
@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 import yaml
 
+from catalogs.entries import find_entry
 from flows.auditing import lineage
 from flows.auditing.lineage import format_text, trace_lineage
 from flows.store.layout import Layout
-from manifests.canonical import canonical_bytes
-from manifests.manifest import seal_of
 from tasks.errors import InputError
 from tests.flows.reseal import reseal
 
@@ -108,12 +107,10 @@ def test_json_csv_and_text_say_the_same(traced):
 
 
 def test_the_runs_that_a_vehicle_was_fitted_to_are_named(kept, tmp_path, quick):
-    from catalogs.entries import find_entry
-
     copy = Layout(tmp_path / "grown")
     shutil.copytree(kept.root, copy.root)
     shutil.copy(find_entry("vehicle", "multibody-grown"), copy.inputs / "vehicle.yaml")
-    reseal(copy.root)
+    reseal(copy)
     result = trace_lineage(str(copy.root), "dry/flat")
     assert not result["follows"] and "NOT as recorded" in format_text(result)
     assert result["measured"]["procedure"] == "coupled-grown"
@@ -123,9 +120,7 @@ def test_the_runs_that_a_vehicle_was_fitted_to_are_named(kept, tmp_path, quick):
 def test_telemetry_that_does_not_follow_is_told(kept, tmp_path, quick):
     copy = Layout(tmp_path / "forged")
     shutil.copytree(kept.root, copy.root)
-    forged = json.loads(copy.manifest.read_bytes())
-    forged["clips"][0]["content"]["ticks"] = "0" * 64
-    copy.manifest.write_bytes(canonical_bytes(forged | {"seal": seal_of(forged)}))
+    reseal(copy, lambda manifest: manifest["clips"][0]["content"].update(ticks="0" * 64))
     assert not trace_lineage(str(copy.root), "dry/flat")["follows"]
     assert trace_lineage(str(copy.root), "dry/hump")["follows"]
 
