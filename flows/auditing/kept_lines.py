@@ -86,9 +86,12 @@ def scale_line(name: str, content: bytes, place: Place, factor: float) -> bytes:
     if kind_of_input(name) == "tyre":
         (key,) = place
         entry = re.compile(rf"^(\s*{re.escape(str(key))}\s*=\s*)([^\s$]+)", flags=re.M | re.I)
-        return entry.sub(
-            lambda found: found[1] + repr(_scale(float(found[2]), factor)), content.decode("utf-8", "replace")
-        ).encode()
+
+        def scale_entry(found: re.Match[str]) -> str:
+            number = _read_number(found[2])
+            return found[0] if number is None else found[1] + repr(_scale(number, factor))
+
+        return entry.sub(scale_entry, content.decode("utf-8", "replace")).encode()
     table = parse_yaml_value(content, name, "catalogue entry")
     leaf = table
     for part in place:

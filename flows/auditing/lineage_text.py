@@ -120,7 +120,9 @@ def _tell_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 def _tell_others(others: Sequence[Mapping[str, Any]]) -> list[str]:
     if not others:
         return []
-    told = [f"  {other['source']}: {_count(other['lines'], 'line')}" for other in others]
+    told = [
+        f"  {shorten(other['source'], WIDEST_SOURCE)}: {_count(other['lines'], 'line')}" for other in others
+    ]
     return ["", "lines that cite no work, by the first words of their source:", *told]
 
 
