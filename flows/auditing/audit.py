@@ -2,10 +2,14 @@
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from flows.auditing.audit_facts import collect_facts, tell_time
+from flows.auditing.audit_report import format_text, tell_verdict, write_audit_page
+from flows.auditing.signing import signature_findings
+from flows.auditing.verify import compare_files
 from flows.making.generate import create_frame_arrays, fan_out
 from flows.making.input_changes import input_changes
 from flows.making.plan import Plan, read_plan
@@ -22,10 +26,11 @@ from flows.store.telemetry import read_columns
 from manifests.canonical import sha256_of
 from manifests.compare import first_pixel_difference, first_row_difference
 from manifests.explain import as_sentences, find_reasons
-from manifests.manifest import damaged_files, manifest_damage
 from manifests.records import Manifest, Receipt
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
+
+__all__ = ["audit_dataset", "format_text"]
 
 STAGE_OF = {"ticks": "vehicle", "frames": "frames"} | dict.fromkeys(arrays_of(labels=True), "render")
 
@@ -34,6 +39,7 @@ def audit_dataset(
     dataset: str,
     *,
     share: float = 0.1,
+    key: str | None = None,
     out: str | None = None,
     runner: RunnerName = "dask",
     workers: int | None = None,
@@ -45,84 +51,86 @@ def audit_dataset(
     ----------
     dataset : a sealed dataset folder
     share : share of the clips to make again, at least one clip unless 0 [1]
-    out : folder for ``audit.json`` and ``audit.txt``; None writes none
+    key : file with the signer's Ed25519 public key in PEM; None checks no signature
+    out : folder for ``audit.html``, ``audit.json`` and ``audit.txt``; None writes none
     workers : how many at once; None takes another number than a generating run does by itself [1]
 
     Returns
     -------
-    The audit: ``verified`` (all well); ``files``; ``damaged[]``; ``rerun[]``, the clips made again; ``mismatches[]``,
-    each with where it differs first and the inputs that can be ``why``; ``differences[]`` of inputs and tools between
-    what made the dataset and what is here; ``not_remade[]``, why damaged inputs let no clip be made.
+    The audit: ``verdict``, a sentence; ``verified`` (all well); what `flows.auditing.audit_facts.collect_facts` says of
+    dataset, tools and machine; ``files``, ``intact``, ``damaged[]`` and ``unrecorded[]`` as of
+    `flows.auditing.verify.compare_files`; ``signed``, ``signature``, ``signers``, ``key_id`` and ``key_sha256`` as of
+    `flows.auditing.signing.signature_findings`; ``rerun[]``, ids of the clips made again, and ``remade[]``, the same
+    with label and outcome; ``compared``, how many tables and arrays of them; ``mismatches[]``, each with where it
+    differs first and the inputs that can be ``why``; ``differences[]`` of inputs and tools between what made the
+    dataset and what is here; ``not_remade[]``, why damaged inputs let no clip be made; ``started_utc``, ``ended_utc``.
 
     Raises
     ------
     InputError
-        If the folder is no sealed dataset of this format, or the share is not in [0, 1].
+        If the folder is no sealed dataset of this format, the share is not in [0, 1], or the key is none.
     """
     if not 0 <= share <= 1:
         raise InputError(f"--share must lie in 0 to 1; it is {share:g}")
-    results = Outputs(out, "audit", "audit.json", "audit.txt")
+    results = Outputs(out, "audit", "audit.html", "audit.json", "audit.txt")
+    started = tell_time()
     changes: list[dict[str, Any]] = []
     mismatches: list[dict[str, Any]] = []
     not_remade: list[str] = []
+    workers = workers or other_count()
     with open_for_writing(dataset, want_everything) as layout:
         manifest = read_manifest(layout)
-        damaged = run_as_stage(damaged_files)(layout.root, manifest)
-        if (fault := manifest_damage(layout.manifest.read_bytes())) is not None:
-            damaged.append({"path": "manifest.json", "clip_id": None, "damage": fault})
+        signature = signature_findings(layout, key)
+        compared = run_as_stage(compare_files)(layout)
+        facts = collect_facts(layout, manifest)
         chosen = chosen_clips(manifest, share)
         try:
             changes = input_changes(layout, manifest)
             mismatches = run_as_stage(remake_and_compare)(
-                layout, manifest, chosen, runner, workers or other_count(), scheduler
+                layout, manifest, chosen, runner, workers, scheduler
             )
         except InputError as error:
-            if not damaged:
+            if compared["verified"]:
                 raise
             chosen, not_remade = [], list(error.problems)
+    differing = {row["clip_id"] for row in mismatches}
     result = {
-        "verified": not damaged and not mismatches,
-        "files": len(manifest["artifacts"]) + sum(len(clip["artifacts"]) for clip in manifest["clips"]),
-        "damaged": damaged,
+        "verified": compared["verified"] and not mismatches and signature["signed"] is not False,
+        **facts,
+        **{name: found for name, found in compared.items() if name != "verified"},
+        **signature,
+        "share": share,
+        "runner": runner,
+        "workers": workers,
         "rerun": [clip["clip_id"] for clip in chosen],
+        "remade": [
+            {"label": c["label"], "clip_id": c["clip_id"], "as_recorded": c["clip_id"] not in differing}
+            for c in chosen
+        ],
+        "compared": count_contents(chosen),
         "mismatches": [row | {"why": find_reasons(row["changed"], changes)} for row in mismatches],
         "differences": as_sentences(changes),
         "not_remade": not_remade,
+        "started_utc": started,
+        "ended_utc": tell_time(),
     }
+    result = {"verdict": tell_verdict(result), **result}
     results.write_json("audit.json", result)
     results.write("audit.txt", format_text(result))
+    results.write("audit.html", write_audit_page(result))
     return result
 
 
-def format_text(result: Mapping[str, Any]) -> str:
-    """The audit in lines for people.
+def count_contents(chosen: Sequence[Receipt]) -> dict[str, int]:
+    """Return how many decoded tables and arrays of clips were compared.
 
     Parameters
     ----------
-    result : of `audit_dataset`
+    chosen : receipts of the clips that were made again
     """
-    lines = [
-        f"{len(result['damaged'])} of {result['files']} files are not those recorded",
-        *(f"  {row['path']}: {row['damage']}" for row in result["damaged"]),
-        f"{len(result['mismatches'])} of {len(result['rerun'])} clips made again differ",
-        *(f"  none could be made: {problem}" for problem in result["not_remade"]),
-    ]
-    for row in result["mismatches"]:
-        pixel = f", pixel {row['pixel'][0]} right and {row['pixel'][1]} down" if "pixel" in row else ""
-        values = f": {row['recorded']} recorded, {row['remade']} made again" if "recorded" in row else ""
-        because = ", ".join(row["why"]) or "no input that is recorded"
-        first = f"{row['stage']}, {row['channel']}, {row['counted_in']} {row['tick']}{pixel}{values}"
-        lines += [
-            f"  {row['label']} ({row['clip_id']}): {', '.join(row['changed'])}",
-            f"    first in {first}",
-            f"    can come from: {because}",
-        ]
-    lines.append(
-        "inputs and tools that differ:" if result["differences"] else "no recorded input or tool differs"
-    )
-    lines += [f"  {difference}" for difference in result["differences"]]
-    lines.append("verified" if result["verified"] else "not verified")
-    return "\n".join(lines) + "\n"
+    contents = [name for clip in chosen for name in clip["content"]]
+    tables = sum(name in STAGED_TABLES for name in contents)
+    return {"tables": tables, "arrays": len(contents) - tables}
 
 
 def other_count() -> int:

@@ -14,7 +14,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import controls_of, hazard_of, weather_of
 from flows.making.places import find_scene
-from flows.making.plan import read_plan
+from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.reading.query import VIEWS
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.outputs import Outputs
@@ -53,16 +53,16 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     results = Outputs(out, "explain", "explain.json", "explain.txt")
     layout = open_for_reading(dataset, want_telemetry)
     manifest, plan = read_manifest(layout), read_plan(layout.root)
-    chosen = [c for c in plan.clips if clip in (c.clip_id, c.label)]
-    problems = []
-    if not chosen:
-        labels = ", ".join(c.label for c in plan.clips[:20])
-        problems.append(f"{dataset}: no clip {clip!r}; there are {labels}{', ...' * (len(plan.clips) > 20)}")
+    problems: list[str] = []
+    planned = None
+    try:
+        planned = find_clip(plan, clip, dataset)
+    except InputError as error:
+        problems += error.problems
     if not 0 <= frame < plan.settings.frames:
         problems.append(f"frame must lie in 0 to {plan.settings.frames - 1}; it is {frame}")
-    if problems:
+    if problems or planned is None:
         raise InputError(problems)
-    (planned,) = chosen
     scenario = planned.scenario
     folder = layout.telemetry / "frames" / f"family={scenario.weather}"
     columns = read_columns(folder, planned.clip_id, [channel.name for channel in VIEWS["frames"]])
@@ -95,7 +95,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         *surface_steps(weather_of(scenario), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row),
         *pitch_steps(vehicle, response, hazard, mode, row, ride.columns),
-        *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, _find_route(plan.scene)),
+        *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, find_route(plan.scene)),
     ]  # fmt: skip
     result = {
         "dataset": str(layout.root),
@@ -142,6 +142,21 @@ def format_text(result: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def find_clip(plan: Plan, clip: str, dataset: str) -> ClipPlan:
+    """Return the clip of a plan that has this label or id.
+
+    Raises
+    ------
+    InputError
+        If there is none; the sentence lists the labels that exist.
+    """
+    for planned in plan.clips:
+        if clip in (planned.clip_id, planned.label):
+            return planned
+    labels = ", ".join(c.label for c in plan.clips[:20])
+    raise InputError(f"{dataset}: no clip {clip!r}; there are {labels}{', ...' * (len(plan.clips) > 20)}")
+
+
 def _as_row(step: Step) -> dict[str, Any]:
     """A step as JSON has it: a number that is none is not represented."""
     row = asdict(step) | {"agrees": step.agrees}
@@ -155,7 +170,7 @@ def _list_scenario(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _find_route(scene: Mapping[str, str]) -> Route | None:
+def find_route(scene: Mapping[str, str]) -> Route | None:
     """The scene's route; None where the scene has moved away, which leaves one step out."""
     try:
         return load_scene(find_scene(scene)).route

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat, load_pem_public_key
 from securesystemslib.signer import CryptoSigner
 
 from catalogs.documents import LARGEST_JSON, read_content
@@ -88,7 +89,9 @@ def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
     Returns
     -------
     ``signed``: True if the key's signature over this very manifest is valid, False if not, None if no key is given;
-    ``signature``: the same in a sentence.
+    ``signature``: the same in a sentence; ``signers``: ids of the keys that the envelope names, which anybody can
+    write there; ``key_id`` of the key that was asked about, and ``key_sha256``, the hash of its DER form; None if no
+    key is given.
 
     Raises
     ------
@@ -96,27 +99,53 @@ def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
         If the key is no Ed25519 public key.
     """
     if key is None:
-        return {"signed": None, "signature": _describe_unchecked(layout)}
-    verifier = load_verifier(read_content(Path(key), "public key", LARGEST_KEY), key)
+        signers, sentence = _describe_unchecked(layout)
+        return {"signed": None, "signature": sentence, "signers": signers, "key_id": None, "key_sha256": None}
+    pem = read_content(Path(key), "public key", LARGEST_KEY)
+    verifier = load_verifier(pem, key)
+    signers = []
     try:
-        content = read_content(layout.manifest, "manifest", LARGEST_JSON)
-        problems = signature_problems(content, _load_envelope(layout), verifier)
+        content, envelope = read_content(layout.manifest, "manifest", LARGEST_JSON), _load_envelope(layout)
+        problems = signature_problems(content, envelope, verifier)
+        signers = _list_signers(envelope)
     except InputError as error:
         problems = list(error.problems)
+    held = {"signers": signers, "key_id": verifier.keyid, "key_sha256": hash_public_key(pem)}
     if problems:
-        return {"signed": False, "signature": "; ".join(problems)}
-    return {"signed": True, "signature": f"valid: key {verifier.keyid[:16]} has signed this manifest.json"}
+        return {"signed": False, "signature": "; ".join(problems), **held}
+    return {
+        "signed": True,
+        "signature": f"valid: key {verifier.keyid[:16]} has signed this manifest.json",
+        **held,
+    }
 
 
-def _describe_unchecked(layout: Layout) -> str:
+def hash_public_key(pem: bytes) -> str:
+    """SHA-256 of a public key in DER form, as ``openssl pkey -pubin -outform DER | sha256sum`` gives it.
+
+    Parameters
+    ----------
+    pem : the key as `manifests.signing.load_verifier` takes it
+    """
+    return sha256_of([load_pem_public_key(pem).public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)])
+
+
+def _describe_unchecked(layout: Layout) -> tuple[list[str], str]:
     try:
         envelope = _load_envelope(layout)
         if envelope is None:
-            return f"there is none, and {SEAL_ALONE}"
-        count = len(read_envelope(envelope).signatures)
+            return [], f"there is none, and {SEAL_ALONE}"
+        signers = _list_signers(envelope)
     except InputError as error:
-        return f"not checked, and not readable: {'; '.join(error.problems)}; {SEAL_ALONE}"
-    return f"{count} not checked: give the signer's public key with --key; {SEAL_ALONE}"
+        return [], f"not checked, and not readable: {'; '.join(error.problems)}; {SEAL_ALONE}"
+    return (
+        signers,
+        f"{len(signers)} not checked: give the signer's public key with --key; {SEAL_ALONE}",
+    )
+
+
+def _list_signers(envelope: bytes | None) -> list[str]:
+    return [] if envelope is None else sorted(read_envelope(envelope).signatures)
 
 
 def _load_envelope(layout: Layout) -> bytes | None:

@@ -1,5 +1,6 @@
 """Are the files of a dataset those recorded, and what did killed runs leave behind? Hashes only, nothing is made."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +32,8 @@ def verify_dataset(dataset: str, *, key: str | None = None, out: str | None = No
 
     Returns
     -------
-    ``verified``; ``signed`` and ``signature``, as of `signature_findings`; ``files`` compared;
-    ``damaged[]`` with ``path``, ``clip_id`` and ``damage``; ``unrecorded[]``,
-    files in the folder that the manifest does not know: among the data they are damage, elsewhere they are not.
+    ``verdict``, a sentence; ``verified``; ``files``, ``intact``, ``damaged[]`` and ``unrecorded[]`` as of
+    `compare_files`; ``signed``, ``signature``, ``signers``, ``key_id`` and ``key_sha256`` as of `signature_findings`.
 
     Raises
     ------
@@ -43,14 +43,67 @@ def verify_dataset(dataset: str, *, key: str | None = None, out: str | None = No
     results = Outputs(out, "verify", "verify.json")
     with open_for_writing(dataset, want_everything) as layout:
         signature = signature_findings(layout, key)
-        result = run_as_stage(compare_files)(layout) | signature
-    result["verified"] = result["verified"] and result["signed"] is not False
+        compared = run_as_stage(compare_files)(layout)
+    verified = compared["verified"] and signature["signed"] is not False
+    sentence = f"{describe_files(compared)}; {describe_signature(signature)}"
+    result = {
+        "verdict": f"{'verified' if verified else 'not verified'}: {sentence}",
+        **compared,
+        **signature,
+        "verified": verified,
+    }
     results.write_json("verify.json", result)
     return result
 
 
+def describe_files(compared: Mapping[str, Any]) -> str:
+    """Return how many files are those recorded, as a clause.
+
+    Parameters
+    ----------
+    compared : result of `compare_files`
+    """
+    files, intact, damaged = compared["files"], compared["intact"], compared["damaged"]
+    of_manifest = next((row["damage"] for row in damaged if row["path"] == "manifest.json"), None)
+    if of_manifest is not None:
+        return f"manifest.json is {of_manifest}, so that nothing it records can be relied on"
+    lost, strange = files - intact, len(damaged) - (files - intact)
+    clause = (
+        f"{intact} of {files} files are those recorded, {lost} {'is' if lost == 1 else 'are'} not"
+        if lost
+        else f"all {files} files are those recorded"
+    )
+    if strange:
+        clause += f", and {strange} more {'lies' if strange == 1 else 'lie'} there that nobody recorded"
+    return clause
+
+
+def describe_signature(signature: Mapping[str, Any]) -> str:
+    """Return what is known of the signature, as a clause.
+
+    Parameters
+    ----------
+    signature : of `signature_findings`
+    """
+    if signature["signed"] is None:
+        return "no signature was checked"
+    known = f"key {signature['key_id'][:16]}"
+    return f"signed by {known}" if signature["signed"] else f"no valid signature of {known}"
+
+
 def compare_files(layout: Layout) -> dict[str, Any]:
-    """Return the result of `verify_dataset` for files that are at hand."""
+    """Compare the files at hand with the manifest, and the manifest with its seal: the one count of both commands.
+
+    Parameters
+    ----------
+    layout : of a dataset
+
+    Returns
+    -------
+    ``verified``; ``files`` that the record names, the manifest among them; how many of these are ``intact``;
+    ``damaged[]`` with ``path``, ``clip_id`` and ``damage``; ``unrecorded[]``, files in the folder that the manifest
+    does not know: among the data they are damage, elsewhere they are not.
+    """
     foreign = foreign_entries(layout.root)
     damaged: list[dict[str, str | None]] = [
         {"path": path, "clip_id": None, "damage": "a link, or no file"} for path in foreign
@@ -60,7 +113,7 @@ def compare_files(layout: Layout) -> dict[str, Any]:
     if fault is not None:
         # nothing that a changed manifest says of the other files can be relied on
         damaged.append({"path": "manifest.json", "clip_id": None, "damage": fault})
-        return {"verified": False, "files": 1, "damaged": damaged, "unrecorded": []}
+        return {"verified": False, "files": 1, "intact": 0, "damaged": damaged, "unrecorded": []}
     manifest = read_manifest(layout)
     recorded = recorded_files(manifest)
     present = {layout.relative(path) for path in layout.root.rglob("*") if path.is_file()}
@@ -71,9 +124,11 @@ def compare_files(layout: Layout) -> dict[str, Any]:
         for path in unrecorded
         if path.startswith(READ_AS_DATA) and path not in foreign
     ]
+    lost = {row["path"] for row in damaged} & {*recorded, "manifest.json"}
     return {
         "verified": not damaged,
         "files": len(recorded) + 1,
+        "intact": len(recorded) + 1 - len(lost),
         "damaged": damaged,
         "unrecorded": unrecorded,
     }

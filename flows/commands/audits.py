@@ -14,6 +14,9 @@ from flows.commands.command import (
 )
 
 GROUP = "Audits"
+KEY = define_option(
+    "key", str | None, "File with the signer's Ed25519 public key (PEM), to check the signature.", None
+)
 VERIFIED = require_key("verified")
 LAW_COLUMNS = ("label", "passed", "laws", "column", "tightest")
 
@@ -37,7 +40,8 @@ COMMANDS = (
         options=(
             DATASET,
             define_option("share", float, "Share of the clips to make again, 0 to 1.", 0.1),
-            OUT,
+            KEY,
+            define_option("out", str | None, "Folder for audit.html, audit.json and audit.txt.", None),
             *RUNNER,
         ),
         passed=VERIFIED,
@@ -50,12 +54,7 @@ COMMANDS = (
         function="flows.auditing.verify:verify_dataset",
         options=(
             DATASET,
-            define_option(
-                "key",
-                str | None,
-                "File with the signer's Ed25519 public key (PEM), to check the signature.",
-                None,
-            ),
+            KEY,
             OUT,
         ),
         passed=VERIFIED,
@@ -121,6 +120,19 @@ COMMANDS = (
             OUT,
         ),
         passed=require_key("agrees"),
+        output="sentences",
+    ),
+    Command(
+        name="lineage",
+        group=GROUP,
+        sentence="List the catalogue lines, works and measured runs that the numbers of a clip rest on, by column.",
+        function="flows.auditing.lineage:trace_lineage",
+        options=(
+            DATASET,
+            define_argument("clip", str, "Label or id of a clip."),
+            define_option("out", str | None, "Folder for lineage.json, lineage.csv and lineage.txt.", None),
+        ),
+        passed=require_key("follows"),
         output="sentences",
     ),
     Command(

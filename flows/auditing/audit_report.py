@@ -1,0 +1,120 @@
+"""The report of an audit: its sentence, its lines for people, and a page that can be filed by itself."""
+
+import base64
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from flows.auditing.verify import describe_files, describe_signature
+from flows.reading.report import PAGE as DATASET_PAGE
+from manifests.explain import ABSENT
+
+PAGE = Path(__file__).parent / "audit_page"
+
+
+def tell_verdict(result: Mapping[str, Any]) -> str:
+    """Return the verdict of an audit in one sentence.
+
+    Parameters
+    ----------
+    result : of `audit_dataset`
+    """
+    clips, same = result["remade"], sum(clip["as_recorded"] for clip in result["remade"])
+    if result["not_remade"]:
+        remade = "no clip could be made again"
+    elif not clips:
+        remade = "no clip was made again"
+    elif same == len(clips):
+        remade = f"{same} of {result['clips']} clips, made again, came out bit for bit as recorded"
+    else:
+        remade = (
+            f"of {len(clips)} clips made again {same} came out as recorded and {len(clips) - same} did not"
+        )
+    word = "Verified" if result["verified"] else "Not verified"
+    return f"{word}: {describe_files(result)}; {remade}; {describe_signature(result)}."
+
+
+def format_text(result: Mapping[str, Any]) -> str:
+    """The audit in lines for people.
+
+    Parameters
+    ----------
+    result : of `audit_dataset`
+    """
+    version, machine = result["tools_here"]["code"]["version"], result["machine"]["name"]
+    lines = [
+        result["verdict"],
+        f"{result['dataset']}, run {result['run_id']}, seal {result['seal']}",
+        f"audited {result['ended_utc']} by musync {version} on {machine}",
+        *(f"  {row['path']}: {row['damage']}" for row in result["damaged"]),
+        *(f"  none could be made: {problem}" for problem in result["not_remade"]),
+    ]
+    same = [clip["label"] for clip in result["remade"] if clip["as_recorded"]]
+    if same:
+        lines.append(f"made again as recorded: {', '.join(same)}")
+    for row in result["mismatches"]:
+        lines += [
+            f"made again otherwise: {row['label']} ({row['clip_id']}): {', '.join(row['changed'])}",
+            f"    first in {describe_place(row)}",
+            f"    can come from: {', '.join(row['why']) or 'no input that is recorded'}",
+        ]
+    lines.append(
+        "inputs and tools that differ:" if result["differences"] else "no recorded input or tool differs"
+    )
+    lines += [f"  {difference}" for difference in result["differences"]]
+    lines.append("verified" if result["verified"] else "not verified")
+    return "\n".join(lines) + "\n"
+
+
+def describe_place(row: Mapping[str, Any]) -> str:
+    """Return where a clip differs first, with both values.
+
+    Parameters
+    ----------
+    row : one of ``mismatches``
+    """
+    pixel = f", pixel {row['pixel'][0]} right and {row['pixel'][1]} down" if "pixel" in row else ""
+    values = f": {row['recorded']} recorded, {row['remade']} made again" if "recorded" in row else ""
+    return f"{row['stage']}, {row['channel']}, {row['counted_in']} {row['tick']}{pixel}{values}"
+
+
+def write_audit_page(result: Mapping[str, Any]) -> str:
+    """Return the page: one file without scripts that loads nothing.
+
+    Parameters
+    ----------
+    result : of `flows.auditing.audit.audit_dataset`
+    """
+    pages = Environment(loader=FileSystemLoader(PAGE), autoescape=True, undefined=StrictUndefined)
+    style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; style-src 'sha256-{digest}'; img-src data:; base-uri 'none'; form-action 'none'"
+    )
+    return pages.get_template("audit.html").render(
+        result=result,
+        tools=compare_tools(result["tools_recorded"], result["tools_here"]),
+        places=[describe_place(row) for row in result["mismatches"]],
+        style=style,
+        policy=policy,
+    )
+
+
+def compare_tools(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Return each fact about the tools by name: what made the dataset, and what audits it.
+
+    Parameters
+    ----------
+    recorded, here : ``tools_recorded`` and ``tools_here`` of an audit
+    """
+    rows = []
+    for part, title in (("code", "musync"), ("git", "source"), ("libraries", ""), ("processor", "processor")):
+        a, b = recorded[part] or {}, here[part] or {}
+        rows += [
+            (f"{title} {name}".strip().replace("_", " "), str(a.get(name, ABSENT)), str(b.get(name, ABSENT)))
+            for name in sorted(a.keys() | b.keys())
+        ]
+    return rows
