@@ -1,0 +1,97 @@
+"""Serve a schedule's flow from this process until it is stopped, and leave no run behind that only seems to go on."""
+
+import asyncio
+import logging
+import signal
+from multiprocessing import active_children
+from pathlib import Path
+from typing import Any, cast
+from uuid import UUID
+
+import httpx
+from prefect import Flow
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.filters import (
+    FlowRunFilter,
+    FlowRunFilterDeploymentId,
+    FlowRunFilterState,
+    FlowRunFilterStateType,
+)
+from prefect.client.schemas.objects import StateType
+from prefect.deployments.runner import EntrypointType
+from prefect.exceptions import PrefectException
+from prefect.runner import Runner
+from prefect.states import Cancelled
+
+AT_ONCE = 1
+"""Of two runs that fall due together the second waits: both would want the same processors."""
+STOP_S = 30.0
+"""For a run to close its workers."""
+UNDER_WAY = [StateType.PENDING, StateType.RUNNING, StateType.PAUSED, StateType.CANCELLING]
+
+
+class StoppableRunner(Runner):
+    """Prefect's runner, which stops on SIGTERM as it does on Ctrl-C."""
+
+    def handle_sigterm(self, *_: Any, **__: Any) -> None:
+        """Interrupt the event loop; Prefect 3.8 calls a coroutine here that nobody awaits, and exits at once."""
+        signal.raise_signal(signal.SIGINT)
+
+
+def serve_flow(flow: Flow[..., Any], every: str, parameters: dict[str, Any]) -> None:
+    """Register the flow with its schedule and run what falls due, one run at a time, until stopped.
+
+    Parameters
+    ----------
+    flow : with ``grid`` among its parameters
+    every : cron expression, UTC
+    parameters : of the flow
+    """
+    # Prefect cancels a connection of its own when it is stopped, and asyncio writes forty lines about that
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)
+    runner = StoppableRunner(name=f"musync-{Path(parameters['grid']).stem}", limit=AT_ONCE)
+    deployment = runner.add_flow(
+        flow,
+        name=runner.name,
+        cron=every,
+        parameters=parameters,
+        concurrency_limit=AT_ONCE,
+        entrypoint_type=EntrypointType.MODULE_PATH,
+    )
+    try:
+        asyncio.run(runner.start())
+    except KeyboardInterrupt:
+        pass  # it was asked to stop
+    finally:
+        _stop_runs()
+        cancel_runs(cast(UUID, deployment))  # Prefect's type is that of both its ways to call it
+
+
+def _stop_runs() -> None:
+    """Stop runs that are still going while the server still answers; this process would wait for them otherwise."""
+    running = active_children()
+    for run in running:
+        run.terminate()
+    for run in running:
+        run.join(STOP_S)
+        run.kill()
+
+
+def cancel_runs(deployment: UUID) -> None:
+    """Mark what the server still takes for under way as cancelled: its process is no more, or never began.
+
+    Parameters
+    ----------
+    deployment : whose runs
+    """
+    under_way = FlowRunFilter(
+        deployment_id=FlowRunFilterDeploymentId(any_=[deployment]),
+        state=FlowRunFilterState(type=FlowRunFilterStateType(any_=UNDER_WAY)),
+    )
+    message = "the schedule was stopped; committed clips are kept, and its next run makes what is missing"
+    try:
+        with get_client(sync_client=True) as client:
+            for run in client.read_flow_runs(flow_run_filter=under_way):
+                client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
+    except (httpx.HTTPError, PrefectException):
+        logging.getLogger(__name__).warning("the server could not be told that the schedule was stopped")
