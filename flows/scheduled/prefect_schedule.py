@@ -62,13 +62,14 @@ make_dataset = task(
 
 def _name_run() -> str:
     """Grid, clips and time of a run; a faulty grid has no number of clips, and fails later with its faults."""
-    grid = flow_run.parameters["grid"]
+    asked = flow_run.parameters["grid"]
     try:
-        clips = f"{len(load_grid(grid).scenarios)} clips, "
+        grid = load_grid(asked)
+        what = f"{grid.settings.name}, {len(grid.scenarios)} clips"
     except InputError:
-        clips = ""
+        what = Path(asked).stem
     at = flow_run.scheduled_start_time or datetime.now(UTC)
-    return f"{Path(grid).stem}, {clips}{at.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
+    return f"{what}, {at.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
 
 
 def _report_crash(flow: Any, flow_run: Any, state: Any) -> None:

@@ -1,6 +1,7 @@
 """A Prefect server for the length of a schedule, where no other one is named."""
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -25,6 +26,8 @@ def prefect_api() -> Iterator[None]:
     os.environ["PREFECT_API_URL"] = f"http://127.0.0.1:{port}/api"
     from flows import prefect_flows  # noqa: F401  (quiets Prefect and puts its home into the project)
 
+    # until the runner takes over, and after it: a process that just ended would leave its server behind
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     command = [sys.executable, "-m", "prefect", "server", "start", "--host", "127.0.0.1", "--port", str(port)]
     server = subprocess.Popen(
         command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL

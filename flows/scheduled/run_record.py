@@ -11,7 +11,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from pydantic import TypeAdapter
 
@@ -162,7 +161,7 @@ def read_record(content: bytes | None, place: object) -> RunRecord | None:
         value = parse_json(content, place, "record of a run")
         if not isinstance(value, dict) or value.pop("format", None) != FORMAT:
             return None
-        record = TypeAdapter(RunRecord).validate_python(value, strict=True)
+        record = TypeAdapter(RunRecord).validate_python(value)
         for time_of in (record.scheduled, record.began, record.updated):
             datetime.fromisoformat(time_of)
     except (InputError, ValueError):  # pydantic's ValidationError is a ValueError

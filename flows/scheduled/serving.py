@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import signal
 from multiprocessing import active_children
 from pathlib import Path
 from typing import Any, cast
@@ -31,11 +30,19 @@ UNDER_WAY = [StateType.PENDING, StateType.RUNNING, StateType.PAUSED, StateType.C
 
 
 class StoppableRunner(Runner):
-    """Prefect's runner, which stops on SIGTERM as it does on Ctrl-C."""
+    """Prefect's runner, which a SIGTERM cancels: Prefect 3.8's own handler calls a coroutine that nobody awaits."""
+
+    main: "asyncio.Task[Any] | None" = None
+
+    async def run(self) -> None:
+        """Serve until this task is cancelled."""
+        self.main = asyncio.current_task()
+        await self.start()
 
     def handle_sigterm(self, *_: Any, **__: Any) -> None:
-        """Interrupt the event loop; Prefect 3.8 calls a coroutine here that nobody awaits, and exits at once."""
-        signal.raise_signal(signal.SIGINT)
+        """Cancel the task, wherever in the event loop it is."""
+        if self.main is not None and not self.main.get_loop().is_closed():
+            self.main.get_loop().call_soon_threadsafe(self.main.cancel)
 
 
 def serve_flow(flow: Flow[..., Any], every: str, parameters: dict[str, Any]) -> None:
@@ -59,8 +66,8 @@ def serve_flow(flow: Flow[..., Any], every: str, parameters: dict[str, Any]) -> 
         entrypoint_type=EntrypointType.MODULE_PATH,
     )
     try:
-        asyncio.run(runner.start())
-    except KeyboardInterrupt:
+        asyncio.run(runner.run())
+    except (KeyboardInterrupt, asyncio.CancelledError):
         pass  # it was asked to stop
     finally:
         _stop_runs()
