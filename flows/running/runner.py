@@ -109,7 +109,7 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
             Client(cluster) as client,
         ):
             share_gpus(client)
-            _tell_dashboard(client)
+            tell_dashboard(client)
             yield client
         return
     try:
@@ -126,11 +126,11 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
         share_gpus(client)
         if warm is not None:
             warm_cluster(client, warm, scheduler)
-        _tell_dashboard(client)
+        tell_dashboard(client)
         yield client
 
 
-def _tell_dashboard(client: Any) -> None:
+def tell_dashboard(client: Any) -> None:
     """Print where Dask's dashboard is; without bokeh its pages say no more than that bokeh is missing."""
     if find_spec("bokeh") is not None:
         print_lines(f"Dask's dashboard: {client.dashboard_link}", error=True)

@@ -13,7 +13,6 @@ from flows.store.layout import Layout
 from flows.store.lease import LOCK, hold_lease
 from flows.store.lock import sole_writer
 from flows.store.objects import Objects, is_address
-from flows.store.staging import remove_staging
 from tasks.errors import InputError
 
 REMOVED = ".removed-"
@@ -43,8 +42,12 @@ def remove_oldest(grid: str, root: str, keep: int) -> tuple[list[str], list[str]
     )
     removed: list[str] = []
     used: list[str] = []
-    for name in sorted(find(root, grid))[:-keep]:
-        (removed if remove(root, name) else used).append(name)
+    oldest = sorted(find(root, grid))[:-keep]
+    open_now = list_open_paths() if oldest and not is_address(root) else set()
+    for name in oldest:
+        inside = f"{Path(root).resolve() / name}/"
+        is_read = any(path.startswith(inside) for path in open_now)
+        (removed if not is_read and remove(root, name) else used).append(name)
     return removed, used
 
 
@@ -84,9 +87,6 @@ def _remove_folder(root: str, name: str) -> bool:
     gone = folder.with_name(f"{REMOVED}{name}")
     try:
         with sole_writer(Layout(folder)):
-            if _is_open(folder):
-                remove_staging(Layout(folder))
-                return False
             folder.rename(gone)  # at once, so that nobody meets a half of it
     except (InputError, OSError):
         return False
@@ -109,13 +109,10 @@ def _remove_objects(root: str, name: str) -> bool:
     return True
 
 
-def _is_open(folder: Path) -> bool:
-    """Whether a process has a file of a folder open or mapped, or works in it; the lock that we hold is none."""
-    inside = f"{folder.resolve()}/"
+def list_open_paths() -> set[str]:
+    """Files that processes of this machine have open, and folders in which they work, as far as we may look."""
+    found: set[str] = set()
     for process in psutil.process_iter():
         with suppress(psutil.Error, OSError):
-            held = {f"{process.cwd()}/", *(entry.path for entry in process.open_files())}
-            held |= {entry.path for entry in process.memory_maps(grouped=True)}
-            if any(path.startswith(inside) for path in held - {f"{inside}.staging/lock"}):
-                return True
-    return False
+            found |= {f"{process.cwd()}/", *(entry.path for entry in process.open_files())}
+    return found

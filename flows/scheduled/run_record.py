@@ -135,7 +135,7 @@ def keep_record(grid: str, root: str, dataset: str, at: datetime) -> Iterator[Ru
         with watch_progress(place.note_progress):
             yield record
     except BaseException as error:
-        record.error = f"{type(error).__name__}: {error}"
+        record.error = f"{type(error).__name__}: {error}".removesuffix(": ")
         raise
     finally:
         record.ended = format_now()

@@ -26,23 +26,34 @@ AT_ONCE = 1
 """Of two runs that fall due together the second waits: both would want the same processors."""
 STOP_S = 30.0
 """For a run to close its workers."""
+LOOK_S = 0.5
 UNDER_WAY = [StateType.PENDING, StateType.RUNNING, StateType.PAUSED, StateType.CANCELLING]
 
 
 class StoppableRunner(Runner):
-    """Prefect's runner, which a SIGTERM cancels: Prefect 3.8's own handler calls a coroutine that nobody awaits."""
+    """Prefect's runner, which a SIGTERM stops: Prefect 3.8's own handler calls a coroutine that nobody awaits."""
 
-    main: "asyncio.Task[Any] | None" = None
+    _main: "asyncio.Task[Any] | None" = None
+    _asked: frozenset[int] = frozenset()
 
     async def run(self) -> None:
-        """Serve until this task is cancelled."""
-        self.main = asyncio.current_task()
+        """Serve until a SIGTERM, or until the task is cancelled."""
+        self._main = asyncio.current_task()
         await self.start()
 
     def handle_sigterm(self, *_: Any, **__: Any) -> None:
-        """Cancel the task, wherever in the event loop it is."""
-        if self.main is not None and not self.main.get_loop().is_closed():
-            self.main.get_loop().call_soon_threadsafe(self.main.cancel)
+        """End the runs and the polling, wherever in the event loop this finds them."""
+        if self._main is not None and not self._main.get_loop().is_closed():
+            self._main.get_loop().call_soon_threadsafe(self._end_runs, self._main.get_loop())
+            self._main.get_loop().call_soon_threadsafe(self._main.cancel)
+
+    def _end_runs(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Ask each run once to end: the runner waits for them, and for one that it is just starting too."""
+        running = {process.pid: process for process in active_children() if process.pid is not None}
+        for pid in running.keys() - self._asked:
+            running[pid].terminate()
+        self._asked |= running.keys()
+        loop.call_later(LOOK_S, self._end_runs, loop)
 
 
 def serve_flow(flow: Flow[..., Any], every: str, parameters: dict[str, Any]) -> None:

@@ -10,12 +10,12 @@ from flows.scheduled.run_record import FORMAT, record_name
 from flows.store.layout import Layout
 from flows.store.lock import sole_writer
 
-NAMES = [f"toy-2026030{day}T030000Z" for day in range(1, 5)]
+NAMES = [f"toy-2026030{day}T030000Z" for day in range(1, 6)]
 
 
 @pytest.fixture
 def root(toy_dataset, tmp_path):
-    """Four datasets with the records that a schedule wrote of them, in a bucket's folder."""
+    """Five datasets with the records that a schedule wrote of them, in a bucket's folder."""
     root = tmp_path / "data" / "nightly"
     run_id = json.loads(toy_dataset.manifest.read_text())["run_id"]
     times = dict.fromkeys(("scheduled", "began", "updated"), "2026-03-01T03:00:00+00:00")
@@ -34,9 +34,9 @@ def left(root) -> list[str]:
 
 
 def test_the_oldest_beyond_the_number_go_with_their_records(root):
-    assert remove_oldest("toy", str(root), 3) == (NAMES[:1], [])
+    assert remove_oldest("toy", str(root), 4) == (NAMES[:1], [])
     assert left(root) == NAMES[1:] and not (root / record_name(NAMES[0])).exists()
-    assert remove_oldest("toy", str(root), 3) == ([], [])
+    assert remove_oldest("toy", str(root), 4) == ([], [])
 
 
 def test_what_the_schedule_did_not_make_or_did_not_finish_stays(root, tmp_path):
@@ -56,16 +56,16 @@ def test_what_the_schedule_did_not_make_or_did_not_finish_stays(root, tmp_path):
 
 def test_a_dataset_that_is_written_or_read_stays_until_the_next_time(root):
     with sole_writer(Layout(root / NAMES[0])), (root / NAMES[1] / "plan.json").open():
-        assert remove_oldest("toy", str(root), 1) == ([NAMES[2]], NAMES[:2])
-    assert left(root) == [*NAMES[:2], NAMES[3]]
-    assert not (root / NAMES[1] / ".staging").exists(), "the lock of a dataset that stays goes again"
+        assert remove_oldest("toy", str(root), 1) == (NAMES[2:4], NAMES[:2])
+    assert left(root) == [*NAMES[:2], NAMES[4]]
+    assert not (root / NAMES[1] / ".staging").exists(), "nothing is written into a dataset that is read"
     assert remove_oldest("toy", str(root), 1) == (NAMES[:2], [])
 
 
 def test_what_a_killed_removal_has_left_goes_the_next_time(root):
     (root / NAMES[0]).rename(root / f".removed-{NAMES[0]}")
     (root / ".removed-letters").mkdir()
-    remove_oldest("toy", str(root), 4)
+    remove_oldest("toy", str(root), 5)
     assert left(root) == [".removed-letters", *NAMES[1:]]
 
 
@@ -80,7 +80,7 @@ def test_in_a_store_objects_go_and_the_manifest_last(root, tmp_path, monkeypatch
     monkeypatch.setattr("obstore.delete", lambda store, names: (gone.extend(names), remove(store, names)))
     (root / NAMES[0] / ".staging").mkdir()
     (root / NAMES[0] / ".staging" / "clip.json").write_text("{}")
-    assert remove_oldest("toy", "s3://data/nightly", 3) == (NAMES[:1], [])
+    assert remove_oldest("toy", "s3://data/nightly", 4) == (NAMES[:1], [])
     assert gone == [
         "plan.json",
         ".staging/clip.json",
