@@ -4,6 +4,7 @@ import asyncio
 import logging
 from multiprocessing import active_children
 from pathlib import Path
+from time import monotonic
 from typing import Any, cast
 from uuid import UUID
 
@@ -34,7 +35,10 @@ class StoppableRunner(Runner):
     """Prefect's runner, which a SIGTERM stops: Prefect 3.8's own handler calls a coroutine that nobody awaits."""
 
     _main: "asyncio.Task[Any] | None" = None
-    _asked: frozenset[int] = frozenset()
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._asked: dict[int, float] = {}
 
     async def run(self) -> None:
         """Serve until a SIGTERM, or until the task is cancelled."""
@@ -49,10 +53,12 @@ class StoppableRunner(Runner):
 
     def _end_runs(self, loop: asyncio.AbstractEventLoop) -> None:
         """Ask each run once to end: the runner waits for them, and for one that it is just starting too."""
-        running = {process.pid: process for process in active_children() if process.pid is not None}
-        for pid in running.keys() - self._asked:
-            running[pid].terminate()
-        self._asked |= running.keys()
+        for run in active_children():
+            if run.pid is not None and run.pid not in self._asked:
+                self._asked[run.pid] = monotonic()
+                run.terminate()
+            elif run.pid is not None and monotonic() - self._asked[run.pid] > STOP_S:
+                run.kill()
         loop.call_later(LOOK_S, self._end_runs, loop)
 
 
