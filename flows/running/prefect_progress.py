@@ -36,9 +36,8 @@ class RunProgress:
             return
         line = escape_controls(f"{title} {done}/{total} {name}".rstrip())
         (get_run_logger().warning if failed else get_run_logger().info)(line)
-        if (
-            failed and not edge
-        ):  # of ten thousand failures each gets its row, and not a call of the server too
+        # of ten thousand failures each gets its row, and not a call of the server too
+        if failed and not edge:
             return
         self._told = time.monotonic()
         if done == 0:

@@ -115,11 +115,20 @@ def scheduled(
     _show_result(result)
     tell("done", {"dataset": dataset, "verdict": verdict})
     if keep is not None:
-        removed, used = remove_oldest(Path(dataset).name.rpartition("-")[0], root, keep)
-        log.info("removed %d of the oldest datasets: %s", len(removed), ", ".join(removed) or "none")
-        if used:
-            log.warning("in use, kept until the next run: %s", ", ".join(used))
+        _remove_oldest(Path(dataset).name.rpartition("-")[0], root, keep)
     return dataset
+
+
+def _remove_oldest(grid: str, root: str, keep: int) -> None:
+    log = get_run_logger()
+    try:
+        removed, used = remove_oldest(grid, root, keep)
+    except (InputError, OSError) as error:  # the dataset is made all the same
+        log.warning("the oldest datasets could not be removed: %s", error)
+        return
+    log.info("removed %d of the oldest datasets: %s", len(removed), ", ".join(removed) or "none")
+    if used:
+        log.warning("in use, kept until the next run: %s", ", ".join(used))
 
 
 def _show_result(result: dict[str, Any]) -> None:

@@ -63,7 +63,7 @@ def scheduled_flows():
     prefect_schedule.make_dataset.retry_delay_seconds = [0.1, 0.1, 0.1]
     options = {"grid": "grid.yaml", "root": "root", "runner": "threads", "workers": 1, "notify": "./hook.sh"}
     scheduling.generate_dataset = unlucky_twice
-    dataset = prefect_schedule.scheduled(**options)
+    dataset = prefect_schedule.scheduled(**options, keep=1)
     scheduling.generate_dataset = wrong
     state = prefect_schedule.scheduled(**options | {"root": "bad"}, return_state=True)
     run = SimpleNamespace(parameters=options | {"root": "killed"}, expected_start_time=datetime.now(UTC))
@@ -192,7 +192,14 @@ def test_a_run_has_rows_in_the_log_a_progress_and_a_name_that_says_what_it_is(ru
         for word in ("begins", "end")
     ]
     rows = "\n".join(runs["rows"])
-    for row in [*stages, "clips 0/4", "clips 4/4", "verdict: 4 clips, 4 made now, ", "no such street"]:
+    for row in [
+        *stages,
+        "clips 0/4",
+        "clips 4/4",
+        "verdict: 4 clips, 4 made now, ",
+        "removed 0 of the oldest datasets",
+        "no such street",
+    ]:
         assert row in rows, row
     assert scheduled["artifacts"]["musync-progress"][1] == 100.0
     assert [
