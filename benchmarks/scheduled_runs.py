@@ -8,6 +8,7 @@ import json
 import os
 import re
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -28,7 +29,7 @@ axes:
 """
 PATIENCE_S = 400
 FIRES = 2
-ARTIFACTS = {"musync-verdicts", "musync-dataset", "musync-contact-sheet"}
+ARTIFACTS = {"musync-verdicts", "musync-dataset", "musync-contact-sheet", "musync-progress"}
 
 
 def main() -> int:
@@ -69,7 +70,13 @@ def main() -> int:
         print(f"artifacts: {', '.join(sorted(shown))}")
         print(f"stopped in the middle of another: {begun > len(finished)}; reports: {_count_reports(place)}")
         print(f"processes left: {len(left)} {left}")
-        return 0 if len(finished) >= FIRES and shown == ARTIFACTS and not left else 1
+        seeming = _runs_that_seem_to_go_on(place)
+        print(f"runs that the database takes for under way: {seeming}")
+        quiet = "never awaited" not in (place / "log").read_text()
+        print(f"stopped without a warning: {quiet}")
+        return (
+            0 if len(finished) >= FIRES and shown == ARTIFACTS and not left and not seeming and quiet else 1
+        )
 
 
 def _list_artifacts(log: str) -> set[str]:
@@ -81,6 +88,13 @@ def _list_artifacts(log: str) -> set[str]:
     )
     with urllib.request.urlopen(request, timeout=30) as answer:
         return {artifact["key"] for artifact in json.load(answer)}
+
+
+def _runs_that_seem_to_go_on(place: Path) -> list[str]:
+    with sqlite3.connect(place / ".musync" / "prefect" / "prefect.db") as database:
+        rows = database.execute("SELECT name || ' ' || state_name FROM flow_run WHERE state_type IN (?, ?, ?)",
+                                ("PENDING", "RUNNING", "CANCELLING"))  # fmt: skip
+        return [name for (name,) in rows]
 
 
 def _count_reports(place: Path) -> int:

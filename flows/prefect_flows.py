@@ -7,14 +7,16 @@ Results are never persisted by Prefect: receipts and hashes on disk decide what 
 
 import os
 from collections.abc import Callable
+from datetime import UTC, datetime
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
 QUIET_AND_LOCAL = {
     "DO_NOT_TRACK": "1",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
-    "PREFECT_LOGGING_LEVEL": "WARNING",
-    # the command says in a sentence why a run ended; the traceback is in the run's log on the server
+    # rows of a run's log on the server; on the terminal the command says in a sentence why a run ended
+    "PREFECT_LOGGING_LEVEL": "INFO",
     "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",
     "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
     "PREFECT_HOME": str(Path.cwd() / ".musync" / "prefect"),
@@ -25,27 +27,51 @@ for _name, _value in QUIET_AND_LOCAL.items():
 Path(os.environ["PREFECT_HOME"]).mkdir(parents=True, exist_ok=True)
 
 from prefect import flow  # noqa: E402  (reads the environment when it is imported)
+from prefect.logging import get_run_logger  # noqa: E402
+from prefect.runtime import flow_run  # noqa: E402
 
+from flows.commands.command import pass_always  # noqa: E402
 from flows.registry import COMMANDS, flow_name, import_function  # noqa: E402
+from flows.running.prefect_progress import RunProgress  # noqa: E402
+from flows.running.progress import watch_progress  # noqa: E402
 
 
-def make_flow(function: Callable[..., Any], name: str) -> Any:
-    """Return the Prefect flow of a function.
+def make_flow(function: Callable[..., Any], name: str, passed: Callable[[Any], bool] | None = None) -> Any:
+    """Return the Prefect flow of a function, whose runs are named by what they are given and when.
 
     Parameters
     ----------
     function : which
     name : of the command, to which the flow's name adds ``musync-``
+    passed : whether a result passes the command's check, for the run's log
     """
+
+    @wraps(function)
+    def run(*args: Any, **kwargs: Any) -> Any:
+        with watch_progress(RunProgress()):
+            result = function(*args, **kwargs)
+        if passed is not None:
+            get_run_logger().info("verdict: %s", "passed" if passed(result) else "the check failed")
+        return result
+
+    def name_run() -> str:
+        given = next((str(value) for value in flow_run.parameters.values() if value is not None), "")
+        return f"{name} {Path(given).name}, {datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC"
+
     description = (function.__doc__ or "").split("\n")[0]
-    return flow(name=f"musync-{name}", persist_result=False, description=description)(function)
+    made = flow(name=f"musync-{name}", flow_run_name=name_run, persist_result=False, description=description)
+    return made(run)
 
 
 def __getattr__(name: str) -> Any:
     """Return the flow of a command by the name of its Python form, such as ``audit_physics``."""
     for command in COMMANDS:
         if command.is_flow and flow_name(command) == name:
-            made = make_flow(import_function(command), name.replace("_", "-"))
+            made = make_flow(
+                import_function(command),
+                name.replace("_", "-"),
+                None if command.passed is pass_always else command.passed,
+            )
             globals()[name] = made
             return made
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -112,10 +112,40 @@ COMMANDS = (
             ),
             *RUNNER,
             define_option(
-                "notify", str | None, "Command or http(s) address that is called when a run fails.", None
+                "notify",
+                str | None,
+                "Who is told of runs: a command, an http(s) address, an Apprise address (mailto://, slack://, ...), or"
+                " env:NAME of a variable that holds one.",
+                None,
+            ),
+            define_option(
+                "notify_on",
+                str,
+                "Runs that are told of, with commas between: failed, late, done.",
+                "failed,late",
+            ),
+            define_option(
+                "keep",
+                int | None,
+                "Remove this schedule's oldest finished datasets beyond this number; by default all stay.",
+                None,
+                minimum=1,
             ),
         ),
         output="nothing",
+        is_flow=False,
+    ),
+    Command(
+        name="status",
+        group=GROUP,
+        sentence="Say what runs in a dataset or a schedule's folder, how far it is, how long yet, and what failed.",
+        function="flows.scheduled.status:report_status",
+        options=(
+            define_argument(
+                "out", str, "Dataset, or folder of a schedule; a folder or s3:// address.", in_store=True
+            ),
+        ),
+        output="sentences",
         is_flow=False,
     ),
     Command(

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable
 from functools import wraps
+from time import perf_counter
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -22,10 +23,16 @@ def run_as_stage(function: Callable[P, R]) -> Callable[P, R]:
             from prefect import task
             from prefect.cache_policies import NO_CACHE
             from prefect.context import FlowRunContext
+            from prefect.logging import get_run_logger
 
             if FlowRunContext.get() is not None:
                 # results stay in memory and arguments are not hashed: receipts and files are our record
-                return task(persist_result=False, cache_policy=NO_CACHE)(function)(*args, **kwargs)
+                stage = task(persist_result=False, cache_policy=NO_CACHE)(function)
+                log, started = get_run_logger(), perf_counter()
+                log.info("stage %s begins", function.__name__)
+                result = stage(*args, **kwargs)
+                log.info("stage %s ended after %.1f s", function.__name__, perf_counter() - started)
+                return result
         return function(*args, **kwargs)
 
     return run

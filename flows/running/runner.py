@@ -5,12 +5,14 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from importlib.util import find_spec
 from itertools import islice
 from multiprocessing import get_context, parent_process
 from queue import SimpleQueue
 from threading import Thread
 from typing import Any, Literal
 
+from flows.running.terminal import print_lines
 from tasks.errors import InputError
 
 RunnerName = Literal["threads", "processes", "dask"]
@@ -107,6 +109,7 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
             Client(cluster) as client,
         ):
             share_gpus(client)
+            tell_dashboard(client)
             yield client
         return
     try:
@@ -123,7 +126,14 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
         share_gpus(client)
         if warm is not None:
             warm_cluster(client, warm, scheduler)
+        tell_dashboard(client)
         yield client
+
+
+def tell_dashboard(client: Any) -> None:
+    """Print where Dask's dashboard is; without bokeh its pages say no more than that bokeh is missing."""
+    if find_spec("bokeh") is not None:
+        print_lines(f"Dask's dashboard: {client.dashboard_link}", error=True)
 
 
 def choose_runner(asked: RunnerChoice, pictures: bool, scheduler: str | None = None) -> RunnerName:

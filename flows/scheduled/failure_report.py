@@ -1,54 +1,75 @@
-"""Report a scheduled run that failed: in a file, and to a command or a webhook."""
+"""Report a scheduled run that failed, is late or has ended: in a file, and to whoever wants to be told."""
 
-import json
-import shlex
 import subprocess
-import urllib.request
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
 from flows.running.terminal import escape_controls
+from flows.scheduled.notification import WHEN_NONE_IS_NAMED, NotTold, send_notice
+from flows.scheduled.run_record import LOCAL
 from flows.store.objects import Objects, is_address
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
 
-NOTIFY_TIMEOUT_S = 60.0
 REPORTS = "reports"
-LOCAL = Path(".musync")
-"""Under the working folder: where reports lie of a schedule that writes to an object store."""
+WHAT = {
+    "failed": "a scheduled run failed",
+    "late": "a scheduled run is late",
+    "done": "a scheduled run has made its dataset",
+}
 
 
 def report_failure(grid: str, root: str, at: datetime, error: BaseException, notify: str | None) -> Path:
-    """Write a report of a failed run, and call the notification hook; return the report's path.
-
-    Under an address in an object store the report is an object too, and the file lies under the working folder.
+    """Write a report of a failed run, and send the notification; return the report's path.
 
     Parameters
     ----------
     grid, root, at : of the run
     error : what ended it
-    notify : shell-like command, which gets the report's path as its last argument, or an http(s) address, which
-        gets JSON; a hook that fails is noted in the report
+    notify : as of `flows.scheduled.notification.send_notice`; None tells nobody
     """
-    name = f"{REPORTS}/{format_stamp(at)}.txt"
-    place = Outputs((LOCAL if is_address(root) else Path(root)).resolve(), "schedule", name)
     facts = {
-        "what": "a scheduled muSync run failed",
-        "grid": grid,
-        "root": root,
-        "scheduled": at.astimezone(UTC).isoformat(),
         "error": f"{type(error).__name__}: {error}",
         "next": "committed clips are kept; the next run of the schedule makes what is missing",
     }
+    return report_run("failed", grid, root, at, facts, notify)
+
+
+def report_run(
+    event: str, grid: str, root: str, at: datetime, further: Mapping[str, str], notify: str | None
+) -> Path:
+    """Write a report of a run, and send the notification; return the report's path.
+
+    Under an address in an object store the report is an object too, and the file lies under the working folder.
+
+    Parameters
+    ----------
+    event : of `flows.scheduled.notification.EVENTS`
+    grid, root, at : of the run
+    further : what is to be said of it
+    notify : as of `flows.scheduled.notification.send_notice`; None tells nobody. What cannot be sent is noted in the
+        report
+    """
+    name = report_name(at, event)
+    place = Outputs((LOCAL if is_address(root) else Path(root)).resolve(), "schedule", name)
+    facts = {
+        "what": WHAT[event],
+        "grid": grid,
+        "root": root,
+        "scheduled": at.astimezone(UTC).isoformat(),
+        **further,
+    }
     # what failed may say anything, but a line of its own it does not get
-    text = "".join(f"{key}: {escape_controls(value)}\n" for key, value in facts.items())
+    facts = {key: escape_controls(value) for key, value in facts.items()}
+    text = "".join(f"{key}: {value}\n" for key, value in facts.items())
     place.write(name, text)
     path = place.path(name)
     if notify is not None:
         try:
-            _call_hook(notify, path, facts)
-        except (OSError, subprocess.SubprocessError) as fault:
-            text += escape_controls(f"notification {notify} failed: {fault}") + "\n"
+            send_notice(notify, event, facts, path)
+        except (NotTold, OSError, subprocess.SubprocessError) as fault:
+            text += escape_controls(f"notification {_without_secrets(notify)} failed: {fault}") + "\n"
             place.write(name, text)
     if is_address(root):
         try:
@@ -58,19 +79,19 @@ def report_failure(grid: str, root: str, at: datetime, error: BaseException, not
     return path
 
 
-def _call_hook(notify: str, report: Path, facts: dict[str, str]) -> None:
-    if is_webhook(notify):
-        body = json.dumps(facts | {"report": str(report)}).encode()
-        # S310: is_webhook lets http and https alone through
-        request = urllib.request.Request(notify, body, {"Content-Type": "application/json"})  # noqa: S310
-        urllib.request.urlopen(request, timeout=NOTIFY_TIMEOUT_S).close()  # noqa: S310
-    else:
-        subprocess.run([*shlex.split(notify), str(report)], check=True, timeout=NOTIFY_TIMEOUT_S)
+def wants(event: str, notify_on: str = WHEN_NONE_IS_NAMED) -> bool:
+    """Whether a schedule tells of an event, by the value of ``--notify-on``."""
+    return event in (word.strip() for word in notify_on.split(","))
 
 
-def is_webhook(notify: str) -> bool:
-    """Whether a hook is an address that is posted to, and not a command."""
-    return notify.startswith(("http://", "https://"))
+def report_name(at: datetime, event: str = "failed") -> str:
+    """Name of a report below the schedule's folder; that of a failure is the run's time alone."""
+    return f"{REPORTS}/{format_stamp(at)}{'' if event == 'failed' else f'-{event}'}.txt"
+
+
+def _without_secrets(notify: str) -> str:
+    scheme, found, _ = notify.partition("://")
+    return f"by {scheme}://..." if found and " " not in scheme else notify
 
 
 def format_stamp(at: datetime) -> str:

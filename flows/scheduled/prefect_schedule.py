@@ -1,32 +1,48 @@
-"""The scheduled run as a Prefect flow: retries with back-off, verdicts and contact sheet as artifacts."""
+"""The scheduled run as a Prefect flow: named, logged, tried again; verdicts and contact sheet as artifacts."""
 
-import logging
+import base64
 from datetime import UTC, datetime
-from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
+from uuid import UUID
+
+import cv2
 
 from flows import prefect_flows  # noqa: F401  (first: it sets what Prefect reads when it is imported)
 
 # isort: split
-from prefect import flow, task
+from prefect import flow, get_run_logger, task
 from prefect.artifacts import create_image_artifact, create_link_artifact, create_table_artifact
 from prefect.cache_policies import NO_CACHE
-from prefect.deployments.runner import EntrypointType
-from prefect.runtime import flow_run
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.filters import (
+    FlowRunFilter,
+    FlowRunFilterDeploymentId,
+    FlowRunFilterState,
+    FlowRunFilterStateType,
+)
+from prefect.client.schemas.objects import StateType
+from prefect.client.schemas.sorting import FlowRunSort
+from prefect.runtime import deployment, flow_run
 from prefect.tasks import exponential_backoff
 
+from catalogs.grids import load_grid
+from flows.running.prefect_progress import RunProgress
+from flows.running.progress import watch_progress
 from flows.running.runner import RunnerName
-from flows.scheduled.failure_report import report_failure
-from flows.scheduled.scheduling import scheduled_run
+from flows.scheduled.failure_report import report_failure, report_run, wants
+from flows.scheduled.lateness import watch_lateness
+from flows.scheduled.notification import WHEN_NONE_IS_NAMED
+from flows.scheduled.retention import remove_oldest
+from flows.scheduled.scheduling import recorded_run
+from flows.scheduled.serving import serve_flow
 from flows.store.objects import is_address
 from tasks.errors import InputError
 
 RETRIES = 3
 FIRST_DELAY_S = 10
-AT_ONCE = 1
-STOP_S = 30.0
-"""For a run to close its workers."""
+SHEET_PX, SHEET_QUALITY = 1000, 75
+"""Longer side of the contact sheet that Prefect keeps [px], and its JPEG quality [1 to 100]."""
 
 
 def _worth_trying_again(_task: Any, _run: Any, state: Any) -> bool:
@@ -41,17 +57,30 @@ make_dataset = task(
     retry_condition_fn=_worth_trying_again,
     persist_result=False,
     cache_policy=NO_CACHE,
-)(scheduled_run)
+)(recorded_run)
+
+
+def _name_run() -> str:
+    """Grid, clips and time of a run; a faulty grid has no number of clips, and fails later with its faults."""
+    asked = flow_run.parameters["grid"]
+    try:
+        grid = load_grid(asked)
+        what = f"{grid.settings.name}, {len(grid.scenarios)} clips"
+    except InputError:
+        what = Path(asked).stem
+    at = flow_run.scheduled_start_time or datetime.now(UTC)
+    return f"{what}, {at.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
 
 
 def _report_crash(flow: Any, flow_run: Any, state: Any) -> None:
     """A run whose process was killed cannot report by itself: whoever started it does."""
     asked = flow_run.parameters
     at = flow_run.expected_start_time or datetime.now(UTC)
-    report_failure(asked["grid"], asked["root"], at, RuntimeError(state.message), asked.get("notify"))
+    notify = asked.get("notify") if wants("failed", asked.get("notify_on") or WHEN_NONE_IS_NAMED) else None
+    report_failure(asked["grid"], asked["root"], at, RuntimeError(state.message), notify)
 
 
-@flow(name="musync-scheduled", persist_result=False, on_crashed=[_report_crash])
+@flow(name="musync-scheduled", flow_run_name=_name_run, persist_result=False, on_crashed=[_report_crash])
 def scheduled(
     grid: str,
     root: str,
@@ -59,53 +88,84 @@ def scheduled(
     workers: int | None = None,
     scheduler: str | None = None,
     notify: str | None = None,
+    notify_on: str = WHEN_NONE_IS_NAMED,
+    keep: int | None = None,
 ) -> str:
     """Make one dated dataset of a grid, or finish an unfinished one; returns where it lies."""
     at = flow_run.scheduled_start_time or datetime.now(UTC)
+    log = get_run_logger()
+
+    def tell(event: str, facts: dict[str, str]) -> None:
+        if notify is not None and wants(event, notify_on):
+            report_run(event, grid, root, at, facts, notify)
+
     try:
-        result = make_dataset(grid, root, at=at, runner=runner, workers=workers, scheduler=scheduler)
+        with (
+            watch_progress(RunProgress()),
+            watch_lateness(at, _next_time(), lambda sentence: tell("late", {"why": sentence})),
+        ):
+            result = make_dataset(grid, root, at=at, runner=runner, workers=workers, scheduler=scheduler)
     except Exception as error:
-        report_failure(grid, root, at, error, notify)
+        report_failure(grid, root, at, error, notify if wants("failed", notify_on) else None)
         raise
     dataset: str = result["dataset"]
-    link = dataset if is_address(dataset) else Path(dataset).as_uri()
-    create_table_artifact(key="musync-verdicts", table=result["verdicts"], description=dataset)
-    create_link_artifact(key="musync-dataset", link=link, link_text=dataset)
-    if Path(result["contact_sheet"]).is_file():
-        create_image_artifact(key="musync-contact-sheet", image_url=Path(result["contact_sheet"]).as_uri())
+    wrong = [row["clip"] for row in result["verdicts"] if row["passed"] is False]
+    verdict = f"{result['clips']} clips, {result['made']} made now, {len(wrong)} in quarantine"
+    log.info("verdict: %s%s", verdict, f" ({', '.join(wrong)})" if wrong else "")
+    _show_result(result)
+    tell("done", {"dataset": dataset, "verdict": verdict})
+    if keep is not None:
+        _remove_oldest(Path(dataset).name.rpartition("-")[0], root, keep)
     return dataset
 
 
-def serve_schedule(every: str, parameters: dict[str, Any]) -> None:
-    """Register the flow with its schedule and run what falls due, one run at a time, until stopped.
-
-    Parameters
-    ----------
-    every : cron expression, UTC
-    parameters : of `scheduled`
-    """
-    # Prefect cancels a connection of its own when it is stopped, and asyncio writes forty lines about that
-    logging.getLogger("asyncio").setLevel(logging.CRITICAL)
+def _remove_oldest(grid: str, root: str, keep: int) -> None:
+    log = get_run_logger()
     try:
-        # of two runs that fall due together the second waits: both would want the same processors
-        scheduled.serve(
-            name=f"musync-{Path(parameters['grid']).stem}",
-            cron=every,
-            parameters=parameters,
-            limit=AT_ONCE,
-            global_limit=AT_ONCE,
-            print_starting_message=False,
-            entrypoint_type=EntrypointType.MODULE_PATH,
+        removed, used = remove_oldest(grid, root, keep)
+    except (InputError, OSError) as error:  # the dataset is made all the same
+        log.warning("the oldest datasets could not be removed: %s", error)
+        return
+    log.info("removed %d of the oldest datasets: %s", len(removed), ", ".join(removed) or "none")
+    if used:
+        log.warning("in use, kept until the next run: %s", ", ".join(used))
+
+
+def _show_result(result: dict[str, Any]) -> None:
+    dataset, sheet = result["dataset"], Path(result["contact_sheet"])
+    link = dataset if is_address(dataset) else Path(dataset).as_uri()
+    create_table_artifact(key="musync-verdicts", table=result["verdicts"], description=dataset)
+    create_link_artifact(key="musync-dataset", link=link, link_text=dataset)
+    if sheet.is_file():
+        create_image_artifact(key="musync-contact-sheet", image_url=embed_picture(sheet), description=dataset)
+
+
+def embed_picture(path: Path) -> str:
+    """A small copy of a picture as a data URI, because a page from a server may not load files of this machine."""
+    picture = cv2.imread(str(path))
+    if picture is None:
+        raise RuntimeError(f"{path}: is no picture")
+    scale = min(1.0, SHEET_PX / max(picture.shape[:2]))
+    small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    _, content = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, SHEET_QUALITY])
+    return f"data:image/jpeg;base64,{base64.b64encode(content.tobytes()).decode()}"
+
+
+def _next_time() -> datetime | None:
+    """When the deployment's next run is due, as the server has planned it; None outside a deployment."""
+    if deployment.id is None:
+        return None
+    planned = FlowRunFilter(
+        deployment_id=FlowRunFilterDeploymentId(any_=[UUID(str(deployment.id))]),
+        state=FlowRunFilterState(type=FlowRunFilterStateType(any_=[StateType.SCHEDULED])),
+    )
+    with get_client(sync_client=True) as client:
+        runs = client.read_flow_runs(
+            flow_run_filter=planned, sort=FlowRunSort.EXPECTED_START_TIME_ASC, limit=1
         )
-    finally:
-        _stop_runs()
+    return runs[0].expected_start_time if runs else None
 
 
-def _stop_runs() -> None:
-    """Stop runs that are still going while the server still answers; this process would wait for them otherwise."""
-    running = active_children()
-    for run in running:
-        run.terminate()
-    for run in running:
-        run.join(STOP_S)
-        run.kill()
+def serve_schedule(every: str, parameters: dict[str, Any]) -> None:
+    """Serve `scheduled` (see `flows.scheduled.serving.serve_flow`)."""
+    serve_flow(scheduled, every, parameters)

@@ -2,33 +2,26 @@
 
 import os
 import re
-import shlex
-import shutil
-import socket
-import subprocess
-import sys
-import time
-import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
 from datetime import UTC, datetime
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from time import process_time
 from typing import Any, get_args
 
-from catalogs.documents import parse_json
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
 from flows.running.runner import RunnerName
-from flows.scheduled.failure_report import format_stamp, is_webhook
-from flows.store.address import PREPARED
+from flows.scheduled.failure_report import format_stamp
+from flows.scheduled.notification import EVENTS, WHEN_NONE_IS_NAMED, notify_problem
+from flows.scheduled.prefect_server import prefect_api
+from flows.scheduled.retention import dated
+from flows.scheduled.run_record import find_run_id, keep_record
+from flows.store.address import PREPARED, stored_bytes
 from flows.store.layout import Layout
 from flows.store.objects import Objects, is_address
 from flows.store.sealed import read_manifest
 from flows.store.staging import BEGUN
 from tasks.errors import InputError
-
-SERVER_START_S = 120.0
-
 
 NO_PLAN = ""
 """In place of a run's id: a run that stopped so early that nothing binds its place to a grid."""
@@ -52,7 +45,7 @@ def dataset_place(grid: str, root: str, backend: str, at: datetime) -> str:
     plan, _ = make_plan(grid, select_backend(backend).name)
     name = plan.settings.name
     begun = _begun_in_store if is_address(root) else _begun_in_folder
-    for place, run_id in begun(root, re.compile(rf"{re.escape(name)}-\d{{8}}T\d{{6}}Z")):
+    for place, run_id in begun(root, dated(name)):
         if run_id in {plan.run_id, NO_PLAN}:
             return place
     return f"{root}/{name}-{format_stamp(at)}"
@@ -66,7 +59,7 @@ def _begun_in_folder(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, s
         if (layout.staging / BEGUN).is_file() and not layout.plan.is_file():
             yield str(folder), NO_PLAN
         if layout.plan.is_file() and not layout.manifest.is_file():
-            run_id = _run_id(layout.plan.read_bytes(), layout.plan)
+            run_id = find_run_id(layout.plan.read_bytes(), layout.plan)
             if run_id is not None:
                 yield str(folder), run_id
 
@@ -78,46 +71,46 @@ def _begun_in_store(root: str, dated: re.Pattern[str]) -> Iterator[tuple[str, st
         if plan is None and all(name.startswith(PREPARED) for name in objects.sizes()):
             yield objects.address, NO_PLAN
         if plan is not None and objects.tag("manifest.json") is None:
-            run_id = _run_id(plan, objects.address)
+            run_id = find_run_id(plan, objects.address)
             if run_id is not None:
                 yield objects.address, run_id
 
 
-def _run_id(plan: bytes, place: object) -> str | None:
-    """Of a plan; None where it is damaged, so that there is nothing to go on with."""
-    try:
-        content = parse_json(plan, place, "plan")
-    except InputError:
-        return None
-    run_id = content.get("run_id") if isinstance(content, dict) else None
-    return run_id if isinstance(run_id, str) else None
-
-
 def scheduled_run(
-    grid: str,
-    root: str,
-    *,
-    at: datetime,
-    runner: RunnerName = "dask",
-    workers: int | None = None,
-    scheduler: str | None = None,
-    backend: str = "auto",
+    grid: str, root: str, *, at: datetime, backend: str = "auto", **execution: Any
 ) -> dict[str, Any]:
-    """One run of a schedule.
+    """One run of a schedule, of which nothing is kept but its dataset.
 
     Parameters
     ----------
     grid, root, at, backend : as for `dataset_place`
-    runner, workers, scheduler : as for generating
+    execution : ``runner``, ``workers`` and ``scheduler``, as for generating
 
     Returns
     -------
-    ``dataset``, ``run_id``, ``clips``, ``made``, ``contact_sheet`` and ``verdicts[]``.
+    ``dataset``, ``run_id``, ``clips``, ``made``, ``contact_sheet``, ``cpu_s`` [s], ``bytes`` [B] and ``verdicts[]``.
     """
+    return _make_at(dataset_place(grid, root, backend, at), grid, backend=backend, **execution)
+
+
+def recorded_run(
+    grid: str, root: str, *, at: datetime, backend: str = "auto", **execution: Any
+) -> dict[str, Any]:
+    """`scheduled_run` with a record of how far it is and how it ended (see `flows.scheduled.run_record`)."""
     place = dataset_place(grid, root, backend, at)
-    report = generate_dataset(
-        grid, place, runner=runner, workers=workers, scheduler=scheduler, backend=backend
-    )
+    with keep_record(PurePosixPath(place).name.rpartition("-")[0], root, place, at) as record:
+        result = _make_at(place, grid, backend=backend, **execution)
+        record.run_id, record.clips = result["run_id"], result["clips"]
+        record.quarantined = sum(not row["passed"] for row in result["verdicts"] if row["passed"] is not None)
+        record.cpu_s, record.bytes = result["cpu_s"], result["bytes"]
+    return result
+
+
+def _make_at(place: str, grid: str, *, runner: RunnerName = "dask", **execution: Any) -> dict[str, Any]:
+    started = process_time()
+    report = generate_dataset(grid, place, runner=runner, **execution)
+    # clips that threads make side by side each count the whole process
+    workers_s = 0.0 if runner == "threads" else sum(cost["cpu_s"] for cost in report.cost.values())
     clips = read_manifest(report.layout)["clips"]
     return {
         "dataset": str(report.layout),
@@ -125,6 +118,8 @@ def scheduled_run(
         "clips": report.clips,
         "made": report.made,
         "contact_sheet": str(report.layout.previews / "contact_sheet.png"),
+        "cpu_s": process_time() - started + workers_s,
+        "bytes": stored_bytes(report.layout),
         "verdicts": [
             {
                 "clip": clip["label"],
@@ -142,10 +137,11 @@ def checked_parameters(
     grid: str,
     every: str,
     out: str,
-    runner: str,
-    workers: int | None,
-    notify: str | None,
+    runner: str = "dask",
+    workers: int | None = None,
+    notify: str | None = None,
     scheduler: str | None = None,
+    notify_on: str = WHEN_NONE_IS_NAMED,
 ) -> dict[str, Any]:
     """The parameters of a schedule's runs, with every fault found now and not at three in the morning.
 
@@ -174,13 +170,13 @@ def checked_parameters(
         problems.append(f"--scheduler {scheduler} belongs to --runner dask; the runner is {runner}")
     if scheduler is not None and not re.fullmatch(r"(tcp|tls)://[^/]+:\d+", scheduler):
         problems.append(f"--scheduler must be like tcp://host:8786 or tls://host:8786; it is {scheduler!r}")
-    if notify is not None and not is_webhook(notify):
-        try:
-            words = shlex.split(notify)
-        except ValueError:  # a quotation that does not end
-            words = []
-        if not words or shutil.which(words[0]) is None:
-            problems.append(f"--notify must be an http(s) address or a command that exists; it is {notify!r}")
+    told = notify_problem(notify) if notify is not None else None
+    problems += [told] if told is not None else []
+    unknown = [word for word in notify_on.split(",") if word.strip() not in EVENTS]
+    if unknown:
+        problems.append(
+            f"--notify-on must be some of {', '.join(EVENTS)}, with commas between; it is {notify_on!r}"
+        )
     if problems:
         raise InputError(problems)
     source = str(Path(grid).resolve()) if Path(grid).suffix in {".yaml", ".yml"} else grid
@@ -191,6 +187,7 @@ def checked_parameters(
         "workers": workers,
         "scheduler": scheduler,
         "notify": notify,
+        "notify_on": notify_on,
     }
 
 
@@ -213,10 +210,10 @@ def serve_grid(
     *,
     every: str,
     out: str,
-    runner: str = "dask",
-    workers: int | None = None,
-    scheduler: str | None = None,
     notify: str | None = None,
+    notify_on: str = WHEN_NONE_IS_NAMED,
+    keep: int | None = None,
+    **execution: Any,
 ) -> None:
     """Serve the generating flow on a schedule from this process, until it is stopped.
 
@@ -227,63 +224,20 @@ def serve_grid(
     grid : grid file or name
     every : cron expression, UTC
     out : folder, or address in an object store, in which each run makes its dated dataset
-    runner, workers, scheduler : as for generating
-    notify : command or http(s) address that is told of a failed run
+    notify : who is told, as of `flows.scheduled.notification.send_notice`
+    notify_on : of what, of `flows.scheduled.notification.EVENTS`, with commas between
+    keep : how many datasets stay; None keeps all [1]
+    execution : ``runner``, ``workers`` and ``scheduler``, as for generating
 
     Raises
     ------
     InputError
         Listing every parameter that is wrong.
     """
-    parameters = checked_parameters(grid, every, out, runner, workers, notify, scheduler)
+    parameters = checked_parameters(grid, every, out, notify=notify, notify_on=notify_on, **execution)
     if not is_address(out):
         Path(out).mkdir(parents=True, exist_ok=True)
-    with _prefect_api():
+    with prefect_api():
         from flows.scheduled.prefect_schedule import serve_schedule
 
-        serve_schedule(every, parameters)
-
-
-@contextmanager
-def _prefect_api() -> Iterator[None]:
-    """A Prefect server for the length of a schedule; the one that ``PREFECT_API_URL`` names where it names one."""
-    if "PREFECT_API_URL" in os.environ:
-        yield
-        return
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    # before Prefect is imported anywhere: it reads its settings then
-    os.environ["PREFECT_API_URL"] = f"http://127.0.0.1:{port}/api"
-    from flows import prefect_flows  # noqa: F401  (quiets Prefect and puts its home into the project)
-
-    command = [sys.executable, "-m", "prefect", "server", "start", "--host", "127.0.0.1", "--port", str(port)]
-    server = subprocess.Popen(
-        command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    try:
-        _wait_until_healthy(server, f"http://127.0.0.1:{port}/api/health")
-        print(f"Prefect's pages: http://127.0.0.1:{port}", file=sys.stderr)
-        yield
-    finally:
-        server.terminate()
-        try:
-            server.wait(30)
-        except subprocess.TimeoutExpired:
-            server.kill()
-        del os.environ["PREFECT_API_URL"]
-
-
-def _wait_until_healthy(server: "subprocess.Popen[bytes]", address: str) -> None:
-    deadline = time.monotonic() + SERVER_START_S
-    while time.monotonic() < deadline:
-        if server.poll() is not None:
-            raise RuntimeError(
-                f"the Prefect server ended with exit code {server.returncode} before it answered"
-            )
-        try:
-            urllib.request.urlopen(address, timeout=2).close()  # noqa: S310  (our own server on loopback)
-            return
-        except OSError:
-            time.sleep(0.3)
-    raise RuntimeError(f"the Prefect server did not answer within {SERVER_START_S:g} s")
+        serve_schedule(every, parameters | {"keep": keep})

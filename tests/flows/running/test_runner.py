@@ -4,12 +4,20 @@ import sys
 import time
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import dask
 import pytest
 
 from flows.running.orchestration import run_as_stage
-from flows.running.runner import ALLOCATOR, SPAWNED, choose_runner, open_executor, run_unordered
+from flows.running.runner import (
+    ALLOCATOR,
+    SPAWNED,
+    choose_runner,
+    open_executor,
+    run_unordered,
+    tell_dashboard,
+)
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 
@@ -117,6 +125,14 @@ def test_local_workers_keep_the_memory_that_the_next_frame_needs():
     with open_executor("dask", 1) as executor:
         assert executor.submit(memory_settings).result() == {k: str(v) for k, v in ALLOCATOR.items()}
     assert dask.config.get(SPAWNED) == before
+
+
+def test_the_dashboard_is_told_where_its_pages_can_be_drawn(monkeypatch, capsys):
+    client = SimpleNamespace(dashboard_link="http://127.0.0.1:8787/status")
+    for found, said in ((None, ""), (object(), "Dask's dashboard: http://127.0.0.1:8787/status\n")):
+        monkeypatch.setattr("flows.running.runner.find_spec", lambda _, found=found: found)
+        tell_dashboard(client)
+        assert capsys.readouterr().err == said
 
 
 def test_two_runs_on_one_machine_do_not_quarrel_about_a_port(recwarn):

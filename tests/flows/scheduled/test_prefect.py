@@ -3,13 +3,19 @@
 One process runs everything, because Prefect's import and temporary server take ten CPU-seconds.
 """
 
+import base64
 import json
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 import yaml
+from prometheus_client.parser import text_string_to_metric_families
 
 from benchmarks import scheduled_runs
 from flows.making.generate import generate_dataset
@@ -57,7 +63,7 @@ def scheduled_flows():
     prefect_schedule.make_dataset.retry_delay_seconds = [0.1, 0.1, 0.1]
     options = {"grid": "grid.yaml", "root": "root", "runner": "threads", "workers": 1, "notify": "./hook.sh"}
     scheduling.generate_dataset = unlucky_twice
-    dataset = prefect_schedule.scheduled(**options)
+    dataset = prefect_schedule.scheduled(**options, keep=1)
     scheduling.generate_dataset = wrong
     state = prefect_schedule.scheduled(**options | {"root": "bad"}, return_state=True)
     run = SimpleNamespace(parameters=options | {"root": "killed"}, expected_start_time=datetime.now(UTC))
@@ -65,24 +71,54 @@ def scheduled_flows():
     hook(None, run, SimpleNamespace(message="status code -9"))
     with get_client(sync_client=True) as client:
         found = {a.key: [a.type, a.data] for a in client.read_artifacts()}
-    return {"delays": delays, "tries": tries, "dataset": dataset, "failed": state.is_failed(),
+        names = [run.name for run in client.read_flow_runs()]
+    return {"delays": delays, "tries": tries, "dataset": dataset, "failed": state.is_failed(), "names": names,
             "artifacts": found, "parameters": list(signature(prefect_schedule.scheduled.fn).parameters)}
 
+def rows_of_log():
+    APILogWorker.instance().drain()
+    with get_client(sync_client=True) as client:
+        return [row.message for row in client.read_logs(None, limit=200)]
+
+async def wait_for_ever(self):
+    signal.signal(signal.SIGTERM, self.handle_sigterm)  # as Prefect's runner does
+    signal.raise_signal(signal.SIGTERM)
+    await asyncio.sleep(600)
+
+def stopped_schedule():
+    serving.Runner.start = wait_for_ever
+    parameters = {"grid": "grid.yaml", "root": "stopped"}
+    with get_client(sync_client=True) as client:
+        add = serving.Runner.add_flow
+        def add_and_submit(self, flow, **options):
+            deployment = add(self, flow, **options)
+            client.create_flow_run_from_deployment(deployment, state=Submitting())
+            return deployment
+        serving.Runner.add_flow = add_and_submit
+        serving.serve_flow(prefect_schedule.scheduled, "0 3 1 1 *", parameters)
+        runs = [run for run in client.read_flow_runs() if run.deployment_id]
+    return [run.state.name for run in runs if run.state.type != StateType.SCHEDULED]
+
 if __name__ == "__main__":  # a worker of Dask needs none of this
+    import asyncio
+    import signal
     from datetime import UTC, datetime
     from inspect import signature
     from types import SimpleNamespace
     from flows import cli, prefect_flows
     from flows.running.failures import ClipsFailed
-    from flows.scheduled import prefect_schedule, scheduling
+    from flows.scheduled import prefect_schedule, scheduling, serving
     from prefect.client.orchestration import get_client
     from prefect.client.schemas.objects import StateType
+    from prefect.logging.handlers import APILogWorker
+    from prefect.states import Submitting
     from tasks.errors import InputError
 
     generate_dataset = scheduling.generate_dataset
     plain = plain_flows()
     print("scheduled:", file=sys.stderr, flush=True)
-    print(json.dumps({"plain": plain, "scheduled": scheduled_flows()}))
+    made = scheduled_flows()
+    print(json.dumps({"plain": plain, "scheduled": made, "rows": rows_of_log(), "stopped": stopped_schedule()}))
 """
 
 
@@ -101,7 +137,8 @@ def runs(tmp_path_factory) -> dict:
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-2000:]
     facts = json.loads(done.stdout.strip().splitlines()[-1])
-    return facts | {"folder": folder, "said": done.stderr.split("scheduled:\n")[0]}
+    said, _, late = done.stderr.partition("scheduled:\n")
+    return facts | {"folder": folder, "said": said, "said_late": late}
 
 
 @pytest.fixture
@@ -136,7 +173,61 @@ def test_verdicts_contact_sheet_and_a_link_to_the_dataset_are_artifacts(schedule
     table = json.loads(rows)
     assert kind == "table" and len(table) == 4
     assert {"clip", "passed", "pitch_rmse_deg", "stopping_distance_m", "reasons"} <= table[0].keys()
-    assert f"file://{scheduled['dataset']}" in link and scheduled["dataset"] in picture
+    assert f"file://{scheduled['dataset']}" in link
+    assert picture.startswith("data:image/jpeg;base64,") and len(picture) < 200_000
+    content = np.frombuffer(base64.b64decode(picture.partition(",")[2]), np.uint8)
+    small = cv2.imdecode(content, cv2.IMREAD_COLOR)
+    sheet = cv2.imread(f"{scheduled['dataset']}/previews/contact_sheet.png")
+    assert max(small.shape) <= 1000
+    assert (
+        abs(cv2.resize(sheet, small.shape[1::-1], interpolation=cv2.INTER_AREA).astype(int) - small).mean()
+        < 4
+    )
+
+
+def test_a_run_has_rows_in_the_log_a_progress_and_a_name_that_says_what_it_is(runs, scheduled):
+    stages = [
+        f"stage {name} {word}"
+        for name in ("prepare_dataset", "fan_out", "seal_dataset")
+        for word in ("begins", "end")
+    ]
+    rows = "\n".join(runs["rows"])
+    for row in [
+        *stages,
+        "clips 0/4",
+        "clips 4/4",
+        "verdict: 4 clips, 4 made now, ",
+        "removed 0 of the oldest datasets",
+        "no such street",
+    ]:
+        assert row in rows, row
+    assert scheduled["artifacts"]["musync-progress"][1] == 100.0
+    assert [
+        name
+        for name in scheduled["names"]
+        if re.fullmatch(r"toy, 4 clips, \d{4}-\d\d-\d\d \d\d:\d\d UTC", name)
+    ]
+    assert [name for name in scheduled["names"] if name.startswith("generate grid.yaml, ")]
+
+
+def test_the_record_of_a_run_says_how_it_ended_and_its_metrics_are_prometheus_text(scheduled):
+    root, bad = scheduled["folder"] / "root" / "runs", scheduled["folder"] / "bad" / "runs"
+    (made,), (failed,) = ([json.loads(p.read_text()) for p in place.glob("*.json")] for place in (root, bad))
+    assert (made["made"], made["error"], made["clips"]) == (4, None, 4) and made["cpu_s"] > 0
+    assert made["bytes"] == sum(
+        p.stat().st_size for p in Path(scheduled["dataset"]).rglob("*") if p.is_file()
+    )
+    assert failed["error"] == "InputError: no such street" and failed["ended"]
+    text = (root / "toy.prom").read_text()
+    values = {s.name: s.value for f in text_string_to_metric_families(text) for s in f.samples}
+    assert (values["musync_run_clips_done"], values["musync_run_succeeded"]) == (4, 1)
+    assert values["musync_dataset_bytes"] == made["bytes"]
+    assert "musync_run_succeeded" + '{grid="toy"} 0.0' in (bad / "toy.prom").read_text()
+
+
+def test_a_stopped_schedule_says_nothing_and_leaves_no_run_that_seems_to_go_on(runs):
+    assert runs["stopped"] == ["Cancelled"]
+    assert "never awaited" not in runs["said_late"]
 
 
 def test_a_run_that_fails_for_good_is_reported_and_the_hook_told_once(scheduled):
@@ -166,7 +257,7 @@ def test_the_deployment_for_a_work_pool_names_a_flow_and_parameters_that_exist_a
         given.get("notify"),
     )
     assert f"def {flow}(" in (SOURCE_ROOT / module).read_text()
-    assert set(given) <= set(scheduled["parameters"]) == set(checked)
+    assert set(given) <= set(scheduled["parameters"]) == set(checked) | {"keep"}
     assert deployment["concurrency_limit"] == 1
 
 

@@ -3,6 +3,7 @@
 import http.server
 import json
 import threading
+import time
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -11,6 +12,8 @@ import flows.making.generate
 from flows.making.clip import make_clip
 from flows.running.failures import ClipsFailed
 from flows.scheduled.failure_report import report_failure
+from flows.scheduled.lateness import watch_lateness
+from flows.scheduled.notification import notify_problem
 from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
 from flows.store.layout import Layout
 from tasks.errors import InputError
@@ -139,6 +142,7 @@ def test_a_failure_is_posted_to_a_webhook(tmp_path):
         address = f"http://127.0.0.1:{server.server_port}/hook"
         report = report_failure("demo", str(tmp_path), AT, ClipsFailed("no luck"), address)
     assert told[0]["error"] == "ClipsFailed: no luck" and told[0]["report"] == str(report)
+    assert told[0]["title"] == "muSync: a scheduled run failed" and told[0]["event"] == "failed"
 
 
 def test_a_hook_that_fails_is_noted_and_does_not_hide_the_failure(tmp_path):
@@ -146,16 +150,58 @@ def test_a_hook_that_fails_is_noted_and_does_not_hide_the_failure(tmp_path):
     assert "no luck" in report.read_text() and "notification false failed" in report.read_text()
 
 
+def test_an_address_may_stand_in_a_variable_and_is_told_nowhere(tmp_path, monkeypatch):
+    monkeypatch.setenv("TELL", "json://user:secret@127.0.0.1:9/hook")
+    assert notify_problem("env:TELL") is None and "env:NOBODY" in str(notify_problem("env:NOBODY"))
+    for notify in ("env:TELL", "json://user:secret@127.0.0.1:9/hook"):
+        report = report_failure("demo", str(tmp_path), AT, ClipsFailed("no luck"), notify)
+        assert "failed: " in report.read_text() and "secret" not in report.read_text()
+
+
+@pytest.mark.parametrize(
+    "notify", ["mailto://me:word@example.org", "https://example.org/hook?key=1", "true 'two words'"]
+)
+def test_mail_web_addresses_and_commands_can_be_told(notify):
+    assert notify_problem(notify) is None
+
+
+@pytest.mark.parametrize("notify", ["nonsense://example.org", "no-such-command", "slack://x", "true 'two"])
+def test_what_can_never_be_told_is_refused(notify):
+    assert "--notify must be" in str(notify_problem(notify))
+
+
+def test_a_run_is_late_that_begins_late_or_still_goes_on_when_the_next_is_due():
+    now, told = datetime.now(UTC), []
+    with watch_lateness(now - timedelta(hours=2), now + timedelta(seconds=0.01), told.append):
+        time.sleep(0.05)
+    assert len(told) == 1 and "began 120 min later" in told[0]
+    with watch_lateness(now, datetime.now(UTC) + timedelta(seconds=0.01), told.append):
+        time.sleep(0.2)
+    assert len(told) == 2 and "still goes on" in told[1]
+    with watch_lateness(now, datetime.now(UTC) + timedelta(seconds=0.1), told.append):
+        pass
+    time.sleep(0.15)
+    assert len(told) == 2
+
+
 def test_everything_wrong_with_a_schedule_is_told_when_it_is_made(tmp_path):
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(InputError) as caught:
         checked_parameters(
-            "nowhere", "every night", str(tmp_path / "taken"), "fish", None, "no-such-command", "cluster"
+            "nowhere",
+            "every night",
+            str(tmp_path / "taken"),
+            "fish",
+            None,
+            "no-such-command",
+            "cluster",
+            "never",
         )
     text = str(caught.value)
-    assert len(caught.value.problems) == 7
+    assert len(caught.value.problems) == 8
     for word in ("--every", "nowhere: no such grid", "--out", "--runner", "--scheduler cluster belongs to",
-                 "--scheduler must be like tcp://host:8786", "--notify"):  # fmt: skip
+                 "--scheduler must be like tcp://host:8786", "--notify must",
+                 "--notify-on"):  # fmt: skip
         assert word in text
 
 

@@ -1,0 +1,121 @@
+"""Serve a schedule's flow from this process until it is stopped, and leave no run behind that only seems to go on."""
+
+import asyncio
+import logging
+from multiprocessing import active_children
+from pathlib import Path
+from time import monotonic
+from typing import Any, cast
+from uuid import UUID
+
+import httpx
+from prefect import Flow
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.filters import (
+    FlowRunFilter,
+    FlowRunFilterDeploymentId,
+    FlowRunFilterState,
+    FlowRunFilterStateType,
+)
+from prefect.client.schemas.objects import StateType
+from prefect.deployments.runner import EntrypointType
+from prefect.exceptions import PrefectException
+from prefect.runner import Runner
+from prefect.states import Cancelled
+
+AT_ONCE = 1
+"""Of two runs that fall due together the second waits: both would want the same processors."""
+STOP_S = 30.0
+"""For a run to close its workers."""
+LOOK_S = 0.5
+UNDER_WAY = [StateType.PENDING, StateType.RUNNING, StateType.PAUSED, StateType.CANCELLING]
+
+
+class StoppableRunner(Runner):
+    """Prefect's runner, which a SIGTERM stops: Prefect 3.8's own handler calls a coroutine that nobody awaits."""
+
+    _main: "asyncio.Task[Any] | None" = None
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._asked: dict[int, float] = {}
+
+    async def run(self) -> None:
+        """Serve until a SIGTERM, or until the task is cancelled."""
+        self._main = asyncio.current_task()
+        await self.start()
+
+    def handle_sigterm(self, *_: Any, **__: Any) -> None:
+        """End the runs and the polling, wherever in the event loop this finds them."""
+        if self._main is not None and not self._main.get_loop().is_closed():
+            self._main.get_loop().call_soon_threadsafe(self._end_runs, self._main.get_loop())
+            self._main.get_loop().call_soon_threadsafe(self._main.cancel)
+
+    def _end_runs(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Ask each run once to end: the runner waits for them, and for one that it is just starting too."""
+        for run in active_children():
+            if run.pid is not None and run.pid not in self._asked:
+                self._asked[run.pid] = monotonic()
+                run.terminate()
+            elif run.pid is not None and monotonic() - self._asked[run.pid] > STOP_S:
+                run.kill()
+        loop.call_later(LOOK_S, self._end_runs, loop)
+
+
+def serve_flow(flow: Flow[..., Any], every: str, parameters: dict[str, Any]) -> None:
+    """Register the flow with its schedule and run what falls due, one run at a time, until stopped.
+
+    Parameters
+    ----------
+    flow : with ``grid`` among its parameters
+    every : cron expression, UTC
+    parameters : of the flow
+    """
+    # Prefect cancels a connection of its own when it is stopped, and asyncio writes forty lines about that
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)
+    runner = StoppableRunner(name=f"musync-{Path(parameters['grid']).stem}", limit=AT_ONCE)
+    deployment = runner.add_flow(
+        flow,
+        name=runner.name,
+        cron=every,
+        parameters=parameters,
+        concurrency_limit=AT_ONCE,
+        entrypoint_type=EntrypointType.MODULE_PATH,
+    )
+    try:
+        asyncio.run(runner.run())
+    except (KeyboardInterrupt, asyncio.CancelledError):
+        pass  # it was asked to stop
+    finally:
+        _stop_runs()
+        cancel_runs(cast(UUID, deployment))  # Prefect's type is that of both its ways to call it
+
+
+def _stop_runs() -> None:
+    """Stop runs that are still going while the server still answers; this process would wait for them otherwise."""
+    running = active_children()
+    for run in running:
+        run.terminate()
+    for run in running:
+        run.join(STOP_S)
+        run.kill()
+
+
+def cancel_runs(deployment: UUID) -> None:
+    """Mark what the server still takes for under way as cancelled: its process is no more, or never began.
+
+    Parameters
+    ----------
+    deployment : whose runs
+    """
+    under_way = FlowRunFilter(
+        deployment_id=FlowRunFilterDeploymentId(any_=[deployment]),
+        state=FlowRunFilterState(type=FlowRunFilterStateType(any_=UNDER_WAY)),
+    )
+    message = "the schedule was stopped; committed clips are kept, and its next run makes what is missing"
+    try:
+        with get_client(sync_client=True) as client:
+            for run in client.read_flow_runs(flow_run_filter=under_way):
+                client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
+    except (httpx.HTTPError, PrefectException):
+        logging.getLogger(__name__).warning("the server could not be told that the schedule was stopped")
