@@ -1,0 +1,40 @@
+"""The table of export formats: what writes each of them, and whose reader opens it."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportFormat:
+    """A form in which a dataset leaves muSync.
+
+    Parameters
+    ----------
+    name : value of ``--to``
+    writer : ``module:function`` below ``flows.exporting``; it takes an open `ExportedDataset` and an empty folder
+    files : what lies in the folder
+    reader : package whose reader opens it, as a test does value by value; empty where Python has none
+    pictures : whether it needs a dataset with frames
+    package : module that the writer imports and a plain installation lacks; empty where it needs none
+    """
+
+    name: str
+    writer: str
+    files: str
+    reader: str
+    pictures: bool = False
+    package: str = ""
+
+
+FORMATS: tuple[ExportFormat, ...] = (
+    ExportFormat(
+        name="webdataset",
+        writer="webdataset:write_webdataset",
+        files="a .tar a clip, a sample a frame",
+        reader="webdataset",
+        pictures=True,
+    ),
+    ExportFormat(
+        name="mcap", writer="mcap:write_mcap", files="an .mcap a clip", reader="mcap", package="mcap"
+    ),
+)
+FORMAT_NAMES = tuple(row.name for row in FORMATS)
