@@ -36,5 +36,19 @@ FORMATS: tuple[ExportFormat, ...] = (
     ExportFormat(
         name="mcap", writer="mcap:write_mcap", files="an .mcap a clip", reader="mcap", package="mcap"
     ),
+    ExportFormat(
+        name="lerobot",
+        writer="lerobot:write_lerobot",
+        files="LeRobot v3: data/, videos/, meta/",
+        reader="lerobot",
+        pictures=True,
+    ),
+    ExportFormat(
+        name="kitti",
+        writer="kitti:write_kitti",
+        files="odometry/ and raw/ with OXTS",
+        reader="pykitti",
+        pictures=True,
+    ),
 )
 FORMAT_NAMES = tuple(row.name for row in FORMATS)

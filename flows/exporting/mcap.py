@@ -2,8 +2,8 @@
 
 ``/telemetry`` (our own schema) has every tick, 1 kHz, with our names, units and signs: pitch positive nose-down; what
 is not represented is absent. ``/tf`` (FrameTransform) has world to rig at every frame, and rig to camera.
-``/camera/image`` is CompressedImage (PNG, as stored), ``/camera/depth`` RawImage in 32FC1 [m], ``/camera/class`` RawImage
-in 8UC1, and ``/camera/calibration`` CameraCalibration.
+``/camera/image`` is CompressedImage (PNG, as stored), ``/camera/depth`` RawImage in 32FC1 [m], ``/camera/class``
+RawImage in 8UC1, and ``/camera/calibration`` CameraCalibration.
 
 World and rig are ISO 8855 as ours; the rotation's pitch about +y is positive nose-down. The frame "camera" has x right,
 y down, z forward. Pixel centres are whole numbers, as ROS and OpenCV count them, so that the principal point is ours
