@@ -50,5 +50,19 @@ FORMATS: tuple[ExportFormat, ...] = (
         reader="pykitti",
         pictures=True,
     ),
+    ExportFormat(
+        name="nerfstudio",
+        writer="nerfstudio:write_nerfstudio",
+        files="a folder a clip with transforms.json; scenes/*.ply",
+        reader="plyfile",
+        pictures=True,
+    ),
+    ExportFormat(
+        name="nuscenes",
+        writer="nuscenes:write_nuscenes",
+        files="tables, samples/, can_bus/",
+        reader="nuscenes-devkit",
+        pictures=True,
+    ),
 )
 FORMAT_NAMES = tuple(row.name for row in FORMATS)

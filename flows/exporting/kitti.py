@@ -1,7 +1,8 @@
 """KITTI: odometry sequences, and drives of the raw data with OXTS packets.
 
-``odometry/sequences/00`` has the pictures as ``image_2``, ``times.txt`` [s] and ``calib.txt``, and
-``odometry/poses/00.txt`` the camera's poses in its first frame (x right, y down, z forward, as ours). ``raw/1970_01_01`` has a drive a clip with
+``odometry/sequences/00`` has the pictures as ``image_2``, ``times.txt`` [s] and ``calib.txt``;
+``odometry/poses/00.txt`` the camera's poses in its first frame (x right, y down, z forward, as ours).
+``raw/1970_01_01`` has a drive a clip with
 one OXTS packet a frame and no pictures. The velodyne's and the IMU's frame are our rig (x forward, y left, z up, below
 the middle of the front axle): ``Tr`` takes the rig to the camera. Pixel centres are whole numbers, as KITTI's.
 
@@ -15,12 +16,13 @@ Formats: http://www.cvlibs.net/datasets/kitti, devkit_odometry/readme.txt and de
 
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinhole
+from flows.exporting.inertial import compute_inertial_motion
 from flows.making.clip import PIXEL_CENTRE
 from tasks.render.camera import Camera
 from tasks.render.contact_sheet import encode_png
@@ -29,8 +31,6 @@ from tasks.vehicle.parameters import Vehicle
 DATE = "1970_01_01"
 EARTH_RADIUS = 6378137.0
 """Of KITTI's Mercator projection [m]."""
-STANDARD_GRAVITY = 9.80665
-"""CGPM 1901 [m s-2]."""
 
 
 def write_kitti(dataset: ExportedDataset, folder: Path) -> None:
@@ -73,22 +73,15 @@ def compute_oxts(clip: ExportedClip, vehicle: Vehicle) -> NDArray[np.float64]:
     clip : that was driven
     vehicle : that drove it
     """
-    frames, pose = clip.frames, clip.T_world_rig
-    yaw, pitch, roll = Rotation.from_matrix(pose[:, :3, :3]).as_euler("ZYX").T
-    east, north, up = pose[:, :3, 3].T
-    still, speed, rate = np.zeros(len(yaw)), frames["speed"], frames["pitch_rate"]
-    # the rig lies in front of and below the centre of gravity, about which the body pitches
-    lever = vehicle.cg_height * np.sin(frames["pitch"]) - vehicle.cg_to_front_axle * np.cos(frames["pitch"])
-    seconds = clip.ticks["t_ns"] * 1e-9
-    au = STANDARD_GRAVITY + np.gradient(clip.ticks["heave_rate"], seconds)[frames["tick"]]
-    af = frames["longitudinal_acceleration"]
-    turn = np.gradient(np.unwrap(yaw), frames["t_ns"] * 1e-9)
+    motion = compute_inertial_motion(clip, vehicle)
+    east, north, up = clip.T_world_rig[:, :3, 3].T
+    still, speed = np.zeros(len(up)), clip.frames["speed"]
     fields = (
         np.degrees(2 * np.arctan(np.exp(north / EARTH_RADIUS))) - 90.0, np.degrees(east / EARTH_RADIUS), up,
-        roll, pitch, yaw,
-        speed * np.sin(yaw), speed * np.cos(yaw), speed, still, frames["heave_rate"] + rate * lever,
-        af * np.cos(pitch) - au * np.sin(pitch), still, af * np.sin(pitch) + au * np.cos(pitch), af, still, au,
-        -turn * np.sin(pitch), rate, turn * np.cos(pitch), still, rate, turn,
+        motion.roll, motion.pitch, motion.yaw,
+        speed * np.sin(motion.yaw), speed * np.cos(motion.yaw), speed, still, motion.vertical_speed,
+        *motion.force.T, motion.force_forward, still, motion.force_up,
+        *motion.turn_rate.T, still, clip.frames["pitch_rate"], motion.yaw_rate,
         still, still,
     )  # fmt: skip
     return np.stack(fields, axis=1)
@@ -110,7 +103,7 @@ def _describe_calibration(camera: Camera) -> str:
 def _describe_raw_calibration(camera: Camera) -> dict[str, str]:
     T_camera_rig = np.linalg.inv(camera.T_rig_camera)
     size = np.array([camera.width, camera.height], np.float64)
-    cameras = {}
+    cameras: dict[str, NDArray[Any]] = {}
     for k in range(4):
         cameras |= {
             f"S_0{k}": size, f"K_0{k}": camera.K - PIXEL_CENTRE, f"D_0{k}": np.zeros(5),
@@ -133,7 +126,7 @@ def _projection(camera: Camera) -> NDArray[np.float64]:
     return np.column_stack((camera.K - PIXEL_CENTRE, np.zeros(3)))
 
 
-def _format(values: NDArray[np.float64]) -> str:
+def _format(values: NDArray[Any]) -> str:
     return " ".join(repr(float(value)) for value in np.ravel(values))
 
 
