@@ -64,5 +64,19 @@ FORMATS: tuple[ExportFormat, ...] = (
         reader="nuscenes-devkit",
         pictures=True,
     ),
+    ExportFormat(
+        name="rerun", writer="rerun:write_rerun", files="an .rrd a clip", reader="rerun-sdk", package="rerun"
+    ),
+    ExportFormat(
+        name="mdf4", writer="mdf4:write_mdf4", files="an .mf4 a clip", reader="asammdf", package="asammdf"
+    ),
+    ExportFormat(
+        name="coco",
+        writer="coco:write_coco",
+        files="annotations.json, images/",
+        reader="pycocotools",
+        pictures=True,
+    ),
+    ExportFormat(name="tum", writer="tum:write_tum", files="a .txt a clip", reader="evo"),
 )
 FORMAT_NAMES = tuple(row.name for row in FORMATS)

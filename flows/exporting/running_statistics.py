@@ -34,7 +34,16 @@ class RunningStatistics:
         values : [N] or [N, components]
         frames : that the block stands for; None is N [1]
         """
-        block = _measure(np.asarray(values, np.float64).reshape(len(values), -1), frames or len(values))
+        self._join(
+            name, _measure(np.asarray(values, np.float64).reshape(len(values), -1), frames or len(values))
+        )
+
+    def merge(self, other: "RunningStatistics") -> None:
+        """Take in what another one has measured."""
+        for name, block in other._columns.items():
+            self._join(name, block)
+
+    def _join(self, name: str, block: _Moments) -> None:
         known = self._columns.get(name)
         self._columns[name] = block if known is None else _merge(known, block)
 
