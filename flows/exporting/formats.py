@@ -78,5 +78,6 @@ FORMATS: tuple[ExportFormat, ...] = (
         pictures=True,
     ),
     ExportFormat(name="tum", writer="tum:write_tum", files="a .txt a clip", reader="evo"),
+    ExportFormat(name="opencrg", writer="opencrg:write_opencrg", files="a .crg a clip", reader=""),
 )
 FORMAT_NAMES = tuple(row.name for row in FORMATS)

@@ -63,7 +63,7 @@ def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
         for file in (data, film):
             file.parent.mkdir(parents=True, exist_ok=True)
         pq.write_table(_make_table(columns), data)
-        write_film(film, pictures, rate)
+        write_film(film, list(pictures), rate)
         own = RunningStatistics()
         for name, values in columns.items():
             own.add(name, values)

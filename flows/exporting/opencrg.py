@@ -1,9 +1,8 @@
 """OpenCRG: the road under each clip, as curved regular grid with one profile, for vehicle simulation tools.
 
-One ``NAME.crg`` a clip, in the text form ``LRFI`` of version 1.1: a straight reference line along the route's station u
-(metres from the route's start) at a constant heading, and cross sections from v = -w to v = +w (v to the left, as ISO 8855)
-whose heights are those of the clip's road feature, z up [m], positive for a hump. The feature is the same across the
-road. The scene's own bends and slopes are not in it: in muSync the vehicle drives along the station.
+One ``NAME.crg`` a clip, in the text form ``LRFI``: a straight reference line along the route's station u [m] and, at
+each step, heights from v = -2.1 m to +2.1 m (v to the left, as ISO 8855), z up [m], positive for a hump. The feature is the
+same across the road. The scene's own bends and slopes are not in it: the vehicle drives along the station.
 
 There is no official reader in Python; the test reads the file by the same specification.
 
@@ -13,7 +12,6 @@ Format: ASAM OpenCRG 1.1.2, https://www.asam.net/standards/detail/opencrg
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flows.exporting.dataset import ExportedDataset
 from flows.making.driving import hazard_of
@@ -21,11 +19,10 @@ from tasks.surface.road_profile import RoadHazard, road_elevation
 
 STEP = 0.02
 """From one cross section to the next [m]: a hump of 2 m has a hundred."""
-HALF_WIDTH = 2.0
+SIDES = tuple(round(-2.1 + 0.6 * k, 1) for k in range(8))
+"""Sections along the road, right to left [m]: eight numbers of ten characters fill the form's record of 80."""
 MARGIN = 5.0
 """Road before the first wheel and beyond the last station [m]."""
-COLUMNS = 8
-"""Numbers in a line of the text form, ten characters each."""
 
 
 def write_opencrg(dataset: ExportedDataset, folder: Path) -> None:
@@ -56,25 +53,22 @@ def format_crg(hazard: RoadHazard, begin: float, end: float, title: str) -> str:
     """
     sections = round((end - begin) / STEP) + 1
     heights = road_elevation(begin + STEP * np.arange(sections), hazard)
-    sides = (-HALF_WIDTH, 0.0, HALF_WIDTH)
     head = [
-        "$CT", f" {title.encode('ascii', 'replace').decode()[:70]}", " made by muSync",
+        "$CT", title.encode("ascii", "replace").decode()[:70], "$",
         "$ROAD_CRG",
-        f" REFERENCE_LINE_START_U   = {begin:.6f}",
-        f" REFERENCE_LINE_END_U     = {begin + STEP * (sections - 1):.6f}",
-        f" REFERENCE_LINE_INCREMENT = {STEP:.6f}",
-        " REFERENCE_LINE_START_PHI = 0.000000",
-        f" LONG_SECTION_V_RIGHT     = {sides[0]:.6f}",
-        f" LONG_SECTION_V_LEFT      = {sides[-1]:.6f}",
-        f" LONG_SECTION_V_INCREMENT = {HALF_WIDTH:.6f}",
+        f"REFERENCE_LINE_START_U   = {begin:.6f}",
+        f"REFERENCE_LINE_END_U     = {begin + STEP * (sections - 1):.6f}",
+        f"REFERENCE_LINE_INCREMENT = {STEP:.6f}",
+        "REFERENCE_LINE_START_PHI = 0.000000",
+        f"LONG_SECTION_V_RIGHT     = {SIDES[0]:.6f}",
+        f"LONG_SECTION_V_LEFT      = {SIDES[-1]:.6f}",
+        f"LONG_SECTION_V_INCREMENT = {SIDES[1] - SIDES[0]:.6f}",
+        "$",
         "$KD_Definition",
         "#:LRFI",
-        "U:reference line u,m,%.3f" % begin + ",%.3f" % STEP,
-        *(f"D:long section {k + 1},m" for k in range(len(sides))),
-        "$" * 72,
+        f"U:reference line u,m,{begin:.3f},{STEP:.3f}",
+        *(f"D:long section {k + 1},m" for k in range(len(SIDES))),
+        "$",
+        "$" * 80,
     ]  # fmt: skip
-    return "\n".join([*head, *_format_rows(heights, len(sides))]) + "\n"
-
-
-def _format_rows(heights: NDArray[np.float64], count: int) -> list[str]:
-    return ["".join(f"{height:10.7f}" for _ in range(count)) for height in heights]
+    return "\n".join([*head, *(f"{height:10.7f}" * len(SIDES) for height in heights)]) + "\n"
