@@ -79,5 +79,11 @@ FORMATS: tuple[ExportFormat, ...] = (
     ),
     ExportFormat(name="tum", writer="tum:write_tum", files="a .txt a clip", reader="evo"),
     ExportFormat(name="opencrg", writer="opencrg:write_opencrg", files="a .crg a clip", reader=""),
+    ExportFormat(
+        name="croissant",
+        writer="croissant:write_croissant",
+        files="croissant.json, telemetry/",
+        reader="mlcroissant",
+    ),
 )
 FORMAT_NAMES = tuple(row.name for row in FORMATS)

@@ -1,8 +1,8 @@
 """OpenCRG: the road under each clip, as curved regular grid with one profile, for vehicle simulation tools.
 
 One ``NAME.crg`` a clip, in the text form ``LRFI``: a straight reference line along the route's station u [m] and, at
-each step, heights from v = -2.1 m to +2.1 m (v to the left, as ISO 8855), z up [m], positive for a hump. The feature is the
-same across the road. The scene's own bends and slopes are not in it: the vehicle drives along the station.
+each step, heights from v = -2.1 m to +2.1 m (v to the left, as ISO 8855), z up [m], positive for a hump. The feature is
+the same across the road. The scene's own bends and slopes are not in it: the vehicle drives along the station.
 
 There is no official reader in Python; the test reads the file by the same specification.
 
