@@ -70,7 +70,7 @@ study-mutants: $(READY)
 EXPORTS := .venv-exports/bin/python -m
 study-exports:
 	$(PYTHON) -m venv .venv-exports
-	$(EXPORTS) pip install --quiet --editable '.[dev,export]' webdataset pykitti plyfile pycocotools evo mlcroissant
+	$(EXPORTS) pip install --quiet --editable '.[dev,export]' webdataset pykitti plyfile pycocotools evo mlcroissant prov
 	$(EXPORTS) pip install --quiet --no-deps nuscenes-devkit pyquaternion descartes shapely scikit-learn joblib \
 		threadpoolctl tqdm cachetools parameterized
 	$(EXPORTS) pytest -rs tests/flows/exporting

@@ -1,7 +1,7 @@
 """Croissant: the dataset's tables with metadata that machine-learning tools and dataset search read.
 
-``croissant.json`` (JSON-LD, Croissant 1.0) describes the Parquet files of ``telemetry/``, copied as they are: SHA-256 of
-each, and each column with its meaning and unit as our schema has them. Names, units and signs are ours (ISO 8855,
+``croissant.json`` (JSON-LD, Croissant 1.0) describes the Parquet files of ``telemetry/``, copied as they are: SHA-256
+of each, and each column with its meaning and unit as our schema has them. Names, units and signs are ours (ISO 8855,
 pitch positive nose-down). A record set is one file: ``clips``, ``pairs``, ``ticks-WEATHER-0000``,
 ``frames-WEATHER-0000``. Columns that hold lists (``T_world_rig``) are in the files and not in the record sets. Pictures
 are not exported.
@@ -17,9 +17,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flows.exporting.dataset import ExportedDataset
+from flows.exporting.whole_dataset import require_every_clip
 from flows.store.layout import write_json
 from tasks.conventions import CHANNELS_BY_NAME
-from tasks.errors import InputError
 
 CONFORMS_TO = "http://mlcommons.org/croissant/1.0"
 PARQUET = "application/x-parquet"
@@ -52,12 +52,7 @@ def write_croissant(dataset: ExportedDataset, folder: Path) -> None:
     InputError
         If some of the clips are left out.
     """
-    clips = dataset.manifest["clips"]
-    if len(dataset) != len(clips):
-        raise InputError(
-            f"{dataset.layout}: --to croissant describes the dataset's own files and takes all {len(clips)} clips;"
-            f" {len(dataset)} are asked for: name all of them with --clip where some are in quarantine"
-        )
+    require_every_clip(dataset, "croissant")
     tables = sorted(name for name in dataset.manifest["artifacts"] if name.endswith(".parquet"))
     files, records = [], []
     for name in tables:

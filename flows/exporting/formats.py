@@ -85,5 +85,11 @@ FORMATS: tuple[ExportFormat, ...] = (
         files="croissant.json, telemetry/",
         reader="mlcroissant",
     ),
+    ExportFormat(
+        name="ro-crate",
+        writer="rocrate:write_rocrate",
+        files="ro-crate-metadata.json, prov.json, telemetry/, inputs/",
+        reader="roc-validator, prov",
+    ),
 )
 FORMAT_NAMES = tuple(row.name for row in FORMATS)
