@@ -29,7 +29,7 @@ def test_runs_go_down_the_columns_and_begin_outside(corner):
 
 
 def test_pycocotools_gives_back_pictures_and_classes(export, stored):
-    module = pytest.importorskip("pycocotools.coco", reason="pip install 'musync[export]'")
+    module = pytest.importorskip("pycocotools.coco", reason="pip install pycocotools")
     read = module.COCO(str(export("coco") / "annotations.json"))
     assert len(read.imgs) == 22
     for image in read.imgs.values():

@@ -9,6 +9,7 @@ import pytest
 from flows.exporting import export as module
 from flows.exporting.export import export_dataset, import_writer
 from flows.exporting.formats import FORMAT_NAMES, FORMATS
+from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 from tests.flows.exporting.conftest import BRAKING, HUMP
 from tests.flows.shell import run_command
@@ -45,6 +46,27 @@ def test_a_folder_that_holds_something_and_one_inside_the_dataset_are_refused(to
         with pytest.raises(InputError, match=rule):
             export_dataset(str(toy_dataset.root), "webdataset", out=str(out), clips=[BRAKING])
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "thesis.txt"]
+
+
+def test_an_empty_folder_is_filled_and_a_dataset_without_frames_gets_its_telemetry(
+    toy_dataset, tmp_path, monkeypatch
+):
+    (tmp_path / "out").mkdir()
+    told = export_dataset(str(toy_dataset.root), "tum", out=str(tmp_path / "out"), clips=[BRAKING])
+    assert told["files"] == 2 == len(list((tmp_path / "out").iterdir()))
+    read = module.read_manifest
+    monkeypatch.setattr(
+        module,
+        "read_manifest",
+        lambda layout: {**(m := read(layout)), "grid": m["grid"] | {"pictures": False}},
+    )
+    with pytest.raises(InputError, match=r"needs frames; .* suits mcap, rerun"):
+        export_dataset(str(toy_dataset.root), "coco", out=str(tmp_path / "other"), clips=[BRAKING])
+
+
+def test_the_documents_have_a_row_for_every_format():
+    text = (SOURCE_ROOT / "docs/how-to/export-a-dataset.md").read_text()
+    assert [name for name in FORMAT_NAMES if text.count(f"\n| `{name}` |") != 2] == []
 
 
 def test_a_writer_that_fails_leaves_nothing_behind(toy_dataset, tmp_path, monkeypatch):

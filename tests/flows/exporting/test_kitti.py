@@ -6,7 +6,7 @@ import pytest
 from flows.making.clip import catalogue_of
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
-pykitti = pytest.importorskip("pykitti", reason="pip install 'musync[export]'")
+pykitti = pytest.importorskip("pykitti", reason="pip install pykitti")
 
 
 @pytest.mark.parametrize(("number", "label"), [(0, BRAKING), (1, HUMP)])

@@ -8,7 +8,7 @@ from tests.flows.exporting.conftest import BRAKING, HUMP
 
 
 def test_evo_reads_times_and_camera_poses(export, stored, toy_dataset):
-    file_interface = pytest.importorskip("evo.tools.file_interface", reason="pip install 'musync[export]'")
+    file_interface = pytest.importorskip("evo.tools.file_interface", reason="pip install evo")
     camera = catalogue_of(toy_dataset.root).camera
     files = sorted(export("tum").glob("*.txt"))
     for path, label in zip(files, (BRAKING, HUMP), strict=True):

@@ -6,7 +6,7 @@ import pytest
 from tasks.conventions import TICK_CHANNELS
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
-wds = pytest.importorskip("webdataset", reason="pip install 'musync[export]'")
+wds = pytest.importorskip("webdataset", reason="pip install webdataset")
 
 
 def test_the_reader_gives_back_pictures_labels_telemetry_and_poses(export, stored):
