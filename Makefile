@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants freeze bench lock clean
+.PHONY: demo test test-minutes check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-exports freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -68,6 +68,16 @@ study-double-track: $(READY)
 
 study-mutants: $(READY)
 	$(BIN)/python -m benchmarks.mutants
+
+# The readers of the exported formats, in an environment of their own; nuscenes-devkit asks for old versions of libraries
+# that it runs without.
+EXPORTS := .venv-exports/bin/python -m
+study-exports:
+	$(PYTHON) -m venv .venv-exports
+	$(EXPORTS) pip install --quiet --editable '.[dev,export]' webdataset pykitti plyfile pycocotools evo mlcroissant prov
+	$(EXPORTS) pip install --quiet --no-deps nuscenes-devkit pyquaternion descartes shapely scikit-learn joblib \
+		threadpoolctl tqdm cachetools parameterized
+	$(EXPORTS) pytest -rs tests/flows/exporting
 
 freeze: $(READY)
 	$(BIN)/musync freeze

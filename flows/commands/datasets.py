@@ -12,6 +12,7 @@ from flows.commands.command import (
     define_argument,
     define_option,
 )
+from flows.exporting.formats import FORMAT_NAMES
 
 GROUP = "Datasets"
 CLIPS = define_option(
@@ -238,6 +239,23 @@ COMMANDS = (
             DATASET,
             define_option("out", str, "Folder for weather.png and hazards.png."),
             define_option("station", float, "Station on the route where the weathers are shown [m].", 12.0),
+        ),
+    ),
+    Command(
+        name="export",
+        group=GROUP,
+        sentence="Write a dataset in a format that other tools read, such as WebDataset, MCAP or LeRobot.",
+        function="flows.exporting.export:export_dataset",
+        options=(
+            DATASET,
+            define_option("to", str, f"{', '.join(FORMAT_NAMES)}.", known=FORMAT_NAMES),
+            define_option(
+                "out",
+                str | None,
+                "New or empty folder for the files; by default DIR-FORMAT, beside the dataset.",
+                None,
+            ),
+            CLIPS,
         ),
     ),
 )

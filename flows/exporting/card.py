@@ -1,0 +1,41 @@
+"""What every export says of the dataset that it was made from, beside the files of its format."""
+
+from typing import Any
+
+from flows.exporting.dataset import TICK_COLUMNS, ExportedDataset, describe_columns
+
+CARD = "musync-export.json"
+
+
+def describe_export(dataset: ExportedDataset, to: str) -> dict[str, Any]:
+    """Return the content of ``musync-export.json``: run, seal, camera, units, and each clip's scenario and figures.
+
+    Parameters
+    ----------
+    dataset : that is exported
+    to : name of the format
+    """
+    camera = dataset.camera
+    return {
+        "format": to,
+        "dataset": dataset.name,
+        "run_id": dataset.manifest["run_id"],
+        "seal": dataset.manifest["seal"],
+        "frame_rate_hz": dataset.frame_rate_hz,
+        "camera": {
+            "name": camera.name,
+            "width": camera.width,
+            "height": camera.height,
+            "K": camera.K.tolist(),
+            "T_rig_camera": camera.T_rig_camera.tolist(),
+            "distortion": None if camera.distortion is None else camera.distortion.tolist(),
+        },
+        "columns": describe_columns(TICK_COLUMNS),
+        "clips": [
+            {
+                key: row[key]
+                for key in ("index", "clip_id", "label", "split", "scenario", "figures", "verdict")
+            }
+            for row in dataset.rows
+        ],
+    }

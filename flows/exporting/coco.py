@@ -1,0 +1,88 @@
+"""COCO: one ``annotations.json`` with a mask of each semantic class in each frame, and the pictures.
+
+A mask is an uncompressed run-length code, column by column, as COCO counts it. Category ids are our class codes plus 1,
+because trainers take 0 for "nothing". A class is no set of objects: where it appears in several places it is still one
+mask (``iscrowd`` 1). Boxes are x, y, width, height in pixels, from the picture's upper left corner.
+
+Format: https://cocodataset.org/#format-data
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flows.exporting.dataset import ExportedDataset
+from flows.exporting.json_array import open_array
+from tasks.conventions import SemanticClass
+from tasks.render.contact_sheet import encode_png
+
+
+def write_coco(dataset: ExportedDataset, folder: Path) -> None:
+    """Write ``annotations.json`` and ``images/``.
+
+    Parameters
+    ----------
+    dataset : with frames
+    folder : empty
+    """
+    (folder / "images").mkdir()
+    images: list[dict[str, Any]] = []
+    count = 0
+    with (folder / "annotations.json").open("w") as stream:
+        stream.write('{"annotations": ')
+        with open_array(stream) as annotations:
+            for clip in dataset:
+                classes = clip.read_array("class")
+                for frame, picture in enumerate(clip.read_array("rgb")):
+                    name = f"{clip.name}_{frame:06d}.png"
+                    (folder / "images" / name).write_bytes(encode_png(picture))
+                    images.append(_describe_image(len(images) + 1, name, clip.label, frame, picture))
+                    for kind in np.unique(classes[frame]).tolist():
+                        count += 1
+                        annotations.append(
+                            {"id": count, "image_id": len(images)}
+                            | describe_mask(classes[frame] == kind, kind)
+                        )
+        categories = [{"id": kind + 1, "name": kind.name.lower()} for kind in SemanticClass]
+        rest = {
+            "images": images,
+            "categories": categories,
+            "info": {"description": f"muSync {dataset.name}", "version": dataset.manifest["run_id"]},
+            "licenses": [],
+        }
+        stream.write(f", {json.dumps(rest, allow_nan=False)[1:]}")
+
+
+def describe_mask(mask: NDArray[np.bool_], kind: int) -> dict[str, Any]:
+    """Return category, run lengths, area and box of a mask.
+
+    Parameters
+    ----------
+    mask : [H, W], with a pixel at least
+    kind : class
+    """
+    column_by_column = mask.ravel(order="F")
+    ends = np.flatnonzero(np.diff(column_by_column)) + 1
+    runs = np.diff(np.concatenate(([0], ends, [mask.size]))).tolist()
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    box = [columns[0], rows[0], columns[-1] - columns[0] + 1, rows[-1] - rows[0] + 1]
+    return {
+        "category_id": kind + 1,
+        # the first run is of pixels outside
+        "segmentation": {"size": list(mask.shape), "counts": [0, *runs] if column_by_column[0] else runs},
+        "area": int(mask.sum()),
+        "bbox": [int(value) for value in box],
+        "iscrowd": 1,
+    }
+
+
+def _describe_image(
+    number: int, name: str, label: str, frame: int, picture: NDArray[np.uint8]
+) -> dict[str, Any]:
+    height, width = picture.shape[:2]
+    return {
+        "id": number, "file_name": f"images/{name}", "height": height, "width": width, "clip": label, "frame": frame
+    }  # fmt: skip

@@ -1,0 +1,203 @@
+"""A finished dataset as the writers of other formats take it: clip by clip, each read when it is its turn."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catalogs.cameras import load_camera
+from catalogs.scenario import Scenario
+from catalogs.vehicles import load_vehicle
+from flows.making.plan import Plan, read_plan
+from flows.making.seal import table_parts
+from flows.store.arrays import arrays_of
+from flows.store.frames import read_clip
+from flows.store.layout import Layout
+from flows.store.telemetry import read_columns
+from manifests.records import Manifest
+from tasks.conventions import CHANNELS_BY_NAME, FRAME_CHANNELS, TICK_CHANNELS
+from tasks.errors import InputError
+from tasks.render.camera import Camera
+from tasks.vehicle.parameters import Vehicle
+
+Columns = dict[str, NDArray[Any]]
+TICK_COLUMNS = tuple(channel.name for channel in TICK_CHANNELS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportedClip:
+    """A clip with what writers ask of it.
+
+    Parameters
+    ----------
+    layout : of its dataset
+    record : what the manifest says of it
+    ticks_file, frames_file : Parquet files with its rows
+    camera : that saw it
+    pictures : whether it has frames
+    """
+
+    layout: Layout
+    record: Mapping[str, Any]
+    ticks_file: str
+    frames_file: str
+    camera: Camera
+    pictures: bool
+
+    @property
+    def label(self) -> str:
+        """The clip's levels of the grid's axes."""
+        return str(self.record["label"])
+
+    @property
+    def clip_id(self) -> str:
+        """Content id."""
+        return str(self.record["clip_id"])
+
+    @property
+    def name(self) -> str:
+        """Number in the dataset and label, with letters, digits and ``+=-_`` alone: of files, topics and keys."""
+        return f"{self.record['index']:05d}_{re.sub(r'[^A-Za-z0-9+=_-]', '_', self.label)[:100]}"
+
+    @property
+    def scenario(self) -> Scenario:
+        """Weather, controls and road."""
+        return Scenario(**self.record["scenario"])
+
+    @cached_property
+    def ticks(self) -> Columns:
+        """Columns of the tick table."""
+        return self._read(self.ticks_file, TICK_COLUMNS)
+
+    @cached_property
+    def frames(self) -> Columns:
+        """Columns of the frame table: the telemetry of each frame's tick, and ``T_world_rig`` [F, 16]."""
+        return self._read(self.frames_file, (*(channel.name for channel in FRAME_CHANNELS), *TICK_COLUMNS))
+
+    @property
+    def T_world_rig(self) -> NDArray[np.float64]:
+        """Rig-to-world poses [F, 4, 4] [m]."""
+        return np.asarray(self.frames["T_world_rig"], np.float64).reshape(-1, 4, 4)
+
+    @property
+    def T_world_camera(self) -> NDArray[np.float64]:
+        """Camera-to-world poses [F, 4, 4], camera axes x right, y down, z forward [m]."""
+        return self.T_world_rig @ self.camera.T_rig_camera
+
+    def read_array(self, name: str) -> NDArray[Any]:
+        """Return one array of the clip's frames [F, H, W, ...]."""
+        return read_clip(self.layout.frames, self.record["index"], name)
+
+    def read_frame_telemetry(self, frame: int) -> dict[str, Any]:
+        """Return the telemetry at a frame, by column, as JSON has it.
+
+        Parameters
+        ----------
+        frame : number in the clip
+        """
+        return {name: to_json_value(self.frames[name][frame]) for name in ("frame", "tick", *TICK_COLUMNS)}
+
+    def _read(self, file: str, required: Sequence[str]) -> Columns:
+        return read_columns(self.layout.root / file, self.clip_id, required)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportedDataset:
+    """A dataset that a writer iterates over once.
+
+    Parameters
+    ----------
+    layout : where it lies
+    manifest : its record
+    rows : records of the clips to export
+    finish : called with the label of each clip after its turn
+    """
+
+    layout: Layout
+    manifest: Manifest
+    rows: Sequence[Mapping[str, Any]]
+    finish: Callable[[str], None]
+
+    @property
+    def name(self) -> str:
+        """The grid's name."""
+        return self.plan.settings.name
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The plan that the dataset was made by."""
+        return read_plan(self.layout.root)
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The dataset's one camera."""
+        return load_camera(self.layout.inputs / "camera.yaml")
+
+    @cached_property
+    def vehicle(self) -> Vehicle:
+        """The dataset's one vehicle."""
+        return load_vehicle(self.layout.inputs / "vehicle.yaml", self.layout.inputs / "weather")
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Of the frames [Hz]."""
+        return self.plan.settings.frame_rate_hz
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """Names of the arrays of its frames; empty without frames."""
+        settings = self.plan.settings
+        return tuple(arrays_of(settings.labels)) if settings.pictures else ()
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[ExportedClip]:
+        """Yield each clip; what was read of one is forgotten with it."""
+        files = {
+            table: {clip_id: path for path, ids in table_parts(self.plan, table).items() for clip_id in ids}
+            for table in ("ticks", "frames")
+        }
+        for row in self.rows:
+            yield ExportedClip(
+                layout=self.layout,
+                record=row,
+                ticks_file=files["ticks"][row["clip_id"]],
+                frames_file=files["frames"][row["clip_id"]],
+                camera=self.camera,
+                pictures=self.plan.settings.pictures,
+            )
+            self.finish(row["label"])
+
+
+def require_pinhole(dataset: ExportedDataset, to: str) -> None:
+    """Refuse a camera whose pictures the format cannot describe.
+
+    Raises
+    ------
+    InputError
+        If the camera has a lens with distortion.
+    """
+    if dataset.camera.distortion is not None:
+        raise InputError(
+            f"{dataset.layout}: --to {to} describes a pinhole; the camera {dataset.camera.name} has a distorting lens:"
+            " make the dataset with a plain camera"
+        )
+
+
+def describe_columns(names: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return unit and meaning of telemetry columns by name."""
+    return {
+        name: {"unit": CHANNELS_BY_NAME[name].unit, "description": CHANNELS_BY_NAME[name].description}
+        for name in names
+    }
+
+
+def to_json_value(value: Any) -> Any:
+    """Return a number as JSON has it: NaN, which means "not represented", becomes None."""
+    plain = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(plain, float) and not np.isfinite(plain) else plain

@@ -1,0 +1,158 @@
+"""``musync export``: a finished dataset in another format, written whole or not at all."""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from flows.exporting.card import CARD, describe_export
+from flows.exporting.dataset import ExportedDataset
+from flows.exporting.formats import FORMAT_NAMES, FORMATS, ExportFormat
+from flows.reading.previews import named_clips
+from flows.reading.suggestions import suggest_names
+from flows.running.progress import progress_bar
+from flows.store.address import is_address, open_for_reading
+from flows.store.layout import PARTIAL, write_json
+from flows.store.sealed import read_manifest
+from manifests.manifest import is_quarantined
+from tasks.errors import InputError
+
+Writer = Callable[[ExportedDataset, Path], None]
+
+
+def export_dataset(
+    dataset: str, to: str, *, out: str | None = None, clips: list[str] | None = None
+) -> dict[str, Any]:
+    """Write a dataset in another format.
+
+    Parameters
+    ----------
+    dataset : a finished dataset
+    to : name of the format
+    out : folder, new or empty; None takes ``DATASET-FORMAT`` beside the dataset
+    clips : labels or ids; None takes all that are not in quarantine
+
+    Returns
+    -------
+    ``folder``, ``format``, ``clips``, ``left_out`` (labels in quarantine), ``files``, ``megabytes``
+
+    Raises
+    ------
+    InputError
+        For an unknown format or clip, a dataset that lacks what the format needs, a package that is not installed, or
+        a folder that holds something.
+    """
+    chosen = find_format(to)
+    writer = import_writer(chosen)
+    layout = open_for_reading(dataset)
+    manifest = read_manifest(layout)
+    rows: Sequence[Mapping[str, Any]] = manifest["clips"]
+    kept, left_out = (named_clips(rows, clips, dataset), []) if clips else part_quarantined(rows)
+    folder = choose_folder(dataset, to, out)
+    problems = [
+        *([] if kept else [f"{dataset}: every clip is in quarantine; name clips with --clip to export them"]),
+        *_picture_problems(chosen, manifest, dataset),
+    ]
+    if problems:
+        raise InputError(problems)
+    with write_folder(folder) as partial, progress_bar("clips", len(kept)) as advance:
+        exported = ExportedDataset(layout=layout, manifest=manifest, rows=kept, finish=advance)
+        writer(exported, partial)
+        write_json(partial / CARD, describe_export(exported, to))
+        sizes = [path.stat().st_size for path in partial.rglob("*") if path.is_file()]
+    return {
+        "folder": str(folder),
+        "format": to,
+        "clips": len(kept),
+        "left_out": left_out,
+        "files": len(sizes),
+        "megabytes": round(sum(sizes) / 1e6, 1),
+    }
+
+
+def find_format(name: str) -> ExportFormat:
+    """Return the format of this name.
+
+    Raises
+    ------
+    InputError
+        If there is none, with the names that come near.
+    """
+    found = next((row for row in FORMATS if row.name == name), None)
+    if found is None:
+        raise suggest_names("--to: format", [name], FORMAT_NAMES, "musync export --help")
+    return found
+
+
+def import_writer(chosen: ExportFormat) -> Writer:
+    """Return the function that writes a format.
+
+    Raises
+    ------
+    InputError
+        If a package that it needs is not installed.
+    """
+    if chosen.package and find_spec(chosen.package) is None:
+        raise InputError(
+            f"--to {chosen.name}: needs the package {chosen.package}, which is not installed:"
+            " pip install 'musync[export]'"
+        )
+    module, _, name = chosen.writer.partition(":")
+    writer: Writer = getattr(import_module(f"flows.exporting.{module}"), name)
+    return writer
+
+
+def part_quarantined(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Mapping[str, Any]], list[str]]:
+    """Return the clips whose pose check did not fail, and the labels of the others."""
+    kept = [row for row in rows if not is_quarantined(row)]
+    return kept, [row["label"] for row in rows if is_quarantined(row)]
+
+
+def choose_folder(dataset: str, to: str, out: str | None) -> Path:
+    """Return the folder of an export, outside the dataset and with nothing in it yet.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    if out is None and is_address(dataset):
+        raise InputError("--out: must name a folder where the dataset lies in an object store")
+    folder = Path(f"{dataset.rstrip('/')}-{to}" if out is None else out)
+    if not is_address(dataset) and folder.resolve().is_relative_to(Path(dataset).resolve()):
+        raise InputError(
+            f"--out {folder}: must lie outside the dataset, whose files are all recorded; name another folder"
+        )
+    if os.path.lexists(folder) and (folder.is_symlink() or not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"--out {folder}: must be new or an empty folder; name another one or remove it")
+    return folder
+
+
+@contextmanager
+def write_folder(folder: Path) -> Iterator[Path]:
+    """Yield a folder to fill beside the final one, which takes its place when all is written.
+
+    Parameters
+    ----------
+    folder : final place, new or empty
+    """
+    partial = folder.absolute().with_name(f"{folder.absolute().name}.{os.getpid()}{PARTIAL}")
+    partial.mkdir(parents=True)
+    try:
+        yield partial
+        partial.replace(folder)  # takes the place of an empty folder too, and of nothing else
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def _picture_problems(chosen: ExportFormat, manifest: Mapping[str, Any], dataset: str) -> list[str]:
+    if not chosen.pictures or manifest["grid"].get("pictures", True):
+        return []
+    without = ", ".join(row.name for row in FORMATS if not row.pictures)
+    return [
+        f"{dataset}: --to {chosen.name} needs frames; the dataset was made with --no-frames, which suits {without}"
+    ]

@@ -1,0 +1,197 @@
+"""LeRobot v3: an episode a clip, one Parquet file and one film each.
+
+``observation.images.front`` is the picture as H.264 (4:2:0, constant rate factor 18: not lossless);
+``observation.state`` the telemetry at the frame in float32, with our names, units and signs (pitch positive nose-down);
+``observation.pose`` our ``T_world_rig`` (ISO 8855: x forward, y left, z up), row by row, in float64; ``action`` the
+commanded brake pressure [MPa]; the task is the clip's label. ``timestamp`` is the time since the start of the clip [s].
+Statistics are over all frames; those of pictures are of colours in 0..1, sampled.
+
+Format: codebase version v3.0, https://huggingface.co/docs/lerobot/lerobot-dataset-v3
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from flows.exporting.dataset import TICK_COLUMNS, ExportedClip, ExportedDataset
+from flows.exporting.running_statistics import RunningStatistics
+from flows.reading.film import write_film
+from flows.store.layout import write_json
+from tasks.errors import InputError
+
+CAMERA, STATE, POSE, ACTION = "observation.images.front", "observation.state", "observation.pose", "action"
+ACTION_COLUMN = "brake_pressure_mpa"
+STATE_COLUMNS = tuple(name for name in TICK_COLUMNS if name not in {"t_ns", ACTION_COLUMN})
+FILES_PER_CHUNK = 1000
+SAMPLED = 4
+"""Statistics of pictures take every fourth pixel of every fourth row; LeRobot's own writer samples them too."""
+COUNTED = ("frame_index", "episode_index", "index", "task_index")
+_PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
+DATA_PATH, VIDEO_PATH = f"data/{_PLACE}.parquet", f"videos/{{video_key}}/{_PLACE}.mp4"
+
+
+def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
+    """Write ``data/``, ``videos/`` and ``meta/``.
+
+    Parameters
+    ----------
+    dataset : with frames of even size, at a whole number of frames a second
+    folder : empty
+
+    Raises
+    ------
+    InputError
+        If the frames are of odd size or the rate no whole number.
+    """
+    camera, rate = dataset.camera, dataset.frame_rate_hz
+    if camera.width % 2 or camera.height % 2 or rate != round(rate):
+        raise InputError(
+            f"{dataset.layout}: --to lerobot needs frames of even size at a whole number a second; they are"
+            f" {camera.width} x {camera.height} at {rate:g}"
+        )
+    episodes, first, total = [], 0, RunningStatistics()
+    for number, clip in enumerate(dataset):
+        place = {"chunk_index": number // FILES_PER_CHUNK, "file_index": number % FILES_PER_CHUNK}
+        columns = _collect_columns(clip, number, first, rate)
+        pictures = clip.read_array("rgb")
+        data, film = folder / DATA_PATH.format(**place), folder / VIDEO_PATH.format(video_key=CAMERA, **place)
+        for file in (data, film):
+            file.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(_make_table(columns), data)
+        write_film(film, list(pictures), rate)
+        own = RunningStatistics()
+        for name, values in columns.items():
+            own.add(name, values)
+        sampled = pictures[:, ::SAMPLED, ::SAMPLED].reshape(-1, 3) / 255.0
+        own.add(CAMERA, sampled, frames=len(pictures))
+        total.merge(own)
+        last = first + len(pictures)
+        episodes.append(_describe_episode(clip, number, (first, last), place, rate) | _flatten(own))
+        first = last
+    _write_meta(folder, dataset, episodes, total, frames=first)
+
+
+def _collect_columns(clip: ExportedClip, number: int, first: int, rate: float) -> dict[str, NDArray[Any]]:
+    frames = clip.frames
+    count = np.arange(len(frames["frame"]), dtype=np.int64)
+    return {
+        STATE: np.stack([frames[name] for name in STATE_COLUMNS], axis=1).astype(np.float32),
+        POSE: np.asarray(frames["T_world_rig"], np.float64),
+        ACTION: frames[ACTION_COLUMN].astype(np.float32),
+        "timestamp": (count / rate).astype(np.float32),
+        "frame_index": count,
+        "episode_index": np.full(len(count), number),
+        "index": first + count,
+        "task_index": np.full(len(count), number),
+    }
+
+
+def _make_table(columns: Mapping[str, NDArray[Any]]) -> pa.Table:
+    return pa.table(
+        {
+            name: pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
+            if values.ndim == 2
+            else pa.array(values)
+            for name, values in columns.items()
+        }
+    )
+
+
+def _describe_episode(
+    clip: ExportedClip, number: int, span: tuple[int, int], place: Mapping[str, int], rate: float
+) -> dict[str, Any]:
+    return {
+        "episode_index": number,
+        "tasks": [clip.label],
+        "length": span[1] - span[0],
+        "data/chunk_index": place["chunk_index"],
+        "data/file_index": place["file_index"],
+        "dataset_from_index": span[0],
+        "dataset_to_index": span[1],
+        f"videos/{CAMERA}/chunk_index": place["chunk_index"],
+        f"videos/{CAMERA}/file_index": place["file_index"],
+        f"videos/{CAMERA}/from_timestamp": 0.0,
+        f"videos/{CAMERA}/to_timestamp": (span[1] - span[0]) / rate,
+        "meta/episodes/chunk_index": 0,
+        "meta/episodes/file_index": 0,
+    }
+
+
+def _flatten(statistics: RunningStatistics) -> dict[str, Any]:
+    rows = _shape_statistics(statistics).items()
+    return {f"stats/{name}/{kind}": value for name, row in rows for kind, value in row.items()}
+
+
+def _shape_statistics(statistics: RunningStatistics) -> dict[str, dict[str, list[Any]]]:
+    """Those of pictures have the shape [3, 1, 1] of a normalised picture's channels."""
+    rows = statistics.summarise()
+    rows[CAMERA] = {
+        kind: values if kind == "count" else np.reshape(values, (3, 1, 1)).tolist()
+        for kind, values in rows[CAMERA].items()
+    }
+    return rows
+
+
+def _describe_features(dataset: ExportedDataset) -> dict[str, Any]:
+    height, width, rate = dataset.camera.height, dataset.camera.width, round(dataset.frame_rate_hz)
+    video = {"height": height, "width": width, "codec": "h264", "pix_fmt": "yuv420p", "is_depth_map": False}
+    info = {f"video.{key}": value for key, value in (video | {"fps": rate, "channels": 3}).items()}
+    return {
+        CAMERA: {
+            "dtype": "video",
+            "shape": [height, width, 3],
+            "names": ["height", "width", "channels"],
+            "info": info | {"has_audio": False},
+        },
+        STATE: {"dtype": "float32", "shape": [len(STATE_COLUMNS)], "names": list(STATE_COLUMNS)},
+        POSE: {
+            "dtype": "float64",
+            "shape": [16],
+            "names": [f"T_world_rig_{k // 4}{k % 4}" for k in range(16)],
+        },
+        ACTION: {"dtype": "float32", "shape": [1], "names": [ACTION_COLUMN]},
+        "timestamp": {"dtype": "float32", "shape": [1], "names": None},
+        **{name: {"dtype": "int64", "shape": [1], "names": None} for name in COUNTED},
+    }
+
+
+def _write_meta(
+    folder: Path,
+    dataset: ExportedDataset,
+    episodes: list[dict[str, Any]],
+    total: RunningStatistics,
+    frames: int,
+) -> None:
+    import pandas as pd
+
+    place = {"chunk_index": 0, "file_index": 0}
+    meta = folder / "meta"
+    table = meta / "episodes" / f"{_PLACE.format(**place)}.parquet"
+    table.parent.mkdir(parents=True)
+    pq.write_table(pa.Table.from_pylist(episodes), table)
+    tasks = pd.Index([episode["tasks"][0] for episode in episodes], name="task")
+    pd.DataFrame({"task_index": range(len(tasks))}, index=tasks).to_parquet(meta / "tasks.parquet")
+    write_json(meta / "stats.json", _shape_statistics(total))
+    write_json(
+        meta / "info.json",
+        {
+            "codebase_version": "v3.0",
+            "robot_type": dataset.plan.settings.vehicle,
+            "total_episodes": len(episodes),
+            "total_frames": frames,
+            "total_tasks": len(episodes),
+            "chunks_size": FILES_PER_CHUNK,
+            "data_files_size_in_mb": 100,
+            "video_files_size_in_mb": 200,
+            "fps": round(dataset.frame_rate_hz),
+            "splits": {"train": f"0:{len(episodes)}"},
+            "data_path": DATA_PATH,
+            "video_path": VIDEO_PATH,
+            "features": _describe_features(dataset),
+        },
+    )

@@ -1,0 +1,203 @@
+"""Tables as nuScenes has them, with CAN bus messages: a scene a clip, a sample a frame.
+
+The version is ``v1.0-musync``; pictures are ``samples/CAM_FRONT/*.png``. The ego frame is nuScenes': x forward, y left,
+z up, below the middle of the rear axle, a wheelbase behind our rig; positive pitch about its y axis is nose-down, as
+ours. The camera's axes are ours (x right, y down, z forward) and pixel centres whole numbers. Quaternions are wxyz.
+Time is in microseconds since the start of the clip.
+
+Of the CAN bus, ``pose`` and ``ms_imu`` have a message a frame (acceleration as an accelerometer feels it, at rest
+9.80665 m/s^2 up), ``zoe_veh_info`` 100 a second (wheel speeds [rpm], speed [km/h]) and ``vehicle_monitor`` two (speed
+[km/h], brake pressure [bar], rear wheels [rpm]). Keys that we do not represent are absent. Scenes count from 2000,
+because the devkit refuses numbers of scenes of its own that lack a CAN bus.
+
+Format: https://www.nuscenes.org/nuscenes#data-format and python-sdk/nuscenes/can_bus/README.md of nuscenes-devkit
+"""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinhole
+from flows.exporting.inertial import compute_inertial_motion
+from flows.exporting.json_array import JsonArray, open_array
+from flows.exporting.poses import compute_quaternions_wxyz
+from flows.making.clip import PIXEL_CENTRE
+from flows.store.layout import write_json
+from manifests.canonical import sha256_of
+from tasks.errors import InputError
+from tasks.render.contact_sheet import encode_png
+from tasks.vehicle.parameters import Vehicle
+
+VERSION = "v1.0-musync"
+CHANNEL = "CAM_FRONT"
+FIRST_SCENE = 2000
+MOST_SCENES = 8000
+"""A scene's number has four digits."""
+STREAMED = ("ego_pose", "scene", "sample", "sample_data")
+EMPTY = ("category", "attribute", "visibility", "instance", "sample_annotation")
+RPM = 60 / (2 * np.pi)
+"""Revolutions a minute in one radian a second."""
+KM_H = 3.6
+BAR = 10.0
+"""Bars in one megapascal."""
+
+
+def write_nuscenes(dataset: ExportedDataset, folder: Path) -> None:
+    """Write ``v1.0-musync/``, ``samples/``, ``can_bus/`` and ``maps/``.
+
+    Parameters
+    ----------
+    dataset : with frames of a pinhole
+    folder : empty
+
+    Raises
+    ------
+    InputError
+        If the lens distorts or there are more than 8000 clips.
+    """
+    require_pinhole(dataset, "nuscenes")
+    if len(dataset) > MOST_SCENES:
+        raise InputError(
+            f"{dataset.layout}: --to nuscenes takes {MOST_SCENES} clips at most: name some with --clip"
+        )
+    tables = folder / VERSION
+    for place in (tables, folder / "samples" / CHANNEL, folder / "can_bus", folder / "maps"):
+        place.mkdir(parents=True)
+    (folder / "maps" / "none.png").write_bytes(encode_png(np.full((1, 1, 3), 255, np.uint8)))
+    for name, rows in (_describe_fixed(dataset) | {name: [] for name in EMPTY}).items():
+        write_json(tables / f"{name}.json", rows)
+    with ExitStack() as stack:
+        rows_of = {
+            name: stack.enter_context(open_array(stack.enter_context((tables / f"{name}.json").open("w"))))
+            for name in STREAMED
+        }
+        for number, clip in enumerate(dataset):
+            scene = f"scene-{FIRST_SCENE + number:04d}"
+            _write_scene(clip, dataset, scene, folder, rows_of)
+            for message, rows in describe_can_bus(clip, dataset.vehicle).items():
+                write_json(folder / "can_bus" / f"{scene}_{message}.json", rows)
+
+
+def make_token(*parts: object) -> str:
+    """Return the token of a row: 32 hexadecimal digits that follow from what it is."""
+    return sha256_of(["/".join(map(str, parts)).encode()])[:32]
+
+
+def compute_ego_poses(clip: ExportedClip, vehicle: Vehicle) -> NDArray[np.float64]:
+    """Return the ego-to-world poses [F, 4, 4]: those of the rig, moved back to the rear axle [m]."""
+    return clip.T_world_rig @ _rig_from_ego(vehicle)
+
+
+def describe_can_bus(clip: ExportedClip, vehicle: Vehicle) -> dict[str, list[dict[str, Any]]]:
+    """Return the messages of a clip's CAN bus, by kind.
+
+    Parameters
+    ----------
+    clip : that was driven
+    vehicle : that drove it
+    """
+    frames, ticks = clip.frames, clip.ticks
+    motion, poses = compute_inertial_motion(clip, vehicle), compute_ego_poses(clip, vehicle)
+    turns = compute_quaternions_wxyz(poses).tolist()
+    at = (frames["t_ns"] // 1000).tolist()
+    forces, rates, places = motion.force.tolist(), motion.turn_rate.tolist(), poses[:, :3, 3].tolist()
+    wheels = {"F": "wheel_speed_f", "R": "wheel_speed_r"}
+    return {
+        "pose": [
+            {"accel": forces[k], "orientation": turns[k], "pos": places[k], "rotation_rate": rates[k],
+             "utime": at[k], "vel": [float(frames["speed"][k]), 0.0, 0.0]}
+            for k in range(len(at))
+        ],
+        "ms_imu": [
+            {"linear_accel": forces[k], "q": turns[k], "rotation_rate": rates[k], "utime": at[k]}
+            for k in range(len(at))
+        ],
+        "zoe_veh_info": [
+            {f"{axle}{side}_wheel_speed": float(ticks[name][k]) * RPM for axle, name in wheels.items() for side in "LR"}
+            | {"longitudinal_accel": float(ticks["longitudinal_acceleration"][k]),
+               "odom_speed": float(ticks["speed"][k]) * KM_H, "utime": int(ticks["t_ns"][k]) // 1000}
+            for k in _every(ticks["t_ns"], 10_000_000)
+        ],
+        "vehicle_monitor": [
+            {"brake": float(ticks["brake_pressure_mpa"][k]) * BAR,
+             "brake_switch": 2 if ticks["brake_pressure_mpa"][k] > 0 else 1,
+             "rear_left_rpm": float(ticks["wheel_speed_r"][k]) * RPM,
+             "rear_right_rpm": float(ticks["wheel_speed_r"][k]) * RPM,
+             "vehicle_speed": float(ticks["speed"][k]) * KM_H, "utime": int(ticks["t_ns"][k]) // 1000}
+            for k in _every(ticks["t_ns"], 500_000_000)
+        ],
+    }  # fmt: skip
+
+
+def _write_scene(
+    clip: ExportedClip, dataset: ExportedDataset, scene: str, folder: Path, rows_of: dict[str, JsonArray]
+) -> None:
+    own = make_token("scene", clip.clip_id)
+    frames = clip.frames
+    count = len(frames["frame"])
+    poses = compute_ego_poses(clip, dataset.vehicle)
+    turns, pictures = compute_quaternions_wxyz(poses), clip.read_array("rgb")
+    rows_of["scene"].append(
+        {"token": own, "log_token": make_token("log"), "nbr_samples": count, "name": scene,
+         "description": clip.label, "first_sample_token": make_token("sample", clip.clip_id, 0),
+         "last_sample_token": make_token("sample", clip.clip_id, count - 1)}
+    )  # fmt: skip
+    for frame, t_ns in enumerate(frames["t_ns"].tolist()):
+        name = f"samples/{CHANNEL}/{scene}_{frame:06d}.png"
+        (folder / name).write_bytes(encode_png(pictures[frame]))
+        ego, sample = (make_token(table, clip.clip_id, frame) for table in ("ego_pose", "sample"))
+        rows_of["ego_pose"].append(
+            {"token": ego, "timestamp": t_ns // 1000, "rotation": turns[frame].tolist(),
+             "translation": poses[frame, :3, 3].tolist()}
+        )  # fmt: skip
+        rows_of["sample"].append(
+            {"token": sample, "timestamp": t_ns // 1000, "scene_token": own}
+            | dict(_link("sample", clip, frame, count))
+        )
+        rows_of["sample_data"].append(
+            {"token": make_token("sample_data", clip.clip_id, frame), "sample_token": sample,
+             "ego_pose_token": ego, "calibrated_sensor_token": make_token("calibrated_sensor"),
+             "timestamp": t_ns // 1000, "fileformat": "png", "is_key_frame": True, "filename": name,
+             "height": dataset.camera.height, "width": dataset.camera.width}
+            | dict(_link("sample_data", clip, frame, count))
+        )  # fmt: skip
+
+
+def _link(table: str, clip: ExportedClip, frame: int, count: int) -> Iterator[tuple[str, str]]:
+    for name, other in (("prev", frame - 1), ("next", frame + 1)):
+        yield name, make_token(table, clip.clip_id, other) if 0 <= other < count else ""
+
+
+def _describe_fixed(dataset: ExportedDataset) -> dict[str, list[dict[str, Any]]]:
+    camera = dataset.camera
+    mount = np.linalg.inv(_rig_from_ego(dataset.vehicle)) @ camera.T_rig_camera
+    log, sensor = make_token("log"), make_token("sensor")
+    return {
+        "log": [{"token": log, "logfile": dataset.manifest["run_id"], "vehicle": dataset.plan.settings.vehicle,
+                 "date_captured": "", "location": dataset.plan.settings.scene}],
+        "map": [{"token": make_token("map"), "log_tokens": [log], "category": "semantic_prior",
+                 "filename": "maps/none.png"}],
+        "sensor": [{"token": sensor, "channel": CHANNEL, "modality": "camera"}],
+        "calibrated_sensor": [
+            {"token": make_token("calibrated_sensor"), "sensor_token": sensor,
+             "translation": mount[:3, 3].tolist(),
+             "rotation": compute_quaternions_wxyz(mount[None])[0].tolist(),
+             "camera_intrinsic": (camera.K - PIXEL_CENTRE).tolist()}
+        ],
+    }  # fmt: skip
+
+
+def _rig_from_ego(vehicle: Vehicle) -> NDArray[np.float64]:
+    pose = np.eye(4)
+    pose[0, 3] = -(vehicle.cg_to_front_axle + vehicle.cg_to_rear_axle)
+    return pose
+
+
+def _every(t_ns: NDArray[np.int64], period_ns: int) -> list[int]:
+    """Rows whose time is a multiple of a period."""
+    rows: list[int] = np.flatnonzero(t_ns % period_ns == 0).tolist()
+    return rows

@@ -1,0 +1,51 @@
+"""pycocotools gives back the class picture; without it the run lengths are decoded here."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from flows.exporting.coco import describe_mask
+from tests.flows.exporting.conftest import BRAKING, HUMP
+
+
+def decode_runs(segmentation):
+    height, width = segmentation["size"]
+    values = np.arange(len(segmentation["counts"])) % 2
+    return np.repeat(values, segmentation["counts"]).reshape(width, height).T.astype(bool)
+
+
+@pytest.mark.parametrize("corner", [True, False])
+def test_runs_go_down_the_columns_and_begin_outside(corner):
+    mask = np.zeros((3, 4), bool)
+    mask[1, 1:3] = True
+    mask[0, 0] = corner
+    told = describe_mask(mask, 5)
+    np.testing.assert_array_equal(decode_runs(told["segmentation"]), mask)
+    assert told["area"] == 2 + corner
+    assert told["bbox"] == ([0, 0, 3, 2] if corner else [1, 1, 2, 1])
+    assert told["category_id"] == 6
+
+
+def test_pycocotools_gives_back_pictures_and_classes(export, stored):
+    module = pytest.importorskip("pycocotools.coco", reason="pip install pycocotools")
+    read = module.COCO(str(export("coco") / "annotations.json"))
+    assert len(read.imgs) == 22
+    for image in read.imgs.values():
+        clip = stored[image["clip"]]
+        picture = cv2.imread(str(export("coco") / image["file_name"]))[..., ::-1]
+        np.testing.assert_array_equal(picture, clip.pixels["rgb"][image["frame"]])
+        classes = np.full(picture.shape[:2], 255)
+        for annotation in read.imgToAnns[image["id"]]:
+            mask = read.annToMask(annotation).astype(bool)
+            assert mask.sum() == annotation["area"]
+            classes[mask] = annotation["category_id"] - 1
+        np.testing.assert_array_equal(classes, clip.pixels["class"][image["frame"]])
+    assert {row["name"] for row in read.cats.values()} >= {"road", "building"}
+
+
+def test_the_file_is_one_json_document(export):
+    content = json.loads((export("coco") / "annotations.json").read_text())
+    assert [image["clip"] for image in content["images"]] == [BRAKING] * 11 + [HUMP] * 11
+    assert len({row["id"] for row in content["annotations"]}) == len(content["annotations"])

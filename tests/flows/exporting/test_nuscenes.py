@@ -1,0 +1,83 @@
+"""The tables join as nuScenes' do; the devkit, where it is installed, opens them and the CAN bus."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from flows.making.clip import catalogue_of
+from tests.flows.exporting.conftest import BRAKING, HUMP
+
+SCENES = {BRAKING: "scene-2000", HUMP: "scene-2001"}
+
+
+@pytest.fixture(scope="module")
+def tables(export):
+    folder = export("nuscenes")
+    return {path.stem: json.loads(path.read_text()) for path in (folder / "v1.0-musync").glob("*.json")}
+
+
+def to_matrix(row):
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_quat(row["rotation"], scalar_first=True).as_matrix()
+    pose[:3, 3] = row["translation"]
+    return pose
+
+
+def test_a_scene_chains_its_samples_to_pictures_and_poses(export, stored, tables, toy_dataset):
+    catalogue = catalogue_of(toy_dataset.root)
+    by_token = {row["token"]: row for rows in tables.values() for row in rows}
+    assert len(by_token) == sum(map(len, tables.values()))
+    data_of = {row["sample_token"]: row for row in tables["sample_data"]}
+    (mount,) = tables["calibrated_sensor"]
+    for scene in tables["scene"]:
+        clip = stored[scene["description"]]
+        token, seen = scene["first_sample_token"], []
+        while token:
+            seen.append(data_of[token])
+            token = by_token[token]["next"]
+        assert len(seen) == scene["nbr_samples"] == 11
+        for frame, row in enumerate(seen):
+            assert row["timestamp"] * 1000 == clip.frames["t_ns"][frame]
+            picture = cv2.imread(str(export("nuscenes") / row["filename"]))[..., ::-1]
+            np.testing.assert_array_equal(picture, clip.pixels["rgb"][frame])
+            ego = to_matrix(by_token[row["ego_pose_token"]])
+            # ego and mount together give our camera's pose
+            expected = clip.T_world_rig[frame] @ catalogue.camera.T_rig_camera
+            np.testing.assert_allclose(ego @ to_matrix(mount), expected, atol=1e-12)
+            # the ego frame lies a wheelbase behind the front axle
+            wheelbase = catalogue.vehicle.cg_to_front_axle + catalogue.vehicle.cg_to_rear_axle
+            behind = np.linalg.inv(clip.T_world_rig[frame]) @ ego[:, 3]
+            np.testing.assert_allclose(behind[:3], [-wheelbase, 0, 0], atol=1e-12)
+
+
+def test_nuscenes_devkit_opens_tables_and_can_bus(export, stored):
+    nuscenes = pytest.importorskip("nuscenes.nuscenes", reason="pip install nuscenes-devkit")
+    from nuscenes.can_bus.can_bus_api import NuScenesCanBus
+
+    folder = str(export("nuscenes"))
+    base = nuscenes.NuScenes(version="v1.0-musync", dataroot=folder, verbose=False)
+    bus = NuScenesCanBus(dataroot=folder)
+    for record, (label, clip) in zip(base.scene, stored.items(), strict=True):
+        assert (record["name"], record["description"]) == (SCENES[label], label)
+        sample = base.get("sample", record["last_sample_token"])
+        path, _, K = base.get_sample_data(sample["data"]["CAM_FRONT"])
+        np.testing.assert_array_equal(cv2.imread(path)[..., ::-1], clip.pixels["rgb"][-1])
+        np.testing.assert_array_equal(K, [[80, 0, 47.5], [0, 80, 31.5], [0, 0, 1]])
+        poses = bus.get_messages(record["name"], "pose")
+        assert [row["utime"] * 1000 for row in poses] == clip.frames["t_ns"].tolist()
+        assert [row["vel"][0] for row in poses] == clip.frames["speed"].tolist()
+        turns = Rotation.from_quat([row["orientation"] for row in poses], scalar_first=True)
+        np.testing.assert_allclose(turns.as_euler("ZYX")[:, 1], clip.frames["pitch"], atol=1e-12)
+        monitor = bus.get_messages(record["name"], "vehicle_monitor")
+        ticks = clip.ticks.iloc[::500]
+        np.testing.assert_allclose([row["vehicle_speed"] for row in monitor], ticks["speed"] * 3.6)
+        np.testing.assert_allclose([row["brake"] for row in monitor], ticks["brake_pressure_mpa"] * 10)
+        wheels = bus.get_messages(record["name"], "zoe_veh_info")
+        np.testing.assert_allclose(
+            [row["RL_wheel_speed"] for row in wheels], clip.ticks["wheel_speed_r"][::10] * 60 / (2 * np.pi)
+        )
+    last = bus.get_messages("scene-2000", "pose")[-1]
+    assert last["accel"][0] < -1 and last["accel"][2] == pytest.approx(9.80665, abs=1)
