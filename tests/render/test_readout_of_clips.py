@@ -9,13 +9,14 @@ from catalogs.weather import load_weather
 from tasks.errors import InputError
 from tasks.eval.image_quality import psnr
 from tasks.render.camera import body_poses, continuous_rig, world_to_camera
-from tasks.render.clip import ClipConditions, RigMotion, render_clip
+from tasks.render.clip import RigMotion, render_clip
 from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.backend import CpuBackend
 from tasks.render.readout import sensor_field
 from tasks.render.sight import row_points
 from tasks.render.weather.attribution import LAYER_BITS
+from tasks.render.weather.layers import ClipConditions
 from tasks.render.weather.scene_light import append_gaussians
 from tasks.scene.route import route_from_positions
 from tasks.scene.scene import Scene

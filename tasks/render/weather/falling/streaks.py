@@ -62,7 +62,7 @@ def draw_streaks(
     return ParticleLayer(rgb=rgb, alpha=1 - through)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _swept(x):  # type: ignore[no-untyped-def]
     """Integral up to x of the biweight kernel 15/16 (1 - x^2)^2 on [-1, 1]."""
     if x <= -1:
@@ -72,7 +72,7 @@ def _swept(x):  # type: ignore[no-untyped-def]
     return 0.5 + 0.9375 * x * (1 + x * x * (-2 / 3 + 0.2 * x * x))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ignore[no-untyped-def]
     height, width = depth.shape
     for s in range(len(streaks)):
@@ -115,7 +115,7 @@ def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ign
                     sums[row, column, c] += a * light[s, c]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _settle(sums, through, rgb):  # type: ignore[no-untyped-def]
     """Light of each pixel: the mean of its particles' light, as far as they hide what is behind them."""
     for row in range(through.shape[0]):
