@@ -9,6 +9,7 @@ from tasks.conventions import SemanticClass
 from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.sky import LUMINANCE, sky_light
+from tasks.render.weather.wet import wet_road
 from tasks.render.weather.wet.puddles import compute_wetness, water_surface
 from tasks.render.weather.wet.reflection import mirrored_scene
 from tasks.render.weather.wet.road_view import RoadView
@@ -30,8 +31,9 @@ CLOUDY = np.full((8, 16, 3), 0.9, np.float32)
 
 def see_road(gbuffer, view=VIEW):
     """The pixels of class road as the road of one frame."""
+    road = gbuffer.class_id == SemanticClass.ROAD
     return RoadView(
-        road=gbuffer.class_id == SemanticClass.ROAD, depth=gbuffer.depth, normal=gbuffer.normal,
+        road=road, mirrors=road, depth=gbuffer.depth, normal=gbuffer.normal,
         rays=pixel_rays(view), T_world_camera=view.T_world_camera, K=view.K,
     )  # fmt: skip
 
@@ -138,7 +140,7 @@ def test_no_mirrored_ray_passes_under_a_car_and_comes_out_above_it(low, high, so
     depth = np.where(hangs, np.float32(8), gbuffer.depth)
     seen = np.where(hangs[..., None], np.float32(0.02), picture)
     road = (gbuffer.class_id == SemanticClass.ROAD) & ~hangs
-    view = replace(see_road(gbuffer), road=road, depth=depth)
+    view = replace(see_road(gbuffer), road=road, mirrors=road, depth=depth)
     mirrored = mirrored_scene(seen, view, CLOUDY, 0.0, np.ones(3))
     behind = road & (depth > 9) & (depth < 11) & (abs(np.arange(160) - 80) < 28)
     assert behind.sum() > 100
@@ -198,3 +200,28 @@ def test_puddles_stay_where_they_are_as_the_car_drives(parameters):
         )
     assert shares[1] == pytest.approx(shares[0], abs=0.08)
     assert np.ptp(shares[0]) > 0.1
+
+
+@pytest.mark.parametrize(
+    "rows", [slice(0, 320), slice(251, 252), slice(252, 253)], ids=["all", "odd", "even"]
+)
+def test_a_pixel_that_leaves_its_own_mirrored_light_out_has_that_of_its_neighbours(
+    parameters, sky, monkeypatch, rows
+):
+    """As if every pixel had its own to half an 8-bit step; a road of one row keeps every bit."""
+    view = shutter()
+    picture, gbuffer = flat_gbuffer(view, 12.0)
+    kept = np.isin(np.arange(320), np.arange(320)[rows])[:, None]
+    narrow = replace(gbuffer, class_id=np.where(kept, gbuffer.class_id, np.uint8(SemanticClass.BUILDING)))
+    film = RoadFilm(depth_mm=1.2, parameters=parameters.kinds["rain"].film, seed=1)
+    light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
+    arguments = (picture, narrow, view, pixel_rays(view), film, light)
+    layer = wet_layer(*arguments)
+    monkeypatch.setattr(wet_road, "LEAST_REACH", 1000)
+    whole = wet_layer(*arguments)
+    if rows.stop - rows.start == 1:
+        assert np.array_equal(layer.add, whole.add)
+        assert layer.add[rows].max() > 0
+    else:
+        assert not np.array_equal(layer.add, whole.add)
+        assert np.sqrt(((layer.add - whole.add) ** 2).mean()) < 0.5 / 255

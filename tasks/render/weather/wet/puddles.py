@@ -59,7 +59,7 @@ class WaterSurface:
     Parameters
     ----------
     smooth : float32 [H, W] share of the pixel under smooth water [1]
-    normal : float32 [H, W, 3] unit normals of that water, world frame [1]
+    normal : float32 [H, W, 3] unit normals of that water where it mirrors, world frame [1]
     cosine : float32 [H, W] cosine of the angle at which the road is seen [1]
     """
 
@@ -94,7 +94,7 @@ def water_surface(
         cosine=np.zeros(view.road.shape, dtype=np.float32),
     )
     _water(
-        view.depth, view.rays, view.normal, view.road, view.T_world_camera[:3, 3], float(view.K[1, 1]),
+        view.depth, view.rays, view.normal, view.road, view.mirrors, view.T_world_camera[:3, 3], float(view.K[1, 1]),
         film_depth_mm, compute_wetness(film_depth_mm, p), p.texture_depth_mm, p.texture_spread_mm,
         p.unevenness_mm, p.unevenness.coarsest_m, p.unevenness.octaves, p.unevenness.roughness,
         p.ripple_slope, p.ripple_m, np.uint64(stream_key(seed, "puddles")),
@@ -105,7 +105,7 @@ def water_surface(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _water(  # type: ignore[no-untyped-def]
-    depth, rays, normal, road, eye, focal, film, wet, texture, spread, uneven, coarsest, octaves, roughness,
+    depth, rays, normal, road, mirrors, eye, focal, film, wet, texture, spread, uneven, coarsest, octaves, roughness,
     ripple_slope, ripple, key, smooth, water, cosine,
 ):  # fmt: skip
     for row in range(road.shape[0]):
@@ -120,6 +120,8 @@ def _water(  # type: ignore[no-untyped-def]
             level = film + uneven * fractal_noise(x, y, size, coarsest, octaves, roughness, key)
             smooth[row, column] = wet * 0.5 * (1 + erf((level - texture) / (spread * sqrt(2.0))))
             cosine[row, column] = min(facing, 1.0)
+            if not mirrors[row, column]:
+                continue
             nx = up[0] - ripple_slope * fractal_noise(x, y, size, ripple, 2, 0.6, key + np.uint64(1000))
             ny = up[1] - ripple_slope * fractal_noise(x, y, size, ripple, 2, 0.6, key + np.uint64(2000))
             length = sqrt(nx * nx + ny * ny + up[2] * up[2])

@@ -35,7 +35,7 @@ def mirrored_scene(
     extinction: float,
     airlight: NDArray[np.floating],
 ) -> NDArray[np.float32]:
-    """Return the radiance that arrives along the mirrored line of sight of every road pixel.
+    """Return the radiance that arrives along the mirrored line of sight of every road pixel that mirrors.
 
     Parameters
     ----------
@@ -47,14 +47,14 @@ def mirrored_scene(
 
     Returns
     -------
-    float32 [H, W, 3] radiance; 0 off the road [1]
+    float32 [H, W, 3] radiance; 0 elsewhere [1]
     """
     out = np.zeros_like(picture)
     K = view.K
     R = np.ascontiguousarray(view.T_world_camera[:3, :3], dtype=np.float32)
     camera = np.array((K[0, 0], K[1, 1], K[0, 2], K[1, 2]), dtype=np.float32)
     _mirror(
-        picture, view.depth, view.normal, view.road, environment, R, camera,
+        picture, view.depth, view.normal, view.mirrors, environment, R, camera,
         np.float32(extinction), np.asarray(airlight, dtype=np.float32), out,
     )  # fmt: skip
     return out
@@ -84,8 +84,9 @@ def _blend_pixel(picture, u, v, out):  # type: ignore[no-untyped-def]
 def _place(origin, direction, t, camera):  # type: ignore[no-untyped-def]
     """Return pixel coordinates and camera z of a point of the ray."""
     z = origin[2] + t * direction[2]
-    u = camera[0] * (origin[0] + t * direction[0]) / z + camera[2]
-    v = camera[1] * (origin[1] + t * direction[1]) / z + camera[3]
+    inverse = np.float32(1) / z
+    u = camera[0] * (origin[0] + t * direction[0]) * inverse + camera[2]
+    v = camera[1] * (origin[1] + t * direction[1]) * inverse + camera[3]
     return u, v, z
 
 
@@ -146,13 +147,13 @@ def _march(origin, direction, climb, depth, camera):  # type: ignore[no-untyped-
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _mirror(picture, depth, normal, road, environment, R, camera, extinction, airlight, out):  # type: ignore[no-untyped-def]
+def _mirror(picture, depth, normal, mirrors, environment, R, camera, extinction, airlight, out):  # type: ignore[no-untyped-def]
     height, width = depth.shape
     origin, direction = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
     colour, sky = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
     for row in range(height):
         for column in range(width):
-            if not road[row, column]:
+            if not mirrors[row, column]:
                 continue
             z = depth[row, column]
             origin[0] = (column + np.float32(0.5) - camera[2]) / camera[0] * z

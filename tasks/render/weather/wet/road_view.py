@@ -13,6 +13,7 @@ class RoadView:
     Parameters
     ----------
     road : bool [H, W] pixels of the road
+    mirrors : bool [H, W] those of them whose mirrored light is computed, one by one
     depth : float32 [H, W] camera z of the whole scene; NaN where there is none [m]
     normal : float32 [H, W, 3] unit normals of the road, world frame [1]
     rays : float32 [H, W, 3] world directions of the pixels, of camera z 1 [1]
@@ -21,6 +22,7 @@ class RoadView:
     """
 
     road: NDArray[np.bool_]
+    mirrors: NDArray[np.bool_]
     depth: NDArray[np.float32]
     normal: NDArray[np.float32]
     rays: NDArray[np.float32]

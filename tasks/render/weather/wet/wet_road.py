@@ -145,8 +145,15 @@ def wet_layer(
     focal_px = float(shutter.K[1, 1])
     road = np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5)
     window = 2 * round(p.normal_window * shutter.height / 2) + 1
+    # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
+    # narrow across at grazing angles
+    smooth_reach, rough_reach = (round(slope * focal_px) for slope in (p.water.ripple_slope, p.rough_slope))
+    mirrors = road.copy()
+    if smooth_reach >= LEAST_REACH:
+        mirrors[1::2] &= ~road[: shutter.height // 2 * 2 : 2]
     view = RoadView(
         road=road,
+        mirrors=mirrors,
         depth=gbuffer.depth,
         normal=_road_normals(gbuffer.normal, road, window),
         rays=rays,
@@ -157,10 +164,8 @@ def wet_layer(
     mirrored = mirrored_scene(
         picture, replace(view, normal=water.normal), light.environment, light.extinction, sky.airlight
     )
-    # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
-    # narrow across at grazing angles
-    sharp = _column_mean(mirrored, road, round(p.water.ripple_slope * focal_px))
-    rough = _column_mean(mirrored, road, round(p.rough_slope * focal_px))
+    sharp = _column_mean(mirrored, view, smooth_reach)
+    rough = _column_mean(mirrored, view, rough_reach)
     gain = np.ones((*road.shape, 1), dtype=np.float32)
     add = np.zeros_like(picture)
     facing = np.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
@@ -175,6 +180,9 @@ def wet_layer(
 
 DRAINED_CLASSES = (SemanticClass.SIDEWALK, SemanticClass.KERB, SemanticClass.TERRAIN)
 """Rough ground with pores that water runs off."""
+LEAST_REACH = 4
+"""Rows to either side over which mirrored light is averaged, from which on a pixel leaves its own light out where the
+pixel above it has some [px]."""
 STEEPEST_SOAKED = 0.5
 """Upward part of a normal from which on ground is soaked through: 60 deg steep, it still gets half the rain [1]."""
 ALBEDO_RANGE = (0.02, 0.9)
@@ -227,26 +235,26 @@ def _road_normals(normal: NDArray[np.float32], road: NDArray[np.bool_], window: 
     return mean
 
 
-def _column_mean(light: NDArray[np.float32], road: NDArray[np.bool_], reach: int) -> NDArray[np.float32]:
-    """Mean of the road pixels of each column within ``reach`` rows."""
+def _column_mean(light: NDArray[np.float32], view: RoadView, reach: int) -> NDArray[np.float32]:
+    """Return the mean of the mirroring pixels of each column within ``reach`` rows, for every road pixel."""
     out = np.zeros_like(light)
-    _slide(light, road, reach, out)
+    _slide(light, view.road, view.mirrors, reach, out)
     return out
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _slide(light, road, reach, out):  # type: ignore[no-untyped-def]
+def _slide(light, road, mirrors, reach, out):  # type: ignore[no-untyped-def]
     height, width = road.shape
     total = np.zeros((width, 3))
     count = np.zeros(width)
     for row in range(-reach, height):
         enters, leaves = row + reach, row - reach - 1
         for column in range(width):
-            if enters < height and road[enters, column]:
+            if enters < height and mirrors[enters, column]:
                 count[column] += 1
                 for c in range(3):
                     total[column, c] += light[enters, column, c]
-            if leaves >= 0 and road[leaves, column]:
+            if leaves >= 0 and mirrors[leaves, column]:
                 count[column] -= 1
                 for c in range(3):
                     total[column, c] -= light[leaves, column, c]
