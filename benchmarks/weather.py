@@ -13,7 +13,7 @@ from tasks.render.camera import world_to_camera
 from tasks.render.composition import compose_over_sky
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.atmosphere import air_layer, light_layer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import recompose_layers
@@ -64,7 +64,9 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
     clear_sky = environment_view(scene.environment, view, K, *size)
 
     def clear() -> None:
-        compose_over_sky(rasterise(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded)
+        compose_over_sky(
+            rasterise_view(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded
+        )
 
     clear_ms = _cpu_ms(clear)
     found = [{"name": "clear frame", "value": clear_ms, "unit": "CPU-ms", "peer": None, "ratio": None}]
@@ -77,10 +79,10 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
         )
         once_s = time.process_time() - started
         cloud = prepare_gaussians(gaussians)
-        gbuffer = rasterise(cloud, view, K, *size)
+        gbuffer = rasterise_view(cloud, view, K, *size)
         picture = compose_over_sky(gbuffer, clear_sky, gaussians.display_encoded)
-        raster_ms = _cpu_ms(rasterise, cloud, view, K, *size)
-        bare_ms = _cpu_ms(rasterise, clear_cloud, view, K, *size)
+        raster_ms = _cpu_ms(rasterise_view, cloud, view, K, *size)
+        bare_ms = _cpu_ms(rasterise_view, clear_cloud, view, K, *size)
         stages = _list_stages(weather, picture, clear_sky, gbuffer, shutter)
         whole_ms = _cpu_ms(apply_weather, weather, picture, clear_sky, gbuffer, shutter)
         added = whole_ms + max(raster_ms - bare_ms, 0)

@@ -80,7 +80,7 @@ def render_clip(
         to_sun=scene.to_sun,
     )
     weathered, weather = weather_scene(clear_scene, conditions, float(camera.K[0, 0]))
-    prepared = backend.prepare(weathered)
+    prepared = backend.prepare_gaussians(weathered)
     field = sensor_field(camera)
     T_world_camera = motion.T_world_rig @ camera.T_rig_camera
     T_world_rows = _row_poses(camera, T_world_camera, motion.rig_at)
@@ -88,7 +88,7 @@ def render_clip(
     frames: list[dict[str, NDArray[np.generic]]] = []
     for frame, pose in enumerate(T_world_camera):
         view = world_to_camera(pose)
-        gbuffer = backend.rasterise(
+        gbuffer = backend.rasterise_view(
             prepared, view, field.K, field.width, field.height, normals=labels or weather.reads_normals
         )
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)

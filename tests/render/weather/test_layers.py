@@ -8,7 +8,7 @@ import pytest
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.render.composition import encode_8bit, to_linear
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.attribution import LAYER_BITS, attribute_pixels, paper_picture, snow_on
 from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import apply_weather
@@ -49,7 +49,7 @@ def street():
 def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005):
     view = shutter(time_s=time_s, exposure_s=exposure_s, speed=speed, **SIZE)
     scene, weather = weather_over(street, SKY, state, parameters, seed)
-    gbuffer = rasterise(
+    gbuffer = rasterise_view(
         prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height
     )
     sky = np.broadcast_to(np.float32((0.2, 0.4, 0.8)), gbuffer.rgb.shape)

@@ -10,7 +10,7 @@ from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.labels import forward_flow
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.atmosphere import air_layer, light_layer, precipitating_air
 from tasks.render.weather.attribution import snow_on
 from tasks.render.weather.falling.precipitation import make_population
@@ -56,7 +56,7 @@ def rendered(street, state, parameters, time_s=2.0, x=0.0, speed=10.0):
     view = shutter(time_s=time_s, x=x, speed=speed, exposure_s=0.005, **SIZE)
     scene, weather = weather_over(street, even_sky(), state, parameters)
     viewmat = np.linalg.inv(view.T_world_camera)
-    gbuffer = rasterise(prepare_gaussians(scene), viewmat, view.K, view.width, view.height)
+    gbuffer = rasterise_view(prepare_gaussians(scene), viewmat, view.K, view.width, view.height)
     sky = environment_view(even_sky(), viewmat, view.K, view.width, view.height)
     picture = compose_over_sky(gbuffer, sky, street.display_encoded)
     return weather, apply_weather(weather, picture, sky, gbuffer, view), gbuffer, view
