@@ -90,6 +90,7 @@ def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ign
         reach_u, reach_v = 0.5 * length * abs(ax) + half, 0.5 * length * abs(ay) + half
         first_u, last_u = max(0, ceil(mid_u - reach_u - 0.5)), min(width - 1, floor(mid_u + reach_u - 0.5))
         first_v, last_v = max(0, ceil(mid_v - reach_v - 0.5)), min(height - 1, floor(mid_v + reach_v - 0.5))
+        per_half = 1 / half
         strength = streak.share * pi / 4 * disc * disc * 0.9375 / (half * length)
         for row in range(first_v, last_v + 1):
             dv = row + 0.5 - mid_v
@@ -101,11 +102,11 @@ def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ign
                 if depth[row, column] < z:
                     continue
                 du = column + 0.5 - mid_u
-                across = (du * ay - dv * ax) / half
+                across = (du * ay - dv * ax) * per_half
                 if across * across >= 1:
                     continue
                 along = du * ax + dv * ay
-                a = _swept((along + 0.5 * length) / half) - _swept((along - 0.5 * length) / half)
+                a = _swept((along + 0.5 * length) * per_half) - _swept((along - 0.5 * length) * per_half)
                 if a <= 0:
                     continue
                 a = min(1.0, a * strength * (1 - across * across) ** 2)
