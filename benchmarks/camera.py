@@ -35,7 +35,7 @@ def measure_rows(scene_name: str = "street") -> list[dict[str, Any]]:
     scene, asked = load_scene(scene_name), load_camera("dashcam-480x320-rolling")
     pinhole = replace(asked, lens=None)
     backend = CpuBackend()
-    prepared = backend.prepare(scene.gaussians)
+    prepared = backend.prepare_gaussians(scene.gaussians)
     ticks = np.arange(201, dtype=np.float64) * 1e-3
     rig_at = continuous_rig(
         scene.route, ticks, STATION + SPEED * ticks, 0 * ticks, PITCH_RATE * ticks, np.array([0.1]),
@@ -50,7 +50,7 @@ def measure_rows(scene_name: str = "street") -> list[dict[str, Any]]:
 
     def draw(pose: NDArray[np.float64], field: Field = one) -> tuple[Light, Light]:
         view = world_to_camera(pose)
-        gbuffer = backend.rasterise(prepared, view, field.K, field.width, field.height)
+        gbuffer = backend.rasterise_view(prepared, view, field.K, field.width, field.height)
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         return compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded), gbuffer.depth
 

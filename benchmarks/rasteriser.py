@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.corridor import driver_view, make_corridor
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise, splat_back
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view, splat_back
 from tasks.render.rasterise.reference_rasteriser import rasterise_reference
 
 STATION = 5.0
@@ -49,7 +49,7 @@ def _view_rows(count: int, width: int, height: int, limit_ms: float | None) -> l
     gaussians, (viewmat, K) = make_corridor(count), driver_view(STATION, width, height)
     prepared = prepare_gaussians(gaussians)
     label = f"{count // 1000}k Gaussians, {width}x{height}"
-    frame_ms = _cpu_ms(lambda: rasterise(prepared, viewmat, K, width, height))
+    frame_ms = _cpu_ms(lambda: rasterise_view(prepared, viewmat, K, width, height))
     if limit_ms is None:
         return [_make_row(f"frame, {label}", frame_ms, "CPU-ms", None, None)]
     residual = np.ones((height, width, 3), dtype=np.float32)
@@ -91,7 +91,7 @@ def _peak_memory_mib() -> float:
     viewmat, K = driver_view(STATION, width, height)
     prepared = prepare_gaussians(make_corridor(count))
     for _ in range(3):
-        rasterise(prepared, viewmat, K, width, height)
+        rasterise_view(prepared, viewmat, K, width, height)
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 

@@ -13,12 +13,20 @@ from tasks.render.camera import world_to_camera
 from tasks.render.composition import compose_over_sky
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.atmosphere import air_layer, light_layer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import recompose_layers
-from tasks.render.weather.layers import ClipWeather, apply_weather, particle_layer, pixel_rays, weather_scene
-from tasks.render.weather.wet.wet_road import wet_layer
+from tasks.render.weather.layers import (
+    ClearScene,
+    ClipConditions,
+    ClipWeather,
+    apply_weather,
+    particle_layer,
+    pixel_rays,
+    weather_scene,
+)
+from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tasks.surface.state import SurfaceState
 
 STATES = {
@@ -56,23 +64,27 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
     clear_sky = environment_view(scene.environment, view, K, *size)
 
     def clear() -> None:
-        compose_over_sky(rasterise(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded)
+        compose_over_sky(
+            rasterise_view(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded
+        )
 
     clear_ms = _cpu_ms(clear)
     found = [{"name": "clear frame", "value": clear_ms, "unit": "CPU-ms", "peer": None, "ratio": None}]
     for name, state in STATES.items():
         started = time.process_time()
         gaussians, weather = weather_scene(
-            scene.gaussians, scene.environment, state, parameters, float(K[0, 0]), 1, scene.route
+            ClearScene(gaussians=scene.gaussians, environment=scene.environment, route=scene.route),
+            ClipConditions(state=state, parameters=parameters, seed=1),
+            float(K[0, 0]),
         )
         once_s = time.process_time() - started
         cloud = prepare_gaussians(gaussians)
-        gbuffer = rasterise(cloud, view, K, *size)
+        gbuffer = rasterise_view(cloud, view, K, *size)
         picture = compose_over_sky(gbuffer, clear_sky, gaussians.display_encoded)
-        raster_ms = _cpu_ms(rasterise, cloud, view, K, *size)
-        bare_ms = _cpu_ms(rasterise, clear_cloud, view, K, *size)
-        stages = _list_stages(weather, picture, gbuffer, shutter)
-        whole_ms = _cpu_ms(apply_weather, weather, picture, gbuffer, shutter)
+        raster_ms = _cpu_ms(rasterise_view, cloud, view, K, *size)
+        bare_ms = _cpu_ms(rasterise_view, clear_cloud, view, K, *size)
+        stages = _list_stages(weather, picture, clear_sky, gbuffer, shutter)
+        whole_ms = _cpu_ms(apply_weather, weather, picture, clear_sky, gbuffer, shutter)
         added = whole_ms + max(raster_ms - bare_ms, 0)
         for stage, call in stages.items():
             found.append(_make_row(f"{name}: {stage}", _cpu_ms(call), clear_ms))
@@ -87,27 +99,30 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
 
 
 def _list_stages(
-    weather: ClipWeather, picture: np.ndarray, gbuffer: GBuffer, shutter: Shutter
+    weather: ClipWeather, picture: np.ndarray, clear_sky: np.ndarray, gbuffer: GBuffer, shutter: Shutter
 ) -> dict[str, Callable[[], object]]:
     """The layers of one frame, each to be called alone."""
     overcast = weather.overcast
     assert overcast is not None and overcast.population is not None
     film, falling = overcast.look.film, overcast.population
     rays = pixel_rays(shutter)
-    cloudy, sky, air = overcast.environment, overcast.sky, overcast.air
-    lit = recompose_layers(
-        picture, [light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays)]
-    )
+    sky, air, view = overcast.sky, overcast.air, world_to_camera(shutter.T_world_camera)
+
+    def see_clouds() -> np.ndarray:
+        return environment_view(overcast.environment, view, shutter.K, shutter.width, shutter.height)
+
+    cloudy = see_clouds()
+    lit = recompose_layers(picture, [light_layer(picture, gbuffer, clear_sky, cloudy, sky)])
     stages: dict[str, Callable[[], object]] = {
-        "light": lambda: light_layer(picture, gbuffer, weather.clear_environment, cloudy, sky, rays),
+        "clouds": see_clouds,
+        "light": lambda: light_layer(picture, gbuffer, clear_sky, cloudy, sky),
         "air": lambda: air_layer(gbuffer, cloudy, air, sky, rays),
         "particles": lambda: particle_layer(weather, falling, sky, gbuffer.depth, shutter),
     }
     if film is not None:
-        stages["wet road with reflection"] = lambda: wet_layer(
-            lit, gbuffer, cloudy, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
-            weather.state.film_depth_mm, film, weather.seed,
-        )  # fmt: skip
+        on_road = RoadFilm(depth_mm=weather.state.film_depth_mm, parameters=film, seed=weather.seed)
+        light = LightOnRoad(environment=overcast.environment, sky=sky, extinction=air.extinction)
+        stages["wet road with reflection"] = lambda: wet_layer(lit, gbuffer, shutter, rays, on_road, light)
     return stages
 
 

@@ -8,7 +8,7 @@ from benchmarks.double_track.campaign import draw_session, measure_run
 from benchmarks.double_track.effects import Truth
 from catalogs.vehicles import load_vehicle
 from flows.making.generate import generate_dataset
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
@@ -19,7 +19,7 @@ from tests.toy_street import toy_street, write_toy_grid
 def compile_rasteriser(_: Path) -> None:
     """Draw a picture."""
     K = np.array([[80.0, 0.0, 48.0], [0.0, 80.0, 32.0], [0.0, 0.0, 1.0]])
-    rasterise(prepare_gaussians(toy_street().gaussians), np.eye(4), K, 96, 64)
+    rasterise_view(prepare_gaussians(toy_street().gaussians), np.eye(4), K, 96, 64)
 
 
 def compile_vehicle(_: Path) -> None:

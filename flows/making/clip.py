@@ -39,11 +39,12 @@ from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdic
 from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
 from tasks.eval.poses.undistort import undistort_frames
 from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
-from tasks.render.clip import ClipConditions, RigMotion, render_clip
+from tasks.render.clip import RigMotion, render_clip
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
 from tasks.render.road_paint import HazardMarking, paint_feature
 from tasks.render.road_refinement import refine_road
+from tasks.render.weather.layers import ClipConditions
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.route import Route
 from tasks.scene.scene import Scene

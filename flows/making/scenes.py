@@ -82,7 +82,9 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
     viewmat, intrinsics, width, height = _read_pose(pose)
     loaded = load_scene(scene)
     engine = select_backend(backend)
-    gbuffer = engine.rasterise(engine.prepare(loaded.gaussians), viewmat, intrinsics, width, height)
+    gbuffer = engine.rasterise_view(
+        engine.prepare_gaussians(loaded.gaussians), viewmat, intrinsics, width, height
+    )
     sky = environment_view(loaded.environment, viewmat, intrinsics, width, height)
     picture = encode_8bit(compose_over_sky(gbuffer, sky, loaded.gaussians.display_encoded))
     buffers: dict[str, Any] = {

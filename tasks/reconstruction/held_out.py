@@ -13,7 +13,7 @@ from tasks.reconstruction.exposure import Exposure
 from tasks.reconstruction.sequence import StereoSequence
 from tasks.reconstruction.sky import sky_view
 from tasks.render.camera import world_to_camera
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.scene.scene import Scene
 
 
@@ -60,7 +60,7 @@ def score_held_out_frames(
     height, width = sequence.left.shape[1:3]
     rows = []
     for i in map(int, frames):
-        gbuffer = rasterise(prepared, world_to_camera(T_world_camera[i]), K, width, height)
+        gbuffer = rasterise_view(prepared, world_to_camera(T_world_camera[i]), K, width, height)
         sky = sky_view(scene.environment, (height, width), sequence.intrinsics, T_world_camera[i])
         shown = exposure.to_picture(gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky, i)
         shown = np.rint(shown * np.float32(255)).astype(np.uint8)

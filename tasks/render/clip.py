@@ -18,10 +18,8 @@ from tasks.render.sensor import apply_sensor
 from tasks.render.sight import take_drawn_frame, take_frame_through_sensor
 from tasks.render.weather.attribution import paper_picture
 from tasks.render.weather.falling.particles import Shutter
-from tasks.render.weather.layers import apply_weather, weather_scene
-from tasks.render.weather.parameters import WeatherParameters
+from tasks.render.weather.layers import ClearScene, ClipConditions, apply_weather, weather_scene
 from tasks.scene.scene import Scene
-from tasks.surface.state import SurfaceState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,22 +36,6 @@ class RigMotion:
     T_world_rig: NDArray[np.float64]
     frame_rate_hz: float
     rig_at: RigAt | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ClipConditions:
-    """The weather of a clip and its appearance.
-
-    Parameters
-    ----------
-    state : what falls, and what lies on the road
-    parameters : optical parameters of the weather
-    seed : visual seed; it moves particles and snow, and nothing else [1]
-    """
-
-    state: SurfaceState
-    parameters: WeatherParameters
-    seed: int
 
 
 def render_clip(
@@ -90,11 +72,15 @@ def render_clip(
     InputError
         The camera moves during a frame, and ``motion`` has no poses between frames.
     """
-    weathered, weather = weather_scene(
-        scene.gaussians, scene.environment, conditions.state, conditions.parameters, float(camera.K[0, 0]),
-        conditions.seed, scene.route, relief, scene.to_sun,
-    )  # fmt: skip
-    prepared = backend.prepare(weathered)
+    clear_scene = ClearScene(
+        gaussians=scene.gaussians,
+        environment=scene.environment,
+        route=scene.route,
+        relief=relief,
+        to_sun=scene.to_sun,
+    )
+    weathered, weather = weather_scene(clear_scene, conditions, float(camera.K[0, 0]))
+    prepared = backend.prepare_gaussians(weathered)
     field = sensor_field(camera)
     T_world_camera = motion.T_world_rig @ camera.T_rig_camera
     T_world_rows = _row_poses(camera, T_world_camera, motion.rig_at)
@@ -102,7 +88,7 @@ def render_clip(
     frames: list[dict[str, NDArray[np.generic]]] = []
     for frame, pose in enumerate(T_world_camera):
         view = world_to_camera(pose)
-        gbuffer = backend.rasterise(
+        gbuffer = backend.rasterise_view(
             prepared, view, field.K, field.width, field.height, normals=labels or weather.reads_normals
         )
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
@@ -116,7 +102,7 @@ def render_clip(
             exposure_s=camera.exposure_s,
         )
         clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
-        finished = apply_weather(weather, clear, gbuffer, shutter, particles=camera.plain)
+        finished = apply_weather(weather, clear, sky, gbuffer, shutter, particles=camera.plain)
         drawn = (weather, finished, gbuffer, shutter)
         if T_world_rows is None:
             seen = take_drawn_frame(*drawn, labels)

@@ -37,7 +37,7 @@ class Lens:
         return np.array((self.k1, self.k2, self.p1, self.p2, self.k3))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def distort_rays(x, y, coefficients):  # type: ignore[no-untyped-def]
     """Return the distorted place of the ray (x, y, 1), for scalars and arrays, in kernels and outside.
 

@@ -11,7 +11,7 @@ from tasks.reconstruction.sequence import StereoSequence
 from tasks.render.camera import world_to_camera
 from tasks.render.composition import encode_8bit
 from tasks.render.environment import environment_view
-from tasks.render.rasterise.rasteriser import PreparedGaussians, prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import PreparedGaussians, prepare_gaussians, rasterise_view
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 
@@ -57,7 +57,7 @@ def stereo_set(frames: int = 7, step: float = 0.7) -> StereoSet:
             pose = poses[i].copy()
             pose[:3, 3] += side * AXES[:, 0]
             view = world_to_camera(pose)
-            gbuffer = rasterise(street, view, K, WIDTH, HEIGHT)
+            gbuffer = rasterise_view(street, view, K, WIDTH, HEIGHT)
             sky = environment_view(environment, view, K, WIDTH, HEIGHT)
             light = gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky
             pictures[i] = encode_8bit(light * np.float32(GAINS[i % len(GAINS)]))

@@ -13,7 +13,7 @@ from tasks.errors import InputError
 from tasks.reconstruction.reconstruct import Reconstruction, reconstruct_street
 from tasks.reconstruction.sequence import StereoSequence, StereoSettings
 from tasks.render.camera import world_to_camera
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.scene.gaussians import check_gaussians
 from tests.reconstruction.stereo_set import (
     CAMERA_HEIGHT,
@@ -59,14 +59,16 @@ def test_a_picture_never_seen_is_shown_within_30_db(built: Reconstruction) -> No
 def test_depth_of_a_picture_never_seen_is_right_to_two_percent(
     built: Reconstruction, truth: StereoSet
 ) -> None:
-    shown = rasterise(
+    shown = rasterise_view(
         prepare_gaussians(built.scene.gaussians),
         world_to_camera(built.T_world_camera[HELD_OUT]),
         truth.K,
         WIDTH,
         HEIGHT,
     )
-    true = rasterise(truth.street, world_to_camera(truth.T_street_camera[HELD_OUT]), truth.K, WIDTH, HEIGHT)
+    true = rasterise_view(
+        truth.street, world_to_camera(truth.T_street_camera[HELD_OUT]), truth.K, WIDTH, HEIGHT
+    )
     both = (shown.alpha > 0.5) & (true.alpha > 0.5)
     error = np.abs(shown.depth[both] / true.depth[both] - 1)
     assert both.sum() > 0.97 * (true.alpha > 0.5).sum()

@@ -19,7 +19,7 @@ from tasks.reconstruction.adjoint import (
 from tasks.reconstruction.refinement import TrainingView, bit_reversed_order, refine_gaussians
 from tasks.render.rasterise.preparation import prepare_gaussians
 from tasks.render.rasterise.projection import DEPTH, LOG_ALPHA, RECORD, RED, X, Y, project_gaussians
-from tasks.render.rasterise.rasteriser import rasterise
+from tasks.render.rasterise.rasteriser import rasterise_view
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
@@ -60,7 +60,7 @@ ONES = np.ones((HEIGHT, WIDTH), np.float32)
 def test_the_blended_picture_is_the_rasterisers() -> None:
     gaussians, sky = make_cloud(), make_backdrop(2)
     picture, _ = blend_and_derive(records_of(gaussians), sky, ONES, sky)
-    gbuffer = rasterise(prepare_gaussians(gaussians), np.eye(4), K, WIDTH, HEIGHT)
+    gbuffer = rasterise_view(prepare_gaussians(gaussians), np.eye(4), K, WIDTH, HEIGHT)
     np.testing.assert_allclose(picture[..., 3], 1 - gbuffer.alpha, atol=2e-5)
     np.testing.assert_allclose(
         picture[..., :3], gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * sky, atol=2e-5
@@ -131,7 +131,7 @@ def views_of(gaussians: Gaussians) -> list[TrainingView]:
     for shift in (-0.4, 0.0, 0.4):
         viewmat = np.eye(4)
         viewmat[0, 3] = shift
-        gbuffer = rasterise(prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
+        gbuffer = rasterise_view(prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
         sky = np.full((HEIGHT, WIDTH, 3), 0.4, np.float32)
         views.append(TrainingView(
             viewmat=viewmat,
@@ -147,7 +147,7 @@ def views_of(gaussians: Gaussians) -> list[TrainingView]:
 def error_of(gaussians: Gaussians, views: list[TrainingView]) -> float:
     total = 0.0
     for view in views:
-        gbuffer = rasterise(prepare_gaussians(gaussians), view.viewmat, K, WIDTH, HEIGHT)
+        gbuffer = rasterise_view(prepare_gaussians(gaussians), view.viewmat, K, WIDTH, HEIGHT)
         total += float(
             ((gbuffer.rgb + (1 - gbuffer.alpha)[..., None] * view.sky - view.radiance) ** 2).mean()
         )

@@ -4,7 +4,7 @@ import numpy as np
 
 from tasks.conventions import SemanticClass
 from tasks.render.camera import world_to_camera
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 
@@ -40,7 +40,7 @@ def crossing_row(road: Gaussians, advance: float) -> float:
     prepared, rows = prepare_gaussians(road), []
     for phase in PHASES:
         lens = np.array([[400.0, 0, 8], [0, 400.0, 20 + phase], [0, 0, 1]])
-        got = rasterise(prepared, world_to_camera(pose), lens, 16, 100)
+        got = rasterise_view(prepared, world_to_camera(pose), lens, 16, 100)
         light = got.rgb[:, 4:12, 0].mean(axis=1) / np.maximum(got.alpha[:, 4:12].mean(axis=1), 1e-6) - DARK
         light[got.alpha[:, 8] < 0.5] = 0
         rows.append((light * (np.arange(100) + 0.5)).sum() / light.sum() - lens[1, 2])

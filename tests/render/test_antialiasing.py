@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tests.render.clouds import HEIGHT, WIDTH, K, make_cloud
 from tests.render.striped_road import crossing_row, striped_road, true_row
 
@@ -19,7 +19,7 @@ def light_of(radius_px: float, antialiased: bool) -> float:
     disc = make_cloud(
         (0.0, 0, z), scales=(radius_px * z / K[0, 0], radius_px * z / K[1, 1], 1e-4), opacities=opacity
     )
-    got = rasterise(prepare_gaussians(replace(disc, antialiased=antialiased)), AHEAD, K, WIDTH, HEIGHT)
+    got = rasterise_view(prepare_gaussians(replace(disc, antialiased=antialiased)), AHEAD, K, WIDTH, HEIGHT)
     return float(got.alpha.sum()) / (opacity * 2 * np.pi * radius_px**2)
 
 
@@ -38,7 +38,9 @@ def test_a_classic_splat_grows_by_a_pixels_variance():
 def test_splats_much_larger_than_a_pixel_are_drawn_alike():
     big = make_cloud((0.3, 0.2, 5.0), scales=(1.0, 0.8, 0.5), opacities=0.7)
     a, b = (
-        rasterise(prepare_gaussians(replace(big, antialiased=antialiased)), AHEAD, K, WIDTH, HEIGHT).alpha
+        rasterise_view(
+            prepare_gaussians(replace(big, antialiased=antialiased)), AHEAD, K, WIDTH, HEIGHT
+        ).alpha
         for antialiased in (False, True)
     )
     assert np.abs(a - b).max() < 0.01

@@ -9,7 +9,7 @@ import torch
 from tasks.render.rasterise.painters_bias import LARGEST_SHIFT, MOST_OVERLAP, interpolate_shift, shift_terms
 from tasks.render.rasterise.painters_bias_torch import means_nearer
 from tasks.render.rasterise.projection import ANTIALIASED_LOW_PASS, X, Y, project_gaussians
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.rasterise.reference_rasteriser import rasterise_reference
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
@@ -82,9 +82,9 @@ def test_a_level_road_of_discs_stays_while_the_camera_comes_closer():
 
 def test_the_kernel_draws_what_the_reference_integrates():
     level = surround_cloud(random_cloud(600))
-    got = rasterise(prepare_gaussians(level), AHEAD, K, WIDTH, HEIGHT)
+    got = rasterise_view(prepare_gaussians(level), AHEAD, K, WIDTH, HEIGHT)
     wanted = rasterise_reference(level, AHEAD, K, WIDTH, HEIGHT)
-    plain = rasterise(prepare_gaussians(replace(level, surroundings=None)), AHEAD, K, WIDTH, HEIGHT)
+    plain = rasterise_view(prepare_gaussians(replace(level, surroundings=None)), AHEAD, K, WIDTH, HEIGHT)
     assert np.abs(got.rgb - wanted.rgb).max() < 2e-3
     assert np.abs(got.rgb - plain.rgb).max() > 0.1
 
@@ -135,7 +135,7 @@ def test_a_disc_that_its_lead_brings_into_the_picture_is_not_culled_with_its_blo
     for x in np.linspace(-2.2, -1.0, 25):
         ball = make_cloud((x, 0.0, 2.0), scales=0.1, opacities=0.9, normals=(0.6, 0, 0.8))
         level = replace(ball, surroundings=np.array([[20.0, 1.0]], np.float32), antialiased=True)
-        got = rasterise(prepare_gaussians(level), AHEAD, K, WIDTH, HEIGHT).alpha
+        got = rasterise_view(prepare_gaussians(level), AHEAD, K, WIDTH, HEIGHT).alpha
         assert np.abs(got - rasterise_reference(level, AHEAD, K, WIDTH, HEIGHT).alpha).max() < 5e-3
         drawn += bool(got.any())
     assert 5 < drawn < 25

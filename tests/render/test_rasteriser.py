@@ -11,7 +11,7 @@ from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.projection import project_gaussians
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.rasterise.reference_rasteriser import blend_steps, rasterise_reference
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
@@ -21,7 +21,7 @@ AHEAD = np.eye(4)
 
 
 def draw_cloud(gaussians: Gaussians, viewmat: NDArray[np.float64] = AHEAD) -> GBuffer:
-    return rasterise(prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
+    return rasterise_view(prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
 
 
 def all_bytes(gbuffer: GBuffer) -> list[bytes]:
@@ -158,10 +158,10 @@ def test_order_of_the_cloud_does_not_change_a_bit() -> None:
 def test_threads_do_not_change_a_bit() -> None:
     prepared = prepare_gaussians(random_cloud(2000))
     views = [camera_at((0, 0, 0), rotation_matrix(seed)) for seed in range(4)]
-    alone = [all_bytes(rasterise(prepared, view, K, WIDTH, HEIGHT)) for view in views]
+    alone = [all_bytes(rasterise_view(prepared, view, K, WIDTH, HEIGHT)) for view in views]
     with ThreadPoolExecutor(2) as pool:
         together = list(
-            pool.map(lambda view: all_bytes(rasterise(prepared, view, K, WIDTH, HEIGHT)), views * 3)
+            pool.map(lambda view: all_bytes(rasterise_view(prepared, view, K, WIDTH, HEIGHT)), views * 3)
         )
     assert together == alone * 3
 
@@ -205,7 +205,9 @@ def test_normals_face_the_camera() -> None:
 
 def test_without_normals_every_other_buffer_keeps_its_bits() -> None:
     prepared = prepare_gaussians(random_cloud(800, 4, 5))
-    with_normals, flat = (rasterise(prepared, np.eye(4), K, WIDTH, HEIGHT, normals=n) for n in (True, False))
+    with_normals, flat = (
+        rasterise_view(prepared, np.eye(4), K, WIDTH, HEIGHT, normals=n) for n in (True, False)
+    )
     assert not flat.normal.any() and with_normals.normal.any()
     for field in fields(GBuffer):
         if field.name != "normal":
@@ -259,9 +261,9 @@ def test_an_unusable_camera_is_refused_with_every_reason() -> None:
     broken = K.copy()
     broken[0, 0] = np.nan
     with pytest.raises(InputError) as caught:
-        rasterise(prepare_gaussians(random_cloud(5)), np.eye(3), broken, 0, 10)
+        rasterise_view(prepare_gaussians(random_cloud(5)), np.eye(3), broken, 0, 10)
     assert [problem.split(" must")[0] for problem in caught.value.problems] == [
         "camera: viewmat", "camera: K", "camera: the picture",
     ]  # fmt: skip
     with pytest.raises(InputError, match=r"focal lengths must be positive; they are 60.0 and -58.0"):
-        rasterise(prepare_gaussians(random_cloud(5)), np.eye(4), np.diag((60, -58, 1.0)), 10, 10)
+        rasterise_view(prepare_gaussians(random_cloud(5)), np.eye(4), np.diag((60, -58, 1.0)), 10, 10)

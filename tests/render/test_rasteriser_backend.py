@@ -15,7 +15,7 @@ from tasks.errors import InputError
 from tasks.render.rasterise import backend
 from tasks.render.rasterise.backend import CpuBackend, compare_with_cpu, probe_scene, select_backend
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"
@@ -32,7 +32,7 @@ def test_cpu_draws_the_probe_as_gsplats_own_torch_code_does() -> None:
     x, y, *_ = np.array(pixels, dtype=object).T
     wanted = np.array([pixel[2:] for pixel in pixels], dtype=np.float64)
     gaussians, viewmat, K = probe_scene()
-    got = rasterise(prepare_gaussians(gaussians), viewmat, K, 64, 48)
+    got = rasterise_view(prepare_gaussians(gaussians), viewmat, K, 64, 48)
     at = y.astype(int), x.astype(int)
     assert np.abs(got.rgb[at] - wanted[:, :3]).max() < 5e-6
     assert np.abs(got.alpha[at] - wanted[:, 3]).max() < 5e-6
@@ -45,10 +45,10 @@ def test_cpu_draws_the_probe_as_gsplats_own_torch_code_does() -> None:
 def test_probe_names_what_a_wrong_backend_draws_wrong() -> None:
     class Mirrored(CpuBackend):
         @staticmethod
-        def rasterise(
+        def rasterise_view(
             prepared: Any, viewmat: NDArray, K: NDArray, width: int, height: int, normals: bool = True
         ) -> GBuffer:
-            drawn = CpuBackend.rasterise(prepared, viewmat, K, width, height)
+            drawn = CpuBackend.rasterise_view(prepared, viewmat, K, width, height)
             return replace(drawn, rgb=drawn.rgb[:, ::-1], class_id=np.roll(drawn.class_id, 5))
 
     problem = compare_with_cpu(Mirrored())
@@ -101,8 +101,8 @@ def test_gsplat_draws_the_cpus_picture() -> None:
             random_cloud(1500, sh_count, seed),
             camera_at((0.1, 0.2, 0), rotation_matrix(seed)),
         )
-        got = gpu.rasterise(gpu.prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
-        wanted = cpu.rasterise(cpu.prepare(gaussians), viewmat, K, WIDTH, HEIGHT)
+        got = gpu.rasterise_view(gpu.prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
+        wanted = cpu.rasterise_view(cpu.prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
         assert np.mean((got.rgb - wanted.rgb) ** 2) < 1e-6
         assert np.mean((got.alpha - wanted.alpha) ** 2) < 1e-6
         assert np.nanmean(np.abs(got.depth / wanted.depth - 1)) < 1e-3

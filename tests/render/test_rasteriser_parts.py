@@ -11,7 +11,6 @@ from scipy.special import sph_harm_y
 
 from tasks.errors import InputError
 from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH, depth_order, tile_lists
-from tasks.render.rasterise.blending import absorb_light
 from tasks.render.rasterise.preparation import BLOCK, SH, morton_order, prepare_gaussians
 from tasks.render.rasterise.projection import (
     COLUMN_FALLOFF,
@@ -24,9 +23,10 @@ from tasks.render.rasterise.projection import (
     Y,
     project_gaussians,
 )
-from tasks.render.rasterise.rasteriser import rasterise, splat_back
+from tasks.render.rasterise.rasteriser import rasterise_view, splat_back
 from tasks.render.rasterise.reference_rasteriser import blend_steps
 from tasks.render.rasterise.shading import shade_lanes
+from tasks.render.rasterise.strips import absorb_light
 from tasks.render.rasterise.view import view_of
 from tasks.scene.spherical_harmonics import sh_basis
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
@@ -143,7 +143,7 @@ def test_splat_back_is_the_adjoint_of_blending() -> None:
     prepared = prepare_gaussians(gaussians)
     residual = np.random.default_rng(1).uniform(0, 1, (HEIGHT, WIDTH, 3)).astype(np.float32)
     numerator, weight = splat_back(prepared, np.eye(4), K, WIDTH, HEIGHT, residual)
-    got = rasterise(prepared, np.eye(4), K, WIDTH, HEIGHT)
+    got = rasterise_view(prepared, np.eye(4), K, WIDTH, HEIGHT)
     colours = np.maximum(gaussians.sh[:, 0].astype(np.float64) * sh_basis(np.eye(3)[0], 1) + 0.5, 0)
     assert (colours * numerator).sum() == pytest.approx(
         (got.rgb.astype(np.float64) * residual).sum(), rel=1e-5

@@ -5,7 +5,7 @@ import pytest
 
 from tasks.conventions import ROAD_CLASSES
 from tasks.render.labels import HAZARD, hazard_mark
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.road_edit import apply_road_profile
 from tasks.render.road_refinement import refine_road
 from tasks.surface.road_profile import RoadHazard, road_elevation
@@ -25,7 +25,7 @@ def seen_from(x: float, height: float, length: float):
     view = shutter(x=x, width=WIDTH, height=HEIGHT, focal=FOCAL)
     pose = view.T_world_camera.copy()
     pose[2, 3] = EYE
-    g = rasterise(prepare_gaussians(cloud), np.linalg.inv(pose), view.K, WIDTH, HEIGHT)
+    g = rasterise_view(prepare_gaussians(cloud), np.linalg.inv(pose), view.K, WIDTH, HEIGHT)
     rows = np.arange(HEIGHT // 2 + 12, HEIGHT)
     by_depth = x + np.median(g.depth[rows, WIDTH // 2 - 3 : WIDTH // 2 + 3], axis=1)
     way = np.arange(0.5, 12, 0.002)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.road_refinement import LENGTH_BY_FEATURE, refine_road
 from tasks.scene.surroundings import add_surroundings
 from tasks.surface.road_profile import RoadHazard
@@ -65,7 +65,7 @@ def test_a_flat_road_of_pieces_is_as_bright_as_before():
     pose[:3, 3] = (6.0, 0.0, 1.3)
     K = np.array([[120.0, 0, 80], [0, 120, 50], [0, 0, 1]])
     clouds = SCENE.gaussians, refine_road(SCENE.gaussians, relief_of(HAZARD))
-    whole, cut = (rasterise(prepare_gaussians(c), np.linalg.inv(pose), K, 160, 100) for c in clouds)
+    whole, cut = (rasterise_view(prepare_gaussians(c), np.linalg.inv(pose), K, 160, 100) for c in clouds)
     changed = np.abs(whole.rgb - cut.rgb).max(axis=-1) > 1e-6
     assert changed.sum() > 300
     assert np.abs(whole.alpha - cut.alpha).max() < 0.04

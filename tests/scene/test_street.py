@@ -12,7 +12,7 @@ from catalogs.scenes.street import load_street_layout
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.preparation import PreparedGaussians, rotation_matrices
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.scene.gaussians import check_gaussians
 from tasks.scene.scene import Scene
 from tasks.scene.street.build import build_street
@@ -60,7 +60,7 @@ def viewmat_at(street: Scene, station: float) -> NDArray[np.float64]:
 
 
 def seen(street: Scene, prepared: PreparedGaussians, station: float) -> GBuffer:
-    return rasterise(prepared, viewmat_at(street, station), K, WIDTH, HEIGHT)
+    return rasterise_view(prepared, viewmat_at(street, station), K, WIDTH, HEIGHT)
 
 
 def every_byte(scene: Scene) -> list[bytes]:

@@ -30,10 +30,10 @@ class Backend(Protocol):
     def name(self) -> str:
         """``"cpu"`` or ``"gsplat"``."""
 
-    def prepare(self, gaussians: Gaussians) -> Any:
-        """Pack a cloud the way this backend draws it; see `tasks.render.rasterise.rasteriser.prepare`."""
+    def prepare_gaussians(self, gaussians: Gaussians) -> Any:
+        """Pack a cloud the way this backend draws it; see `tasks.render.rasterise.rasteriser.prepare_gaussians`."""
 
-    def rasterise(
+    def rasterise_view(
         self,
         prepared: Any,
         viewmat: NDArray[np.floating],
@@ -42,15 +42,15 @@ class Backend(Protocol):
         height: int,
         normals: bool = True,
     ) -> GBuffer:
-        """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise`; normals may be there unasked."""
+        """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise_view`; normals may be there unasked."""
 
 
 class CpuBackend:
     """`tasks.render.rasterise.rasteriser` as a `Backend`."""
 
     name = "cpu"
-    prepare = staticmethod(rasteriser.prepare_gaussians)
-    rasterise = staticmethod(rasteriser.rasterise)
+    prepare_gaussians = staticmethod(rasteriser.prepare_gaussians)
+    rasterise_view = staticmethod(rasteriser.rasterise_view)
 
 
 def select_backend(name: str = "auto") -> Backend:
@@ -113,8 +113,8 @@ def _describe_difference(
     backend: Backend, gaussians: Gaussians, viewmat: NDArray[np.float64], K: NDArray[np.float64]
 ) -> str:
     width, height = 64, 48
-    drawn = backend.rasterise(backend.prepare(gaussians), viewmat, K, width, height)
-    wanted = rasteriser.rasterise(rasteriser.prepare_gaussians(gaussians), viewmat, K, width, height)
+    drawn = backend.rasterise_view(backend.prepare_gaussians(gaussians), viewmat, K, width, height)
+    wanted = rasteriser.rasterise_view(rasteriser.prepare_gaussians(gaussians), viewmat, K, width, height)
     differences = {
         "rgb": drawn.rgb - wanted.rgb,
         "alpha": drawn.alpha - wanted.alpha,

@@ -13,10 +13,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from tasks.render.rasterise.blending import MAX_ALPHA, SURFACE_RATIO
+from tasks.render.rasterise.blending import SURFACE_RATIO
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.painters_bias_torch import means_nearer
 from tasks.render.rasterise.projection import NEAR, low_pass
+from tasks.render.rasterise.strips import MAX_ALPHA
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians, check_gaussians
 
@@ -53,7 +54,7 @@ class GsplatBackend:
         if self.device.type == "cuda" and not torch.cuda.is_available():
             raise RuntimeError("torch finds no CUDA device")
 
-    def prepare(self, gaussians: Gaussians) -> DeviceGaussians:
+    def prepare_gaussians(self, gaussians: Gaussians) -> DeviceGaussians:
         """Check a cloud and copy it to the device.
 
         Raises
@@ -75,7 +76,7 @@ class GsplatBackend:
         )
 
     @torch.no_grad()
-    def rasterise(
+    def rasterise_view(
         self,
         prepared: DeviceGaussians,
         viewmat: NDArray[np.floating],
@@ -84,7 +85,7 @@ class GsplatBackend:
         height: int,
         normals: bool = True,
     ) -> GBuffer:
-        """Draw one view, always with its normals; see `tasks.render.rasterise.rasteriser.rasterise`."""
+        """Draw one view, always with its normals; see `tasks.render.rasterise.rasteriser.rasterise_view`."""
         view = view_of(viewmat, K, width, height)
         direction = prepared.means - self._to_tensor(view.eye.astype(np.float32))
         degree = int(prepared.sh.shape[1] ** 0.5) - 1

@@ -11,10 +11,10 @@ from tasks.render.rasterise.projection import project_gaussians
 from tasks.render.rasterise.splat_back import splat_back
 from tasks.render.rasterise.view import view_of
 
-__all__ = ["PreparedGaussians", "prepare_gaussians", "rasterise", "splat_back"]
+__all__ = ["PreparedGaussians", "prepare_gaussians", "rasterise_view", "splat_back"]
 
 
-def rasterise(
+def rasterise_view(
     prepared: PreparedGaussians,
     viewmat: NDArray[np.floating],
     K: NDArray[np.floating],

@@ -139,7 +139,7 @@ def _shift_nearer(
 def rasterise_reference(
     gaussians: Gaussians, viewmat: NDArray[np.floating], K: NDArray[np.floating], width: int, height: int
 ) -> GBuffer:
-    """Return the result of `tasks.render.rasterise.rasteriser.rasterise` by slow, readable code.
+    """Return the result of `tasks.render.rasterise.rasteriser.rasterise_view` by slow, readable code.
 
     Parameters
     ----------

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from tasks.errors import InputError
 from tasks.render.rasterise.binning import tile_lists
-from tasks.render.rasterise.blending import blend_transposed
 from tasks.render.rasterise.preparation import PreparedGaussians
 from tasks.render.rasterise.projection import project_gaussians
+from tasks.render.rasterise.transposed_blending import blend_transposed
 from tasks.render.rasterise.view import view_of
 
 
@@ -21,7 +21,7 @@ def splat_back(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the sum over the pixels of blend weight times residual, for every Gaussian.
 
-    With w_i(p) the weight that `rasterise` gives Gaussian i at pixel p, the picture is
+    With w_i(p) the weight that `rasterise_view` gives Gaussian i at pixel p, the picture is
     ``sum_i w_i(p) colour_i``; this is its transpose, ``sum_p w_i(p) residual(p)``.
 
     Parameters

@@ -1,13 +1,11 @@
 """Air between the eye and the scene: light under cloud, and Koschmieder's veil over distance."""
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.environment import sample_panorama
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.precipitation import NearField, Population, drawn_optical_depth
 from tasks.render.weather.layer import Layer
@@ -96,10 +94,9 @@ def optical_depth(air: Air, distance: NDArray[np.floating]) -> NDArray[np.float6
 def light_layer(
     picture: NDArray[np.float32],
     gbuffer: GBuffer,
-    clear_environment: NDArray[np.float32],
-    environment: NDArray[np.float32],
+    clear_sky: NDArray[np.float32],
+    cloudy_sky: NDArray[np.float32],
     sky: SkyLight,
-    rays: NDArray[np.float32],
 ) -> Layer:
     """Return the layer that changes the light of the street to that under cloud and replaces its sky.
 
@@ -107,30 +104,27 @@ def light_layer(
     ----------
     picture : float32 [H, W, 3] clear picture, sky included [1]
     gbuffer : the rasterisation it was made from
-    clear_environment, environment : float32 [h, w, 3] environment in clear weather, and under cloud [1]
+    clear_sky, cloudy_sky : float32 [H, W, 3] the pixels' sky in clear weather, and under cloud [1]
     sky : the light under cloud
-    rays : float32 [H, W, 3] world directions of the pixels, of camera z 1 [1]
 
     Returns
     -------
     Layer
     """
     lit = np.empty_like(picture)
-    _relight(
-        picture, gbuffer.alpha, clear_environment, environment, sky.relight.astype(np.float32), rays, lit
-    )
+    _relight(picture, gbuffer.alpha, clear_sky, cloudy_sky, sky.relight.astype(np.float32), lit)
     return Layer(name="light", gain=np.zeros((1, 1, 1), dtype=np.float32), add=lit)
 
 
 def air_layer(
-    gbuffer: GBuffer, environment: NDArray[np.float32], air: Air, sky: SkyLight, rays: NDArray[np.float32]
+    gbuffer: GBuffer, cloudy_sky: NDArray[np.float32], air: Air, sky: SkyLight, rays: NDArray[np.float32]
 ) -> Layer:
     """Return the veil of the air over the street; the sky contains the veil already.
 
     Parameters
     ----------
     gbuffer : the rasterisation
-    environment : float32 [h, w, 3] environment under cloud [1]
+    cloudy_sky : float32 [H, W, 3] the pixels' sky under cloud [1]
     air : the air
     sky : the light under cloud
     rays : float32 [H, W, 3] world directions of the pixels, of camera z 1 [1]
@@ -144,61 +138,47 @@ def air_layer(
     add = np.empty((height, width, 3), dtype=np.float32)
     table = air.drawn.astype(np.float32)
     _veil(
-        gbuffer.depth, gbuffer.alpha, rays, environment, sky.airlight.astype(np.float32),
+        gbuffer.depth, gbuffer.alpha, rays, cloudy_sky, sky.airlight.astype(np.float32),
         np.float32(air.extinction), table, np.float32(TABLE_STEPS / air.table_m), gain, add,
     )  # fmt: skip
     return Layer(name="air", gain=gain, add=add)
 
 
-OPAQUE = 0.995
-"""Alpha from which what shines through of the sky behind is not sampled: under the brightest sky it is
-one 8-bit step."""
-
-
-@numba.njit(cache=True, nogil=True)
-def _relight(picture, alpha, clear, cloudy, relight, rays, lit):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _relight(picture, alpha, clear, cloudy, relight, lit):  # type: ignore[no-untyped-def]
     height, width = alpha.shape
-    behind, own = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
+    zero, one = np.float32(0), np.float32(1)
     for row in range(height):
         for column in range(width):
-            left = np.float32(1) - alpha[row, column]
-            open_sky = alpha[row, column] < OPAQUE
-            ray = rays[row, column]
+            left = one - alpha[row, column]
+            # where nothing is drawn the picture is the sky's, to the last bit
+            own = one if left < one else zero
+            red = own * max(picture[row, column, 0] - left * clear[row, column, 0], zero)
+            green = own * max(picture[row, column, 1] - left * clear[row, column, 1], zero)
+            blue = own * max(picture[row, column, 2] - left * clear[row, column, 2], zero)
             for c in range(3):
-                own[c] = picture[row, column, c]
-            if open_sky:
-                if left < 1:
-                    sample_panorama(clear, ray[0], ray[1], ray[2], behind)
-                for c in range(3):
-                    own[c] = max(own[c] - left * behind[c], np.float32(0)) if left < 1 else np.float32(0)
-                sample_panorama(cloudy, ray[0], ray[1], ray[2], behind)
-            for c in range(3):
-                value = relight[c, 0] * own[0] + relight[c, 1] * own[1] + relight[c, 2] * own[2]
-                lit[row, column, c] = value + left * behind[c] if open_sky else value
+                value = relight[c, 0] * red + relight[c, 1] * green + relight[c, 2] * blue
+                lit[row, column, c] = value + left * cloudy[row, column, c]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _veil(depth, alpha, rays, cloudy, airlight, extinction, drawn, steps_per_m, gain, add):  # type: ignore[no-untyped-def]
     height, width = depth.shape
-    behind = np.zeros(3, dtype=np.float32)
+    zero, one = np.float32(0), np.float32(1)
     last = len(drawn) - 1
     for row in range(height):
         for column in range(width):
             cover, ray = alpha[row, column], rays[row, column]
-            if cover == 0:
-                gain[row, column, 0] = 1
-                for c in range(3):
-                    add[row, column, c] = 0
+            if cover == zero:
+                gain[row, column, 0] = one
+                add[row, column, 0], add[row, column, 1], add[row, column, 2] = zero, zero, zero
                 continue
-            distance = depth[row, column] * sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
+            distance = depth[row, column] * np.sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
             place = min(distance * steps_per_m, np.float32(last))
             k = min(int(place), last - 1)
-            near = drawn[k] + (place - k) * (drawn[k + 1] - drawn[k])
+            near = drawn[k] + (place - np.float32(k)) * (drawn[k + 1] - drawn[k])
             through = np.exp(near - extinction * distance)
             gain[row, column, 0] = through
             for c in range(3):
-                add[row, column, c] = (1 - through) * cover * airlight[c]
-            if cover < OPAQUE:
-                sample_panorama(cloudy, ray[0], ray[1], ray[2], behind)
-                for c in range(3):
-                    add[row, column, c] += (1 - through) * (1 - cover) * behind[c]
+                light = cover * airlight[c] + (one - cover) * cloudy[row, column, c]
+                add[row, column, c] = (one - through) * light

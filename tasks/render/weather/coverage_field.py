@@ -84,7 +84,7 @@ def rank_uniform(
     return ranks
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def lattice_noise(x, y, key):  # type: ignore[no-untyped-def]
     """Smooth noise of unit wavelength: mean 0, variance 1 over all places and seeds.
 
@@ -110,7 +110,7 @@ def lattice_noise(x, y, key):  # type: ignore[no-untyped-def]
     return ((1 - ty) * a + ty * b) * sqrt(12 / spread)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def fractal_noise(x, y, footprint, coarsest, octaves, roughness, key):  # type: ignore[no-untyped-def]
     """Sum of `lattice_noise` waves, each turned against the one before so that their grids do not align."""
     total, power = 0.0, 0.0
@@ -126,7 +126,7 @@ def fractal_noise(x, y, footprint, coarsest, octaves, roughness, key):  # type: 
     return total / sqrt(power)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _field(x, y, footprint, out, coarsest, octaves, roughness, key):  # type: ignore[no-untyped-def]
     for i in range(len(x)):
         out[i] = fractal_noise(x[i], y[i], footprint[i], coarsest, octaves, roughness, key)

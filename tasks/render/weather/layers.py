@@ -1,9 +1,9 @@
 """Weather over a clear clip. Call order, once for the clip and then for every frame:
 
-1. ``gaussians, weather = weather_scene(gaussians, environment, state, parameters, focal_px, seed, route,
-   relief, to_sun)``, where the Gaussians have the clip's road edit; rasterise the returned Gaussians;
+1. ``gaussians, weather = weather_scene(clear_scene, conditions, focal_px)``, where the Gaussians have the clip's
+   road edit; rasterise the returned Gaussians;
 2. ``picture = compose(gbuffer, clear sky)``: the clear linear picture, sky included, as in dry weather;
-3. ``frame = apply_weather(weather, picture, gbuffer, shutter)``, then encode ``frame.picture``.
+3. ``frame = apply_weather(weather, picture, clear_sky, gbuffer, shutter)``, then encode ``frame.picture``.
 
 From the scene to the lens the layers are: light (cloud in place of the sun), wet (water on the road), air (veil
 over distance), particles (drops and flakes near the camera). Snow on the ground is part of the scene. In dry
@@ -12,11 +12,14 @@ weather the scene and the picture are returned unchanged.
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
+from tasks.render.camera import world_to_camera
+from tasks.render.environment import environment_view
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.road_edit import RoadRelief, measure_road_lift
 from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
@@ -36,11 +39,47 @@ from tasks.render.weather.sky import (
 )
 from tasks.render.weather.snow.field import SnowField, snow_field
 from tasks.render.weather.snow.layer import snow_layer, snowed_over, whiten_gaussians
-from tasks.render.weather.wet.wet_road import wet_layer
+from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 from tasks.surface.state import SurfaceState
 from tasks.surface.weather import DRY
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClearScene:
+    """A clip's scene before its weather.
+
+    Parameters
+    ----------
+    gaussians : the clear scene with the clip's road edit
+    environment : float32 [h, w, 3] its clear environment, as in `Scene.environment` [1]
+    route : path of the wheels that left tracks in the snow; None for snow without tracks
+    relief : road feature of the clip, which is relit by the weather's light; None for a flat road
+    to_sun : [3] unit vector to the clear sky's sun, as in `Scene.to_sun` [1]
+    """
+
+    gaussians: Gaussians
+    environment: NDArray[np.float32]
+    route: Route | None = None
+    relief: RoadRelief | None = None
+    to_sun: NDArray[np.floating] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClipConditions:
+    """The weather of a clip and its appearance.
+
+    Parameters
+    ----------
+    state : what falls, and what lies on the road
+    parameters : optical parameters of the weather, of the catalogue
+    seed : visual seed; it moves particles and snow, and nothing else [1]
+    """
+
+    state: SurfaceState
+    parameters: WeatherParameters
+    seed: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,14 +113,12 @@ class ClipWeather:
     state : surface state
     parameters : numbers of the catalogue
     seed : visual seed of the clip [1]
-    clear_environment : float32 [h, w, 3] environment in clear weather [1]
     overcast : None under a clear sky
     """
 
     state: SurfaceState
     parameters: WeatherParameters
     seed: int
-    clear_environment: NDArray[np.float32]
     overcast: Overcast | None
 
     @property
@@ -107,29 +144,15 @@ class WeatherFrame:
 
 
 def weather_scene(
-    gaussians: Gaussians,
-    environment: NDArray[np.float32],
-    state: SurfaceState,
-    parameters: WeatherParameters,
-    focal_px: float,
-    seed: int,
-    route: Route | None = None,
-    relief: RoadRelief | None = None,
-    to_sun: NDArray[np.floating] | None = None,
+    clear: ClearScene, conditions: ClipConditions, focal_px: float
 ) -> tuple[Gaussians, ClipWeather]:
     """Bring a clip's weather into its scene: softened shadows, snow where it lies, the light on a road feature.
 
     Parameters
     ----------
-    gaussians : the clear scene with the clip's road edit
-    environment : float32 [h, w, 3] its clear environment, as in `Scene.environment` [1]
-    state : kind of weather and surface state
-    parameters : numbers of the catalogue
+    clear : the scene without weather
+    conditions : the weather
     focal_px : focal length of the camera [px]
-    seed : visual seed of the clip [1]
-    route : path of the wheels that left tracks in the snow; None for snow without tracks
-    relief : road feature of the clip, which is relit by the weather's light; None for a flat road
-    to_sun : [3] unit vector to the clear sky's sun, as in `Scene.to_sun` [1]
 
     Returns
     -------
@@ -141,15 +164,15 @@ def weather_scene(
     InputError
         If there is no such kind of weather, it has precipitation without a rate, or the scene has no road.
     """
-    p, look = parameters, parameters.find_look(state.kind)
+    gaussians, environment, relief = clear.gaussians, clear.environment, clear.relief
+    state, p, seed = conditions.state, conditions.parameters, conditions.seed
+    look = p.find_look(state.kind)
     if look is None:
-        dry = ClipWeather(
-            state=state, parameters=parameters, seed=seed, clear_environment=environment, overcast=None
-        )
+        dry = ClipWeather(state=state, parameters=p, seed=seed, overcast=None)
         if relief is None:
             return gaussians, dry
         return relight_gaussians(
-            gaussians, relief, clear_light(gaussians, environment, parameters.sky, to_sun)
+            gaussians, relief, clear_light(gaussians, environment, p.sky, clear.to_sun)
         ), dry
     if look.particles is not None and state.precipitation_mm_h == 0:
         raise InputError(f"weather: {state.kind} needs precipitation_mm_h above 0; it is 0: use {DRY}")
@@ -166,7 +189,7 @@ def weather_scene(
     scene = without_sun(gaussians, p.sky.shadow_kept)
     field = None
     if cover is not None:
-        field = snow_field(gaussians, cover.patches, cover.tracks, cover.anchors, route, seed)
+        field = snow_field(gaussians, cover.patches, cover.tracks, cover.anchors, clear.route, seed)
         amount = (state.snow_coverage, state.snow_depth_mm, cover)
         lift = None if relief is None else measure_road_lift(scene, relief)
         snow = snow_layer(scene, field, white, *amount, lift)
@@ -181,14 +204,13 @@ def weather_scene(
     )
     if relief is not None:
         scene = relight_gaussians(scene, relief, overcast_light(overcast.environment, sky))
-    return scene, ClipWeather(
-        state=state, parameters=p, seed=seed, clear_environment=environment, overcast=overcast
-    )
+    return scene, ClipWeather(state=state, parameters=p, seed=seed, overcast=overcast)
 
 
 def apply_weather(
     weather: ClipWeather,
     picture: NDArray[np.float32],
+    clear_sky: NDArray[np.float32],
     gbuffer: GBuffer,
     shutter: Shutter,
     *,
@@ -200,6 +222,7 @@ def apply_weather(
     ----------
     weather : from `weather_scene`
     picture : float32 [H, W, 3] linear picture of its scene before the clear environment [1]
+    clear_sky : float32 [H, W, 3] the clear environment in the same view, see `environment_view` [1]
     gbuffer : the rasterisation it was made from
     shutter : pose, motion, time and exposure of the frame
     particles : False if `particle_layer` draws them afterwards, for a sensor with a lens or a rolling shutter, whose
@@ -214,16 +237,15 @@ def apply_weather(
         return WeatherFrame(base=picture, layers=(), picture=picture)
     sky, air, film = overcast.sky, overcast.air, overcast.look.film
     rays = pixel_rays(shutter)
-    layers = [light_layer(picture, gbuffer, weather.clear_environment, overcast.environment, sky, rays)]
+    view = world_to_camera(shutter.T_world_camera)
+    cloudy = environment_view(overcast.environment, view, shutter.K, shutter.width, shutter.height)
+    layers = [light_layer(picture, gbuffer, clear_sky, cloudy, sky)]
     if film is not None:
+        on_road = RoadFilm(depth_mm=weather.state.film_depth_mm, parameters=film, seed=weather.seed)
+        light = LightOnRoad(environment=overcast.environment, sky=sky, extinction=air.extinction)
         dry = recompose_layers(picture, layers)
-        layers.append(
-            wet_layer(
-                dry, gbuffer, overcast.environment, sky, air.extinction, rays, shutter.T_world_camera, shutter.K,
-                weather.state.film_depth_mm, film, weather.seed,
-            )
-        )  # fmt: skip
-    layers.append(air_layer(gbuffer, overcast.environment, air, sky, rays))
+        layers.append(wet_layer(dry, gbuffer, shutter, rays, on_road, light))
+    layers.append(air_layer(gbuffer, cloudy, air, sky, rays))
     if particles and overcast.population is not None:
         layers.append(particle_layer(weather, overcast.population, overcast.sky, gbuffer.depth, shutter))
     return WeatherFrame(base=picture, layers=tuple(layers), picture=recompose_layers(picture, layers))
@@ -270,5 +292,14 @@ def pixel_rays(shutter: Shutter) -> NDArray[np.float32]:
     K = shutter.K
     u = ((np.arange(shutter.width) + 0.5 - K[0, 2]) / K[0, 0]).astype(np.float32)
     v = ((np.arange(shutter.height) + 0.5 - K[1, 2]) / K[1, 1]).astype(np.float32)
-    R = shutter.T_world_camera[:3, :3].astype(np.float32)
-    return u[None, :, None] * R[:, 0] + v[:, None, None] * R[:, 1] + R[:, 2]
+    rays = np.empty((shutter.height, shutter.width, 3), dtype=np.float32)
+    _fill_rays(u, v, shutter.T_world_camera[:3, :3].astype(np.float32), rays)
+    return rays
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _fill_rays(u, v, R, rays):  # type: ignore[no-untyped-def]
+    for i in range(len(v)):
+        for j in range(len(u)):
+            for c in range(3):
+                rays[i, j, c] = u[j] * R[c, 0] + v[i] * R[c, 1] + R[c, 2]

@@ -34,7 +34,7 @@ def stream_key(seed: int, stream: str) -> int:
     return int.from_bytes(digest, "little")
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def philox(c0, c1, c2, c3, key):  # type: ignore[no-untyped-def]
     """Philox4x32-10 (Salmon et al. 2011, doi:10.1145/2063384.2063405).
 
@@ -55,13 +55,13 @@ def philox(c0, c1, c2, c3, key):  # type: ignore[no-untyped-def]
     return c0, c1, c2, c3
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def scale_to_unit(word):  # type: ignore[no-untyped-def]
     """A uint64 word below 2^32 as a number in the open interval (0, 1) [1]."""
     return (float(word) + 0.5) * _TO_UNIT
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def lattice_unit(x, y, key):  # type: ignore[no-untyped-def]
     """One number in [0, 1) for each node of an integer lattice.
 

@@ -3,12 +3,35 @@
 import numpy as np
 
 from tasks.conventions import SemanticClass
+from tasks.render.camera import world_to_camera
+from tasks.render.environment import environment_view
 from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.road_edit import RoadRelief
 from tasks.render.weather.falling.particles import Shutter
+from tasks.render.weather.layers import ClearScene, ClipConditions, ClipWeather, weather_scene
+from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.route import Route
 from tasks.scene.spherical_harmonics import C0
+from tasks.surface.state import SurfaceState
 
 ASPHALT = 0.17
+FOCAL_PX = 120.0
+
+
+def weather_over(
+    street: Gaussians, environment: np.ndarray, state: SurfaceState, parameters: WeatherParameters,
+    seed: int = 1, route: Route | None = None, relief: RoadRelief | None = None,
+) -> tuple[Gaussians, ClipWeather]:  # fmt: skip
+    """The street in a weather, and the weather."""
+    clear = ClearScene(gaussians=street, environment=environment, route=route, relief=relief)
+    return weather_scene(clear, ClipConditions(state=state, parameters=parameters, seed=seed), FOCAL_PX)
+
+
+def see_sky(environment: np.ndarray, view: Shutter) -> np.ndarray:
+    """The part of a panorama that a view sees."""
+    viewmat = world_to_camera(view.T_world_camera)
+    return environment_view(environment, viewmat, view.K, view.width, view.height)
 
 
 def surfels(

@@ -6,9 +6,9 @@ import pytest
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.sky import sky_light
 from tasks.render.weather.wet.puddles import water_surface
-from tasks.render.weather.wet.wet_road import fresnel_reflectance, wet_layer
+from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, fresnel_reflectance, wet_layer
 from tests.render.weather.scenes import ASPHALT, flat_gbuffer
-from tests.render.weather.test_wet_road import VIEW
+from tests.render.weather.test_wet_road import CLOUDY, VIEW, see_road
 
 GLAZE_MM, FILM_MM = 0.4, 0.489
 """Depths of the glaze, and of the water film of 10 mm/h."""
@@ -21,15 +21,11 @@ def film_on_road(parameters, kind, depth_mm):
     road = gbuffer.class_id == 1
     rows = np.arange(len(road))[:, None, None]
     picture = np.where(road[..., None], picture, (rows // 4 % 2).astype(np.float32))
-    rays, pose = pixel_rays(VIEW), VIEW.T_world_camera
-    smooth = water_surface(
-        gbuffer.depth, rays, gbuffer.normal, road, pose[:3, 3], 133.0, depth_mm, film.water, 3
-    ).smooth
+    smooth = water_surface(see_road(gbuffer), depth_mm, film.water, 3).smooth
     sky = sky_light(np.full(3, ASPHALT / 0.1), 1.0, 0.0002, 0.1, parameters.sky)
-    cloudy = np.full((8, 16, 3), 0.9, np.float32)
-    return road, smooth, wet_layer(
-        picture, gbuffer, cloudy, sky, 0.0, rays, pose, VIEW.K, depth_mm, film, 3
-    )  # fmt: skip
+    on_road = RoadFilm(depth_mm=depth_mm, parameters=film, seed=3)
+    light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
+    return road, smooth, wet_layer(picture, gbuffer, VIEW, pixel_rays(VIEW), on_road, light)
 
 
 def test_nothing_falls_on_ice_and_the_air_is_clear(parameters):

@@ -8,15 +8,15 @@ import pytest
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.render.composition import encode_8bit, to_linear
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.attribution import LAYER_BITS, attribute_pixels, paper_picture, snow_on
 from tasks.render.weather.layer import recompose_layers
-from tasks.render.weather.layers import apply_weather, weather_scene
+from tasks.render.weather.layers import apply_weather
 from tasks.render.weather.scene_light import append_gaussians, to_display_unclipped
 from tasks.render.weather.snow.layer import GROUND_CLASSES
 from tasks.surface.state import SurfaceState
 from tests.render.weather.conftest import shutter
-from tests.render.weather.scenes import clear_sky, road, surfels
+from tests.render.weather.scenes import clear_sky, road, surfels, weather_over
 
 SKY = clear_sky()
 RAIN = {
@@ -48,16 +48,17 @@ def street():
 
 def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005):
     view = shutter(time_s=time_s, exposure_s=exposure_s, speed=speed, **SIZE)
-    scene, weather = weather_scene(street, SKY, state, parameters, SIZE["focal"], seed)
-    gbuffer = rasterise(
+    scene, weather = weather_over(street, SKY, state, parameters, seed)
+    gbuffer = rasterise_view(
         prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height
     )
-    picture = gbuffer.rgb + (1 - gbuffer.alpha[..., None]) * np.float32((0.2, 0.4, 0.8))
-    return weather, apply_weather(weather, picture, gbuffer, view), gbuffer, view
+    sky = np.broadcast_to(np.float32((0.2, 0.4, 0.8)), gbuffer.rgb.shape)
+    picture = gbuffer.rgb + (1 - gbuffer.alpha[..., None]) * sky
+    return weather, apply_weather(weather, picture, sky, gbuffer, view), gbuffer, view
 
 
 def test_dry_weather_changes_no_bit(street, parameters):
-    scene, weather = weather_scene(street, SKY, SurfaceState(kind="dry"), parameters, 120.0, 1)
+    scene, weather = weather_over(street, SKY, SurfaceState(kind="dry"), parameters)
     assert scene is street
     _, drawn, gbuffer, view = frame(street, SurfaceState(kind="dry"), parameters)
     assert drawn.picture is drawn.base
@@ -80,7 +81,9 @@ def test_layers_recompose_to_the_picture_bit_for_bit(street, parameters, state):
 def test_a_picture_without_normals_is_the_same_where_the_weather_reads_none(street, parameters):
     for state in (SurfaceState(kind="dry"), RAIN[10], SNOW[2], ICE):
         weather, drawn, gbuffer, view = frame(street, state, parameters)
-        flat = apply_weather(weather, drawn.base, replace(gbuffer, normal=np.ones_like(gbuffer.normal)), view)
+        sky = np.broadcast_to(np.float32((0.2, 0.4, 0.8)), gbuffer.rgb.shape)
+        other = replace(gbuffer, normal=np.ones_like(gbuffer.normal))
+        flat = apply_weather(weather, drawn.base, sky, other, view)
         assert np.array_equal(flat.picture, drawn.picture) != weather.reads_normals, state.kind
 
 
@@ -188,12 +191,12 @@ def test_every_rule_that_a_state_breaks_is_told_at_once():
 
 def test_weather_that_falls_needs_a_rate_and_an_unknown_kind_is_refused(street, parameters):
     with pytest.raises(InputError, match="snow needs precipitation_mm_h above 0"):
-        weather_scene(street, SKY, SurfaceState(kind="snow"), parameters, 120.0, 1)
+        weather_over(street, SKY, SurfaceState(kind="snow"), parameters)
     with pytest.raises(InputError, match=r"must be dry, rain.*it is 'hail'"):
-        weather_scene(street, SKY, SurfaceState(kind="hail"), parameters, 120.0, 1)
+        weather_over(street, SKY, SurfaceState(kind="hail"), parameters)
 
 
 def test_a_scene_without_road_is_refused(street, parameters):
     bare = replace(street, class_id=np.full(len(street), SemanticClass.BUILDING, np.uint8))
     with pytest.raises(InputError, match="no Gaussian of the scene has class road"):
-        weather_scene(bare, SKY, RAIN[10], parameters, 120.0, 1)
+        weather_over(bare, SKY, RAIN[10], parameters)

@@ -10,17 +10,17 @@ from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
 from tasks.render.labels import forward_flow
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.atmosphere import air_layer, light_layer, precipitating_air
 from tasks.render.weather.attribution import snow_on
 from tasks.render.weather.falling.precipitation import make_population
 from tasks.render.weather.layer import recompose_layers
-from tasks.render.weather.layers import apply_weather, pixel_rays, weather_scene
+from tasks.render.weather.layers import apply_weather, pixel_rays
 from tasks.render.weather.scene_light import append_gaussians
 from tasks.render.weather.sky import sky_light
 from tasks.surface.state import SurfaceState
 from tests.render.weather.conftest import shutter
-from tests.render.weather.scenes import flat_gbuffer, road, surfels
+from tests.render.weather.scenes import flat_gbuffer, road, see_sky, surfels, weather_over
 
 SIZE = {"width": 144, "height": 96, "focal": 120.0}
 RAIN = SurfaceState(kind="rain", precipitation_mm_h=25, film_depth_mm=0.839)
@@ -54,12 +54,12 @@ def street():
 
 def rendered(street, state, parameters, time_s=2.0, x=0.0, speed=10.0):
     view = shutter(time_s=time_s, x=x, speed=speed, exposure_s=0.005, **SIZE)
-    scene, weather = weather_scene(street, even_sky(), state, parameters, SIZE["focal"], 1)
+    scene, weather = weather_over(street, even_sky(), state, parameters)
     viewmat = np.linalg.inv(view.T_world_camera)
-    gbuffer = rasterise(prepare_gaussians(scene), viewmat, view.K, view.width, view.height)
+    gbuffer = rasterise_view(prepare_gaussians(scene), viewmat, view.K, view.width, view.height)
     sky = environment_view(even_sky(), viewmat, view.K, view.width, view.height)
     picture = compose_over_sky(gbuffer, sky, street.display_encoded)
-    return weather, apply_weather(weather, picture, gbuffer, view), gbuffer, view
+    return weather, apply_weather(weather, picture, sky, gbuffer, view), gbuffer, view
 
 
 @pytest.mark.parametrize("state", [RAIN, SNOW], ids=["rain", "snow"])
@@ -91,7 +91,8 @@ def test_a_deeper_film_mirrors_more_and_a_longer_exposure_leaves_the_street_as_i
     assert np.all(np.diff(light) > 0)
     _, drawn, gbuffer, view = rendered(street, RAIN, parameters)
     weather, picture = rendered(street, RAIN, parameters)[0], drawn.base
-    longer = apply_weather(weather, picture, gbuffer, replace(view, exposure_s=2 * view.exposure_s))
+    sky = see_sky(even_sky(), view)
+    longer = apply_weather(weather, picture, sky, gbuffer, replace(view, exposure_s=2 * view.exposure_s))
     for before, after in zip(drawn.layers[:-1], longer.layers[:-1], strict=True):
         assert before.add.tobytes() == after.add.tobytes()
     # twice as long and half as strong: as much light is taken
@@ -139,9 +140,10 @@ def test_a_mirrored_street_makes_the_mirrored_frame(street, parameters):
     pictures = []
     for side in (uneven, mirrored):
         _, drawn, gbuffer, view = rendered(side, SurfaceState(kind="dry"), parameters)
+        around = see_sky(even_sky(), view)
         layers = [
-            light_layer(drawn.base, gbuffer, even_sky(), even_sky(), sky, pixel_rays(view)),
-            air_layer(gbuffer, even_sky(), air, sky, pixel_rays(view)),
+            light_layer(drawn.base, gbuffer, around, around, sky),
+            air_layer(gbuffer, around, air, sky, pixel_rays(view)),
         ]
         pictures.append((drawn.base, recompose_layers(drawn.base, layers), gbuffer.depth))
     assert np.abs(pictures[0][0] - pictures[0][0][:, ::-1]).max() > 0.1
@@ -161,7 +163,9 @@ def test_koschmieder_at_the_visual_range_leaves_five_percent_of_a_black_target(p
         extinction=2.995732 / 50.0, drawn=np.zeros(65),
     )  # fmt: skip
     sky = sky_light(np.full(3, 1.7), 0.5, air.extinction, 0.1, parameters.sky)
-    veil = recompose_layers(picture, [air_layer(gbuffer, even_sky(), air, sky, pixel_rays(view))])
+    veil = recompose_layers(
+        picture, [air_layer(gbuffer, see_sky(even_sky(), view), air, sky, pixel_rays(view))]
+    )
     distance = gbuffer.depth * np.linalg.norm(pixel_rays(view), axis=-1)
     for share, at in ((0.05, 50.0), (0.5, 50.0 * np.log(2) / np.log(20)), (0.814, 50.0 * 0.0687)):
         row, column = np.unravel_index(np.nanargmin(np.abs(distance - at)), distance.shape)

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from tasks.render.road_edit import RoadRelief, apply_road_profile, measure_road_lift
-from tasks.render.weather.layers import weather_scene
 from tasks.render.weather.relief import ReliefLight, clear_light, relief_ratios, relight_gaussians, sun_in
 from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
-from tests.render.weather.scenes import clear_sky, road
+from tests.render.weather.scenes import clear_sky, road, weather_over
 from tests.toy_street import toy_street
 
 SCENE = toy_street()
@@ -160,7 +159,7 @@ def test_only_the_road_on_the_feature_and_in_its_shadow_changes_colour(parameter
 
 def test_a_flat_road_keeps_every_byte(parameters):
     dry = SurfaceState(kind="dry")
-    scene, _ = weather_scene(SCENE.gaussians, clear_sky(), dry, parameters, 80.0, 1, SCENE.route, None)
+    scene, _ = weather_over(SCENE.gaussians, clear_sky(), dry, parameters, route=SCENE.route)
     assert scene is SCENE.gaussians
 
 
@@ -174,9 +173,9 @@ def test_under_cloud_a_feature_has_no_sunny_side(parameters, kind):
         state = replace(state, snow_coverage=0.0, snow_depth_mm=0.0)
     relief = relief_of(0.1, 2.0)
     shaped, _ = apply_road_profile(SCENE.gaussians, relief, 4.0, -4.0)
-    arguments = (clear_sky(), state, parameters, 80.0, 1, SCENE.route)
-    flat, _ = weather_scene(shaped, *arguments)
-    lit, _ = weather_scene(shaped, *arguments, relief)
+    arguments = (shaped, clear_sky(), state, parameters)
+    flat, _ = weather_over(*arguments, route=SCENE.route)
+    lit, _ = weather_over(*arguments, route=SCENE.route, relief=relief)
     assert len(lit) == len(flat)
     colour = [0.28209479 * g.sh[:, 0].mean(axis=1) + 0.5 for g in (flat, lit)]
     gain = colour[1] / np.maximum(colour[0], 1e-6)

@@ -23,7 +23,7 @@ from tasks.render.weather.sky import (
     sky_light,
 )
 from tests.render.weather.conftest import shutter
-from tests.render.weather.scenes import clear_sky, flat_gbuffer
+from tests.render.weather.scenes import clear_sky, flat_gbuffer, see_sky
 
 WHITE = np.array((1.8, 1.7, 1.5))
 
@@ -115,7 +115,9 @@ def test_the_sky_is_replaced_and_the_street_relit(parameters, sky, air):
     picture, gbuffer = flat_gbuffer(view)
     clear = clear_sky()
     cloudy = overcast_environment(clear, sky, air.extinction, parameters.sky, 1)
-    lit = recompose_layers(picture, [light_layer(picture, gbuffer, clear, cloudy, sky, pixel_rays(view))])
+    lit = recompose_layers(
+        picture, [light_layer(picture, gbuffer, see_sky(clear, view), see_sky(cloudy, view), sky)]
+    )
     ground = gbuffer.alpha == 1
     assert lit[ground] == pytest.approx(picture[ground] @ sky.relight.T, rel=1e-5)
     assert np.all(lit[~ground] <= cloudy.max(axis=(0, 1)) + 1e-6)
@@ -129,7 +131,9 @@ def test_half_covered_pixels_change_their_own_share_only(parameters, sky, air):
     cloudy = np.full((8, 16, 3), 0.9, np.float32)
     half = replace(gbuffer, alpha=np.full_like(gbuffer.alpha, 0.5))
     picture = np.full((64, 96, 3), 0.5 * 0.2 + 0.5 * 0.6, np.float32)
-    lit = recompose_layers(picture, [light_layer(picture, half, clear, cloudy, sky, pixel_rays(view))])
+    lit = recompose_layers(
+        picture, [light_layer(picture, half, see_sky(clear, view), see_sky(cloudy, view), sky)]
+    )
     assert lit == pytest.approx(np.broadcast_to(0.1 * sky.relight.sum(axis=1) + 0.45, lit.shape), rel=1e-5)
 
 
@@ -138,7 +142,7 @@ def test_contrast_falls_with_distance_as_koschmieder_says(parameters, sky, air):
     picture, gbuffer = flat_gbuffer(view)
     cloudy = np.tile(sky.airlight.astype(np.float32), (8, 16, 1))
     air = replace(air, extinction=0.05, drawn=np.linspace(0, 0.3, len(air.drawn)))
-    layer = air_layer(gbuffer, cloudy, air, sky, pixel_rays(view))
+    layer = air_layer(gbuffer, see_sky(cloudy, view), air, sky, pixel_rays(view))
     veiled = recompose_layers(picture, [layer])
     distance = gbuffer.depth * np.linalg.norm(pixel_rays(view), axis=-1)
     seen = gbuffer.alpha == 1

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
-from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise
+from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.scene_light import append_gaussians, mean_colours, remove_gaussians
@@ -155,7 +155,9 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
         scene = append_gaussians(
             remove_gaussians(whiten_gaussians(street, field, WHITE, *amount), snow.buried), snow.gaussians
         )
-        gbuffer = rasterise(prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160)
+        gbuffer = rasterise_view(
+            prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, 240, 160
+        )
         inside = gbuffer.alpha > 0.9
         place = view.T_world_camera[:3, 3] + gbuffer.depth[..., None] * pixel_rays(view)
         expected.append(float((rank_at(field, place[inside, 0], place[inside, 1]) <= coverage).mean()))

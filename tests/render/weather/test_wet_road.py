@@ -9,15 +9,33 @@ from tasks.conventions import SemanticClass
 from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.sky import LUMINANCE, sky_light
+from tasks.render.weather.wet import wet_road
 from tasks.render.weather.wet.puddles import compute_wetness, water_surface
 from tasks.render.weather.wet.reflection import mirrored_scene
-from tasks.render.weather.wet.wet_road import fresnel_reflectance, wet_albedo_ratio, wet_layer
+from tasks.render.weather.wet.road_view import RoadView
+from tasks.render.weather.wet.wet_road import (
+    LightOnRoad,
+    RoadFilm,
+    fresnel_reflectance,
+    wet_albedo_ratio,
+    wet_layer,
+)
 from tests.render.weather.conftest import shutter
 from tests.render.weather.scenes import ASPHALT, flat_gbuffer
 
 FILMS = (0.0, 0.05, 0.189, 0.489, 0.839, 1.263, 4.0)
 """Film depths [mm]; the middle four are those of 2, 10, 25 and 50 mm/h."""
 VIEW = shutter(width=160, height=108, focal=133.0)
+CLOUDY = np.full((8, 16, 3), 0.9, np.float32)
+
+
+def see_road(gbuffer, view=VIEW):
+    """The pixels of class road as the road of one frame."""
+    road = gbuffer.class_id == SemanticClass.ROAD
+    return RoadView(
+        road=road, mirrors=road, depth=gbuffer.depth, normal=gbuffer.normal,
+        rays=pixel_rays(view), T_world_camera=view.T_world_camera, K=view.K,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +45,9 @@ def sky(parameters):
 
 def wet(parameters, sky, film, wall_x=12.0, seed=1):
     picture, gbuffer = flat_gbuffer(VIEW, wall_x)
-    cloudy, pose, p = np.full((8, 16, 3), 0.9, np.float32), VIEW.T_world_camera, parameters.kinds["rain"].film
-    return picture, gbuffer, wet_layer(
-        picture, gbuffer, cloudy, sky, 0.0, pixel_rays(VIEW), pose, VIEW.K, film, p, seed
-    )  # fmt: skip
+    on_road = RoadFilm(depth_mm=film, parameters=parameters.kinds["rain"].film, seed=seed)
+    light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
+    return picture, gbuffer, wet_layer(picture, gbuffer, VIEW, pixel_rays(VIEW), on_road, light)
 
 
 def test_water_reflects_two_percent_straight_down_and_all_at_grazing():
@@ -59,12 +76,9 @@ def test_the_film_drowns_more_of_the_road_everywhere_as_it_rises(parameters):
     _, gbuffer = flat_gbuffer(VIEW)
     road = gbuffer.class_id == 1
     shares = [
-        water_surface(
-            gbuffer.depth, pixel_rays(VIEW), gbuffer.normal, road, VIEW.T_world_camera[:3, 3], 133.0, film,
-            parameters.kinds["rain"].film.water, 3,
-        ).smooth
+        water_surface(see_road(gbuffer), film, parameters.kinds["rain"].film.water, 3).smooth
         for film in FILMS
-    ]  # fmt: skip
+    ]
     assert shares[0].max() == 0
     assert np.all(np.diff(shares, axis=0) >= 0)
     assert np.all(np.diff([share[road].mean() for share in shares]) > 0)
@@ -98,6 +112,8 @@ def test_only_the_road_gets_wet(parameters, sky):
 def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):
     """By Lekner and Dorf at their own reflectance; walls, which face no rain, and cars stay as they are."""
     picture, gbuffer = flat_gbuffer(VIEW)
+    film = RoadFilm(depth_mm=4.0, parameters=parameters.kinds["rain"].film, seed=1)
+    light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
     beside = (gbuffer.class_id == SemanticClass.ROAD) & (np.arange(160) > 100)
     for kind, soaks in (
         (SemanticClass.SIDEWALK, True),
@@ -105,20 +121,13 @@ def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):
         (SemanticClass.VEHICLE, False),
     ):
         ground = replace(gbuffer, class_id=np.where(beside, np.uint8(kind), gbuffer.class_id))
-        cloudy = np.full((8, 16, 3), 0.9, np.float32)
-        layer = wet_layer(
-            picture, ground, cloudy, sky, 0.0, pixel_rays(VIEW), VIEW.T_world_camera, VIEW.K, 4.0,
-            parameters.kinds["rain"].film, 1,
-        )  # fmt: skip
+        layer = wet_layer(picture, ground, VIEW, pixel_rays(VIEW), film, light)
         expected = wet_albedo_ratio(ASPHALT / (LUMINANCE @ sky.white), 1.333, 0.066) if soaks else 1.0
         assert layer.gain[beside] == pytest.approx(expected, rel=1e-3)
         assert np.all(layer.add[beside] == 0)
     standing = replace(ground, class_id=np.where(beside, np.uint8(SemanticClass.KERB), gbuffer.class_id))
     standing.normal[beside] = (1, 0, 0)
-    upright = wet_layer(
-        picture, standing, cloudy, sky, 0.0, pixel_rays(VIEW), VIEW.T_world_camera, VIEW.K, 4.0,
-        parameters.kinds["rain"].film, 1,
-    )  # fmt: skip
+    upright = wet_layer(picture, standing, VIEW, pixel_rays(VIEW), film, light)
     assert np.all(upright.gain[beside] == 1)
 
 
@@ -131,10 +140,8 @@ def test_no_mirrored_ray_passes_under_a_car_and_comes_out_above_it(low, high, so
     depth = np.where(hangs, np.float32(8), gbuffer.depth)
     seen = np.where(hangs[..., None], np.float32(0.02), picture)
     road = (gbuffer.class_id == SemanticClass.ROAD) & ~hangs
-    sky = np.full((8, 16, 3), 0.9, np.float32)
-    mirrored = mirrored_scene(
-        seen, depth, gbuffer.normal, road, sky, VIEW.T_world_camera, VIEW.K, 0.0, np.ones(3)
-    )
+    view = replace(see_road(gbuffer), road=road, mirrors=road, depth=depth)
+    mirrored = mirrored_scene(seen, view, CLOUDY, 0.0, np.ones(3))
     behind = road & (depth > 9) & (depth < 11) & (abs(np.arange(160) - 80) < 28)
     assert behind.sum() > 100
     if solid:
@@ -153,11 +160,7 @@ def test_the_mirror_takes_and_gives_no_more_than_all_light(parameters, sky):
 
 def test_a_mirrored_stripe_lies_straight_below_its_stripe():
     picture, gbuffer = flat_gbuffer(VIEW, 12.0)
-    road = gbuffer.class_id == 1
-    sky = np.full((8, 16, 3), 0.9, np.float32)
-    mirrored = mirrored_scene(
-        picture, gbuffer.depth, gbuffer.normal, road, sky, VIEW.T_world_camera, VIEW.K, 0.0, np.ones(3)
-    )
+    mirrored = mirrored_scene(picture, see_road(gbuffer), CLOUDY, 0.0, np.ones(3))
     horizon, foot = 54, 54 + 133.0 * 1.4 / 12.0
     row = int(foot) + 6
     # a point of the wall and its image stand symmetric about the wall's foot, in height over the road
@@ -171,13 +174,9 @@ def test_a_mirrored_stripe_lies_straight_below_its_stripe():
 def test_mirrored_pictures_have_mirrored_reflections():
     picture, gbuffer = flat_gbuffer(VIEW, 12.0)
     picture = picture * np.linspace(0.5, 1.5, 160, dtype=np.float32)[None, :, None]
-    sky = np.full((8, 16, 3), 0.9, np.float32)
 
     def reflect(picture, gbuffer):
-        road = gbuffer.class_id == 1
-        return mirrored_scene(
-            picture, gbuffer.depth, gbuffer.normal, road, sky, VIEW.T_world_camera, VIEW.K, 0.0, np.ones(3)
-        )
+        return mirrored_scene(picture, see_road(gbuffer), CLOUDY, 0.0, np.ones(3))
 
     flipped = replace(gbuffer, depth=gbuffer.depth[:, ::-1].copy(), class_id=gbuffer.class_id[:, ::-1].copy())
     straight = reflect(picture, gbuffer)
@@ -192,15 +191,37 @@ def test_puddles_stay_where_they_are_as_the_car_drives(parameters):
     for x in (0.0, 1.0):
         view = shutter(width=160, height=108, focal=133.0, x=x)
         _, gbuffer = flat_gbuffer(view)
-        rays, eye = pixel_rays(view), view.T_world_camera[:3, 3]
-        surface = water_surface(
-            gbuffer.depth, rays, gbuffer.normal, gbuffer.class_id == 1, eye, 133.0, 0.6, p, 3
-        )
+        surface = water_surface(see_road(gbuffer, view), 0.6, p, 3)
         column = 80
-        place = eye[0] + gbuffer.depth[:, column] * rays[:, column, 0]
+        place = x + gbuffer.depth[:, column] * pixel_rays(view)[:, column, 0]
         near = (gbuffer.class_id[:, column] == 1) & (place > 4.5) & (place < 7.0)
         shares.append(
             np.interp(np.linspace(4.8, 6.5, 20), place[near][::-1], surface.smooth[near, column][::-1])
         )
     assert shares[1] == pytest.approx(shares[0], abs=0.08)
     assert np.ptp(shares[0]) > 0.1
+
+
+@pytest.mark.parametrize(
+    "rows", [slice(0, 320), slice(251, 252), slice(252, 253)], ids=["all", "odd", "even"]
+)
+def test_a_pixel_that_leaves_its_own_mirrored_light_out_has_that_of_its_neighbours(
+    parameters, sky, monkeypatch, rows
+):
+    """As if every pixel had its own to half an 8-bit step; a road of one row keeps every bit."""
+    view = shutter()
+    picture, gbuffer = flat_gbuffer(view, 12.0)
+    kept = np.isin(np.arange(320), np.arange(320)[rows])[:, None]
+    narrow = replace(gbuffer, class_id=np.where(kept, gbuffer.class_id, np.uint8(SemanticClass.BUILDING)))
+    film = RoadFilm(depth_mm=1.2, parameters=parameters.kinds["rain"].film, seed=1)
+    light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
+    arguments = (picture, narrow, view, pixel_rays(view), film, light)
+    layer = wet_layer(*arguments)
+    monkeypatch.setattr(wet_road, "LEAST_REACH", 1000)
+    whole = wet_layer(*arguments)
+    if rows.stop - rows.start == 1:
+        assert np.array_equal(layer.add, whole.add)
+        assert layer.add[rows].max() > 0
+    else:
+        assert not np.array_equal(layer.add, whole.add)
+        assert np.sqrt(((layer.add - whole.add) ** 2).mean()) < 0.5 / 255

@@ -62,7 +62,7 @@ def draw_streaks(
     return ParticleLayer(rgb=rgb, alpha=1 - through)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _swept(x):  # type: ignore[no-untyped-def]
     """Integral up to x of the biweight kernel 15/16 (1 - x^2)^2 on [-1, 1]."""
     if x <= -1:
@@ -72,7 +72,7 @@ def _swept(x):  # type: ignore[no-untyped-def]
     return 0.5 + 0.9375 * x * (1 + x * x * (-2 / 3 + 0.2 * x * x))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ignore[no-untyped-def]
     height, width = depth.shape
     for s in range(len(streaks)):
@@ -90,6 +90,7 @@ def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ign
         reach_u, reach_v = 0.5 * length * abs(ax) + half, 0.5 * length * abs(ay) + half
         first_u, last_u = max(0, ceil(mid_u - reach_u - 0.5)), min(width - 1, floor(mid_u + reach_u - 0.5))
         first_v, last_v = max(0, ceil(mid_v - reach_v - 0.5)), min(height - 1, floor(mid_v + reach_v - 0.5))
+        per_half = 1 / half
         strength = streak.share * pi / 4 * disc * disc * 0.9375 / (half * length)
         for row in range(first_v, last_v + 1):
             dv = row + 0.5 - mid_v
@@ -101,11 +102,11 @@ def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ign
                 if depth[row, column] < z:
                     continue
                 du = column + 0.5 - mid_u
-                across = (du * ay - dv * ax) / half
+                across = (du * ay - dv * ax) * per_half
                 if across * across >= 1:
                     continue
                 along = du * ax + dv * ay
-                a = _swept((along + 0.5 * length) / half) - _swept((along - 0.5 * length) / half)
+                a = _swept((along + 0.5 * length) * per_half) - _swept((along - 0.5 * length) * per_half)
                 if a <= 0:
                     continue
                 a = min(1.0, a * strength * (1 - across * across) ** 2)
@@ -115,7 +116,7 @@ def _stroke(streaks, light, depth, focal, aperture, through, sums):  # type: ign
                     sums[row, column, c] += a * light[s, c]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _settle(sums, through, rgb):  # type: ignore[no-untyped-def]
     """Light of each pixel: the mean of its particles' light, as far as they hide what is behind them."""
     for row in range(through.shape[0]):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tasks.render.weather.coverage_field import FieldParameters, fractal_noise
 from tasks.render.weather.random_streams import stream_key
+from tasks.render.weather.wet.road_view import RoadView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +59,7 @@ class WaterSurface:
     Parameters
     ----------
     smooth : float32 [H, W] share of the pixel under smooth water [1]
-    normal : float32 [H, W, 3] unit normals of that water, world frame [1]
+    normal : float32 [H, W, 3] unit normals of that water where it mirrors, world frame [1]
     cosine : float32 [H, W] cosine of the angle at which the road is seen [1]
     """
 
@@ -68,15 +69,7 @@ class WaterSurface:
 
 
 def water_surface(
-    depth: NDArray[np.float32],
-    rays: NDArray[np.float32],
-    normal: NDArray[np.float32],
-    road: NDArray[np.bool_],
-    eye: NDArray[np.floating],
-    focal_px: float,
-    film_depth_mm: float,
-    parameters: RoadWaterParameters,
-    seed: int,
+    view: RoadView, film_depth_mm: float, parameters: RoadWaterParameters, seed: int
 ) -> WaterSurface:
     """Return the share of smooth water and the normals of its surface.
 
@@ -85,12 +78,7 @@ def water_surface(
 
     Parameters
     ----------
-    depth : float32 [H, W] camera z of the road [m]
-    rays : float32 [H, W, 3] world directions of the pixels, of camera z 1 [1]
-    normal : float32 [H, W, 3] unit normals of the road, world frame [1]
-    road : bool [H, W] pixels to compute
-    eye : [3] position of the camera [m]
-    focal_px : focal length [px]
+    view : the road
     film_depth_mm : total film depth h_t [mm]
     parameters : parameters of the film
     seed : visual seed of the clip [1]
@@ -101,12 +89,12 @@ def water_surface(
     """
     p = parameters
     surface = WaterSurface(
-        smooth=np.zeros(road.shape, dtype=np.float32),
-        normal=np.zeros((*road.shape, 3), dtype=np.float32),
-        cosine=np.zeros(road.shape, dtype=np.float32),
+        smooth=np.zeros(view.road.shape, dtype=np.float32),
+        normal=np.zeros((*view.road.shape, 3), dtype=np.float32),
+        cosine=np.zeros(view.road.shape, dtype=np.float32),
     )
     _water(
-        depth, rays, normal, road, np.asarray(eye, dtype=np.float64), focal_px,
+        view.depth, view.rays, view.normal, view.road, view.mirrors, view.T_world_camera[:3, 3], float(view.K[1, 1]),
         film_depth_mm, compute_wetness(film_depth_mm, p), p.texture_depth_mm, p.texture_spread_mm,
         p.unevenness_mm, p.unevenness.coarsest_m, p.unevenness.octaves, p.unevenness.roughness,
         p.ripple_slope, p.ripple_m, np.uint64(stream_key(seed, "puddles")),
@@ -115,9 +103,9 @@ def water_surface(
     return surface
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _water(  # type: ignore[no-untyped-def]
-    depth, rays, normal, road, eye, focal, film, wet, texture, spread, uneven, coarsest, octaves, roughness,
+    depth, rays, normal, road, mirrors, eye, focal, film, wet, texture, spread, uneven, coarsest, octaves, roughness,
     ripple_slope, ripple, key, smooth, water, cosine,
 ):  # fmt: skip
     for row in range(road.shape[0]):
@@ -132,6 +120,8 @@ def _water(  # type: ignore[no-untyped-def]
             level = film + uneven * fractal_noise(x, y, size, coarsest, octaves, roughness, key)
             smooth[row, column] = wet * 0.5 * (1 + erf((level - texture) / (spread * sqrt(2.0))))
             cosine[row, column] = min(facing, 1.0)
+            if not mirrors[row, column]:
+                continue
             nx = up[0] - ripple_slope * fractal_noise(x, y, size, ripple, 2, 0.6, key + np.uint64(1000))
             ny = up[1] - ripple_slope * fractal_noise(x, y, size, ripple, 2, 0.6, key + np.uint64(2000))
             length = sqrt(nx * nx + ny * ny + up[2] * up[2])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.environment import sample_panorama
+from tasks.render.weather.wet.road_view import RoadView
 
 STEPS = 26
 FIRST_STEP_M = 0.15
@@ -29,51 +30,44 @@ EDGE_FADE = 0.35
 
 def mirrored_scene(
     picture: NDArray[np.float32],
-    depth: NDArray[np.float32],
-    normal: NDArray[np.float32],
-    road: NDArray[np.bool_],
+    view: RoadView,
     environment: NDArray[np.float32],
-    T_world_camera: NDArray[np.floating],
-    K: NDArray[np.floating],
     extinction: float,
     airlight: NDArray[np.floating],
 ) -> NDArray[np.float32]:
-    """Return the radiance that arrives along the mirrored line of sight of every road pixel.
+    """Return the radiance that arrives along the mirrored line of sight of every road pixel that mirrors.
 
     Parameters
     ----------
     picture : float32 [H, W, 3] the scene, without the veil of the air [1]
-    depth : float32 [H, W] camera z; NaN where there is none [m]
-    normal : float32 [H, W, 3] unit normals of the water surface, world frame [1]
-    road : bool [H, W] pixels to compute
+    view : the road, with the normals of the water's surface
     environment : float32 [h, w, 3] sky and far field [1]
-    T_world_camera : [4, 4] camera pose [m]
-    K : [3, 3] intrinsics [px]
     extinction : extinction coefficient of the air on the way from the mirrored object [m-1]
     airlight : [3] radiance of an infinitely deep layer of air [1]
 
     Returns
     -------
-    float32 [H, W, 3] radiance; 0 off the road [1]
+    float32 [H, W, 3] radiance; 0 elsewhere [1]
     """
     out = np.zeros_like(picture)
-    R = np.ascontiguousarray(np.asarray(T_world_camera)[:3, :3], dtype=np.float32)
+    K = view.K
+    R = np.ascontiguousarray(view.T_world_camera[:3, :3], dtype=np.float32)
     camera = np.array((K[0, 0], K[1, 1], K[0, 2], K[1, 2]), dtype=np.float32)
     _mirror(
-        picture, depth, normal, road, environment, R, camera,
+        picture, view.depth, view.normal, view.mirrors, environment, R, camera,
         np.float32(extinction), np.asarray(airlight, dtype=np.float32), out,
     )  # fmt: skip
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _gap(u, v, z, depth):  # type: ignore[no-untyped-def]
     """Return the distance of a point of the ray behind the surface seen at its pixel [m]; negative in front of it."""
     surface = depth[int(v), int(u)]
     return z - surface if surface == surface else np.float32(-1e9)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _blend_pixel(picture, u, v, out):  # type: ignore[no-untyped-def]
     height, width = picture.shape[:2]
     x = min(max(u - np.float32(0.5), np.float32(0)), np.float32(width - 1.001))
@@ -86,16 +80,17 @@ def _blend_pixel(picture, u, v, out):  # type: ignore[no-untyped-def]
         out[c] = (1 - ty) * above + ty * below
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _place(origin, direction, t, camera):  # type: ignore[no-untyped-def]
     """Return pixel coordinates and camera z of a point of the ray."""
     z = origin[2] + t * direction[2]
-    u = camera[0] * (origin[0] + t * direction[0]) / z + camera[2]
-    v = camera[1] * (origin[1] + t * direction[1]) / z + camera[3]
+    inverse = np.float32(1) / z
+    u = camera[0] * (origin[0] + t * direction[0]) * inverse + camera[2]
+    v = camera[1] * (origin[1] + t * direction[1]) * inverse + camera[3]
     return u, v, z
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-untyped-def]
     """Return u, v, t and weight where a ray that left the picture meets the extended surface at the edge (u, v)."""
     height, width = depth.shape
@@ -110,7 +105,7 @@ def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-
     return edge_u, edge_v, t, np.float32(exp(-beyond / (EDGE_FADE * height)))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _march(origin, direction, climb, depth, camera):  # type: ignore[no-untyped-def]
     """Follow a ray through the depth picture; return pixel (u, v) and length t where it meets a surface, and a weight.
 
@@ -151,14 +146,14 @@ def _march(origin, direction, climb, depth, camera):  # type: ignore[no-untyped-
     return hidden_u, hidden_v, hidden_t, np.float32(hidden)
 
 
-@numba.njit(cache=True, nogil=True)
-def _mirror(picture, depth, normal, road, environment, R, camera, extinction, airlight, out):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _mirror(picture, depth, normal, mirrors, environment, R, camera, extinction, airlight, out):  # type: ignore[no-untyped-def]
     height, width = depth.shape
     origin, direction = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
     colour, sky = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
     for row in range(height):
         for column in range(width):
-            if not road[row, column]:
+            if not mirrors[row, column]:
                 continue
             z = depth[row, column]
             origin[0] = (column + np.float32(0.5) - camera[2]) / camera[0] * z

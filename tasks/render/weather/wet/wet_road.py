@@ -6,7 +6,7 @@ Refraction of the texture below shifts it by at most the film depth, about a mil
 of a pixel at three metres: it is left out.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import cv2
@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import Layer
 from tasks.render.weather.sky import LUMINANCE, SkyLight
 from tasks.render.weather.wet.puddles import RoadWaterParameters, compute_wetness, water_surface
 from tasks.render.weather.wet.reflection import mirrored_scene
+from tasks.render.weather.wet.road_view import RoadView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +44,39 @@ class RoadFilmParameters:
     normal_window: float
 
 
-@numba.njit(cache=True, nogil=True)
+@dataclass(frozen=True, kw_only=True)
+class RoadFilm:
+    """The film on the road of one clip.
+
+    Parameters
+    ----------
+    depth_mm : total film depth h_t [mm]
+    parameters : optics of the wet road
+    seed : visual seed of the clip [1]
+    """
+
+    depth_mm: float
+    parameters: RoadFilmParameters
+    seed: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class LightOnRoad:
+    """What a wet road mirrors beside the picture itself.
+
+    Parameters
+    ----------
+    environment : float32 [h, w, 3] sky and far field under cloud [1]
+    sky : the light under cloud
+    extinction : extinction coefficient of the air [m-1]
+    """
+
+    environment: NDArray[np.float32]
+    sky: SkyLight
+    extinction: float
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def fresnel_reflectance(cosine, refractive_index):  # type: ignore[no-untyped-def]
     """Unpolarised reflectance of a smooth surface (Fresnel; Born & Wolf 1999, section 1.5).
 
@@ -62,7 +96,7 @@ def fresnel_reflectance(cosine, refractive_index):  # type: ignore[no-untyped-de
     return (across * across + along * along) / 2
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def wet_albedo_ratio(albedo, refractive_index, diffuse_reflectance):  # type: ignore[no-untyped-def]
     """Diffuse reflectance of a surface under a water film by its dry one.
 
@@ -87,57 +121,57 @@ def wet_albedo_ratio(albedo, refractive_index, diffuse_reflectance):  # type: ig
 def wet_layer(
     picture: NDArray[np.float32],
     gbuffer: GBuffer,
-    environment: NDArray[np.float32],
-    sky: SkyLight,
-    extinction: float,
+    shutter: Shutter,
     rays: NDArray[np.float32],
-    T_world_camera: NDArray[np.floating],
-    K: NDArray[np.floating],
-    film_depth_mm: float,
-    parameters: RoadFilmParameters,
-    seed: int,
+    film: RoadFilm,
+    light: LightOnRoad,
 ) -> Layer:
-    """The water on the road and on the ground beside it.
+    """Return the layer of water on the road and on the ground beside it.
 
     Parameters
     ----------
     picture : float32 [H, W, 3] the dry scene in its light, without the veil of the air [1]
     gbuffer : the rasterisation
-    environment : float32 [h, w, 3] sky and far field under cloud [1]
-    sky : the light under cloud
-    extinction : extinction coefficient of the air [m-1]
+    shutter : pose and intrinsics
     rays : float32 [H, W, 3] world directions of the pixels, of camera z 1 [1]
-    T_world_camera : [4, 4] camera pose [m]
-    K : [3, 3] intrinsics [px]
-    film_depth_mm : total film depth h_t [mm]
-    parameters : optics of the wet road
-    seed : visual seed of the clip [1]
+    film : the water
+    light : what it mirrors beside the picture
 
     Returns
     -------
     Layer
     """
-    p = parameters
-    height = gbuffer.depth.shape[0]
-    focal_px = float(K[1, 1])
+    p, sky = film.parameters, light.sky
+    focal_px = float(shutter.K[1, 1])
     road = np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5)
-    normal = _road_normals(gbuffer.normal, road, 2 * round(p.normal_window * height / 2) + 1)
-    water = water_surface(
-        gbuffer.depth, rays, normal, road, T_world_camera[:3, 3], focal_px, film_depth_mm, p.water, seed
-    )
-    light = mirrored_scene(
-        picture, gbuffer.depth, water.normal, road, environment, T_world_camera, K, extinction, sky.airlight
-    )
+    window = 2 * round(p.normal_window * shutter.height / 2) + 1
     # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
     # narrow across at grazing angles
-    sharp = _column_mean(light, road, round(p.water.ripple_slope * focal_px))
-    rough = _column_mean(light, road, round(p.rough_slope * focal_px))
+    smooth_reach, rough_reach = (round(slope * focal_px) for slope in (p.water.ripple_slope, p.rough_slope))
+    mirrors = road.copy()
+    if smooth_reach >= LEAST_REACH:
+        mirrors[1::2] &= ~road[: shutter.height // 2 * 2 : 2]
+    view = RoadView(
+        road=road,
+        mirrors=mirrors,
+        depth=gbuffer.depth,
+        normal=_road_normals(gbuffer.normal, road, window),
+        rays=rays,
+        T_world_camera=shutter.T_world_camera,
+        K=shutter.K,
+    )
+    water = water_surface(view, film.depth_mm, p.water, film.seed)
+    mirrored = mirrored_scene(
+        picture, replace(view, normal=water.normal), light.environment, light.extinction, sky.airlight
+    )
+    sharp = _column_mean(mirrored, view, smooth_reach)
+    rough = _column_mean(mirrored, view, rough_reach)
     gain = np.ones((*road.shape, 1), dtype=np.float32)
     add = np.zeros_like(picture)
     facing = np.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
     drained = np.where(np.isin(gbuffer.class_id, DRAINED_CLASSES), facing, np.float32(0))
     _wet(
-        picture, road, drained, water.smooth, water.cosine, sharp, rough, compute_wetness(film_depth_mm, p.water),
+        picture, road, drained, water.smooth, water.cosine, sharp, rough, compute_wetness(film.depth_mm, p.water),
         p.water.ripple_slope, p.rough_slope, p.refractive_index, p.diffuse_reflectance,
         LUMINANCE / float(LUMINANCE @ sky.white), gain, add,
     )  # fmt: skip
@@ -146,13 +180,16 @@ def wet_layer(
 
 DRAINED_CLASSES = (SemanticClass.SIDEWALK, SemanticClass.KERB, SemanticClass.TERRAIN)
 """Rough ground with pores that water runs off."""
+LEAST_REACH = 4
+"""Rows to either side over which mirrored light is averaged, from which on a pixel leaves its own light out where the
+pixel above it has some [px]."""
 STEEPEST_SOAKED = 0.5
 """Upward part of a normal from which on ground is soaked through: 60 deg steep, it still gets half the rain [1]."""
 ALBEDO_RANGE = (0.02, 0.9)
 """Reflectances that a road's own paint and stone can have; beyond them it is the light that was misread."""
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _wet(  # type: ignore[no-untyped-def]
     picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
     to_albedo, gain, add,
@@ -198,26 +235,26 @@ def _road_normals(normal: NDArray[np.float32], road: NDArray[np.bool_], window: 
     return mean
 
 
-def _column_mean(light: NDArray[np.float32], road: NDArray[np.bool_], reach: int) -> NDArray[np.float32]:
-    """Mean of the road pixels of each column within ``reach`` rows."""
+def _column_mean(light: NDArray[np.float32], view: RoadView, reach: int) -> NDArray[np.float32]:
+    """Return the mean of the mirroring pixels of each column within ``reach`` rows, for every road pixel."""
     out = np.zeros_like(light)
-    _slide(light, road, reach, out)
+    _slide(light, view.road, view.mirrors, reach, out)
     return out
 
 
-@numba.njit(cache=True, nogil=True)
-def _slide(light, road, reach, out):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _slide(light, road, mirrors, reach, out):  # type: ignore[no-untyped-def]
     height, width = road.shape
     total = np.zeros((width, 3))
     count = np.zeros(width)
     for row in range(-reach, height):
         enters, leaves = row + reach, row - reach - 1
         for column in range(width):
-            if enters < height and road[enters, column]:
+            if enters < height and mirrors[enters, column]:
                 count[column] += 1
                 for c in range(3):
                     total[column, c] += light[enters, column, c]
-            if leaves >= 0 and road[leaves, column]:
+            if leaves >= 0 and mirrors[leaves, column]:
                 count[column] -= 1
                 for c in range(3):
                     total[column, c] -= light[leaves, column, c]
