@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants freeze bench lock clean
+.PHONY: demo test test-minutes check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-calibration freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -68,6 +68,9 @@ study-double-track: $(READY)
 
 study-mutants: $(READY)
 	$(BIN)/python -m benchmarks.mutants
+
+study-calibration: $(READY)
+	$(BIN)/python -m benchmarks.known_truth
 
 freeze: $(READY)
 	$(BIN)/musync freeze
