@@ -31,8 +31,8 @@ def print_fits(title: str, fits: list[FitOutcome]) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m benchmarks.known_truth", description=__doc__)
     parser.add_argument("--draws", type=int, default=200, help="draws of errors that are refitted linearly")
-    parser.add_argument("--truths", type=int, default=5, help="vehicles that these draws are spread over")
-    parser.add_argument("--fits", type=int, default=20, help="whole fits of traces with errors")
+    parser.add_argument("--truths", type=int, default=4, help="vehicles that these draws are spread over")
+    parser.add_argument("--fits", type=int, default=14, help="whole fits of traces with errors")
     parser.add_argument("--exact", type=int, default=2, help="whole fits of traces without errors")
     parser.add_argument("--procedure", default="paper-staged")
     parser.add_argument("--workers", type=int, default=2)
