@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-exports freeze bench lock clean
+.PHONY: demo test test-minutes check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-exports study-calibration freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -78,6 +78,8 @@ study-exports:
 	$(EXPORTS) pip install --quiet --no-deps nuscenes-devkit pyquaternion descartes shapely scikit-learn joblib \
 		threadpoolctl tqdm cachetools parameterized
 	$(EXPORTS) pytest -rs tests/flows/exporting
+study-calibration: $(READY)
+	$(BIN)/python -m benchmarks.known_truth
 
 freeze: $(READY)
 	$(BIN)/musync freeze

@@ -10,9 +10,9 @@ from pydantic import Field, field_validator, model_validator
 from catalogs.entries import find_entry
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, read_entry, require_quantity
 from catalogs.vehicles import vehicle_units
+from tasks.identification.calibration.procedure import Bounds, Procedure, Stage
 from tasks.identification.calibration.residual import Phase, Response, Yardstick
 from tasks.identification.calibration.scalars import KNOT_GROUPS
-from tasks.identification.calibration.staged import Bounds, Procedure, Stage
 from tasks.vehicle.effects.table import EFFECT_UNITS
 
 Count = Annotated[Scalar, require_quantity("1", minimum=1)]
@@ -73,6 +73,7 @@ class ProcedureEntry(CatalogueEntry):
     mode: Literal["paper", "coupled"]
     passes: Count
     evaluations: Count
+    tolerance: Annotated[Scalar, require_quantity("1", above=0)] | None = None
     start: Annotated[Scalar, require_quantity("s", above=0)]
     settle: Annotated[Scalar, require_quantity("s", minimum=0)]
     tail_speed: Annotated[Scalar, require_quantity("m s-1", above=0)]
@@ -124,6 +125,7 @@ def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
         stages=tuple(Stage(**dict(stage)) for stage in entry.stages),
         passes=int(entry.passes.value),
         evaluations=int(entry.evaluations.value),
+        tolerance=entry.tolerance.value if entry.tolerance else None,
         bounds={group: _convert_bounds(bounds) for group, bounds in entry.bounds.items()},
         yardstick=Yardstick(
             scales={name: scale.value for name, scale in entry.scales},

@@ -21,9 +21,9 @@ from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.errors import InputError
 from tasks.identification.calibration.identifiability import compute_identifiability
+from tasks.identification.calibration.procedure import Procedure
 from tasks.identification.calibration.residual import WHEELS, CalibrationCase
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
-from tasks.identification.calibration.staged import Procedure
 from tasks.identification.calibration.staged import calibrate_vehicle as run_stages
 from tasks.vehicle.effects.table import EFFECT_UNITS, NUMBERS_OF_EFFECTS
 from tasks.vehicle.parameters import Vehicle

@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.identification.calibration.residual import CalibrationCase
-from tasks.identification.calibration.scalars import CalibrationScalar, list_calibration_scalars, read_scalar
-from tasks.identification.calibration.staged import (
-    Procedure,
-    Stage,
+from tasks.identification.calibration.jacobian import (
     build_smoothness_rows,
+    compute_case_jacobian,
     compute_stage_jacobian,
 )
+from tasks.identification.calibration.procedure import Procedure, Stage
+from tasks.identification.calibration.residual import CalibrationCase, compute_residuals, simulate_case
+from tasks.identification.calibration.scalars import CalibrationScalar, list_calibration_scalars, read_scalar
 from tasks.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Identifiability:
     ----------
     scalars : one entry each
     confounded : pairs of names with their correlation, strongest first
-    eigenvalues : eigenvalues of the prior-scaled Fisher information, descending; the bounds alone give 1 [1]
+    eigenvalues : eigenvalues of the prior-scaled information, descending; the bounds alone give 1 [1]
     weakest : direction of the smallest eigenvalue: share of each scalar with more than a tenth, by name [1]
     """
 
@@ -68,11 +68,14 @@ class Identifiability:
 def compute_identifiability(
     vehicle: Vehicle, cases: Sequence[CalibrationCase], procedure: Procedure
 ) -> Identifiability:
-    """Return the identifiability of all scalars by their Fisher information over all cases.
+    """Return the identifiability of all scalars by the joint information of all cases.
 
     Bounds and smoothness are the prior. Every response of every case counts as one observation, whose standard
     deviation is the response's scale, because the residual of a deterministic model is one smooth curve per case and
     not thousands of independent samples.
+
+    A procedure that converges is reported for the values at which its stages rest, so that a response informs only
+    the stage that is fitted to it; any other by the Fisher information of all responses.
 
     Parameters
     ----------
@@ -81,49 +84,165 @@ def compute_identifiability(
     procedure : groups, bounds and scales
     """
     scalars = list_calibration_scalars(vehicle, procedure.groups)
+    bounds = [procedure.bounds[s.group] for s in scalars]
+    widths = np.array([b.upper - b.lower for b in bounds])
+    prior_sd = widths / np.sqrt(12.0)
+    if procedure.tolerance is None:
+        information = compute_fisher(_compute_joint_rows(vehicle, cases, procedure, scalars) * prior_sd)
+    else:
+        rows = compute_stage_rows(vehicle, cases, procedure, scalars)
+        owned = [np.array([s.group in stage.groups for s in scalars]) for stage in procedure.stages]
+        information = compute_staged_information([stage * prior_sd for stage in rows], owned)
+    x = np.array([read_scalar(vehicle, s) for s in scalars])
+    return summarise_information(information, scalars, x, [b.unit for b in bounds], widths)
+
+
+def compute_fisher(rows: Floats) -> Floats:
+    """Return the Fisher information of residuals and of a prior of standard deviation 1, shape (n, n) [1].
+
+    Parameters
+    ----------
+    rows : derivatives of the residuals by scalars in units of their prior's standard deviation, shape (m, n) [1]
+    """
+    information: Floats = rows.T @ rows + np.eye(rows.shape[1])
+    return information
+
+
+def compute_staged_information(rows: Sequence[Floats], owned: Sequence[NDArray[np.bool_]]) -> Floats:
+    """Return the information about the values at which stages come to rest that hold each other's scalars.
+
+    They solve one equation a scalar: the derivative of its own stage's loss is 0. With A, the derivatives of these
+    equations by all scalars, and B, their covariance, the information is A' inv(B) A (Godambe 1960,
+    doi:10.1214/aoms/1177705693). A single stage with all scalars gives the Fisher information.
+
+    Parameters
+    ----------
+    rows, owned : as in ``compute_stage_equations``
+
+    Returns
+    -------
+    Shape (n, n) [1].
+    """
+    slope, spread = compute_stage_equations(rows, owned)
+    information: Floats = slope.T @ np.linalg.solve(spread, slope)
+    return information
+
+
+def compute_stage_equations(
+    rows: Sequence[Floats], owned: Sequence[NDArray[np.bool_]]
+) -> tuple[Floats, Floats]:
+    """Return the derivatives and the covariance of the equations that the stages solve, the prior's part included.
+
+    Parameters
+    ----------
+    rows : of each stage, derivatives of its residuals as in ``compute_fisher``, shape (m, n) [1]
+    owned : of each stage, the scalars that it moves, shape (n,)
+
+    Returns
+    -------
+    Both of shape (n, n) [1].
+    """
+    slope, spread = (np.eye(len(owned[0])) for _ in range(2))
+    for jacobian, own in zip(rows, owned, strict=True):
+        slope[own] += jacobian[:, own].T @ jacobian
+        spread[np.ix_(own, own)] += jacobian[:, own].T @ jacobian[:, own]
+    return slope, spread
+
+
+def compute_stage_rows(
+    vehicle: Vehicle,
+    cases: Sequence[CalibrationCase],
+    procedure: Procedure,
+    scalars: Sequence[CalibrationScalar],
+) -> list[Floats]:
+    """Return the derivatives of each stage's residuals by all scalars, with a stage's smoothness; one run serves all.
+
+    Parameters
+    ----------
+    vehicle : calibrated vehicle
+    cases : development cases
+    procedure : stages and steps of the differences
+    scalars : the n scalars
+
+    Returns
+    -------
+    One array a stage, shape (m, n) [1 / unit].
+    """
+
+    def list_residuals(changed: Vehicle, case: CalibrationCase) -> list[Floats]:
+        ride = simulate_case(changed, case, procedure.mode, procedure.yardstick.margin_s)
+        return [
+            compute_residuals(ride, case, stage.responses, stage.phase, procedure.yardstick)
+            if case.kind in stage.kinds
+            else np.empty(0)
+            for stage in procedure.stages
+        ]
+
+    jacobian = compute_case_jacobian(
+        vehicle, cases, lambda car, case: np.concatenate(list_residuals(car, case)), procedure, scalars
+    )
+    stage_of_row = np.concatenate(
+        [
+            np.repeat(np.arange(len(procedure.stages)), [len(r) for r in list_residuals(vehicle, case)])
+            for case in cases
+        ]
+    )
+    smooth = build_smoothness_rows(scalars, procedure)
+    return [
+        np.vstack(
+            [
+                jacobian[stage_of_row == k],
+                smooth[[scalars[np.flatnonzero(row)[0]].group in stage.groups for row in smooth]],
+            ]
+        )
+        for k, stage in enumerate(procedure.stages)
+    ]
+
+
+def _compute_joint_rows(
+    vehicle: Vehicle,
+    cases: Sequence[CalibrationCase],
+    procedure: Procedure,
+    scalars: Sequence[CalibrationScalar],
+) -> Floats:
+    """Return the derivatives of every response in every case by all scalars, shape (m, n) [1 / unit]."""
     everything = Stage(
         name="all", groups=procedure.groups, responses=("speed", "pitch", "slip", "wheel_load", "stop"),
         kinds=("flat", "hump", "depression"), phase="event",
     )  # fmt: skip
     x = np.array([read_scalar(vehicle, s) for s in scalars])
     coasting = replace(everything, responses=("speed_drop",), phase="start")
-    jacobian = np.vstack(
+    return np.vstack(
         [
             compute_stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
             compute_stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
             build_smoothness_rows(scalars, procedure),
         ]
     )
-    bounds = [procedure.bounds[s.group] for s in scalars]
-    return summarise_jacobian(
-        jacobian, scalars, x, [b.unit for b in bounds], np.array([b.upper - b.lower for b in bounds])
-    )
 
 
-def summarise_jacobian(
-    jacobian: Floats,
+def summarise_information(
+    information: Floats,
     scalars: Sequence[CalibrationScalar],
     values: Floats,
     units: Sequence[str],
     widths: Floats,
 ) -> Identifiability:
-    """Return standard deviations, correlations and the weakest direction that follow from a Jacobian.
+    """Return standard deviations, correlations and the weakest direction that follow from an information matrix.
 
     Parameters
     ----------
-    jacobian : derivatives of residuals in units of their standard deviation, shape (m, n) [1 / unit]
+    information : of scalars in units of their prior's standard deviation, prior included, shape (n, n) [1]
     scalars, units : the n scalars and their units
     values : calibrated values, shape (n,) [unit]
     widths : distances between the bounds, shape (n,) [unit]
     """
     prior_sd = widths / np.sqrt(12.0)
-    scaled = jacobian * prior_sd
-    fisher = scaled.T @ scaled + np.eye(len(values))
-    covariance = np.linalg.inv(fisher)
+    covariance = np.linalg.inv(information)
     share = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(share, share)
-    alone = 1.0 / np.sqrt(np.diag(fisher))
-    eigenvalues, vectors = np.linalg.eigh(fisher)
+    alone = 1.0 / np.sqrt(np.diag(information))
+    eigenvalues, vectors = np.linalg.eigh(information)
     names = [s.name for s in scalars]
     pairs = [
         (names[i], names[j], float(correlation[i, j]))

@@ -10,9 +10,14 @@ from catalogs.entries import find_entry
 from catalogs.references import read_reference
 from flows.measured.calibration import calibrate_on_traces, calibration_case
 from flows.studies.vehicle_model import agreement_of
-from tasks.identification.calibration.identifiability import summarise_jacobian
+from tasks.identification.calibration.identifiability import (
+    compute_fisher,
+    compute_staged_information,
+    summarise_information,
+)
+from tasks.identification.calibration.jacobian import build_smoothness_rows, compute_stage_jacobian
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
-from tasks.identification.calibration.staged import build_smoothness_rows, compute_stage_jacobian, run_stage
+from tasks.identification.calibration.staged import StageRecord, accept_jointly, compute_joint_loss, run_stage
 from tasks.identification.calibration.staged import calibrate_vehicle as run_stages
 
 
@@ -99,17 +104,26 @@ def test_a_scalar_that_rests_on_a_bound_is_named(vehicle, make_traces, tmp_path,
 
 def test_a_scalar_to_which_no_run_answers_stays_where_it_was(vehicle, make_traces):
     procedure, interval = load_procedure("paper-staged")
-    efficiency = next(s for s in procedure.stages if s.groups == ("efficiency",))
+    efficiency = next(s for s in procedure.stages if "efficiency" in s.groups)
     cases = cases_of(make_traces(vehicle, "paper"), vehicle, procedure, interval)
-    free = {
-        **procedure.bounds,
-        "efficiency": dataclasses.replace(procedure.bounds["efficiency"], smooth=np.inf),
-    }
-    fitted, _ = run_stage(vehicle, cases, efficiency, dataclasses.replace(procedure, bounds=free))
+    fitted, _ = run_stage(vehicle, cases, efficiency, procedure)
     assert fitted.families["dry"].efficiency == vehicle.families["dry"].efficiency
     assert fitted.families["rain"].efficiency[0] == pytest.approx(
         vehicle.families["rain"].efficiency[0], abs=1e-9
     )
+
+
+def test_an_unseen_scalar_goes_to_the_value_about_which_the_prior_lies(vehicle, make_traces, changed):
+    procedure, interval = load_procedure("paper-staged")
+    efficiency = next(s for s in procedure.stages if "efficiency" in s.groups)
+    cases = cases_of(make_traces(vehicle, "paper", ("wet",)), vehicle, procedure, interval)
+    moved = changed(vehicle, "dry", "efficiency", 0, 1.1)
+    fitted, _ = run_stage(moved, cases, efficiency, procedure, prior=vehicle)
+    assert fitted.families["dry"].efficiency[0] == pytest.approx(
+        vehicle.families["dry"].efficiency[0], abs=1e-4
+    )
+    kept, _ = run_stage(moved, cases, efficiency, procedure)
+    assert kept.families["dry"].efficiency[0] == pytest.approx(1.1, abs=1e-9)
 
 
 def test_the_sparse_jacobian_is_that_of_differences_of_every_case(vehicle, make_traces):
@@ -129,8 +143,10 @@ def test_the_sparse_jacobian_is_that_of_differences_of_every_case(vehicle, make_
 
 
 def test_neighbouring_knots_of_a_family_are_held_together_and_no_others(vehicle):
-    procedure, _ = load_procedure("paper-staged")
-    rows = build_smoothness_rows(list_calibration_scalars(vehicle, ("efficiency", "pitch_scale")), procedure)
+    procedure, _ = load_procedure("coupled-grown")
+    rows = build_smoothness_rows(
+        list_calibration_scalars(vehicle, ("efficiency", "slip_stiffness")), procedure
+    )
     pairs = [tuple(np.flatnonzero(row)) for row in rows]
     assert pairs == [(1, 2), (2, 3), (3, 4), (5, 6), (6, 7)]
     assert np.allclose(rows.sum(axis=1), 0)
@@ -146,7 +162,8 @@ def test_confounded_and_unseen_scalars_are_named():
     rng = np.random.Generator(np.random.Philox(key=[3, 0]))
     a = rng.normal(size=200)
     jacobian = np.stack([a, a + 1e-3 * rng.normal(size=200), np.zeros(200)], axis=1)
-    report = summarise_jacobian(jacobian, scalars, np.zeros(3), ["1", "1", "rad"], np.full(3, np.sqrt(12.0)))
+    units, widths = ["1", "1", "rad"], np.full(3, np.sqrt(12.0))
+    report = summarise_information(compute_fisher(jacobian), scalars, np.zeros(3), units, widths)
     assert [pair[:2] for pair in report.confounded] == [("hold_ratio", "coupled_pitch_scale")]
     assert report.confounded[0][2] < -0.99
     unseen = report.scalars[2]
@@ -154,6 +171,48 @@ def test_confounded_and_unseen_scalars_are_named():
     # alone each is known to 1 / |a|
     assert report.scalars[0].sd_alone == pytest.approx(1 / np.sqrt(1 + a @ a))
     assert report.scalars[0].sd > 0.5
+
+
+def test_stages_that_hold_each_others_scalars_know_less_than_a_joint_fit():
+    """Monte Carlo of the stages' own equations is the oracle of the closed form."""
+    rng = np.random.Generator(np.random.Philox(key=[11, 0]))
+    first, second = rng.normal(size=(30, 3)), rng.normal(size=(20, 3))
+    owned = [np.array([True, True, False]), np.array([False, False, True])]
+    covariance = np.linalg.inv(compute_staged_information([first, second], owned))
+    draws = 20000
+    x = prior = rng.normal(size=(3, draws))
+    noises = rng.normal(size=(30, draws)), rng.normal(size=(20, draws))
+    for _ in range(25):
+        for rows, own, noise in zip((first, second), owned, noises, strict=True):
+            held = noise - rows[:, ~own] @ x[~own]
+            normal = rows[:, own].T @ rows[:, own] + np.eye(own.sum())
+            x = x.copy()
+            x[own] = np.linalg.solve(normal, rows[:, own].T @ held + prior[own])
+    assert np.cov(x) == pytest.approx(covariance, abs=0.03 * np.diag(covariance).max())
+    joint = np.linalg.inv(compute_fisher(np.vstack([first, second])))
+    assert (np.diag(covariance) > np.diag(joint)).all()
+    alone = compute_staged_information([first], [np.array([True] * 3)])
+    assert alone == pytest.approx(compute_fisher(first))
+
+
+def test_a_stage_is_taken_as_far_as_all_cases_together_are_no_worse(vehicle, make_traces):
+    procedure, interval = load_procedure("paper-staged")
+    truth = dataclasses.replace(vehicle, static_pitch=np.deg2rad(0.3))
+    cases = cases_of(make_traces(truth, "paper", ("wet",), noise=0.0), vehicle, procedure, interval)
+    record = StageRecord(stage="any", turn=0, before=2.0, after=1.0, moved=0.4, at_bounds=())
+    start = vehicle.static_pitch
+
+    def accept(target):
+        after = dataclasses.replace(vehicle, static_pitch=target)
+        return accept_jointly(vehicle, after, record, cases, procedure)
+
+    to_truth, taken = accept(truth.static_pitch)
+    assert (to_truth.static_pitch, taken.accepted) == (pytest.approx(truth.static_pitch), 1.0)
+    too_far, taken = accept(start + 5 * (truth.static_pitch - start))
+    assert (taken.accepted, taken.moved) == (0.25, pytest.approx(0.1))
+    assert compute_joint_loss(too_far, cases, procedure) < compute_joint_loss(vehicle, cases, procedure)
+    away, taken = accept(start - 0.01)
+    assert away == vehicle and (taken.accepted, taken.moved, taken.after) == (0.0, 0.0, record.before)
 
 
 def test_the_same_traces_give_the_same_bytes(vehicle, make_traces, tmp_path):
