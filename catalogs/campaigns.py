@@ -19,12 +19,12 @@ from catalogs.documents import read_content
 from catalogs.quantities import Text, parse_entry
 from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign, Run, Tolerances
-from tasks.campaign.channels import CHANNELS_BY_NAME
+from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.run_validation import COLUMN_UNITS, run_problems
 from tasks.errors import InputError
 
 NEEDED = ("brake_pressure", "speed")
-"""Channels without which a campaign says nothing."""
+"""Channels without which a campaign says nothing; another of `BRAKE_SIGNALS` may stand in for the first."""
 TOLERANCE_KEYS = (
     "pressure_gain",
     "mass",
@@ -55,6 +55,8 @@ class MeasuredHeader(CampaignHeader):
     split: Split
     tolerances_1sigma: TolerancesEntry
     not_measured: tuple[Text, ...] = ()
+    brake_signal: Text | None = None
+    brake_stands_for: Text | None = None
 
 
 def read_campaign(folder: str | Path) -> Campaign:
@@ -79,7 +81,10 @@ def read_campaign(folder: str | Path) -> Campaign:
     train, held_out = header.split.train, header.split.held_out
     problems = _split_problems([row["run"] for row in rows], train, held_out)
     problems += _channel_problems(header.not_measured)
-    needed = [name for name in ("time", *NEEDED, *CHANNELS) if name not in header.not_measured]
+    problems += _brake_problems(header)
+    signal = _find_brake_signal(header)
+    needed = [name for name in ("time", signal, *NEEDED, *CHANNELS) if name not in header.not_measured]
+    needed = list(dict.fromkeys(needed))
     digest = hashlib.sha256(header_bytes + table_bytes)
     interval, judged = 1.0 / header.sample_rate_hz, set(held_out)
     runs = []
@@ -93,11 +98,14 @@ def read_campaign(folder: str | Path) -> Campaign:
             digest.update(row["run"].encode() + content)
             columns, units = parse_columns(content, path.name, COLUMN_UNITS)
             columns = {name: values for name, values in columns.items() if name not in header.not_measured}
-            found = run_problems(columns, units, interval, needed)
+            found = run_problems(
+                columns, units, interval, needed, brake_stands_in=header.brake_stands_for is not None
+            )
         except InputError as error:
             found = list(error.problems)
         problems += [f"{row['run']}: {problem}" for problem in found]
-        if not found and all(name in columns for name in NEEDED):
+        if not found and signal in columns and "speed" in columns:
+            columns["brake_pressure"] = BRAKE_SIGNALS[signal] * columns[signal]
             runs.append(_make_run(row, columns, row["run"] in judged, interval))
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
@@ -110,6 +118,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         content_hash=digest.hexdigest(),
         split_hash=hashlib.sha256(split.encode()).hexdigest(),
         channels=tuple(name for name in CHANNELS if name in needed),
+        brake_signal=signal if header.brake_stands_for is None else header.brake_stands_for,
     )
 
 
@@ -165,11 +174,29 @@ def _channel_problems(not_measured: Sequence[str]) -> list[str]:
         for name in not_measured
         if name not in CHANNELS_BY_NAME
     ]
-    return problems + [
-        f"channel {name} must be measured: closing the loop compares the speed under a known brake"
-        for name in NEEDED
-        if name in not_measured
-    ]
+    if "speed" in not_measured:
+        problems.append(
+            "channel speed must be measured: closing the loop compares the speed under a known brake"
+        )
+    return problems
+
+
+def _brake_problems(header: MeasuredHeader) -> list[str]:
+    """Sentences on a campaign of which nobody can say how hard the driver braked."""
+    signal = _find_brake_signal(header)
+    if signal not in BRAKE_SIGNALS:
+        return [f"brake_signal: {shorten_value(signal)} must be one of {', '.join(BRAKE_SIGNALS)}"]
+    if signal in header.not_measured:
+        return [
+            f"channel {signal} must be measured: closing the loop compares the speed under a known brake; one of"
+            f" {', '.join(BRAKE_SIGNALS)} is enough"
+        ]
+    return []
+
+
+def _find_brake_signal(header: MeasuredHeader) -> str:
+    """Return the channel that says how hard the driver brakes: the campaign's own word, else the brake pressure."""
+    return header.brake_signal or "brake_pressure"
 
 
 def _make_run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: bool, interval: float) -> Run:

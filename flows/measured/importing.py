@@ -21,7 +21,7 @@ from flows.store.layout import write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
-from tasks.campaign.channels import CHANNELS_BY_NAME
+from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.episodes import pressure_episodes
 from tasks.campaign.signals import Signal, convert_to_channel
 from tasks.errors import InputError
@@ -170,6 +170,7 @@ def write_campaign(
         "source": channel_map.source,
         "notes": channel_map.notes,
         "not_measured": list(channel_map.not_measured),
+        **_brake_facts(channel_map),
         "made_from": {"channel_map_sha256": map_hash, "files_sha256": sources},
     }
     text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True)
@@ -192,6 +193,16 @@ def write_campaign(
     }
     write_json(folder / "import.json", report)
     return report
+
+
+def _brake_facts(channel_map: ChannelMap) -> dict[str, str]:
+    """What says how hard the driver brakes, where no pressure was measured; empty where one was."""
+    rules = {rule.channel: rule for rule in channel_map.rules}
+    if "brake_pressure" in rules:
+        gain = rules["brake_pressure"].gain
+        return {} if gain is None else {"brake_stands_for": f"a signal in {gain.source_unit}"}
+    found = [name for name in BRAKE_SIGNALS if name in rules]
+    return {"brake_signal": found[0]} if found else {}
 
 
 def run_table(columns: dict[str, np.ndarray], rate: float) -> pa.Table:

@@ -97,6 +97,7 @@ class Campaign:
     content_hash : SHA-256 over every file read
     split_hash : SHA-256 over the names of the training and held-out runs
     channels : of `CHANNELS`, those that were measured
+    brake_signal : signal or unit that stands for the brake pressure
     """
 
     name: str
@@ -106,6 +107,7 @@ class Campaign:
     content_hash: str
     split_hash: str
     channels: tuple[str, ...] = CHANNELS
+    brake_signal: str = "brake_pressure"
 
     @property
     def is_measured(self) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.channels import CHANNELS_BY_NAME, guess_unit
+from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS, guess_unit
 from tasks.campaign.signals import Signal
 
 GAP_STEPS = 5.0
@@ -115,9 +115,14 @@ def plausibility_problems(
     interval : of the clock [s]
     units : the unit that each channel's values were taken to be in
     """
-    problems = _step_problems(columns, interval) + _pressure_problems(columns, interval)
+    stands_in = UNITS[units.get("brake_pressure", "MPa")][0] != "pressure"
+    problems = _step_problems(columns, interval) + (
+        [] if stands_in else _pressure_problems(columns, interval)
+    )
     for name, values in columns.items():
         channel = CHANNELS_BY_NAME[name]
+        if name == "brake_pressure" and stands_in:
+            continue  # a command or torque in its place has a scale that nobody knows
         peak = float(np.max(np.abs(values)))
         if peak > channel.limit:
             problems.append(
@@ -137,7 +142,7 @@ def plausibility_problems(
                 0.8,
                 units["longitudinal_acceleration"],
             )
-        problems += _braking_problems(smooth, rate, interval)
+        problems += _braking_problems(smooth, rate, interval, stands_in)
     if "pitch" in smooth and "pitch_rate" in smooth:
         slope = np.gradient(smooth["pitch"], interval)
         problems += _pair_problems(
@@ -183,8 +188,8 @@ def _pressure_problems(columns: Mapping[str, NDArray[np.float64]], interval: flo
     if "speed" in columns:
         rate = np.sort(np.gradient(_moving_mean(columns["speed"], interval), interval))
         lost = -float(np.mean(rate[: max(round(SMOOTHING / interval), 1)]))
-    if lost <= WITHOUT_BRAKE:
-        return []
+    if lost <= WITHOUT_BRAKE or np.any(columns.get("engine_torque", np.zeros(1)) < 0.0):
+        return []  # a motor that brakes needs no pressure
     return [
         f"channel brake_pressure is 0 over the whole run while speed falls at {lost:.1f} m/s^2, which needs the brake"
         f" beyond {WITHOUT_BRAKE:g}: record it anew, or leave the run out"
@@ -251,7 +256,7 @@ def _pair_problems(
 
 
 def _braking_problems(
-    columns: Mapping[str, NDArray[np.float64]], rate: NDArray[np.float64], interval: float
+    columns: Mapping[str, NDArray[np.float64]], rate: NDArray[np.float64], interval: float, stands_in: bool
 ) -> list[str]:
     moving = columns["speed"] > MOVING
     braking = moving & (rate < -1.0)
@@ -266,7 +271,7 @@ def _braking_problems(
         dive, less = columns["pitch"][lag:] - columns["pitch"][:-lag], rate[:-lag] - rate[lag:]
         found = _pair_problems("pitch", dive, "the deceleration", less, 0.5, None)
         problems += found or _dive_problems(dive, less)
-    if "brake_pressure" in columns:
+    if "brake_pressure" in columns and not stands_in:
         gain = -float(np.mean(rate[braking])) / float(np.mean(columns["brake_pressure"][braking]))
         low, high = DECELERATION_PER_PRESSURE
         if not low < gain < high:

@@ -13,6 +13,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "rad/s": ("angular speed", 1.0), "deg/s": ("angular speed", pi / 180), "rpm": ("angular speed", pi / 30),
     "MPa": ("pressure", 1e6), "bar": ("pressure", 1e5), "kPa": ("pressure", 1e3), "Pa": ("pressure", 1.0),
     "psi": ("pressure", 6894.757293168),
+    "N": ("force", 1.0), "kN": ("force", 1e3),
     "N m": ("torque", 1.0), "kN m": ("torque", 1e3),
     "1": ("ratio", 1.0), "%": ("ratio", 1e-2),
 }  # fmt: skip
@@ -62,12 +63,24 @@ SIDE_CHANNELS = (
     _make_channel("roll_rate", "deg/s", 150.0, "right side down positive", moves=False),
     _make_channel("lateral_acceleration", "m/s^2", 20.0, "left positive", moves=False),
     _make_channel("brake_torque", "N m", 40000.0, "all wheels together, braking positive", moves=False),
+    _make_channel(
+        "brake_command",
+        "1",
+        1.2,
+        "share of the full brake: pedal travel or a controller's command",
+        moves=False,
+    ),
+    _make_channel("pedal_force", "N", 3000.0, "of the foot on the brake pedal", moves=False),
     _make_channel("engine_torque", "N m", 40000.0, "at the wheels, driving positive", moves=False),
     _make_channel("road_slope", "deg", 30.0, "of the road, uphill positive", moves=False),
     _make_channel("throttle", "1", 1.2, "share of the full throttle", moves=False),
 )
 """Channels that selection rules, residual plots and the closing of the loop use where they were measured."""
 
+BRAKE_SIGNALS = {"brake_pressure": 1.0, "brake_command": 10.0, "brake_torque": 0.001, "pedal_force": 0.02}
+"""Signals that say how hard the driver brakes, the best first, and the pressure that a unit of each stands for [MPa].
+
+Only for a pressure is this a measurement; for the others the brake's gain is unknown, and a fit finds it."""
 CHANNELS_BY_NAME = {channel.name: channel for channel in (*MAIN_CHANNELS, *SIDE_CHANNELS)}
 
 

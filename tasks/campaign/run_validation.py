@@ -21,6 +21,8 @@ def run_problems(
     units: Mapping[str, str],
     interval: float,
     needed: Collection[str],
+    *,
+    brake_stands_in: bool = False,
 ) -> list[str]:
     """Return every problem of one run, one sentence each; empty when it can be used.
 
@@ -30,6 +32,7 @@ def run_problems(
     units : units from the file's metadata, by column; a column without one counts as correct
     interval : declared time between samples [s]
     needed : columns that there must be
+    brake_stands_in : the brake pressure is another signal in its place, whose scale nobody knows
     """
     problems = [
         f"channel {name} is missing: if nobody measured it, list it under not_measured in campaign.yaml"
@@ -60,7 +63,8 @@ def run_problems(
     for name, signal in signals.items():
         frozen = frozen_problem(name, signal, signals.get("speed"))
         problems += [] if frozen is None else [f"channel {name} {frozen}"]
-    return problems + plausibility_problems(usable, interval, COLUMN_UNITS)
+    taken = COLUMN_UNITS | ({"brake_pressure": "1"} if brake_stands_in else {})
+    return problems + plausibility_problems(usable, interval, taken)
 
 
 def _clock_problems(time: NDArray[np.float64], interval: float) -> list[str]:

@@ -74,7 +74,11 @@ def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:
     rules : of the joint fit
     """
     few = min(len(campaign.train), len(campaign.held_out)) < rules.fewest_runs
-    return few or _is_gain_unknown(campaign, rules)
+    # only a joint fit knows a throttle, and a brake signal that is no pressure
+    other_inputs = campaign.brake_signal != "brake_pressure" or any(
+        run.throttle is not None for run in campaign.runs
+    )
+    return few or other_inputs or _is_gain_unknown(campaign, rules)
 
 
 def judge_jointly(
@@ -161,7 +165,9 @@ def judge_jointly(
 
 
 def _is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
-    return campaign.tolerances.session[SESSION.index("pressure_gain")] >= rules.unknown_gain_tolerance
+    """Whether the brake's gain is to be found: the file hardly knows it, or the signal is no pressure."""
+    tolerance = campaign.tolerances.session[SESSION.index("pressure_gain")]
+    return campaign.brake_signal != "brake_pressure" or tolerance >= rules.unknown_gain_tolerance
 
 
 def _fit_everything(

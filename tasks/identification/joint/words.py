@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Campaign
+from tasks.campaign.channels import BRAKE_SIGNALS
 from tasks.identification.decision.answer import ChannelError, NamedEffect, VerdictName
 from tasks.identification.joint.elimination import certain_numbers
 from tasks.identification.joint.fit import JointFit
@@ -34,7 +35,7 @@ def tell_what_was_used(
     rules : of the joint fit
     """
     runs = campaign.runs
-    inputs = ["brake pressure"]
+    inputs = [campaign.brake_signal.replace("_", " ")]
     inputs += ["engine torque"] if any(run.drive_torque is not None for run in runs) else []
     inputs += ["throttle"] if any(run.throttle is not None for run in runs) else []
     inputs += ["road slope"] if any(run.road_slope is not None for run in runs) else []
@@ -46,7 +47,13 @@ def tell_what_was_used(
         if any(saturates_tyres(stop.model, rules) for stop in train)
         else "; no run passed the limit of the model's tyres"
     )
+    stands_for = BRAKE_SIGNALS.get(campaign.brake_signal, 1.0)
     return [
+        *(
+            [f"a {inputs[0]} of 1 is taken for {stands_for:g} MPa, and the gain is fitted"]
+            if stands_for != 1.0
+            else []
+        ),
         f"inputs that were measured: {', '.join(inputs)}; compared: {', '.join(seen)}",
         f"the training runs reach {speeds.min():.3g} to {speeds.max():.3g} m/s and {pressure:.3g} MPa{grip}: beyond"
         " that nothing is claimed",
