@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
@@ -93,6 +94,7 @@ def test_what_no_library_holds_is_a_form_at_its_port_and_variable() -> None:
     assert (verdict.effects[0].port, verdict.effects[0].variable) == ("suspension_force", "suspension_speed")
 
 
+@pytest.mark.minutes
 def test_two_effects_at_once_are_both_named() -> None:
     verdict = judged({"lag": 0.08, "drag_area": 0.7}, design=LEVEL)
     assert verdict.verdict == "FOUND"
@@ -100,6 +102,7 @@ def test_two_effects_at_once_are_both_named() -> None:
     assert verdict.error["speed"].after < 0.5 * verdict.error["speed"].frozen
 
 
+@pytest.mark.minutes
 def test_what_stops_of_one_kind_cannot_tell_apart_is_a_set_with_the_run_that_can() -> None:
     verdict = judged({"pad_drag": 40.0}, design=load_closing_study().drives())
     told = {*names(verdict), *(rival.name for _, rival in verdict.rivals)}
@@ -143,6 +146,7 @@ class TestACarThatIsGrown:
         assert names(verdict) == ["aerodynamic_drag"]
         assert "grown already has lag: what is named comes on top of that" in verdict.reasons
 
+    @pytest.mark.minutes
     def test_a_calibrated_vehicle_is_judged_with_all_that_calibration_gave_it(self) -> None:
         grown = load_vehicle("multibody-grown")
         assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
