@@ -44,6 +44,7 @@ class DecisionRulesEntry(CatalogueEntry):
     rival_gain_share: Share
     discrepancy_limit: Level
     foreign_inflation: Level
+    disputed_inflation: Level
     win_share: Share
     bootstrap_resamples: Count
     refined_candidates: Count

@@ -60,6 +60,7 @@ class DecisionRules:
     rival_gain_share : share of the named effect's gain from which another effect counts as a rival [1]
     discrepancy_limit : mean square of a channel's whitened leftover in a run from which its noise is widened [1]
     foreign_inflation : inflation beside the best effects from which the vehicle's equations are not the model's [1]
+    disputed_inflation : inflation of a named effect from which the runs disagree about it, which tells the same [1]
     win_share : share of bootstrap resamples that the named effect must win [1]
     bootstrap_resamples : bootstrap resamples of the runs [1]
     refined_candidates : candidates of a screening that are refined through the simulation [1]
@@ -96,6 +97,7 @@ class DecisionRules:
     rival_gain_share: float
     discrepancy_limit: float
     foreign_inflation: float
+    disputed_inflation: float
     win_share: float
     bootstrap_resamples: int
     refined_candidates: int

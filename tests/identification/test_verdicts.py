@@ -14,8 +14,10 @@ from catalogs.vehicles import load_vehicle
 from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run
 from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.answer import Verdict
+from tasks.identification.decision.discovery import ForeignCarError
 from tasks.identification.decision.verdict import find_missing_effects
 from tasks.identification.inference.forward import predict_channels, prepare_run
+from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
@@ -48,6 +50,9 @@ BUMPS = (*LEAN[2:5], *LEAN[7:9], LEAN[10], LEAN[11])
 OUTSIDE = {truth.name: truth for truth in load_truths() if not truth.in_library}
 
 
+RULES = load_decision_rules()
+
+
 def judged(
     values: dict[str, float],
     *,
@@ -56,13 +61,14 @@ def judged(
     driven: Vehicle = VEHICLE,
     outside: str | None = None,
     design: tuple[RunPlan, ...] = LEAN,
+    rules: DecisionRules = RULES,
 ) -> Verdict:
     slots = OUTSIDE[outside].slots if outside else ()
     campaign = make_synthetic_campaign(driven, SURFACE, values, seed, slots=slots, design=design)
     last = 3 * len(design) // 4
     runs = tuple(replace(run, held_out=number >= last) for number, run in enumerate(campaign.runs))
     return find_missing_effects(
-        replace(campaign, runs=runs), vehicle, SURFACE, tuple(LIBRARY.values()), load_decision_rules()
+        replace(campaign, runs=runs), vehicle, SURFACE, tuple(LIBRARY.values()), rules
     ).verdict
 
 
@@ -79,6 +85,11 @@ def test_a_number_off_beyond_its_tolerance_is_a_retune() -> None:
     assert speed.retuned < 1.1 * speed.after < speed.frozen, (
         "six tolerances are within a re-tuned session's reach"
     )
+
+
+def test_a_named_effect_about_which_the_runs_disagree_is_left_to_the_joint_fit() -> None:
+    with pytest.raises(ForeignCarError):
+        judged({"lag": 0.08}, design=BUMPS, rules=replace(RULES, disputed_inflation=0.5))
 
 
 def test_an_instrument_that_feels_gravity_is_a_sensor_and_no_missing_physics() -> None:
