@@ -23,7 +23,7 @@ LIBRARIES = (
     "torch", "cv2", "pyarrow.parquet", "pandas", "pydantic", "yaml", "typer", "zarr", "duckdb", "matplotlib.pyplot",
     "av", "dask", "hypothesis", "pytest",
 )  # fmt: skip
-"""What is imported before the tests of any change."""
+"""Modules that are imported before the tests of any change."""
 POLL_S = 0.05
 """Time between two looks at whether the tests have ended [s]."""
 

@@ -88,7 +88,7 @@ def _name_column(column: Mapping[str, Any]) -> str:
 
 
 def _tell_reached(result: Mapping[str, Any]) -> list[str]:
-    """What is told by file: pictures and their check."""
+    """Return the sentences on what is known by file alone: pictures and their check."""
     said = []
     for reached in dict.fromkeys(name for row in result["lines"] for name in row["reaches"]):
         rows = [row for row in result["lines"] if reached in row["reaches"]]

@@ -1,4 +1,4 @@
-"""What every export says of the dataset that it was made from, beside the files of its format."""
+"""The card that lies in every export: the dataset that it was made from, its run, seal, units and camera."""
 
 from typing import Any
 

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flows.exporting.dataset import TICK_COLUMNS, describe_columns
-from flows.making.clip import PIXEL_CENTRE
-from tasks.render.camera import Camera
+from tasks.render.camera import PIXEL_CENTRE, Camera
 
 Message = dict[str, Any]
 TELEMETRY = "musync.Telemetry"

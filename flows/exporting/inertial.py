@@ -1,4 +1,4 @@
-"""What an inertial unit in the rig would feel, from stored telemetry."""
+"""Specific force and turn rate of an inertial unit in the rig, from stored telemetry."""
 
 from dataclasses import dataclass
 

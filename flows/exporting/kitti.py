@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 
 from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinhole
 from flows.exporting.inertial import compute_inertial_motion
-from flows.making.clip import PIXEL_CENTRE
-from tasks.render.camera import Camera
+from tasks.render.camera import PIXEL_CENTRE, Camera
 from tasks.render.contact_sheet import encode_png
 from tasks.vehicle.parameters import Vehicle
 

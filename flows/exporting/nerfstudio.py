@@ -19,8 +19,9 @@ import numpy as np
 
 from catalogs.scenes.gaussian_files import write_gaussians
 from flows.exporting.dataset import ExportedClip, ExportedDataset
-from flows.exporting.edited_scene import edit_scene
 from flows.making.clip import catalogue_of
+from flows.making.driving import hazard_of
+from flows.making.edited_scene import edit_scene
 from flows.store.layout import write_json
 from tasks.render.camera import Camera
 from tasks.render.contact_sheet import encode_png
@@ -50,7 +51,10 @@ def write_nerfstudio(dataset: ExportedDataset, folder: Path) -> None:
         road = scenario.hazard_center_m, scenario.hazard_length_m, scenario.hazard_height_m
         if road not in roads:
             roads[road] = f"scenes/road-{len(roads):03d}.ply"
-            write_gaussians(edit_scene(scenario, catalogue), folder / roads[road])
+            drawn, _ = edit_scene(
+                catalogue.scene, hazard_of(scenario), catalogue.marking, catalogue.looks.sky.asphalt_albedo
+            )
+            write_gaussians(drawn, folder / roads[road])
         _write_clip(clip, dataset, folder / clip.name, roads[road])
 
 

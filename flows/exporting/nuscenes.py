@@ -25,10 +25,10 @@ from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinho
 from flows.exporting.inertial import compute_inertial_motion
 from flows.exporting.json_array import JsonArray, open_array
 from flows.exporting.poses import compute_quaternions_wxyz
-from flows.making.clip import PIXEL_CENTRE
 from flows.store.layout import write_json
 from manifests.canonical import sha256_of
 from tasks.errors import InputError
+from tasks.render.camera import PIXEL_CENTRE
 from tasks.render.contact_sheet import encode_png
 from tasks.vehicle.parameters import Vehicle
 

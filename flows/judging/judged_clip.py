@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flows.judging.physics import clip_columns
 from flows.judging.trajectories import read_trajectory
-from flows.making.clip import PIXEL_CENTRE, catalogue_of, prepare_for_checks
+from flows.making.clip import catalogue_of, prepare_for_checks
 from flows.making.plan import read_plan
 from flows.reading.film import through_film
 from flows.store.frames import read_clip
@@ -23,6 +23,7 @@ from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.outside_trajectory import motion_from_trajectory
 from tasks.eval.poses.undistort import undistort_frames
 from tasks.eval.severity import image_statistics, sampled_frames
+from tasks.render.camera import PIXEL_CENTRE
 
 Row = dict[str, Any]
 METHODS = tuple(POSE_CHECKS)

@@ -6,11 +6,12 @@ from numpy.typing import NDArray
 
 from flows.judging.evaluation_rows import control_of, figure_row
 from flows.judging.judged_clip import JudgedClip, Row, View
-from flows.making.clip import PIXEL_CENTRE, Catalogue, catalogue_of
+from flows.making.clip import Catalogue, catalogue_of
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim
 from tasks.eval.road_edit import score_road_edit
+from tasks.render.camera import PIXEL_CENTRE
 
 LOOK_AHEAD = 40.0
 """Way before a road feature from which its mask is looked for [m]."""

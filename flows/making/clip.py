@@ -26,6 +26,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
 from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures
+from flows.making.edited_scene import edit_scene
 from flows.making.places import find_scene, remember_place
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
 from flows.store.address import find_local, send_files
@@ -38,24 +39,17 @@ from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
 from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
 from tasks.eval.poses.undistort import undistort_frames
-from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
+from tasks.render.camera import PIXEL_CENTRE, Camera, RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
 from tasks.render.rasterise.backend import select_backend
-from tasks.render.road_edit import RoadRelief, apply_road_profile
-from tasks.render.road_paint import HazardMarking, paint_feature
-from tasks.render.road_refinement import refine_road
+from tasks.render.road_paint import HazardMarking
 from tasks.render.weather.layers import ClipConditions
 from tasks.render.weather.parameters import WeatherParameters
-from tasks.scene.route import Route
 from tasks.scene.scene import Scene
 from tasks.studies.sensitivity import StudyProtocol
-from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
-
-PIXEL_CENTRE = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
-"""The renderer puts pixel centres at +0.5, OpenCV and the judges at whole numbers [px]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,17 +175,6 @@ def warm_up(layout: Layout, scene: str) -> None:
             judge_motion(buffers, frames, state.film_depth_mm, catalogue)
 
 
-def relief_of(hazard: RoadHazard, route: Route) -> RoadRelief:
-    """The road feature on its route, as the renderer takes it."""
-    return RoadRelief(
-        route=route,
-        elevation=lambda station: road_elevation(station, hazard),
-        slope=lambda station: road_slope(station, hazard),
-        near=hazard.center_m - hazard.length_m / 2,
-        far=hazard.center_m + hazard.length_m / 2,
-    )
-
-
 def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:
     """The tick that each frame shows, and the rig pose at it."""
     frame = np.arange(plan.settings.frames)
@@ -226,19 +209,11 @@ def render_frames(
     rig_at: RigAt,
 ) -> dict[str, NDArray[Any]]:
     """Render the clip's finished frames, depth and class."""
-    hazard = hazard_of(scenario)
-    scene = catalogue.scene
-    gaussians, relief = scene.gaussians, None
-    if hazard.height_m != 0:
-        relief = relief_of(hazard, scene.route)
-        carriageway = scene.carriageway_left, scene.carriageway_right
-        gaussians = refine_road(gaussians, relief)
-        if catalogue.marking is not None and hazard.height_m > 0:
-            albedo = catalogue.looks.sky.asphalt_albedo
-            gaussians = paint_feature(gaussians, relief, catalogue.marking, *carriageway, albedo)
-        gaussians, _ = apply_road_profile(gaussians, relief, *carriageway)
+    gaussians, relief = edit_scene(
+        catalogue.scene, hazard_of(scenario), catalogue.marking, catalogue.looks.sky.asphalt_albedo
+    )
     return render_clip(
-        replace(scene, gaussians=gaussians),
+        replace(catalogue.scene, gaussians=gaussians),
         catalogue.camera,
         RigMotion(
             T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),

@@ -196,7 +196,7 @@ def write_campaign(
 
 
 def _brake_facts(channel_map: ChannelMap) -> dict[str, str]:
-    """What says how hard the driver brakes, where no pressure was measured; empty where one was."""
+    """Return the signal that stands for the brake pressure; empty where the pressure was measured."""
     rules = {rule.channel: rule for rule in channel_map.rules}
     if "brake_pressure" in rules:
         gain = rules["brake_pressure"].gain

@@ -30,7 +30,7 @@ from catalogs.grids import load_grid
 from flows.running.prefect_progress import RunProgress
 from flows.running.progress import watch_progress
 from flows.running.runner import RunnerName
-from flows.scheduled.failure_report import report_failure, report_run, wants
+from flows.scheduled.failure_report import is_told_of, report_failure, report_run
 from flows.scheduled.lateness import watch_lateness
 from flows.scheduled.notification import WHEN_NONE_IS_NAMED
 from flows.scheduled.retention import remove_oldest
@@ -76,7 +76,9 @@ def _report_crash(flow: Any, flow_run: Any, state: Any) -> None:
     """A run whose process was killed cannot report by itself: whoever started it does."""
     asked = flow_run.parameters
     at = flow_run.expected_start_time or datetime.now(UTC)
-    notify = asked.get("notify") if wants("failed", asked.get("notify_on") or WHEN_NONE_IS_NAMED) else None
+    notify = (
+        asked.get("notify") if is_told_of("failed", asked.get("notify_on") or WHEN_NONE_IS_NAMED) else None
+    )
     report_failure(asked["grid"], asked["root"], at, RuntimeError(state.message), notify)
 
 
@@ -96,7 +98,7 @@ def scheduled(
     log = get_run_logger()
 
     def tell(event: str, facts: dict[str, str]) -> None:
-        if notify is not None and wants(event, notify_on):
+        if notify is not None and is_told_of(event, notify_on):
             report_run(event, grid, root, at, facts, notify)
 
     try:
@@ -106,7 +108,7 @@ def scheduled(
         ):
             result = make_dataset(grid, root, at=at, runner=runner, workers=workers, scheduler=scheduler)
     except Exception as error:
-        report_failure(grid, root, at, error, notify if wants("failed", notify_on) else None)
+        report_failure(grid, root, at, error, notify if is_told_of("failed", notify_on) else None)
         raise
     dataset: str = result["dataset"]
     wrong = [row["clip"] for row in result["verdicts"] if row["passed"] is False]

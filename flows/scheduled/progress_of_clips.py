@@ -1,4 +1,4 @@
-"""What is seen of a dataset that is being made, and what follows: its state, and how long it will take yet."""
+"""The state of a dataset that is being made, and how long it will take yet, from the files that are there."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What is known of a schedule's run, in ``ROOT/runs/<dataset>.json``: how far it is, what failed, how it ended.
+"""The record of a schedule's run, in ``ROOT/runs/<dataset>.json``: how far it is, what failed, how it ended.
 
 It is rewritten while the run goes on, at most every `EVERY_S`: a file, or an object in a store, like the dataset.
 """

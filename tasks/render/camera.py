@@ -13,6 +13,9 @@ from tasks.scene.route import Route
 RigAt = Callable[[int, NDArray[np.float64]], NDArray[np.float64]]
 """Rig poses [N, 4, 4] [m] about a frame, at times [N] from its own [s]."""
 
+PIXEL_CENTRE = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]])
+"""The renderer puts pixel centres at +0.5, OpenCV and the judges at whole numbers [px]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:

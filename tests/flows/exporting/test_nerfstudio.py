@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from catalogs.scenes.gaussian_files import read_gaussians
-from flows.exporting.edited_scene import edit_scene
 from flows.making.clip import catalogue_of
+from flows.making.driving import hazard_of
+from flows.making.edited_scene import edit_scene
 from flows.making.plan import read_plan
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
@@ -57,7 +58,8 @@ def test_the_ply_of_a_clip_is_the_scene_that_it_was_drawn_from(export, toy_datas
     folder = export("nerfstudio") / FOLDERS[label]
     file = folder / json.loads((folder / "transforms.json").read_text())["gaussians_file"]
     scenario = next(clip.scenario for clip in plan.clips if clip.label == label)
-    drawn = edit_scene(scenario, catalogue)
+    albedo = catalogue.looks.sky.asphalt_albedo
+    drawn, _ = edit_scene(catalogue.scene, hazard_of(scenario), catalogue.marking, albedo)
     assert np.array_equal(drawn.means, catalogue.scene.gaussians.means) == (label == BRAKING)
     read = read_gaussians(file)
     np.testing.assert_allclose(read.means, drawn.means, atol=1e-6)

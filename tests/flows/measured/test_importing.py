@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,10 @@ import yaml
 
 from catalogs.campaigns import read_campaign
 from catalogs.channel_maps import load_channel_map
-from catalogs.decision_rules import load_decision_rules
 from catalogs.entries import entry_names
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
 from tasks.errors import InputError
-from tasks.identification.joint.verdict import needs_joint_fit
 from tests.campaign.recorded import MAP, braking_columns, log_signal
 
 Columns = dict[str, np.ndarray]
@@ -127,47 +124,6 @@ def test_the_campaign_is_the_one_that_closing_the_loop_reads(tmp_path: Path) -> 
     assert campaign.runs[4].disc_rise == 40.0
     speed = campaign.runs[2].response[:, CHANNELS.index("speed")]
     np.testing.assert_allclose(speed, braking_columns(14.0)["speed"][40 : 40 + len(speed)], atol=1e-9)
-
-
-def test_a_brake_command_stands_for_the_pressure_and_asks_for_the_joint_fit(tmp_path: Path) -> None:
-    columns = log_signal(braking_columns(seconds=8.0))
-    columns["command"] = columns.pop("p_bar") / 40.0  # 2 MPa are half of the brake
-    write_csv(tmp_path / "log.csv", columns)
-    content = yaml.safe_load(MAP)
-    del content["channels"]["brake_pressure"]
-    content["channels"]["brake_command"] = {"source": "command", "unit": "1"}
-    parts = ("train", "held_out") * 3
-    content |= {
-        "not_measured": ["brake_pressure"],
-        "runs": [
-            {"name": f"r{i}", "file": "log.csv", "from_s": 0.2 * i, "to_s": 0.2 * i + 3.0, "part": part}
-            for i, part in enumerate(parts)
-        ],
-    }
-    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
-    import_measurements(
-        str(tmp_path / "log.csv"), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign")
-    )
-    campaign = read_campaign(tmp_path / "campaign")
-    assert campaign.brake_signal == "brake_command" and campaign.runs[0].pressure.max() == pytest.approx(
-        5.0, abs=0.1
-    )
-    assert needs_joint_fit(campaign, load_decision_rules().joint)
-    assert not needs_joint_fit(replace(campaign, brake_signal="brake_pressure"), load_decision_rules().joint)
-
-
-def test_a_campaign_without_any_brake_signal_is_told_which_would_do(tmp_path: Path) -> None:
-    content = yaml.safe_load(MAP)
-    del content["channels"]["brake_pressure"]
-    write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
-    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content | {"not_measured": ["brake_pressure"]}))
-    import_measurements(
-        str(tmp_path / "log.csv"), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign")
-    )
-    with pytest.raises(
-        InputError, match="brake_pressure, brake_command, brake_torque, pedal_force is enough"
-    ):
-        read_campaign(tmp_path / "campaign")
 
 
 def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
