@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, TypeAdapter
 
+from catalogs.effects import load_effects
 from catalogs.quantities import CatalogueEntry, Text, read_entries
 from tasks.campaign.campaign import CHANNELS
 from tasks.identification.joint.numbers import JointNumber
@@ -25,7 +26,6 @@ class JointNumberEntry(CatalogueEntry):
     removable: bool
     needs: Annotated[tuple[Text, ...], Field(min_length=1)]
     source: Text
-    says: Text
     of_pressure: bool = False
 
 
@@ -38,8 +38,6 @@ def _check(entries: dict[str, JointNumberEntry]) -> dict[str, JointNumberEntry]:
             problems.append(f"{name} must be in {PARAMETERS[name].unit}; it is in {entry.unit}")
         if not entry.lower <= 0.0 <= entry.upper:
             problems.append(f"{name} must have 0, the vehicle file's value, within its limits")
-        if not ("{value}" in entry.says or "{share}" in entry.says):
-            problems.append(f"{name} must say its value: says needs {{value}} or {{share}}")
         problems += [
             f"{name} needs {need}, which is no channel" for need in entry.needs if need not in CHANNELS
         ]
@@ -65,10 +63,12 @@ def load_joint_numbers(path: str | Path = JOINT_NUMBERS) -> tuple[JointNumber, .
         With every rule that the file breaks.
     """
     entries = read_entries(NUMBERS, Path(path), "set of joint numbers")
+    # where several effects begin with one number, the first of the library is it alone
+    effects = {effect.parameters[0].name: effect for effect in reversed(load_effects())}
     return tuple(
         JointNumber(
             name=name, sigma=entry.sigma, lower=entry.lower, upper=entry.upper, group=entry.group,
-            removable=entry.removable, needs=entry.needs, says=entry.says, of_pressure=entry.of_pressure,
+            removable=entry.removable, needs=entry.needs, effect=effects[name], of_pressure=entry.of_pressure,
         )
         for name, entry in entries.items()
     )  # fmt: skip

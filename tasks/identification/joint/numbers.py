@@ -8,6 +8,7 @@ import numpy as np
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.inference.forward import RunModel
 from tasks.identification.rules import JointRules
+from tasks.vehicle.effects.library import Effect
 
 CALIBRATED = ("gain", "friction", "radius")
 """Groups of numbers that re-tuning moves."""
@@ -27,7 +28,7 @@ class JointNumber:
     group : numbers of one group stand in for each other on few runs
     removable : must earn its place
     needs : channels of which one must be measured
-    says : the finding in plain words, with {value} or {share} in it
+    effect : of the library, whose first number it is
     of_pressure : sigma is a share of the largest brake pressure of the training runs
     """
 
@@ -38,7 +39,7 @@ class JointNumber:
     group: str
     removable: bool
     needs: tuple[str, ...]
-    says: str
+    effect: Effect
     of_pressure: bool = False
 
     def say(self, value: float) -> str:
@@ -48,8 +49,7 @@ class JointNumber:
         ----------
         value : that was found [unit of the table]
         """
-        share = f"{abs(100.0 * value):.2g} % {'above' if value >= 0.0 else 'below'}"
-        return self.says.format(value=f"{value:.2g}", share=share)
+        return self.effect.say({self.name: value})
 
 
 def choose_numbers(

@@ -45,9 +45,10 @@ class Effect:
 
         Parameters
         ----------
-        values : numbers of the effect by name [units of the table]
+        values : numbers of the effect by name; one that is not given has its first value [units of the table]
         """
-        return self.says.format_map({name: _Said(value) for name, value in values.items()})
+        numbers = {p.name: p.start for p in self.parameters} | dict(values)
+        return self.says.format_map({name: _Said(value) for name, value in numbers.items()})
 
 
 class _Said(float):

@@ -1,5 +1,6 @@
 """Reasons of a joint verdict are sentences, in the plain words of the catalogue."""
 
+from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.identification.decision.answer import NamedEffect, Parameter
 from tasks.identification.joint.words import tell_rivals
@@ -20,3 +21,15 @@ def test_a_rival_is_told_in_plain_words_with_the_run_that_separates_the_two():
         "these runs cannot tell whether the brakes follow the pressure with a lag of 0.056 s or the brakes answer"
         " 0.05 s late: press the brake in steps from constant speed, logging at 100 Hz or more"
     )
+
+
+def test_an_effect_is_said_with_its_first_number_alone_and_the_other_at_its_start() -> None:
+    pads = next(effect for effect in load_effects() if effect.name == "pad_friction_speed")
+    assert pads.say({"pad_speed": 0.02}) == "the pads lose 2 % of their friction per m/s above 15 m/s"
+    assert "above 20 m/s" in pads.say({"pad_speed": 0.02, "pad_speed_reference": 20.0})
+
+
+def test_a_number_is_said_as_the_effect_that_it_is_alone() -> None:
+    said = {number.name: number.say(0.05) for number in load_joint_numbers()}
+    assert said["rolling_coefficient"] == "the wheels roll with a further resistance of 5 % of the weight"
+    assert said["drag_area"] == "the air holds the car back with a further drag area of 0.05 m2"
