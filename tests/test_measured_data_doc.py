@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 
+pytestmark = pytest.mark.minutes
 TEXT = (SOURCE_ROOT / "docs" / "measured-data.md").read_text()
 COMMANDS = [
     line for block in re.findall(r"```\n(.*?)```", TEXT, flags=re.S) for line in block.strip().splitlines()
