@@ -115,7 +115,7 @@ def _judge(measured: Campaign, model: Vehicle, road: SurfaceParameters) -> Trace
     if not needs_joint_fit(measured, rules.joint):
         with suppress(ForeignCarError):
             return find_missing_effects(measured, model, road, effects, rules)
-    return judge_jointly(measured, model, road, effects, load_joint_numbers(), rules)
+    return judge_jointly(measured, model, road, load_joint_numbers(), rules)
 
 
 def _reached_ranges(trace: Trace | JointTrace) -> dict[str, tuple[float, float]]:
@@ -134,21 +134,16 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     ----------
     trace : the verdict and what it stands on
     """
-    library = load_effects()
+    library, verdict = load_effects(), trace.verdict
     train, held_out = predict_runs(trace)
+    rivals = [rival for _, rival in verdict.rivals]
+    sentence = tell_verdict(verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error)
     if isinstance(trace, Trace):
-        verdict = trace.verdict
-        rivals = [rival for _, rival in verdict.rivals]
-        return {
-            "search": SEARCHES[0],
-            "sentence": tell_verdict(
-                verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error
-            ),
-            "residual_rmse": compute_residual_rmse((*train, *held_out)),
-        }
+        residual = compute_residual_rmse((*train, *held_out))
+        return {"search": SEARCHES[0], "sentence": sentence, "residual_rmse": residual}
     return {
         "search": SEARCHES[1],
-        "sentence": trace.sentence,
+        "sentence": sentence,
         "calibrated": [effect_json(effect, library) for effect in trace.calibrated],
         "numbers": {
             number.name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[number.name].unit}
