@@ -18,7 +18,7 @@ from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
 from tasks.campaign.planned_runs import RICH, RunPlan
-from tasks.identification.benchmark import classify_outcome, interval_holds_truth, make_synthetic_campaign
+from tasks.identification.benchmark import classify_outcome, make_synthetic_campaign, measure_interval_miss
 from tasks.identification.decision.answer import Verdict
 
 FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
@@ -106,6 +106,7 @@ def close_loop_benchmark(
         made = time.process_time()
         library = tuple(effect for effect in effects if effect.name not in left_out)
         verdict = judge_campaign(campaign, model, surface, library).verdict
+        miss = measure_interval_miss(verdict, planned.name, planned.values) if planned.name else None
         row = {
             "kind": planned.kind,
             "truth": planned.name,
@@ -117,7 +118,8 @@ def close_loop_benchmark(
             "rivals": [rival.name for _, rival in verdict.rivals],
             "ports": [[effect.port, effect.variable] for effect in verdict.effects],
             "tried": [[effect.name, effect.score, effect.held_out_gain] for effect in verdict.tried[:3]],
-            "covered": interval_holds_truth(verdict, planned.name, planned.values) if planned.name else None,
+            "half_widths_off": miss,
+            "covered": None if miss is None else miss <= 1.0,
             "reasons": list(verdict.reasons),
             "cpu_s": time.process_time() - made,
             "made_cpu_s": made - before,
