@@ -10,7 +10,9 @@ from catalogs.references import ReferenceCase, Traces, read_reference
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
+from flows.drawing import as_svg
 from flows.store.outputs import Outputs
+from flows.studies.sensitivity_figure import draw_sensitivity
 from tasks.errors import InputError
 from tasks.eval.state_agreement import CaseAgreement, case_agreement, summarise_groups
 from tasks.studies.sensitivity import beside_print, sensitivity_study
@@ -23,13 +25,14 @@ BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipe
 
 def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
-    results = Outputs(out, "sensitivity", "sensitivity.json")
+    results = Outputs(out, "sensitivity", "sensitivity.json", "sensitivity.svg")
     protocol, printed = load_sensitivity_study()
     vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     started = time.process_time()
     result = sensitivity_study(vehicle, surface, protocol)
     result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
     results.write_json("sensitivity.json", result)
+    results.write("sensitivity.svg", as_svg(draw_sensitivity(result["curves"], result["beside_print"])))
     return result
 
 
