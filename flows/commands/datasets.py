@@ -239,6 +239,12 @@ COMMANDS = (
             DATASET,
             define_option("out", str, "Folder for weather.png and hazards.png."),
             define_option("station", float, "Station on the route where the weathers are shown [m].", 12.0),
+            define_option(
+                "beside",
+                list[str] | None,
+                "Finished dataset of another street, whose weathers come below; repeat it for more.",
+                None,
+            ),
         ),
     ),
     Command(
