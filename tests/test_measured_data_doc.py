@@ -1,4 +1,4 @@
-"""docs/measured-data.md: its commands run as they stand, and its tables hold what they give."""
+"""docs/how-to/import-measured-data.md: its commands run as they stand, and its tables hold what they give."""
 
 import json
 import re
@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 
-TEXT = (SOURCE_ROOT / "docs" / "measured-data.md").read_text()
+TEXT = (SOURCE_ROOT / "docs" / "how-to" / "import-measured-data.md").read_text()
 COMMANDS = [
     line for block in re.findall(r"```\n(.*?)```", TEXT, flags=re.S) for line in block.strip().splitlines()
 ]
