@@ -1,4 +1,4 @@
-"""docs/how-to/import-measured-data.md: its commands run as they stand, and its tables hold what they give."""
+"""docs/evidence/measured-drives.md: its commands run as they stand after the import, and its tables hold what they give."""
 
 import json
 import re
@@ -11,7 +11,10 @@ from typer.testing import CliRunner
 from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 
-TEXT = (SOURCE_ROOT / "docs" / "how-to" / "import-measured-data.md").read_text()
+TEXT = "".join(
+    (SOURCE_ROOT / "docs" / page).read_text()
+    for page in ("how-to/import-measured-data.md", "evidence/measured-drives.md")
+)
 COMMANDS = [
     line for block in re.findall(r"```\n(.*?)```", TEXT, flags=re.S) for line in block.strip().splitlines()
 ]
