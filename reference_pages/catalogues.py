@@ -30,21 +30,10 @@ TABLED = ("camera", "surface", "bus", "calibration procedure", "hazard marking",
 LISTED = ("tyre", "channel map", "stop study", "bump study")
 """Kinds of which the files are named with their first comment; other pages say what they hold."""
 
+REFERENCE = "paper-reference"
+"""Vehicle that stands first beside others."""
 NUMBER = re.compile(r"\{[^}]*\}")
 """Place of a number in a sentence of the library."""
-
-
-def write_catalogue_pages() -> dict[str, str]:
-    """Return the pages of the catalogues: Markdown by path below ``docs/``."""
-    folder = "reference/catalogues"
-    return {
-        f"{folder}/weather.md": write_weather_page(),
-        f"{folder}/effects.md": write_effects_page(),
-        f"{folder}/vehicles.md": write_vehicles_page(),
-        f"{folder}/grids.md": write_grids_page(),
-        f"{folder}/others.md": write_other_kinds_page(),
-        f"{folder}/rules.md": write_rules_page(),
-    }
 
 
 def write_weather_page() -> str:
@@ -60,7 +49,14 @@ def write_weather_page() -> str:
 def write_effects_page() -> str:
     """Return the page of the library: the effects that `close-loop` may name."""
     rows = [
-        (f"`{effect.name}`", effect.effect_class, effect.variable, effect.enters, NUMBER.sub("...", effect.says), _name_numbers(effect))
+        (
+            f"`{effect.name}`",
+            effect.effect_class,
+            effect.variable,
+            effect.enters,
+            NUMBER.sub("...", effect.says),
+            _name_numbers(effect),
+        )
         for effect in load_effects()
     ]
     return (
@@ -73,12 +69,16 @@ def write_effects_page() -> str:
 
 def write_vehicles_page() -> str:
     """Return the page of vehicles: their numbers side by side, then each with its sources."""
-    names = [name for name in entry_names("vehicle")]
+    names = sorted(entry_names("vehicle"), key=lambda name: (name != REFERENCE, name))
     numbers = {name: vehicle_numbers(name) for name in names}
     keys = list(dict.fromkeys(key for name in names for key in numbers[name]))
     unit_of = {key: number.unit for name in names for key, number in numbers[name].items()}
     rows = [
-        (f"`{key}`", unit_of[key], *(format_value(numbers[n][key].value) if key in numbers[n] else "" for n in names))
+        (
+            f"`{key}`",
+            unit_of[key],
+            *(format_value(numbers[n][key].value) if key in numbers[n] else "" for n in names),
+        )
         for key in keys
     ]
     page = (
@@ -101,19 +101,27 @@ def write_grids_page() -> str:
     for name in entry_names("grid"):
         grid = load_grid(name)
         settings = grid.settings
-        drawn = f"{settings.frames} frames at {settings.frame_rate_hz:g} Hz" if settings.pictures else "no pictures"
+        drawn = (
+            f"{settings.frames} frames at {settings.frame_rate_hz:g} Hz"
+            if settings.pictures
+            else "no pictures"
+        )
         page += (
             f"\n## {name}\n\n{format_cell(_read_comment(find_entry('grid', name)))}\n\n{len(grid.scenarios)} clips of"
             f" {(settings.frames - 1) / settings.frame_rate_hz:g} s, {drawn}, vehicle `{settings.vehicle}`.\n\n"
         )
         scenarios = [{k: v for k, v in vars(s).items() if v is not None} for _, s in grid.scenarios]
-        fields = [f for f in CHANNELS_BY_NAME if any(f in s for s in scenarios) and f not in {"label", "clip_id"}]
+        fields = [
+            f for f in CHANNELS_BY_NAME if any(f in s for s in scenarios) and f not in {"label", "clip_id"}
+        ]
         rows = []
         for field in fields:
             levels = list(dict.fromkeys(format_value(s.get(field)) for s in scenarios))
             channel = CHANNELS_BY_NAME[field]
             if levels not in ([""], ["0"], ["no"]):
-                rows.append((f"`{field}`", ", ".join(filter(None, levels)), channel.unit, channel.description))
+                rows.append(
+                    (f"`{field}`", ", ".join(filter(None, levels)), channel.unit, channel.description)
+                )
         page += format_table(("control", "levels", "unit", "meaning"), rows)
     return page
 
@@ -127,7 +135,9 @@ def write_other_kinds_page() -> str:
             page += _describe_file(find_entry(kind, name), name, level=3)
     page += "\n## Tyres, channel maps, studies\n\n"
     rows = [
-        (kind, f"`{name}`", _read_comment(find_entry(kind, name))) for kind in LISTED for name in entry_names(kind)
+        (kind, f"`{name}`", _read_comment(find_entry(kind, name)))
+        for kind in LISTED
+        for name in entry_names(kind)
     ]
     return page + format_table(("kind", "name", "its file says"), rows)
 
@@ -164,17 +174,13 @@ def _describe_file(path: Path, heading: str, level: int = 2) -> str:
 
 def _describe_content(heading: str, path: Path, content: object, level: int = 2) -> str:
     """Return a section: the file's own comment, and a row for each entry that has a source."""
-    rows, further = [], False
+    rows = []
     for key, entry in list_quantities(content):
         value = entry.get("value", entry.get("levels", ""))
         rest = {k: v for k, v in entry.items() if k not in {"value", "levels", "unit", "source"}}
-        told = "; ".join(f"{k} {format_value(v)}" for k, v in rest.items())
-        further |= bool(told)
-        rows.append((f"`{key}`", value, entry.get("unit", ""), told, entry["source"]))
-    head = ("entry", "value", "unit", "further", "source")
-    if not further:
-        head, rows = (head[:3] + head[4:], [row[:3] + row[4:] for row in rows])
-    table = format_table(head, rows) if rows else "Its entries have no single source; the file is short: read it.\n"
+        further = "; ".join(f"{k} {format_value(v)}" for k, v in rest.items())
+        rows.append((f"`{key}`", value, entry.get("unit", ""), further, entry["source"]))
+    table = format_table(("entry", "value", "unit", "further", "source"), rows)
     place = path.relative_to(CATALOGUE.parent).as_posix()
     comment = format_cell(_read_comment(path))
     return f"\n{'#' * level} {heading}\n\n`{place}`{': ' + comment if comment else ''}\n\n{table}\n"
@@ -196,3 +202,14 @@ def _yaml_files(folder: str) -> list[Path]:
 
 def _name_numbers(effect: Effect) -> str:
     return ", ".join(f"`{parameter.name}`" for parameter in effect.parameters)
+
+
+WRITERS = {
+    "reference/catalogues/weather.md": write_weather_page,
+    "reference/catalogues/effects.md": write_effects_page,
+    "reference/catalogues/vehicles.md": write_vehicles_page,
+    "reference/catalogues/grids.md": write_grids_page,
+    "reference/catalogues/others.md": write_other_kinds_page,
+    "reference/catalogues/rules.md": write_rules_page,
+}
+"""What writes each page, by its path below ``docs/``."""

@@ -35,7 +35,8 @@ def rewrite_docstring(text: str) -> str:
     for section, body in zip(pieces[1::2], pieces[2::2], strict=True):
         head = f"{section}\n{'-' * len(section)}\n"
         if section == "Parameters":
-            body = "\n".join(PARAMETER.sub(r"\1\n    \2", line) for line in body.splitlines()) + "\n\n"
+            lines = (PARAMETER.sub(r"\1\n    \2", line) for line in body.strip("\n").splitlines())
+            body = "\n".join(lines) + "\n\n"
         elif section in {"Returns", "Yields"} and not re.match(r"\S+\n+\s", body) and " " in body.strip():
             # a sentence: the type stands in the signature
             head, body = f"**{section}**\n\n", f"{body.strip()}\n\n"

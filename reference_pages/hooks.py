@@ -3,9 +3,7 @@
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
-from reference_pages.catalogues import write_catalogue_pages
-from reference_pages.modules import write_module_pages
-from reference_pages.schema import write_schema_page
+from reference_pages.pages import WRITERS
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -16,7 +14,6 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     files : found by MkDocs
     config : of the build
     """
-    pages = write_catalogue_pages() | write_module_pages() | {"reference/schema.md": write_schema_page()}
-    for path, content in pages.items():
-        files.append(File.generated(config, path, content=content))
+    for path, write in WRITERS.items():
+        files.append(File.generated(config, path, content=write()))
     return files

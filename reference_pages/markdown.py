@@ -8,14 +8,20 @@ DOI = re.compile(r"doi:(10\.\d+/[^\s,;]*[^\s,;.)])")
 
 
 def format_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a Markdown table.
+    """Return a Markdown table; a column in which no row has a text is left out.
 
     Parameters
     ----------
     head : titles of the columns
     rows : cells as text, or as what `format_value` takes
     """
-    lines = [head, ["---"] * len(head), *([format_cell(cell) for cell in row] for row in rows)]
+    cells = [[format_cell(cell) for cell in row] for row in rows]
+    filled = [number for number in range(len(head)) if any(row[number] for row in cells)]
+    lines = [
+        [head[number] for number in filled],
+        ["---"] * len(filled),
+        *([row[number] for number in filled] for row in cells),
+    ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
@@ -46,7 +52,7 @@ def format_value(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | float):
-        return f"{value:.10g}"
+        return f"{value:.15g}"
     if isinstance(value, list | tuple):
         return ", ".join(format_value(part) for part in value)
     return str(value)

@@ -1,5 +1,7 @@
 """Pages of the Python reference: the modules that an engineer looks up, by subject; mkdocstrings fills them in."""
 
+from functools import partial
+
 PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "musync": (
         "musync: open a dataset",
@@ -69,8 +71,8 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "judges": (
         "Judges",
-        "What is measured from finished frames and stored telemetry. [Judges](../../explanation/judges.md) says why they"
-        " share no code with what they judge.",
+        "What is measured from finished frames and stored telemetry. [Judges](../../explanation/judges.md) says why"
+        " they share no code with what they judge.",
         (
             "tasks.eval.poses.checks",
             "tasks.eval.poses.motion",
@@ -88,7 +90,8 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "measured-runs": (
         "Measured runs and verdicts",
-        "Campaigns, and how `close-loop` reaches a verdict ([closing the loop](../../explanation/closing-the-loop.md)).",
+        "Campaigns, and how `close-loop` reaches a verdict:"
+        " [closing the loop](../../explanation/closing-the-loop.md).",
         (
             "tasks.campaign.campaign",
             "tasks.campaign.channels",
@@ -113,15 +116,21 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
 """Title, introduction and objects of each page, by the name of its file."""
 
 
-def write_module_pages() -> dict[str, str]:
-    """Return the pages of the Python reference: Markdown by path below ``docs/``."""
-    return {f"reference/python/{name}.md": _write_page(*page) for name, page in PAGES.items()}
+def write_module_page(title: str, introduction: str, objects: tuple[str, ...]) -> str:
+    """Return a page of the Python reference as Markdown.
 
-
-def _write_page(title: str, introduction: str, objects: tuple[str, ...]) -> str:
+    Parameters
+    ----------
+    title, introduction : how it begins
+    objects : modules, classes and functions, which mkdocstrings describes
+    """
     parts = [f"# {title}\n\n{introduction}\n"]
     for path in objects:
         name = path.rsplit(".", 1)[-1]
         public = f"musync.{name}" if path.startswith("flows.reading") or name == "InputError" else path
         parts.append(f"\n## `{public}`\n\n::: {path}\n")
     return "".join(parts)
+
+
+WRITERS = {f"reference/python/{name}.md": partial(write_module_page, *page) for name, page in PAGES.items()}
+"""What writes each page, by its path below ``docs/``."""

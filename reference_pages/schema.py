@@ -24,13 +24,14 @@ def write_schema_page() -> str:
         " `tasks/conventions.py` and `flows/store/arrays.py`, from which the Parquet and Zarr files take their metadata"
         " too. `musync schema` prints the same. [The house](../explanation/architecture.md#dataset) lists the files,"
         " [For analysts](../how-to/query-a-dataset.md) says how to read them. A unit of 1 is dimensionless; NaN in"
-        " Parquet, and NULL in a view, mean \"not represented\".\n"
+        ' Parquet, and NULL in a view, mean "not represented".\n'
     )
     for view, meaning in MEANINGS.items():
-        rows = [(f"`{c['name']}`", c["unit"], c["symbol"], c["standard_name"], c["description"]) for c in columns[view]]
+        rows = [
+            (f"`{c['name']}`", c["unit"], c["symbol"], c["standard_name"], c["description"])
+            for c in columns[view]
+        ]
         head = ("column", "unit", "symbol", "CF standard name", "meaning")
-        if not any(row[3] for row in rows):
-            head, rows = head[:3] + head[4:], [row[:3] + row[4:] for row in rows]
         page += f"\n## View `{view}`\n\n{meaning.capitalize()}.\n\n" + format_table(head, rows)
     return page + "\n## Arrays of the frames\n\n" + _write_arrays(columns["arrays"])
 

@@ -1,4 +1,4 @@
-"""docs/evidence/measured-drives.md: its commands run as they stand after the import, and its tables hold what they give."""
+"""docs/evidence/measured-drives.md: its commands run as they stand, and its tables hold what they give."""
 
 import json
 import re
