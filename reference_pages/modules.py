@@ -5,7 +5,7 @@ from functools import partial
 PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "musync": (
         "musync: open a dataset",
-        "`import musync` opens a finished dataset. [For analysts](../../how-to/query-a-dataset.md) shows it in use.",
+        "`import musync` opens a finished dataset. [Query a dataset](../../how-to/query-a-dataset.md) shows it in use.",
         (
             "flows.reading.opening.open",
             "flows.reading.opening.Dataset",
