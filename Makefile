@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-exports study-calibration freeze bench lock clean
+.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-exports study-calibration freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -46,6 +46,12 @@ check: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The documentation as a site, in build/docs; with docs-serve at 127.0.0.1:8000, where its search works too.
+docs docs-serve: export NO_MKDOCS_2_WARNING := 1
+docs docs-serve: $(READY)
+	$(PIP) install --no-build-isolation --editable '.[docs]'
+	$(BIN)/python -m mkdocs $(if $(filter docs,$@),build --strict,serve)
 
 study: $(READY)
 	$(BIN)/musync sensitivity --out datasets/study

@@ -1,6 +1,6 @@
 """Paper and coupled mode beside each other on the paper's 19 + 12 conditions: ``python -m benchmarks.vehicle_modes``.
 
-Prints the table of docs/vehicle-modes.md.
+Prints the table of docs/explanation/vehicle-modes.md.
 """
 
 from math import isnan

@@ -1,4 +1,4 @@
-"""docs/audits.md: the commands about signatures and installations run as they stand."""
+"""docs/how-to/audit-a-dataset.md: the commands about signatures and installations run as they stand."""
 
 import re
 import shlex
@@ -14,7 +14,7 @@ from manifests.environment import environment_bom
 from manifests.provenance import SOURCE_ROOT
 from manifests.signing import ENVELOPE, PREDICATE_TYPE
 
-TEXT = (SOURCE_ROOT / "docs" / "audits.md").read_text()
+TEXT = (SOURCE_ROOT / "docs" / "how-to" / "audit-a-dataset.md").read_text()
 
 
 def section(title: str) -> str:

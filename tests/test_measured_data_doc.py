@@ -1,4 +1,4 @@
-"""docs/measured-data.md: its commands run as they stand, and its tables hold what they give."""
+"""docs/evidence/measured-drives.md: its commands run as they stand, and its tables hold what they give."""
 
 import json
 import re
@@ -12,7 +12,10 @@ from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 
 pytestmark = pytest.mark.minutes
-TEXT = (SOURCE_ROOT / "docs" / "measured-data.md").read_text()
+TEXT = "".join(
+    (SOURCE_ROOT / "docs" / page).read_text()
+    for page in ("how-to/import-measured-data.md", "evidence/measured-drives.md")
+)
 COMMANDS = [
     line for block in re.findall(r"```\n(.*?)```", TEXT, flags=re.S) for line in block.strip().splitlines()
 ]

@@ -1,4 +1,4 @@
-"""The table of docs/vehicle-modes.md is what the code gives, and the modes are as close as it says."""
+"""The table of docs/explanation/vehicle-modes.md is what the code gives, and the modes are as close as it says."""
 
 from math import isnan
 from pathlib import Path
@@ -10,7 +10,7 @@ from benchmarks.vehicle_modes import HEADER, compute_differences, format_table
 from tasks.studies.mode_comparison import mode_difference
 from tests.vehicle.conftest import command
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "vehicle-modes.md"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "explanation" / "vehicle-modes.md"
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
-PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "effects.md"
 
 
 def test_the_page_lists_the_table():

@@ -287,7 +287,7 @@ def test_an_effect_is_found_in_a_car_on_the_magic_formula(car):
 
 
 def test_the_document_shows_what_runs_and_its_figures_are_those_of_the_model(drive, vehicle, car):
-    text = (SOURCE_ROOT / "docs/tyres.md").read_text()
+    text = (SOURCE_ROOT / "docs/reference/tyres.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
     names: dict[str, object] = {}
     exec(code, names)  # noqa: S102

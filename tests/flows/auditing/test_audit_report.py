@@ -20,6 +20,7 @@ from flows.auditing.signing import sign_dataset
 from flows.auditing.verify import describe_files, verify_dataset
 from flows.store.layout import Layout
 from manifests.provenance import code_version, library_versions
+from tests.browsers import find_barriers, open_chromium
 from tests.manifests.test_signing import private_pem, public_pem
 
 
@@ -101,6 +102,11 @@ def test_the_page_has_every_fact_and_loads_and_runs_nothing(audit):
     digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
     assert f"default-src &#39;none&#39;; style-src &#39;sha256-{digest}&#39;" in page
     assert "prefers-color-scheme: dark" in style and 'name="viewport"' in page
+
+
+def test_nothing_keeps_anybody_from_reading_the_page(audit):
+    with open_chromium() as browser:
+        assert find_barriers(browser, audit["folder"] / "out" / "audit.html") == []
 
 
 def test_words_of_a_stranger_are_text_and_a_difference_is_marked(audit):

@@ -20,7 +20,7 @@ def test_the_recordings_bumps_and_slopes(outside_data: Path, tmp_path: Path) -> 
     import_measurements(str(source), map="comma2k19", out=str(tmp_path / "campaign"))
     result = bump_study(str(tmp_path / "campaign"), out=str(tmp_path / "out"))
     assert result == json.loads((tmp_path / "out" / "bump_study.json").read_text())
-    # what docs/measured-data.md prints
+    # what docs/evidence/measured-drives.md prints
     assert result["sensors"]["gravity_on_slope"] == pytest.approx(10.0, abs=0.1)
     assert result["sensors"]["rate_of_pitch_gain"] == pytest.approx(0.98, abs=0.02)
     first, second, rough = result["windows"]

@@ -3,7 +3,6 @@
 import base64
 import hashlib
 import json
-import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -24,6 +23,7 @@ from tasks.campaign.campaign import Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
+from tests.browsers import find_barriers, open_chromium
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 STOPS = tuple(
@@ -169,16 +169,9 @@ def test_the_next_step_follows_from_the_verdict(
     assert all("; rm" not in command or "'a car; rm -r x'" in command for _, command in steps)
 
 
-def test_a_browser_draws_zooms_by_key_and_fetches_nothing(text: str, tmp_path: Path) -> None:
-    api = pytest.importorskip(
-        "playwright.sync_api", reason="playwright is not installed: pip install playwright"
-    )
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if found is None:
-        pytest.skip("no Chromium")
+def test_a_browser_draws_zooms_by_key_fetches_nothing_and_keeps_nobody_out(text: str, tmp_path: Path) -> None:
     (tmp_path / "report.html").write_text(text)
-    with api.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=found, args=["--no-sandbox"])
+    with open_chromium() as browser:
         page = browser.new_page(viewport={"width": 400, "height": 800}, color_scheme="dark")
         asked: list[str] = []
         wrong: list[str] = []
@@ -196,7 +189,8 @@ def test_a_browser_draws_zooms_by_key_and_fetches_nothing(text: str, tmp_path: P
         lines = plot.evaluate("p => p.data.map(line => line.name)")
         wide = page.evaluate("document.documentElement.scrollWidth")
         back = plot.evaluate("p => p.layout.xaxis.range")
-        browser.close()
+        barriers = find_barriers(browser, tmp_path / "report.html")
+    assert barriers == []
     assert half[1] - half[0] == pytest.approx(0.5 * (whole[1] - whole[0])) and back == pytest.approx(whole)
     assert not any("frozen" in line for line in lines) and any("after" in line for line in lines)
     assert wide <= 400 and wrong == [] and [a for a in asked if not a.startswith(("file:", "data:"))] == []

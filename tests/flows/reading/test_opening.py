@@ -106,7 +106,7 @@ def test_the_python_of_the_analysts_page_runs_as_it_stands(data, toy_dataset, tm
     """But for the dataset's name, and for windows that fit the toy's 11 frames, all of them in quarantine."""
     pytest.importorskip("polars", reason="polars is optional")
     pytest.importorskip("xarray", reason="xarray is optional")
-    page = (SOURCE_ROOT / "docs" / "analysts.md").read_text()
+    page = (SOURCE_ROOT / "docs" / "how-to" / "query-a-dataset.md").read_text()
     blocks = re.findall(r"```python\n(.*?)```", page, flags=re.S)
     code = "\n".join(blocks).replace("datasets/demo", str(toy_dataset.root))
     code = code.replace("window=16, stride=8", "window=4, stride=4, quarantined=True")

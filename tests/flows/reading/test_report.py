@@ -15,6 +15,7 @@ from flows.reading.report import make_report, pack_columns
 from flows.store.telemetry import read_columns
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
+from tests.browsers import find_barriers, open_chromium
 
 
 @pytest.fixture(scope="module")
@@ -27,16 +28,8 @@ def page_folder(toy_dataset, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    api = pytest.importorskip(
-        "playwright.sync_api", reason="playwright is not installed: pip install playwright"
-    )
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if found is None:
-        pytest.skip("no Chromium on the path: install one to test the report page")
-    with api.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=found, args=["--no-sandbox"])
-        yield opened
-        opened.close()
+    with open_chromium() as browser:
+        yield browser
 
 
 @pytest.fixture
@@ -66,6 +59,10 @@ def cursor_s(page) -> float:
     return page.evaluate(
         "(({ xaxis }) => xaxis.p2l(parseFloat(traces.cursor.style.left) - xaxis._offset))(traces.plot._fullLayout)"
     )
+
+
+def test_nothing_keeps_anybody_from_using_the_page(browser, page_folder):
+    assert find_barriers(browser, page_folder / "index.html", ready="body[data-ready]") == []
 
 
 def test_the_page_lists_every_clip_and_each_filter_reduces_them(page):

@@ -1,4 +1,4 @@
-"""How commands end: the codes of docs/commands.md, sentences and no traceback on the terminal."""
+"""How commands end: the codes of docs/reference/commands.md, sentences and no traceback on the terminal."""
 
 import errno
 import os

@@ -9,7 +9,7 @@ from catalogs.vehicles import vehicle_provenance
 from flows.studies.vehicle_model import measure_agreement
 from manifests.canonical import sha256_of_file
 
-# docs/calibration.md, "Before and after"; speed [m/s], pitch [deg], slip [1], wheel load [N]
+# docs/evidence/calibration.md, "Before and after"; speed [m/s], pitch [deg], slip [1], wheel load [N]
 PRINTED = {
     "multibody-staged": {
         "development": (0.1076, 0.150, 0.1065, 79.6),
