@@ -27,8 +27,9 @@ LARGEST_TRACE = 2**30
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Traces = dict[str, NDArray[np.float64]]
-PRESSURE = "brake_pressure"
-"""Column that a trace may hold beside those that are scored [MPa]."""
+PRESSURE, CG_HEIGHT, ACCELERATION = "brake_pressure", "cg_height", "longitudinal_acceleration"
+OPTIONAL_COLUMNS = (PRESSURE, CG_HEIGHT, ACCELERATION)
+"""Columns that a trace may hold beside those that are scored [MPa], [m], [m/s2]."""
 
 
 class ReferenceCase(BaseModel):
@@ -52,6 +53,7 @@ class ReferenceCase(BaseModel):
     hazard_height_m: Number = 0.0
     hazard_length_m: Number = 0.0
     stopping_distance_m: Number | None = None
+    static_pitch_deg: Number | None = None
 
     @model_validator(mode="after")
     def _keeps_physical_limits(self) -> "ReferenceCase":
@@ -179,15 +181,15 @@ def trace_file(folder: Path, case: str) -> Path:
 
 
 def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Traces]:
-    """A case and its columns; a brake onset that the conditions leave open is read from the trace's pressure."""
+    """A case with its columns, optional ones included; an open brake onset is read from the trace's pressure."""
     path = trace_file(folder, case.case)
     held, _ = parse_columns(
-        read_content(path, "trace", LARGEST_TRACE), str(path), (*REFERENCE_COLUMNS, PRESSURE)
+        read_content(path, "trace", LARGEST_TRACE), str(path), (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS)
     )
     missing = [name for name in REFERENCE_COLUMNS if name not in held]
     if missing:
         raise InputError(f"{path}: a trace needs the columns {', '.join(missing)}; they are missing")
-    columns = {name: held[name] for name in REFERENCE_COLUMNS}
+    columns = {name: held[name] for name in (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS) if name in held}
     problems = [
         f"{path}: column {name} must hold numbers throughout; {int(np.sum(~np.isfinite(values)))} are not"
         for name, values in columns.items()

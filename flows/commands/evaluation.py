@@ -48,6 +48,20 @@ COMMANDS = (
                 None,
             ),
             define_option(
+                "reference",
+                str | None,
+                "Folder of independent reference traces (cases.json and Parquet files) to judge the motion against as"
+                " well.",
+                None,
+            ),
+            define_option(
+                "event_window",
+                str,
+                "Opening of E_geometry's window: contact, as the front axle meets the feature, or paper, at 2.2 s.",
+                "contact",
+                known=("contact", "paper"),
+            ),
+            define_option(
                 "crf",
                 int | None,
                 "Encode with H.264 at this constant rate factor first, and judge the decoded frames.",
