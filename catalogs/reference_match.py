@@ -75,6 +75,9 @@ def find_case(cases: Sequence[ReferenceCase], scenario: Scenario, friction: floa
     """
     differing = {case.case: list_differences(case, scenario, friction) for case in cases}
     equal = [case for case in cases if not differing[case.case]]
+    # a covered road is as slippery at any rate: of equal drives the one of this rate is meant
+    same_rate = [case for case in equal if case.precipitation_mm_h == scenario.precipitation_mm_h]
+    equal = same_rate if len(same_rate) == 1 else equal
     if len(equal) == 1:
         return equal[0]
     if equal:

@@ -40,6 +40,7 @@ class ReferenceCase(BaseModel):
     case: Name
     split: str = "all"
     weather: WeatherName
+    precipitation_mm_h: Number | None = None
     surface_coefficient: Annotated[float, Field(gt=0, le=2)]
     initial_speed_km_h: Annotated[float, Field(gt=0)]
     peak_pressure_mpa: Annotated[float, Field(ge=0)] | None = None

@@ -13,7 +13,7 @@ from catalogs.references import read_reference
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
 from flows.judging.judged_clip import JudgedClip
 from tasks.errors import InputError
-from tasks.eval.state_agreement import STOP_SPEED
+from tasks.vehicle.replayed_trace import ENDS_STANDING
 
 Floats = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def reference_traces(clips: Sequence[JudgedClip], folder: Path) -> Standard:
             absent[key] = "; ".join(error.problems)
             continue
         trace = traces[case]
-        time, stands = trace["time"], trace["speed"][-1] <= STOP_SPEED
+        time, stands = trace["time"], trace["speed"][-1] <= ENDS_STANDING
         known = (times >= time[0] - 1e-9) & (times <= time[-1] + 1e-9)
         station = np.interp(times, time, trace["station"])
         motions[key] = MeantMotion(

@@ -72,8 +72,9 @@ def generate_dataset(
 ) -> RunReport:
     """Make the dataset of ``grid`` in ``out``, or what is missing of it; ``vehicle`` takes the grid's place.
 
-    Of a grid with ``poses`` each clip shows the motion of the trace with its conditions. Without ``pictures`` nothing is
-    rendered: telemetry alone, of the same clips. The runner ``auto`` is that of `flows.running.runner.choose_runner`.
+    Of a grid with ``poses`` each clip shows the motion of the trace with its conditions. Without ``pictures`` nothing
+    is rendered: telemetry alone, of the same clips.
+    The runner ``auto`` is that of `flows.running.runner.choose_runner`.
 
     Raises
     ------

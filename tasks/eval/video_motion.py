@@ -95,6 +95,26 @@ def reference_progress(station: Floats) -> Floats:
     return way / way.max()
 
 
+def resample_onto_grid(times: Floats, values: Floats, grid: Floats) -> Floats:
+    """Return a recovered coordinate at the times of the common grid, linear between frames.
+
+    Parameters
+    ----------
+    times : [F] rising from 0 [s]
+    values : [F] [any]
+    grid : [N] rising from 0 [s]
+
+    Raises
+    ------
+    InputError
+        If the video ends before the grid does, by more than half a frame.
+    """
+    slack = 0.5 * float(np.median(np.diff(times)))
+    if times[-1] < grid[-1] - slack:
+        raise InputError(f"The video ends at {times[-1]:.2f} s; the protocol judges it to {grid[-1]:.2f} s.")
+    return np.interp(grid, times, values)
+
+
 def weather_error(
     forward: Floats, control_forward: Floats, station: Floats, control_station: Floats, window: int | None
 ) -> float:

@@ -13,7 +13,9 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.vehicle.rollout import TICK_NS, Rollout
 
 STANDING = 0.05
-"""Speed below which a car stands [m/s] (paper, Appendix E): where a trace ends with it, its last pose is held."""
+"""Speed below which a car stands [m/s] (paper, Appendix E)."""
+ENDS_STANDING = 2 * STANDING
+"""Speed up to which a trace ended with the stop [m/s]: its last sample may lie some ticks before `STANDING`."""
 REST_S = 0.8
 """Time before which the height of the centre of gravity is that of rest [s] (paper, Appendix A.5)."""
 MOVED = ("speed", "longitudinal_acceleration", "heave_rate", "pitch_rate", "braking_slip_f", "braking_slip_r")
@@ -48,7 +50,7 @@ def replay_trace(
     ticks = np.arange(round(duration_s * 1000) + 1, dtype=np.int64)
     t, time = ticks * (TICK_NS * 1e-9), trace["time"]
     static = float(np.deg2rad(trace["pitch"][0] if static_pitch_deg is None else static_pitch_deg))
-    stands = trace["speed"][-1] <= STANDING
+    stands = trace["speed"][-1] <= ENDS_STANDING
     beyond = t > time[-1] + 1e-9
 
     def sample_column(values: Floats) -> Floats:
@@ -77,7 +79,7 @@ def replay_trace(
             columns[name][beyond] = 0.0
     columns["t_ns"] = ticks * TICK_NS
     onset = np.nan if brake_onset_s is None else brake_onset_s
-    standing = np.flatnonzero(trace["speed"] <= STANDING)
+    slow = np.flatnonzero(trace["speed"] <= STANDING)
     return Rollout(
         columns={c.name: columns.get(c.name, np.full(len(ticks), np.nan)) for c in TICK_CHANNELS},
         mode="coupled",
@@ -87,7 +89,7 @@ def replay_trace(
         target_slip=np.nan,
         static_pitch=static,
         brake_onset_time=onset,
-        stop_time=float(time[standing[0]]) if len(standing) else np.nan,
+        stop_time=float(time[slow[0]] if len(slow) else time[-1]) if stands or len(slow) else np.nan,
         stopping_distance=np.nan if stopping_distance_m is None else stopping_distance_m,
         calibration_extrapolated=False,
     )

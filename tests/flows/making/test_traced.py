@@ -152,3 +152,5 @@ def test_a_case_is_found_by_its_conditions_and_by_nothing_else() -> None:
     ]  # fmt: skip
     with pytest.raises(InputError, match="several reference cases have these conditions: stop, twin"):
         find_case([stop, stop.model_copy(update={"case": "twin"})], asked, 0.34713)
+    twin = stop.model_copy(update={"case": "twin", "precipitation_mm_h": 50.0})
+    assert find_case([stop, twin], asked, 0.34713) is twin
