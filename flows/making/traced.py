@@ -15,7 +15,7 @@ from tasks.errors import InputError
 from tasks.studies.label_ranges import PERCENTILES
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import surface_state
-from tasks.vehicle.replayed_trace import ENDS_STANDING, replay_trace
+from tasks.vehicle.replayed_trace import BEFORE_START, ENDS_STANDING, replay_trace
 from tasks.vehicle.rollout import Rollout
 
 FOLDER = "traces"
@@ -136,6 +136,8 @@ def _find_gap(name: str, trace: Traces, last: float) -> str | None:
     time, speed = trace["time"], trace["speed"]
     if time[0] > 1e-9:
         return f"case {name} must begin at 0 s; it begins at {time[0]:g} s"
+    if (first := trace["station"].min()) < -BEFORE_START:
+        return f"case {name} must drive from station 0 on; it begins at {first:.2f} m"
     if time[-1] < last - 1e-9 and speed[-1] > ENDS_STANDING:
         return (
             f"case {name} ends at {time[-1]:g} s with {speed[-1]:.2f} m/s, before the last frame at {last:g} s: make"

@@ -16,6 +16,8 @@ STANDING = 0.05
 """Speed below which a car stands [m/s] (paper, Appendix E)."""
 ENDS_STANDING = 2 * STANDING
 """Speed up to which a trace ended with the stop [m/s]: its last sample may lie some ticks before `STANDING`."""
+BEFORE_START = 0.05
+"""Way before the route's start that is taken as its start [m]: the first samples of a car that moves from 0 s on."""
 REST_S = 0.8
 """Time before which the height of the centre of gravity is that of rest [s] (paper, Appendix A.5)."""
 MOVED = ("speed", "longitudinal_acceleration", "heave_rate", "pitch_rate", "braking_slip_f", "braking_slip_r")
@@ -58,7 +60,7 @@ def replay_trace(
 
     height = trace["cg_height"]
     columns: dict[str, NDArray[np.generic]] = {
-        "station": sample_column(trace["station"]),
+        "station": sample_column(np.maximum(trace["station"], 0.0)),
         "speed": sample_column(trace["speed"]),
         "pitch": sample_column(np.deg2rad(trace["pitch"]) - static),
         "heave": sample_column(height - np.median(height[time < max(REST_S, time[0] + 1e-9)])),

@@ -108,6 +108,8 @@ def test_what_the_traces_do_not_show_is_said_at_once(tmp_path: Path) -> None:
     )
     low = trace_columns()
     del low["cg_height"]
+    ahead = trace_columns() | {"station": trace_columns()["station"] - 3}
+    assert "bump must drive from station 0 on; it begins at -3.00 m" in refused("ahead", HUMP, ahead)
     assert "bump needs the column cg_height" in refused("low", HUMP, low)
     with pytest.raises(InputError, match="leave out --vehicle, --poses"):
         make_dataset(None, str(tmp_path / "out"), manifest="demo", poses="traces")
