@@ -16,6 +16,7 @@ from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from tasks.errors import InputError
 from tasks.eval.state_agreement import REFERENCE_COLUMNS, CaseFacts
 from tasks.surface.road_profile import RoadHazard
+from tasks.surface.weather import DRY
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.rollout import Controls
 
@@ -83,6 +84,11 @@ class ReferenceCase(BaseModel):
     def braked(self) -> bool:
         """Whether the case brakes at all."""
         return bool(self.peak_pressure_mpa) and (self.brake_onset_s, self.brake_onset_m) != (None, None)
+
+    @property
+    def control(self) -> str:
+        """What the case varies, as the paper's table of held-out cases groups it: road, weather or brake."""
+        return "road" if self.hazard_height_m != 0 else "weather" if self.weather != DRY else "brake"
 
     def controls(self) -> Controls:
         """The driver: speed is held until the brake, and a case that does not brake coasts from the start."""
