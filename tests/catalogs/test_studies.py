@@ -59,6 +59,7 @@ def test_a_group_stands_beside_the_figure_of_its_split_alone():
         "count": 2,
         "speed_rmse_m_s": 0.01,
         "maximum": {"speed_rmse_m_s": 0.02},
+        "road_cases_brake": True,
     }
     rows = {row["figure"]: row for row in put_beside_print([group, group | {"split": "mine"}])}
     assert len(rows) == 5 and rows["slip_rmse"]["mean"] is None
@@ -69,3 +70,6 @@ def test_a_group_stands_beside_the_figure_of_its_split_alone():
         0.021,
         0.024,
     )
+    assert not found["note"]
+    (check, *_) = put_beside_print([group | {"split": "speed_check", "group": "all"}])
+    assert check["note"] == "the cases here brake, the paper's coast by their slip"
