@@ -67,6 +67,13 @@ COMMANDS = (
                 known="catalogs/vehicles/*.yaml",
             ),
             define_option(
+                "poses",
+                str | None,
+                "Folder of reference traces (cases.json, Parquet files): each clip shows the motion of the one with"
+                " its conditions, not the vehicle's.",
+                None,
+            ),
+            define_option(
                 "pictures",
                 bool,
                 "Render the frames; --no-frames makes telemetry alone.",
