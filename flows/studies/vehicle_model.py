@@ -14,6 +14,7 @@ from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.drawing import as_svg
 from flows.store.outputs import Outputs
 from flows.studies.sensitivity_figure import draw_sensitivity
+from flows.studies.trajectory_figure import draw_trajectories
 from tasks.errors import InputError
 from tasks.eval.agreement_groups import summarise_by_control, summarise_groups
 from tasks.eval.state_agreement import CaseAgreement, case_agreement
@@ -21,8 +22,10 @@ from tasks.eval.stop_agreement import stop_agreement
 from tasks.studies.sensitivity import beside_print, sensitivity_study
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Mode, simulate_scenario
+from tasks.vehicle.rollout import Mode, Rollout, simulate_scenario
 
+PAPER = ("paper-reference", "paper")
+"""The paper's vehicle and mode, drawn beside any other."""
 BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries")
 
 STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
@@ -51,18 +54,24 @@ def measure_agreement(
     traces : folder with cases.json and NAME.parquet or */NAME.parquet
     vehicle : catalogue name or file
     mode : paper or coupled; None takes the one a frozen vehicle was fitted in, and paper for any other
-    out : folder for ``agreement.json``; None writes none
+    out : folder for ``agreement.json`` and a figure of each case, ``CASE.svg``; None writes none
 
     Raises
     ------
     InputError
         Listing every case whose trace or condition is missing.
     """
-    results = Outputs(out, "agreement", "agreement.json")
+    reference = read_reference(Path(traces))
+    results = Outputs(out, "agreement", "agreement.json", *(f"{case.case}.svg" for case, _ in reference))
     model, provenance = load_vehicle(vehicle), vehicle_provenance(vehicle)
-    chosen = mode or (provenance.mode if provenance else "paper")
-    result = {"vehicle": vehicle, "mode": chosen} | agreement_of(model, read_reference(Path(traces)), chosen)
+    chosen: Mode = mode or (provenance.mode if provenance else "paper")
+    result = {"vehicle": vehicle, "mode": chosen} | agreement_of(model, reference, chosen)
     results.write_json("agreement.json", result)
+    for (case, columns), row in zip(reference, result["cases"] if out else (), strict=False):
+        rides = {f"{vehicle}, {chosen} mode": simulate_case(model, case, columns, chosen)}
+        if (vehicle, chosen) != PAPER:
+            rides[", ".join(PAPER) + " mode"] = simulate_case(load_vehicle(PAPER[0]), case, columns, "paper")
+        results.write(f"{case.case}.svg", as_svg(draw_trajectories(case.case, columns, rides, row["window"])))
     return result
 
 
@@ -81,10 +90,7 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
     rows: list[dict[str, Any]] = []
     splits: dict[str, list[CaseAgreement]] = {}
     for case, columns in reference:
-        ride = simulate_scenario(
-            model, SurfaceState(kind=case.weather, friction=case.surface_coefficient), case.controls(), case.hazard(),
-            mode=mode, duration_s=case.duration_s(columns),
-        )  # fmt: skip
+        ride = simulate_case(model, case, columns, mode)
         scored = case_agreement(columns, ride.columns, case.facts(model.wheelbase), ride.static_pitch)
         splits.setdefault(case.split, []).append(scored)
         stop = stop_agreement(columns, ride.columns, case.facts(model.wheelbase))
@@ -109,6 +115,21 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
         "mean": _make_plain(overall),
         "beside_print": put_beside_print(groups),
     }
+
+
+def simulate_case(model: Vehicle, case: ReferenceCase, columns: Traces, mode: Mode) -> Rollout:
+    """Return a vehicle's ride under the conditions of a reference case, for as long as its trace.
+
+    Parameters
+    ----------
+    model : the vehicle
+    case, columns : the reference and its trace
+    mode : paper or coupled
+    """
+    return simulate_scenario(
+        model, SurfaceState(kind=case.weather, friction=case.surface_coefficient), case.controls(), case.hazard(),
+        mode=mode, duration_s=case.duration_s(columns),
+    )  # fmt: skip
 
 
 def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:

@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
+from catalogs.vehicles import load_vehicle
 from flows.measured.dive_figure import draw_dives
 from flows.studies.sensitivity_figure import draw_sensitivity
+from flows.studies.trajectory_figure import draw_trajectories
+from tasks.surface.road_profile import FLAT_ROAD
+from tasks.surface.state import SurfaceState
+from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.rollout import Controls, simulate_scenario
 
 
 def test_bands_lie_about_the_nominal_curve_and_printed_figures_at_their_rates():
@@ -52,3 +58,30 @@ def test_each_dive_is_drawn_over_its_own_peak_and_the_mean_where_all_drives_have
     np.testing.assert_allclose(mean.lines[0].get_ydata(), [0.0, 0.25])
     spread = mean.collections[0].get_datalim(mean.transData)
     assert (spread.y0, spread.y1) == pytest.approx((-0.5, 1.0))
+
+
+def test_a_model_that_is_its_own_reference_leaves_nothing_over():
+    brake = BrakeCommand(
+        peak_pressure_mpa=2.3, onset_s=0.1, ramp_s=0.5, onset_station_m=None, hold_s=None, release_s=0.5
+    )
+    ride = simulate_scenario(
+        load_vehicle("paper-reference"), SurfaceState(kind="dry", friction=0.82),
+        Controls(initial_speed=10.0, brake=brake, hold_speed_until_brake=True), FLAT_ROAD, mode="paper", duration_s=1.0,
+    )  # fmt: skip
+    told = ride.columns
+    wheels = {"fl": "f", "fr": "f", "rl": "r", "rr": "r"}
+    trace = {
+        "time": told["t_ns"] * 1e-9,
+        "speed": told["speed"],
+        "pitch": np.degrees(told["pitch"] + ride.static_pitch),
+    }
+    trace |= {f"slip_{wheel}": told[f"braking_slip_{axle}"] for wheel, axle in wheels.items()}
+    trace |= {f"wheel_load_{wheel}": told[f"axle_load_{axle}"] / 2 for wheel, axle in wheels.items()}
+    figure = draw_trajectories("own $case", trace, {"itself": ride}, (0.1, 0.9))
+    labels = [axis.get_ylabel() for axis in figure.axes]
+    left_over = [
+        axis.lines[0] for axis, label in zip(figure.axes, labels, strict=True) if label == "difference"
+    ]
+    assert len(left_over) == 4 and max(np.max(np.abs(line.get_ydata())) for line in left_over) < 1e-9
+    pitch = figure.axes[labels.index("pitch, nose down [deg]")].lines[0].get_ydata()
+    assert pitch[-1] - pitch[0] > 1.0
