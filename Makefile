@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-exports study-calibration freeze bench lock clean
+.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-exports study-calibration study-editors freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -86,6 +86,9 @@ study-exports:
 	$(EXPORTS) pytest -rs tests/flows/exporting
 study-calibration: $(READY)
 	$(BIN)/python -m benchmarks.known_truth
+
+study-editors: $(READY)
+	$(BIN)/python -m benchmarks.editors datasets/editors
 
 freeze: $(READY)
 	$(BIN)/musync freeze

@@ -23,6 +23,7 @@ FOLDERS = {
     "surface": "surfaces",
     "tyre": "tyres",
     "vehicle": "vehicles",
+    "video protocol": "video_protocols",
 }
 """Folder of each kind of entry."""
 YAML = (".yaml", ".yml")

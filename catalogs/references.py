@@ -16,6 +16,7 @@ from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from tasks.errors import InputError
 from tasks.eval.state_agreement import REFERENCE_COLUMNS, CaseFacts
 from tasks.surface.road_profile import RoadHazard
+from tasks.surface.weather import DRY
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.rollout import Controls
 
@@ -27,8 +28,9 @@ LARGEST_TRACE = 2**30
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Traces = dict[str, NDArray[np.float64]]
-PRESSURE = "brake_pressure"
-"""Column that a trace may hold beside those that are scored [MPa]."""
+PRESSURE, CG_HEIGHT, ACCELERATION = "brake_pressure", "cg_height", "longitudinal_acceleration"
+OPTIONAL_COLUMNS = (PRESSURE, CG_HEIGHT, ACCELERATION)
+"""Columns that a trace may hold beside those that are scored [MPa], [m], [m/s2]."""
 
 
 class ReferenceCase(BaseModel):
@@ -39,6 +41,7 @@ class ReferenceCase(BaseModel):
     case: Name
     split: str = "all"
     weather: WeatherName
+    precipitation_mm_h: Number | None = None
     surface_coefficient: Annotated[float, Field(gt=0, le=2)]
     initial_speed_km_h: Annotated[float, Field(gt=0)]
     peak_pressure_mpa: Annotated[float, Field(ge=0)] | None = None
@@ -52,6 +55,7 @@ class ReferenceCase(BaseModel):
     hazard_height_m: Number = 0.0
     hazard_length_m: Number = 0.0
     stopping_distance_m: Number | None = None
+    static_pitch_deg: Number | None = None
 
     @model_validator(mode="after")
     def _keeps_physical_limits(self) -> "ReferenceCase":
@@ -80,6 +84,11 @@ class ReferenceCase(BaseModel):
     def braked(self) -> bool:
         """Whether the case brakes at all."""
         return bool(self.peak_pressure_mpa) and (self.brake_onset_s, self.brake_onset_m) != (None, None)
+
+    @property
+    def control(self) -> str:
+        """What the case varies, as the paper's table of held-out cases groups it: road, weather or brake."""
+        return "road" if self.hazard_height_m != 0 else "weather" if self.weather != DRY else "brake"
 
     def controls(self) -> Controls:
         """The driver: speed is held until the brake, and a case that does not brake coasts from the start."""
@@ -179,15 +188,15 @@ def trace_file(folder: Path, case: str) -> Path:
 
 
 def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Traces]:
-    """A case and its columns; a brake onset that the conditions leave open is read from the trace's pressure."""
+    """A case with its columns, optional ones included; an open brake onset is read from the trace's pressure."""
     path = trace_file(folder, case.case)
     held, _ = parse_columns(
-        read_content(path, "trace", LARGEST_TRACE), str(path), (*REFERENCE_COLUMNS, PRESSURE)
+        read_content(path, "trace", LARGEST_TRACE), str(path), (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS)
     )
     missing = [name for name in REFERENCE_COLUMNS if name not in held]
     if missing:
         raise InputError(f"{path}: a trace needs the columns {', '.join(missing)}; they are missing")
-    columns = {name: held[name] for name in REFERENCE_COLUMNS}
+    columns = {name: held[name] for name in (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS) if name in held}
     problems = [
         f"{path}: column {name} must hold numbers throughout; {int(np.sum(~np.isfinite(values)))} are not"
         for name, values in columns.items()

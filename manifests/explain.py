@@ -6,6 +6,7 @@ from typing import Any
 
 from catalogs.documents import parse_yaml_value
 from catalogs.tyres import tyre_entries
+from manifests.canonical import sha256_of
 from manifests.provenance import code_version, describe_processor, library_versions
 
 VEHICLE, RENDER, JUDGING = "vehicle", "render", "judging"
@@ -18,6 +19,7 @@ REACHES = {
     "gates.yaml": (JUDGING,),
     "study.yaml": (JUDGING,),
     "weather": (RENDER,),
+    "traces": (VEHICLE, RENDER),
     "scene": (RENDER,),
     "backend": (RENDER,),
     "parameters": (VEHICLE, RENDER),
@@ -168,7 +170,7 @@ def kind_of_input(name: str) -> str:
     path = PurePosixPath(name)
     if path.suffix == ".tir":
         return "tyre"
-    return "weather" if path.parts[0] == "weather" else name
+    return path.parts[0] if path.parts[0] in ("weather", "traces") else name
 
 
 def parse_input(name: str, content: bytes | None) -> Any:
@@ -188,4 +190,6 @@ def parse_input(name: str, content: bytes | None) -> Any:
         return ABSENT
     if kind_of_input(name) == "tyre":
         return tyre_entries(content)
+    if PurePosixPath(name).suffix == ".parquet":
+        return {"sha256": sha256_of([content])}
     return parse_yaml_value(content, name, "catalogue entry")

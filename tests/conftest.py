@@ -30,12 +30,7 @@ def compiled_kernels(tmp_path_factory):
         return
     from tests import kernels
 
-    jobs = [
-        kernels.compile_rasteriser,
-        kernels.compile_vehicle,
-        kernels.compile_double_track,
-        kernels.compile_weather,
-    ]
+    jobs = [kernels.compile_rasteriser, kernels.compile_vehicle, kernels.compile_weather]
     first = int(worker.removeprefix("gw")) % len(jobs)
     for job in jobs[first:] + jobs[:first]:
         with (tmp_path_factory.getbasetemp().parent / f"{job.__name__}.lock").open("a+") as lock:

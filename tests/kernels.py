@@ -4,8 +4,6 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.double_track.campaign import draw_session, measure_run
-from benchmarks.double_track.effects import Truth
 from catalogs.vehicles import load_vehicle
 from flows.making.generate import generate_dataset
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
@@ -39,11 +37,3 @@ def compile_vehicle(_: Path) -> None:
 def compile_weather(folder: Path) -> None:
     """Make a dataset with snow."""
     generate_dataset(write_toy_grid(folder, frames=2), str(folder / "data"), runner="threads", workers=1)
-
-
-def compile_double_track(_: Path) -> None:
-    """Drive the car of the double-track campaigns."""
-    name = "null-01"
-    measure_run(
-        {"speed": 9.0, "duration": 0.1}, "run-01", Truth(name=name), draw_session(1, name), (1, name, 0), True
-    )

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 
+pytestmark = pytest.mark.minutes
 TEXT = "".join(
     (SOURCE_ROOT / "docs" / page).read_text()
     for page in ("how-to/import-measured-data.md", "evidence/measured-drives.md")

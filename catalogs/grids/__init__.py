@@ -31,12 +31,14 @@ class Grid:
     scenarios : labelled, in order
     tags : of each, its split (empty without splits) and its place in the calibrated range
     left_out : combinations that ``exclude`` took out [1]
+    poses : folder of reference traces whose motion the clips show in place of the vehicle's; None for the vehicle
     """
 
     settings: GridFile
     scenarios: tuple[tuple[str, Scenario], ...]
     tags: tuple[tuple[str, str], ...]
     left_out: int = 0
+    poses: Path | None = None
 
 
 class FaultyGrid(InputError):

@@ -1,7 +1,5 @@
 """The report of an audit: its sentence, its lines for people, and a page that can be filed by itself."""
 
-import base64
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +7,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from flows.auditing.verify import describe_files, describe_signature
+from flows.drawing import make_policy
 from flows.reading.report import PAGE as DATASET_PAGE
 from manifests.explain import ABSENT
 
@@ -90,16 +89,12 @@ def write_audit_page(result: Mapping[str, Any]) -> str:
     """
     pages = Environment(loader=FileSystemLoader(PAGE), autoescape=True, undefined=StrictUndefined)
     style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
-    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
-    policy = (
-        f"default-src 'none'; style-src 'sha256-{digest}'; img-src data:; base-uri 'none'; form-action 'none'"
-    )
     return pages.get_template("audit.html").render(
         result=result,
         tools=compare_tools(result["tools_recorded"], result["tools_here"]),
         places=[describe_place(row) for row in result["mismatches"]],
         style=style,
-        policy=policy,
+        policy=make_policy(style=style),
     )
 
 

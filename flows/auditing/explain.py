@@ -15,6 +15,7 @@ from catalogs.vehicles import load_vehicle
 from flows.making.driving import controls_of, hazard_of, weather_of
 from flows.making.places import find_scene
 from flows.making.plan import ClipPlan, Plan, read_plan
+from flows.making.traced import refuse_traced
 from flows.reading.query import VIEWS
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.outputs import Outputs
@@ -53,6 +54,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     results = Outputs(out, "explain", "explain.json", "explain.txt")
     layout = open_for_reading(dataset, want_telemetry)
     manifest, plan = read_manifest(layout), read_plan(layout.root)
+    refuse_traced(plan.inputs, dataset, "explain")
     problems: list[str] = []
     planned = None
     try:

@@ -20,6 +20,7 @@ from flows.auditing.explain import find_clip, find_route
 from flows.auditing.kept_lines import Line, describe_file, list_lines
 from flows.auditing.lineage_text import format_text
 from flows.making.plan import Plan
+from flows.making.traced import refuse_traced
 from flows.reading.answer_files import format_csv
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
@@ -79,6 +80,7 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     layout = open_for_reading(dataset, want_inputs)
     manifest = read_manifest(layout)
     plan = Plan.of(manifest, layout.manifest)
+    refuse_traced(plan.inputs, dataset, "lineage")
     planned = find_clip(plan, clip, dataset)
     kept = _read_kept(layout, manifest)
     asked = Asked(

@@ -67,6 +67,13 @@ COMMANDS = (
                 known="catalogs/vehicles/*.yaml",
             ),
             define_option(
+                "poses",
+                str | None,
+                "Folder of reference traces (cases.json, Parquet files): each clip shows the motion of the one with"
+                " its conditions, not the vehicle's.",
+                None,
+            ),
+            define_option(
                 "pictures",
                 bool,
                 "Render the frames; --no-frames makes telemetry alone.",
@@ -239,6 +246,12 @@ COMMANDS = (
             DATASET,
             define_option("out", str, "Folder for weather.png and hazards.png."),
             define_option("station", float, "Station on the route where the weathers are shown [m].", 12.0),
+            define_option(
+                "beside",
+                list[str] | None,
+                "Finished dataset of another street, whose weathers come below; repeat it for more.",
+                None,
+            ),
         ),
     ),
     Command(

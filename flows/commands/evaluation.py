@@ -20,6 +20,21 @@ def leave_out_roc(result: dict[str, Any]) -> dict[str, Any]:
     return result | {"rows": rows}
 
 
+def show_table(result: dict[str, Any]) -> dict[str, Any]:
+    """Return the table of a judged set with a text in each cell, and what is missing."""
+    from flows.judging.judge_set import format_cell
+
+    rows = [{key: format_cell(cell) for key, cell in row.items()} for row in result["table"]]
+    empty = {key for key in rows[0] if all(row[key] == "-" for row in rows)}
+    table = [{key: cell for key, cell in row.items() if key not in empty} for row in rows]
+    return {
+        "protocol": result["protocol"],
+        "window": result["window"],
+        "table": table,
+        "missing": result["missing"],
+    }
+
+
 COMMANDS = (
     Command(
         name="evaluate",
@@ -46,6 +61,20 @@ COMMANDS = (
                 str | None,
                 "YAML file of local checkpoints of learned judges (CLIP, DOVER, FAST-VQA, LPIPS).",
                 None,
+            ),
+            define_option(
+                "reference",
+                str | None,
+                "Folder of independent reference traces (cases.json and Parquet files) to judge the motion against as"
+                " well.",
+                None,
+            ),
+            define_option(
+                "event_window",
+                str,
+                "Opening of E_geometry's window: contact, as the front axle meets the feature, or paper, at 2.2 s.",
+                "contact",
+                known=("contact", "paper"),
             ),
             define_option(
                 "crf",
@@ -90,6 +119,40 @@ COMMANDS = (
             OUT,
         ),
         passed=require_key("passed"),
+    ),
+    Command(
+        name="judge-set",
+        group=GROUP,
+        sentence="Judge the clips of video editors by a protocol: a table of models, the paper's figures beside them.",
+        function="flows.judging.judge_set:judge_video_set",
+        options=(
+            define_argument(
+                "folder", str, "Folder of models, sources, claims and targets (docs/evaluation.md)."
+            ),
+            define_option(
+                "protocol",
+                str,
+                "Protocol: YAML file, or the name of one in catalogs/video_protocols.",
+                "paper",
+                known="catalogs/video_protocols/*.yaml",
+            ),
+            define_option("out", str, "Folder for judge-set.json and judge-set.md."),
+            define_option(
+                "learned",
+                str | None,
+                "YAML file of local checkpoints of learned judges (CLIP, DOVER, FAST-VQA, LPIPS).",
+                None,
+            ),
+            define_option(
+                "window",
+                int | None,
+                "Smoothing of the table's motion figures [frames]: 0, 5, 7 or 9; by default the protocol's.",
+                None,
+                minimum=0,
+                maximum=9,
+            ),
+        ),
+        brief=show_table,
     ),
     Command(
         name="retention",

@@ -77,7 +77,26 @@ def shorten_agreement(result: dict[str, Any]) -> dict[str, Any]:
     """Return an agreement with the main columns of each case, and the groups."""
     hidden = {"window", "note"}
     cases = [{key: value for key, value in row.items() if key not in hidden} for row in result["cases"]]
-    return {"cases": cases, "groups": result["groups"]}
+    figures = tuple(result["mean"])
+    groups = [
+        {"split": row["split"], "group": row["group"], "cases": row["count"]}
+        | {name: _write_pair(row[name], row["maximum"][name]) for name in figures}
+        for row in result["groups"]
+    ]
+    printed = [
+        {"cases of": f"{row['split']}, {row['group']}", "figure": row["figure"],
+         "here": _write_pair(row["mean"], row["maximum"]),
+         "paper": _write_pair(row["paper_mean"], row["paper_maximum"]), "note": row["note"]}
+        for row in result["beside_print"]
+    ]  # fmt: skip
+    return {"cases": cases, "mean / maximum of groups": groups, "beside the paper's against CarSim": printed}
+
+
+def _write_pair(mean: float | None, maximum: float | None) -> str | None:
+    """Mean and, where there is one, maximum in one cell, as the paper prints them."""
+    if mean is None:
+        return None
+    return f"{mean:.4g}" if maximum is None else f"{mean:.4g} / {maximum:.4g}"
 
 
 def shorten_verdict(result: dict[str, Any]) -> dict[str, Any]:

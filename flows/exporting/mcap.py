@@ -21,7 +21,7 @@ import numpy as np
 
 from flows.exporting import foxglove
 from flows.exporting.dataset import TICK_COLUMNS, ExportedClip, ExportedDataset
-from flows.exporting.poses import compute_quaternions_xyzw
+from flows.exporting.poses import compute_quaternions
 from tasks.render.contact_sheet import encode_png
 
 TOPICS = {
@@ -70,7 +70,8 @@ def _iterate_messages(clip: ExportedClip) -> Iterator[tuple[str, int, foxglove.M
     frame_of_tick = {int(tick): frame for frame, tick in enumerate(clip.frames["tick"])}
     columns = {name: clip.ticks[name].tolist() for name in TICK_COLUMNS}
     T_world_rig, mount = clip.T_world_rig, clip.camera.T_rig_camera
-    turns, turn = compute_quaternions_xyzw(T_world_rig), compute_quaternions_xyzw(mount[None])[0]
+    turns = compute_quaternions(T_world_rig, scalar_first=False)
+    turn = compute_quaternions(mount[None], scalar_first=False)[0]
     arrays = {name: clip.read_array(name) for name in ("rgb", "depth", "class")} if clip.pictures else {}
     for tick, t_ns in enumerate(columns["t_ns"]):
         values = {name: column[tick] for name, column in columns.items()}

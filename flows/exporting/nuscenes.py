@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinhole
 from flows.exporting.inertial import compute_inertial_motion
 from flows.exporting.json_array import JsonArray, open_array
-from flows.exporting.poses import compute_quaternions_wxyz
+from flows.exporting.poses import compute_quaternions
 from flows.store.layout import write_json
 from manifests.canonical import sha256_of
 from tasks.errors import InputError
@@ -102,7 +102,7 @@ def describe_can_bus(clip: ExportedClip, vehicle: Vehicle) -> dict[str, list[dic
     """
     frames, ticks = clip.frames, clip.ticks
     motion, poses = compute_inertial_motion(clip, vehicle), compute_ego_poses(clip, vehicle)
-    turns = compute_quaternions_wxyz(poses).tolist()
+    turns = compute_quaternions(poses, scalar_first=True).tolist()
     at = (frames["t_ns"] // 1000).tolist()
     forces, rates, places = motion.force.tolist(), motion.turn_rate.tolist(), poses[:, :3, 3].tolist()
     wheels = {"F": "wheel_speed_f", "R": "wheel_speed_r"}
@@ -140,7 +140,7 @@ def _write_scene(
     frames = clip.frames
     count = len(frames["frame"])
     poses = compute_ego_poses(clip, dataset.vehicle)
-    turns, pictures = compute_quaternions_wxyz(poses), clip.read_array("rgb")
+    turns, pictures = compute_quaternions(poses, scalar_first=True), clip.read_array("rgb")
     rows_of["scene"].append(
         {"token": own, "log_token": make_token("log"), "nbr_samples": count, "name": scene,
          "description": clip.label, "first_sample_token": make_token("sample", clip.clip_id, 0),
@@ -185,7 +185,7 @@ def _describe_fixed(dataset: ExportedDataset) -> dict[str, list[dict[str, Any]]]
         "calibrated_sensor": [
             {"token": make_token("calibrated_sensor"), "sensor_token": sensor,
              "translation": mount[:3, 3].tolist(),
-             "rotation": compute_quaternions_wxyz(mount[None])[0].tolist(),
+             "rotation": compute_quaternions(mount[None], scalar_first=True)[0].tolist(),
              "camera_intrinsic": (camera.K - PIXEL_CENTRE).tolist()}
         ],
     }  # fmt: skip

@@ -5,29 +5,17 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 
-def compute_quaternions_xyzw(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotations of poses as unit quaternions x, y, z, w with w not negative.
+def compute_quaternions(poses: NDArray[np.float64], *, scalar_first: bool) -> NDArray[np.float64]:
+    """Return the rotations of poses as unit quaternions with w not negative.
 
     Parameters
     ----------
     poses : [N, 4, 4]
+    scalar_first : w, x, y, z; else x, y, z, w
 
     Returns
     -------
     float64 [N, 4] [1]
     """
-    return np.asarray(Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True), np.float64)
-
-
-def compute_quaternions_wxyz(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotations of poses as unit quaternions w, x, y, z with w not negative.
-
-    Parameters
-    ----------
-    poses : [N, 4, 4]
-
-    Returns
-    -------
-    float64 [N, 4] [1]
-    """
-    return np.roll(compute_quaternions_xyzw(poses), 1, axis=1)
+    turns = Rotation.from_matrix(poses[:, :3, :3])
+    return np.asarray(turns.as_quat(canonical=True, scalar_first=scalar_first), np.float64)

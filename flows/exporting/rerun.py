@@ -20,7 +20,7 @@ from flows.exporting.dataset import (
     describe_columns,
     require_pinhole,
 )
-from flows.exporting.poses import compute_quaternions_xyzw
+from flows.exporting.poses import compute_quaternions
 from tasks.conventions import SemanticClass
 from tasks.render.contact_sheet import encode_png
 
@@ -73,7 +73,8 @@ def _send_telemetry(rerun: Any, recording: Any, clip: ExportedClip) -> None:
 
 def _send_frames(rerun: Any, recording: Any, clip: ExportedClip) -> None:
     poses, camera = clip.T_world_rig, clip.camera
-    turns, turn = compute_quaternions_xyzw(poses), compute_quaternions_xyzw(camera.T_rig_camera[None])[0]
+    turns = compute_quaternions(poses, scalar_first=False)
+    turn = compute_quaternions(camera.T_rig_camera[None], scalar_first=False)[0]
     recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     mount = rerun.Transform3D(translation=camera.T_rig_camera[:3, 3], quaternion=rerun.Quaternion(xyzw=turn))
     recording.log(CAMERA, mount, static=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from flows.exporting.dataset import ExportedDataset
-from flows.exporting.poses import compute_quaternions_xyzw
+from flows.exporting.poses import compute_quaternions
 
 
 def write_tum(dataset: ExportedDataset, folder: Path) -> None:
@@ -24,6 +24,8 @@ def write_tum(dataset: ExportedDataset, folder: Path) -> None:
     """
     for clip in dataset:
         poses = clip.T_world_camera
-        rows = np.column_stack((clip.frames["t_ns"] / 1e9, poses[:, :3, 3], compute_quaternions_xyzw(poses)))
+        rows = np.column_stack(
+            (clip.frames["t_ns"] / 1e9, poses[:, :3, 3], compute_quaternions(poses, scalar_first=False))
+        )
         text = "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
         (folder / f"{clip.name}.txt").write_text(f"# timestamp tx ty tz qx qy qz qw\n{text}")

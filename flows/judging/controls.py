@@ -15,6 +15,7 @@ from flows.judging.physics import clip_facts
 from flows.making.clip import Catalogue, catalogue_of
 from flows.making.driving import simulate_drive
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
+from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
@@ -67,6 +68,7 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """
     results = Outputs(out, "controls", "controls.json", "controls.svg")
     root = open_for_reading(dataset).root
+    refuse_traced(read_plan(root).inputs, dataset, "controls")
     facts = clip_facts(root)
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")

@@ -86,7 +86,7 @@ def _average_rows(
 ) -> Row:
     first, scored = rows[0], [row for row in rows if row["value"] is not None]
     seeds = [places[row["condition"]].seed for row in scored]
-    values = _seed_means([row["value"] for row in scored], seeds)
+    values = average_within_seeds([row["value"] for row in scored], seeds)
     floors = [row["floor"] for row in scored]
     notes = [f"mean of {len(scored)}"]
     if len(scored) < len(rows):
@@ -96,14 +96,20 @@ def _average_rows(
     return figure_row(
         first["metric"], first["method"], condition, float(np.mean(values)) if values else None, first["unit"],
         note="; ".join(notes), window=first["window"],
-        floor=None if not floors or None in floors else float(np.mean(_seed_means(floors, seeds))),
+        floor=None if not floors or None in floors else float(np.mean(average_within_seeds(floors, seeds))),
         paper=paper, averaged=len(scored),
         seed_std=float(np.std(values, ddof=1)) if len(values) > 1 else None,
     )  # fmt: skip
 
 
-def _seed_means(values: list[float], seeds: list[str]) -> list[float]:
-    """Mean within each seed."""
+def average_within_seeds(values: Sequence[float], seeds: Sequence[str]) -> list[float]:
+    """Return the mean of the values of each seed, in the order of their first values.
+
+    Parameters
+    ----------
+    values : figures of one metric [any]
+    seeds : visual seed of each
+    """
     by_seed: dict[str, list[float]] = defaultdict(list)
     for value, seed in zip(values, seeds, strict=True):
         by_seed[seed].append(value)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from flows.drawing import NO_SCRIPTS, as_svg, escape_formulas
+from flows.drawing import as_svg, escape_formulas, make_policy
 from flows.judging.judged_clip import JudgedClip, Row
 
 COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
@@ -83,7 +83,8 @@ def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, c
           f"{_render_table([row for row in rows if row['metric'] == name])}" for name in names),
     ]  # fmt: skip
     return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8">{NO_SCRIPTS}<title>muSync evaluation</title>'
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{make_policy()}"><title>muSync evaluation</title>'
         f"<style>{STYLE}</style></head><body>{''.join(parts)}</body></html>"
     )
 

@@ -1,6 +1,7 @@
 """Scores of learned judges for a dataset's pictures; where weights are missing, a row that says so."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,18 +99,68 @@ def _score_severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge
                 note = f"not run: the catalogue has no CLIP prompts of {kind}"
                 yield figure_row(name, "TorchScript", condition, None, "1", note=note)
             continue
-        judge = ClipWeather(
-            encode_image=getattr(network, "encode_image", network),
-            weather=features[kind],
-            dry=features[DRY],
-        )
+        judge = weather_judge(network, features, kind)
         rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
         scores = {c.facts["clip_id"]: _score_clip(view, c, judge) for c in levels}
-        rho, _ = severity_agreement(rates, scores)
-        # the paper counts pairs whose score rises, whatever the correlation's sign
-        rising = np.diff([scores[key] for key in sorted(rates, key=lambda key: rates[key])]) > 0
-        for name, value in zip(names, (rho, float(np.mean(rising))), strict=True):
+        for name, value in zip(names, rank_weathers(rates, scores), strict=True):
             yield figure_row(name, "TorchScript", condition, value, "1", note=clip_judge.note)
+
+
+def weather_judge(network: Any, features: Mapping[str, NDArray[np.floating]], kind: str) -> ClipWeather:
+    """Return CLIP's judge of one kind of weather.
+
+    Parameters
+    ----------
+    network : of the pictures, or a module with ``encode_image``
+    features : mean text features by kind of weather
+    kind : of weather
+    """
+    return ClipWeather(
+        encode_image=getattr(network, "encode_image", network), weather=features[kind], dry=features[DRY]
+    )
+
+
+def rank_weathers(rates: Mapping[str, float], scores: Mapping[str, float]) -> tuple[float, float]:
+    """Return Spearman's rank correlation of scores and rates, and the share of neighbouring levels whose score rises.
+
+    The paper counts pairs whose score rises, whatever the correlation's sign.
+
+    Parameters
+    ----------
+    rates : of each clip [mm/h]
+    scores : of the same clips [1]
+    """
+    rising = np.diff([scores[key] for key in sorted(rates, key=lambda key: rates[key])]) > 0
+    return severity_agreement(dict(rates), dict(scores))[0], float(np.mean(rising))
+
+
+def score_pictures(
+    frames: NDArray[np.uint8], judges: Mapping[str, LoadedJudge], kinds: Sequence[str]
+) -> dict[str, float]:
+    """Return the score of every learned judge that has weights, for the frames of one video.
+
+    Parameters
+    ----------
+    frames : uint8 [F, H, W, 3] sRGB
+    judges : from `catalogs.learned_judges.load_judges`
+    kinds : of weather that CLIP tells from dry: ``clip_KIND`` is its similarity less the dry one
+    """
+    scores: dict[str, float] = {}
+    if (dover := judges["dover"].network) is not None:
+        scores |= dover_scores(WholeVideo(network=dover).evaluate_network(frames))
+    if (fast := judges["fast_vqa"].network) is not None:
+        scores["fast_vqa"] = WholeVideo(network=fast).score(frames)
+    if (lpips := judges["lpips"].network) is not None:
+        scores["temporal_lpips"] = FlowAlignedDistance(network=lpips).score(frames)
+    clip = judges["clip"]
+    if clip.network is not None and clip.text_features is not None:
+        features = dict(zip(load_prompts(), clip.text_features, strict=True))
+        scores |= {
+            f"clip_{kind}": weather_judge(clip.network, features, kind).score(frames)
+            for kind in kinds
+            if kind in features
+        }
+    return scores
 
 
 def _score_clip(view: View, clip: JudgedClip, judge: VideoJudge) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from catalogs.documents import read_yaml
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
@@ -36,6 +37,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """
     results = Outputs(out, "audit-physics", "physics.json")
     root = open_for_reading(dataset, want_telemetry).root
+    refuse_traced(read_plan_record(Layout(root))["inputs"], dataset, "audit-physics")
     constants = read_constants(root)
     clips = clip_facts(root)
     held = [facts["label"] for facts in clips if facts["hold_speed"]]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from catalogs.cameras import load_camera
 from catalogs.gates import load_gates
 from catalogs.hazard_markings import load_marking
+from catalogs.references import read_reference
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.studies import load_sensitivity_study
@@ -29,6 +30,8 @@ from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_f
 from flows.making.edited_scene import edit_scene
 from flows.making.places import find_scene, remember_place
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
+from flows.making.traced import FOLDER as TRACES
+from flows.making.traced import Reference, replay_drive, unknown_ranges
 from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_json
@@ -64,6 +67,7 @@ class Catalogue:
     gates: PoseThresholds
     study: StudyProtocol
     marking: HazardMarking | None = None
+    traces: Reference | None = None
 
     @property
     def looks(self) -> WeatherParameters:
@@ -93,6 +97,7 @@ def load_catalogue(inputs: Path, scene: str) -> Catalogue:
         gates=load_gates(inputs / "gates.yaml"),
         marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
         study=load_sensitivity_study(inputs / "study.yaml")[0],
+        traces=read_reference(traces) if (traces := inputs / TRACES).is_dir() else None,
     )
 
 
@@ -106,12 +111,12 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     clip = plan.clips[index]
     catalogue = catalogue_of(layout.root)
 
-    mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
-    state, ride = simulate_drive(clip.scenario, catalogue.vehicle, catalogue.surface, mode, duration_s)
+    state, ride = move_car(clip.scenario, plan, catalogue)
     facts = surface_figures(state, ride)
-    ranges = ranges_of(
-        clip.scenario, state, catalogue.vehicle, catalogue.surface, catalogue.study, mode, duration_s
-    )
+    ranges = unknown_ranges() if catalogue.traces is not None else ranges_of(
+        clip.scenario, state, catalogue.vehicle, catalogue.surface, catalogue.study,
+        plan.settings.vehicle_mode, plan.duration_s,
+    )  # fmt: skip
     frames = frame_rows(ride, plan, catalogue)
     buffers: dict[str, NDArray[Any]] = {}
     if plan.settings.pictures:
@@ -165,14 +170,21 @@ def warm_up(layout: Layout, scene: str) -> None:
     catalogue = catalogue_of(root)
     short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
     for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
-        state, ride = simulate_drive(
-            clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, short.duration_s
-        )
+        state, ride = move_car(clip.scenario, short, catalogue)
         frames = frame_rows(ride, short, catalogue)
         if plan.settings.pictures:
             rig_at = rig_of(ride, frames, catalogue)
             buffers = render_frames(clip.scenario, state, frames, short, catalogue, int(clip.seed), rig_at)
             judge_motion(buffers, frames, state.film_depth_mm, catalogue)
+
+
+def move_car(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, Rollout]:
+    """Return the surface, and the motion of the vehicle on it or that of the trace which the dataset shows instead."""
+    if catalogue.traces is not None:
+        return replay_drive(scenario, catalogue.surface, catalogue.traces, plan.duration_s)
+    return simulate_drive(
+        scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
+    )
 
 
 def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:

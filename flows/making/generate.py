@@ -72,13 +72,14 @@ def generate_dataset(
 ) -> RunReport:
     """Make the dataset of ``grid`` in ``out``, or what is missing of it; ``vehicle`` takes the grid's place.
 
-    Without ``pictures`` nothing is rendered: telemetry alone, of the same clips. The runner ``auto`` is that of
-    `flows.running.runner.choose_runner`.
+    Of a grid with ``poses`` each clip shows the motion of the trace with its conditions. Without ``pictures`` nothing
+    is rendered: telemetry alone, of the same clips.
+    The runner ``auto`` is that of `flows.running.runner.choose_runner`.
 
     Raises
     ------
     InputError
-        For a faulty grid, or a folder that holds something else.
+        For a faulty grid, a folder that holds something else, or traces that do not show what the grid asks for.
     ClipsFailed
         If clips failed, and not for want of an input; run the same command again to make just those.
     """

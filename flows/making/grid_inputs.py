@@ -18,6 +18,7 @@ from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
 from flows.making.memory import memory_problems
 from flows.making.places import remember_place
+from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
 from tasks.surface.weather import WEATHERS
@@ -99,6 +100,9 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
         problems += _weather_problems(grid.settings, weathers)
     if scene:
         problems += _route_problems(grid)
+    if grid.poses is not None:
+        traces, found = read_trace_inputs(grid, grid.poses)
+        inputs, problems = inputs | traces, problems + found
     return inputs, scene, problems + _camera_problems(grid.settings, tick_rate_hz)
 
 

@@ -1,7 +1,10 @@
 """A request for a dataset: of a grid, or of a frozen run that is made again."""
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+from catalogs.grids import load_grid
 from flows.making.freezing import reproduce_run
 from flows.making.generate import RunReport, generate_dataset
 from tasks.errors import InputError
@@ -13,6 +16,7 @@ def make_dataset(
     *,
     manifest: str | None = None,
     vehicle: str | None = None,
+    poses: str | None = None,
     pictures: bool = True,
     **execution: Any,
 ) -> dict[str, Any]:
@@ -24,6 +28,7 @@ def make_dataset(
     out : dataset folder, or its address in an object store
     manifest : name or file of a frozen run, in place of a grid
     vehicle, pictures : as of `flows.making.generate.generate_dataset`; a frozen run has its own
+    poses : folder of reference traces whose motion the clips show in place of the vehicle's
     execution : ``runner``, ``workers``, ``scheduler`` and ``backend`` of `flows.making.generate.generate_dataset`
 
     Returns
@@ -37,12 +42,14 @@ def make_dataset(
         For neither or both of grid and manifest, and as `generate_dataset` and `reproduce_run` raise it.
     """
     if grid is not None and manifest is None:
-        return _list_facts(generate_dataset(grid, out, vehicle=vehicle, pictures=pictures, **execution))
+        asked = grid if poses is None else replace(load_grid(grid), poses=Path(poses))
+        return _list_facts(generate_dataset(asked, out, vehicle=vehicle, pictures=pictures, **execution))
     if manifest is None or grid is not None:
         raise InputError("generate needs either a GRID or --manifest NAME, and not both")
-    if vehicle is not None or not pictures:
+    if vehicle is not None or poses is not None or not pictures:
         raise InputError(
-            "--manifest sets the vehicle and whether frames are rendered: leave out --vehicle and --no-frames"
+            "--manifest sets the vehicle, its motion and whether frames are rendered: leave out --vehicle, --poses and"
+            " --no-frames"
         )
     report, differing = reproduce_run(manifest, out, **execution)
     return _list_facts(report) | {

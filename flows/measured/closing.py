@@ -1,7 +1,6 @@
 """Closing the loop: a measured campaign in, a verdict, a grown vehicle and a report out."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -9,32 +8,26 @@ from typing import Any
 import numpy as np
 
 from catalogs.campaigns import read_campaign
-from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
-from catalogs.joint_numbers import load_joint_numbers
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_content
 from flows.measured.closing_ledger import record_reading
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from flows.measured.residuals import compute_residual_rmse, predict_runs
+from flows.measured.searches import SEARCHES, judge_campaign
 from flows.measured.verdict_report import write_verdict_page
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.campaign.campaign import SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
-from tasks.identification.decision.discovery import ForeignCarError
 from tasks.identification.decision.excitation import find_reached_range
-from tasks.identification.decision.verdict import Trace, find_missing_effects
+from tasks.identification.decision.verdict import Trace
 from tasks.identification.decision.words import say_effect, tell_verdict
-from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
-from tasks.surface.state import SurfaceParameters
+from tasks.identification.joint.verdict import JointTrace
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
-from tasks.vehicle.parameters import Vehicle
 
-SEARCHES = ("one effect at a time", "joint fit")
-"""How a verdict was reached."""
 CARRIED = {name: set(PARAMETERS[name].fields) for name in SESSION if PARAMETERS[name].kind == "scaled"}
 """Fields of a vehicle whose tolerance is that of a number of the session."""
 
@@ -67,7 +60,7 @@ def close_loop(
     results.write_json("split.json", split_of(measured))
     earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
-    trace = _judge(measured, model, road)
+    trace = judge_campaign(measured, model, road, load_effects())
     result = verdict_json(trace.verdict) | tell_search(trace)
     result["held_out_readings_before"] = earlier
     if earlier:
@@ -109,15 +102,6 @@ def session_tolerances(vehicle: str) -> dict[str, float]:
     }
 
 
-def _judge(measured: Campaign, model: Vehicle, road: SurfaceParameters) -> Trace | JointTrace:
-    """Look for one effect at a time where the file knows its car; fit all numbers at once where it does not."""
-    effects, rules = load_effects(), load_decision_rules()
-    if not needs_joint_fit(measured, rules.joint):
-        with suppress(ForeignCarError):
-            return find_missing_effects(measured, model, road, effects, rules)
-    return judge_jointly(measured, model, road, effects, load_joint_numbers(), rules)
-
-
 def _reached_ranges(trace: Trace | JointTrace) -> dict[str, tuple[float, float]]:
     """Return what the training runs reached of the variable of each form that is named."""
     if isinstance(trace, JointTrace):
@@ -134,21 +118,16 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     ----------
     trace : the verdict and what it stands on
     """
-    library = load_effects()
+    library, verdict = load_effects(), trace.verdict
     train, held_out = predict_runs(trace)
+    rivals = [rival for _, rival in verdict.rivals]
+    sentence = tell_verdict(verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error)
     if isinstance(trace, Trace):
-        verdict = trace.verdict
-        rivals = [rival for _, rival in verdict.rivals]
-        return {
-            "search": SEARCHES[0],
-            "sentence": tell_verdict(
-                verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error
-            ),
-            "residual_rmse": compute_residual_rmse((*train, *held_out)),
-        }
+        residual = compute_residual_rmse((*train, *held_out))
+        return {"search": SEARCHES[0], "sentence": sentence, "residual_rmse": residual}
     return {
         "search": SEARCHES[1],
-        "sentence": trace.sentence,
+        "sentence": sentence,
         "calibrated": [effect_json(effect, library) for effect in trace.calibrated],
         "numbers": {
             number.name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[number.name].unit}

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import Truth, load_sizes, load_truths
 from catalogs.studies.closing import load_closing_study
@@ -13,14 +12,14 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from flows.measured.closing_benchmark_tables import benchmark_tables
+from flows.measured.searches import judge_campaign
 from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, source_hashes
 from tasks.campaign.planned_runs import RICH, RunPlan
-from tasks.identification.benchmark import classify_outcome, interval_holds_truth, make_synthetic_campaign
+from tasks.identification.benchmark import classify_outcome, make_synthetic_campaign, measure_interval_miss
 from tasks.identification.decision.answer import Verdict
-from tasks.identification.decision.verdict import find_missing_effects
 
 FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
 RATES = "closing_error_rates.json"
@@ -92,7 +91,7 @@ def close_loop_benchmark(
     rows = [row for row in read_lines(log, {"engine", "truth", "seed"}) if row["engine"] == engine]
     done = {(row["truth"], row["seed"]) for row in rows}
     model, surface, effects = load_vehicle(vehicle), load_surface("dense-asphalt"), load_effects()
-    rules, started = load_decision_rules(), time.monotonic()
+    started = time.monotonic()
     for planned in _plan(seeds, nulls, harder):
         if (planned.name, planned.seed) in done:
             continue
@@ -105,9 +104,9 @@ def close_loop_benchmark(
             slots=tuple(slot for truth in planned.truths for slot in truth.slots), design=planned.design,
         )  # fmt: skip
         made = time.process_time()
-        verdict = find_missing_effects(
-            campaign, model, surface, tuple(e for e in effects if e.name not in left_out), rules
-        ).verdict
+        library = tuple(effect for effect in effects if effect.name not in left_out)
+        verdict = judge_campaign(campaign, model, surface, library).verdict
+        miss = measure_interval_miss(verdict, planned.name, planned.values) if planned.name else None
         row = {
             "kind": planned.kind,
             "truth": planned.name,
@@ -119,7 +118,8 @@ def close_loop_benchmark(
             "rivals": [rival.name for _, rival in verdict.rivals],
             "ports": [[effect.port, effect.variable] for effect in verdict.effects],
             "tried": [[effect.name, effect.score, effect.held_out_gain] for effect in verdict.tried[:3]],
-            "covered": interval_holds_truth(verdict, planned.name, planned.values) if planned.name else None,
+            "half_widths_off": miss,
+            "covered": None if miss is None else miss <= 1.0,
             "reasons": list(verdict.reasons),
             "cpu_s": time.process_time() - made,
             "made_cpu_s": made - before,

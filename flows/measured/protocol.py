@@ -10,6 +10,8 @@ from catalogs.drives import read_drives
 from catalogs.protocols import load_protocol
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from flows.drawing import as_svg
+from flows.measured.dive_figure import draw_dives
 from flows.store.outputs import Outputs
 from tasks.campaign.attrition import attrition_table
 from tasks.campaign.selection import Judged, select_events
@@ -20,6 +22,9 @@ from tasks.vehicle.parameters import Vehicle
 SCORE_UNITS = {
     "pitch_rmse": "deg", "pitch_correlation": "1", "rate_rmse": "deg/s", "rate_correlation": "1", "no_dive_rmse": "deg",
 }  # fmt: skip
+
+
+DIVES = "dives.svg"
 
 
 def brake_protocol(
@@ -38,7 +43,8 @@ def brake_protocol(
     protocol : protocol by name or YAML file
     vehicle : to start from, by name or YAML file; None takes the campaign's
     all_events : go on with every candidate, whatever rules it breaks; the table stays as it is
-    out : folder for ``brake_protocol.json`` and ``attrition.csv``; None writes none
+    out : folder for ``brake_protocol.json``, ``attrition.csv`` and ``dives.svg``, where two drives have events; None
+        writes none
 
     Returns
     -------
@@ -50,7 +56,7 @@ def brake_protocol(
     InputError
         If the campaign lacks what the protocol needs.
     """
-    results = Outputs(out, "brake-protocol", "brake_protocol.json", "attrition.csv")
+    results = Outputs(out, "brake-protocol", "brake_protocol.json", "attrition.csv", DIVES)
     rules = load_protocol(protocol)
     recorded = read_drives(campaign)
     base = load_vehicle(vehicle or recorded.vehicle)
@@ -85,6 +91,12 @@ def brake_protocol(
     writer.writeheader()
     writer.writerows(table)
     results.write("attrition.csv", text.getvalue())
+    if folds:
+        variant = result["macro"][-1][
+            "variant"
+        ]  # both pitch and its rate calibrate, where the rate was measured
+        shown = [fold for fold in result["folds"] if fold["variant"] == variant]
+        results.write(DIVES, as_svg(draw_dives(shown)))
     return result
 
 

@@ -1,7 +1,5 @@
 """The page of a verdict: one HTML file that needs no other."""
 
-import base64
-import hashlib
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,6 +7,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from flows.drawing import make_policy
 from flows.measured.closing_error_rates import tell_error_rates
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import (
@@ -70,7 +69,7 @@ def write_verdict_page(trace: Trace | JointTrace, result: Mapping[str, Any], cam
         }
     return pages.get_template(template).render(
         campaign=campaign, result=result, meaning=MEANING[result["verdict"]], steps=find_next_steps(result, campaign),
-        figures=figures, style=style, scripts=scripts, policy=_make_policy(scripts), **told,
+        figures=figures, style=style, scripts=scripts, policy=make_policy(scripts=scripts), **told,
     )  # fmt: skip
 
 
@@ -140,18 +139,6 @@ def _list_candidates(trace: Trace) -> list[dict[str, Any]]:
             rows.append({"name": name, "what": what, "share": share, "of": candidate})
     rows += [{"name": e.name, "what": "not named", "share": None, "of": e} for e in trace.verdict.tried]
     return rows
-
-
-def _make_policy(scripts: tuple[str, ...]) -> str:
-    """Return the content-security policy under which these scripts run, and no other."""
-    hashes = " ".join(
-        f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
-        for script in scripts
-    )
-    return (
-        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:;"
-        " base-uri 'none'; form-action 'none'"
-    )
 
 
 def _format_digits(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""Two sheets of stills: the same place in every weather; a road feature before, at and after contact, and its twin."""
+"""Two sheets of stills: one place of each street in every weather; a road feature before, at and after contact."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -23,36 +23,43 @@ BEFORE_M, AFTER_M = 5.0, 1.0
 Picture = tuple[str, NDArray[np.uint8]]
 
 
-def draw_sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, Any]:
-    """Draw what a dataset's grid allows of the two sheets.
+def draw_sheets(
+    dataset: str, out: str, *, station: float = 12.0, beside: Sequence[str] | None = None
+) -> dict[str, Any]:
+    """Draw what a dataset's grid allows of the two sheets; further datasets add a row of their weathers each.
 
     Parameters
     ----------
     dataset : a finished dataset
     out : folder for weather.png and hazards.png
     station : where along the route the weathers are shown [m]
+    beside : finished datasets of other streets
 
     Raises
     ------
     InputError
-        The folder holds no finished dataset, or its grid has neither two weathers nor a road feature.
+        A folder holds no finished dataset, the first one's grid has neither two weathers nor a road feature, or
+        another's has one weather only.
     """
     results = Outputs(out, "sheets", "weather.png", "hazards.png")
-    layout = open_for_reading(dataset)
-    if not layout.manifest.is_file():
-        raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
-    clips = read_manifest(layout)["clips"]
-    weathers = [row for row in _by_everything_but_weather(clips) if len(row) > 1]
+    (layout, clips), *others = _open_finished([dataset, *(beside or ())])
     hazards = pick_evenly([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
-    drawn = {
+    drawn: dict[str, list[list[Picture]]] = {
         "weather": [
             [_draw_still(layout, clip, station, clip["label"]) for clip in row]
-            for row in pick_evenly(weathers, PREVIEW_CLIPS)
+            for row in pick_evenly(_list_weathers(clips), PREVIEW_CLIPS)
         ],
         "hazards": [_draw_contact(layout, clip, clips) for clip in hazards],
     }
     if not any(drawn.values()):
         raise InputError(f"{dataset}: must have two weathers of one drive, or a road feature; it has neither")
+    for name, (street, more_clips) in zip(beside or (), others, strict=True):
+        weathers = _list_weathers(more_clips)
+        if not weathers:
+            raise InputError(
+                f"{name}: must have two weathers of one drive, to stand beside {dataset}; it has not"
+            )
+        drawn["weather"].append([_draw_still(street, clip, station, clip["label"]) for clip in weathers[0]])
     written = {}
     for name, rows in drawn.items():
         if rows:
@@ -62,12 +69,22 @@ def draw_sheets(dataset: str, out: str, *, station: float = 12.0) -> dict[str, A
     return written
 
 
-def _by_everything_but_weather(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
+def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Sequence[Mapping[str, Any]]]]:
+    """Return each dataset with the clips of its manifest; every folder that holds none is told."""
+    layouts = [open_for_reading(dataset) for dataset in datasets]
+    lacking = [name for name, layout in zip(datasets, layouts, strict=True) if not layout.manifest.is_file()]
+    if lacking:
+        raise InputError([f"{name}: must be a finished dataset; it has no manifest.json" for name in lacking])
+    return [(layout, read_manifest(layout)["clips"]) for layout in layouts]
+
+
+def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
+    """Return the clips of each drive that was made in two weathers or more."""
     groups: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
     for clip in clips:
         rest = tuple(value for key, value in sorted(clip["scenario"].items()) if key not in WEATHER_FIELDS)
         groups.setdefault(rest, []).append(clip)
-    return list(groups.values())
+    return [row for row in groups.values() if len(row) > 1]
 
 
 def _draw_contact(

@@ -8,11 +8,16 @@ from typing import Any
 
 from catalogs.references import ReferenceCase, Traces, read_reference
 from catalogs.studies import load_sensitivity_study
+from catalogs.studies.agreement import put_beside_print
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
+from flows.drawing import as_svg
 from flows.store.outputs import Outputs
+from flows.studies.sensitivity_figure import draw_sensitivity
 from tasks.errors import InputError
-from tasks.eval.state_agreement import CaseAgreement, case_agreement, summarise_groups
+from tasks.eval.agreement_groups import summarise_by_control, summarise_groups
+from tasks.eval.state_agreement import CaseAgreement, case_agreement
+from tasks.eval.stop_agreement import stop_agreement
 from tasks.studies.sensitivity import beside_print, sensitivity_study
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
@@ -20,16 +25,19 @@ from tasks.vehicle.rollout import Mode, simulate_scenario
 
 BENCHMARKS = ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries")
 
+STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
+
 
 def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
-    results = Outputs(out, "sensitivity", "sensitivity.json")
+    results = Outputs(out, "sensitivity", "sensitivity.json", "sensitivity.svg")
     protocol, printed = load_sensitivity_study()
     vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     started = time.process_time()
     result = sensitivity_study(vehicle, surface, protocol)
     result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
     results.write_json("sensitivity.json", result)
+    results.write("sensitivity.svg", as_svg(draw_sensitivity(result["curves"], result["beside_print"])))
     return result
 
 
@@ -61,6 +69,9 @@ def measure_agreement(
 def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], mode: Mode) -> dict[str, Any]:
     """Agreement of a vehicle with reference cases: a row a case, the groups of each split, the mean over all.
 
+    Groups are those of the paper's tables: flat, hump, depression and all cases, and what a case varies: weather, brake
+    or road. ``beside_print`` has the paper's figure of the same split and group.
+
     Parameters
     ----------
     model : the vehicle
@@ -76,14 +87,28 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
         )  # fmt: skip
         scored = case_agreement(columns, ride.columns, case.facts(model.wheelbase), ride.static_pitch)
         splits.setdefault(case.split, []).append(scored)
-        rows.append({"split": case.split} | asdict(scored) | {"window": list(scored.window)})
+        stop = stop_agreement(columns, ride.columns, case.facts(model.wheelbase))
+        stops = dict.fromkeys(STOP_FIGURES) if stop is None else asdict(stop)
+        rows.append({"split": case.split} | asdict(scored) | {"window": list(scored.window)} | stops)
+    controls = {case.case: case.control for case, _ in reference}
     groups = [
-        {"split": split, "group": name, "count": group.count, **_make_plain(group.mean)}
+        {"split": split, "group": name, "count": group.count, **_make_plain(group.mean),
+         "event_unit": group.event_unit, "maximum": _make_plain(group.maximum)}
         for split, cases in splits.items()
-        for name, group in summarise_groups(cases).items()
-    ]
+        for name, group in (summarise_groups(cases) | summarise_by_control(cases, controls)).items()
+    ]  # fmt: skip
+    braked = {case.split for case, _ in reference if case.braked and case.hazard_height_m != 0}
+    for group in groups:
+        group["road_cases_brake"] = group["split"] in braked
+        if group["group"] == "flat":
+            group |= _average_stops([row for row in rows if row["split"] == group["split"]])
     overall = summarise_groups([case for cases in splits.values() for case in cases])["all"].mean
-    return {"cases": rows, "groups": groups, "mean": _make_plain(overall)}
+    return {
+        "cases": rows,
+        "groups": groups,
+        "mean": _make_plain(overall),
+        "beside_print": put_beside_print(groups),
+    }
 
 
 def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
@@ -104,6 +129,12 @@ def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[s
     ]
     results.write_json("bench.json", {"rows": rows})
     return {"rows": rows}
+
+
+def _average_stops(rows: list[dict[str, Any]]) -> dict[str, float]:
+    """Mean absolute errors of the stops among a split's cases; nothing where none stops."""
+    found = {name: [row[name] for row in rows if row[name] is not None] for name in STOP_FIGURES}
+    return {name: sum(values) / len(values) for name, values in found.items() if values}
 
 
 def _make_plain(figures: dict[str, float]) -> dict[str, float | None]:

@@ -4,7 +4,7 @@ Signals stay on their original time axis and keep the static pitch offset; nothi
 or left out. The model is sampled at the reference's timestamps.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -95,26 +95,6 @@ class CaseAgreement:
     note: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class GroupAgreement:
-    """Mean and maximum over the cases of a group.
-
-    Parameters
-    ----------
-    group : "flat", "hump", "depression" or "all"
-    count : number of cases [1]
-    mean, maximum : figure by name (`FIGURES`), in the units of `CaseAgreement`; the event error is NaN
-        where the group mixes its units
-    event_unit : "m", "km/h", or empty where the group mixes both
-    """
-
-    group: str
-    count: int
-    mean: dict[str, float]
-    maximum: dict[str, float]
-    event_unit: str
-
-
 def case_agreement(
     reference: Mapping[str, Floats], model: Mapping[str, Floats], facts: CaseFacts, static_pitch: float
 ) -> CaseAgreement:
@@ -174,36 +154,6 @@ def case_agreement(
     )
 
 
-def summarise_groups(cases: Sequence[CaseAgreement]) -> dict[str, GroupAgreement]:
-    """Return mean and maximum over flat, hump, depression and all cases, as in the paper's tables.
-
-    Parameters
-    ----------
-    cases : one per case, all of one split
-
-    Returns
-    -------
-    group by name; a group without a case is left out
-    """
-    groups = {kind: [c for c in cases if c.kind == kind] for kind in ("flat", "hump", "depression")}
-    groups["all"] = list(cases)
-    return {name: _summarise_group(name, members) for name, members in groups.items() if members}
-
-
-def _summarise_group(name: str, members: Sequence[CaseAgreement]) -> GroupAgreement:
-    units = {c.event_unit for c in members}
-    figures = {f: np.array([getattr(c, f) for c in members]) for f in FIGURES}
-    if len(units) > 1:
-        figures["event_error"] = np.full(len(members), np.nan)
-    return GroupAgreement(
-        group=name,
-        count=len(members),
-        mean={f: float(v.mean()) for f, v in figures.items()},
-        maximum={f: float(v.max()) for f, v in figures.items()},
-        event_unit=units.pop() if len(units) == 1 else "",
-    )
-
-
 def _check_columns(reference: Mapping[str, Floats], model: Mapping[str, Floats], facts: CaseFacts) -> None:
     problems = []
     for owner, columns, needed in (
@@ -224,8 +174,8 @@ def _check_columns(reference: Mapping[str, Floats], model: Mapping[str, Floats],
 def _event_window(reference: Mapping[str, Floats], facts: CaseFacts) -> tuple[float, float, str]:
     time, station = reference["time"], reference["station"]
     if facts.kind == "flat":
-        start = _brake_onset_time(time, station, facts)
-        stop = _stop_time(time, reference["speed"], start)
+        start = find_brake_onset(time, station, facts)
+        stop = find_stop(time, reference["speed"], start)
         end = (time[-1] if stop is None else stop) + AFTER_STOP
     else:
         half = facts.hazard_length / 2
@@ -253,8 +203,8 @@ def _event_error(
         return abs(speeds[1] - speeds[0]) * 3.6, "km/h"
     distances = []
     for t, columns in ((reference["time"], reference), (model_time, model)):
-        onset = _brake_onset_time(t, columns["station"], facts)
-        stop = _stop_time(t, columns["speed"], onset)
+        onset = find_brake_onset(t, columns["station"], facts)
+        stop = find_stop(t, columns["speed"], onset)
         if stop is None and columns is model:
             raise InputError(
                 f"Case {facts.case}: the model must come to a stop within its record, but goes "
@@ -267,7 +217,14 @@ def _event_error(
     return abs(distances[1] - distances[0]), "m"
 
 
-def _brake_onset_time(time: Floats, station: Floats, facts: CaseFacts) -> float:
+def find_brake_onset(time: Floats, station: Floats, facts: CaseFacts) -> float:
+    """Return when a trace brakes: the case's time, or when it reaches the case's station [s].
+
+    Parameters
+    ----------
+    time, station : of the trace [s], [m]
+    facts : of the case
+    """
     if facts.brake_onset is not None:
         return facts.brake_onset
     onset = _crossing_time(time, station, facts.brake_onset_station or 0.0)
@@ -278,8 +235,14 @@ def _brake_onset_time(time: Floats, station: Floats, facts: CaseFacts) -> float:
     return onset
 
 
-def _stop_time(time: Floats, speed: Floats, onset: float) -> float | None:
-    """First time from `onset` on at which the vehicle stands [s]."""
+def find_stop(time: Floats, speed: Floats, onset: float) -> float | None:
+    """Return the first time from the brake's onset on at which the vehicle stands [s]; None if it never does.
+
+    Parameters
+    ----------
+    time, speed : of the trace [s], [m/s]
+    onset : of the brake [s]
+    """
     standing = np.flatnonzero((speed <= STOP_SPEED) & (time >= onset))
     return float(time[standing[0]]) if standing.size else None
 

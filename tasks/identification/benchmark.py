@@ -150,8 +150,10 @@ def classify_outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] 
     return "right" if names == [truth] else "wrong"
 
 
-def interval_holds_truth(verdict: Verdict, truth: str, values: Mapping[str, float]) -> bool | None:
-    """Return whether the 95 % interval of the first parameter holds the truth; None unless the truth alone is named.
+def measure_interval_miss(verdict: Verdict, truth: str, values: Mapping[str, float]) -> float | None:
+    """Return how far the truth is from the first parameter's value, in halves of its 95 % interval on that side [1].
+
+    The interval holds the truth up to 1. None unless the truth alone is named.
 
     Parameters
     ----------
@@ -162,7 +164,9 @@ def interval_holds_truth(verdict: Verdict, truth: str, values: Mapping[str, floa
     if [effect.name for effect in verdict.effects] != [truth]:
         return None
     first = verdict.effects[0].parameters[0]
-    return first.ci_low <= values[first.name] <= first.ci_high
+    off = values[first.name] - first.value
+    half = first.ci_high - first.value if off > 0.0 else first.value - first.ci_low
+    return float(abs(off) / max(half, np.finfo(np.float64).tiny))
 
 
 def compute_exact_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:

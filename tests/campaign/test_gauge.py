@@ -63,6 +63,7 @@ def test_a_gauge_that_cannot_read_below_zero_brakes_no_wheel_at_rest() -> None:
     assert np.all(denoise_pressure(np.maximum(STOP + noise(0.02), 0.0))[off] == 0.0)
 
 
+@pytest.mark.minutes
 def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery() -> None:
     """Judged with the pressure as read, a form at the brake is found in it."""
     model, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")

@@ -1,7 +1,10 @@
 """The paper's conditions and its surface study, as the catalogue holds them."""
 
+import pytest
+
 from catalogs.scenario import scenario_problems
 from catalogs.studies import load_conditions, load_sensitivity_study
+from catalogs.studies.agreement import printed_agreement, put_beside_print
 
 
 def test_there_are_nineteen_development_and_twelve_held_out_conditions():
@@ -34,3 +37,39 @@ def test_the_study_samples_the_published_parameters():
     assert (len(protocol.weathers["rain"].parameters), len(protocol.weathers["snow"].parameters)) == (6, 5)
     assert (protocol.samples, protocol.weathers["rain"].seed) == (128, 20260725)
     assert sum(figure.unit == "m" for figure in printed) == 7
+
+
+def test_the_printed_groups_add_up_to_the_printed_means():
+    printed = printed_agreement()
+    for split, parts in (
+        ("held-out", ("weather", "brake", "road")),
+        ("development", ("flat", "hump", "depression")),
+    ):
+        groups, whole = [printed[split][name] for name in parts], printed[split]["all"]
+        assert sum(group.count for group in groups) == whole.count
+        for figure, mean in whole.mean.items():
+            total = sum(group.count * group.mean[figure] for group in groups) / whole.count
+            assert total == pytest.approx(mean, rel=0.03), f"{split} {figure}"
+
+
+def test_a_group_stands_beside_the_figure_of_its_split_alone():
+    group = {
+        "split": "held_out",
+        "group": "brake",
+        "count": 2,
+        "speed_rmse_m_s": 0.01,
+        "maximum": {"speed_rmse_m_s": 0.02},
+        "road_cases_brake": True,
+    }
+    rows = {row["figure"]: row for row in put_beside_print([group, group | {"split": "mine"}])}
+    assert len(rows) == 5 and rows["slip_rmse"]["mean"] is None
+    found = rows["speed_rmse_m_s"]
+    assert (found["mean"], found["maximum"], found["paper_mean"], found["paper_maximum"]) == (
+        0.01,
+        0.02,
+        0.021,
+        0.024,
+    )
+    assert not found["note"]
+    (check, *_) = put_beside_print([group | {"split": "speed_check", "group": "all"}])
+    assert check["note"] == "the cases here brake, the paper's coast by their slip"

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
+from tasks.eval.agreement_groups import summarise_by_control, summarise_groups
 from tasks.eval.state_agreement import (
     FIGURES,
     MODEL_COLUMNS,
     CaseFacts,
     case_agreement,
-    summarise_groups,
 )
+from tasks.eval.stop_agreement import stop_agreement
 
 Columns = dict[str, NDArray[np.float64]]
 FLAT = CaseFacts(
@@ -183,6 +184,23 @@ def test_groups_are_the_paper_s() -> None:
     assert groups["all"].mean["speed_rmse_m_s"] == pytest.approx(0.03)
     assert groups["flat"].event_unit == "m" and groups["hump"].event_unit == "km/h"
     assert groups["all"].event_unit == "" and np.isnan(groups["all"].mean["event_error"])
+
+    by_control = summarise_by_control([*rows[:1], rows[2]], {"flat": "weather", "hump": "road"})
+    assert list(by_control) == ["weather", "road"] and by_control["road"].count == 1
+    assert by_control["weather"].maximum["speed_rmse_m_s"] == pytest.approx(0.01)
+
+
+def test_a_stop_s_duration_and_slip_distance_are_those_of_each_trace() -> None:
+    reference, model = as_reference(make_drive(5.0)), make_drive(4.0)
+    found = stop_agreement(reference, model, FLAT)
+    # 10 m/s to .05 m/s; the slip is .04 and .03 on the way of v2 / 2a
+    assert found is not None and found.braking_time_error_s == pytest.approx(9.95 / 4 - 9.95 / 5, abs=2e-3)
+    assert found.slip_distance_error_m == pytest.approx(0.035 * (100 / 8 - 100 / 10), abs=2e-3)
+    ended = as_reference(make_drive(5.0), until=2.985)  # at .075 m/s, ticks before it stands
+    late = stop_agreement(ended, make_drive(5.0), FLAT)
+    assert late is not None and late.braking_time_error_s == pytest.approx(0.005, abs=1.1e-3)
+    assert stop_agreement(reference, make_drive(0.0), FLAT) is None
+    assert stop_agreement(as_reference(make_drive(0.0)), make_drive(0.0), HUMP) is None
 
 
 def test_what_cannot_be_scored_is_refused_with_its_reason() -> None:

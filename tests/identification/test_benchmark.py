@@ -13,7 +13,11 @@ from catalogs.vehicles import load_vehicle
 from flows.measured import closing_benchmark
 from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from tasks.campaign.planned_runs import TRAINING
-from tasks.identification.benchmark import compute_exact_interval, make_synthetic_campaign
+from tasks.identification.benchmark import (
+    compute_exact_interval,
+    make_synthetic_campaign,
+    measure_interval_miss,
+)
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 
@@ -47,6 +51,14 @@ def test_every_truth_is_of_the_library_or_a_form_outside_it() -> None:
     assert all((t.form is None) == t.in_library for t in truths)
 
 
+@pytest.mark.parametrize(("truth", "miss"), [(0.06, 0.0), (0.08, 1.0), (0.1, 2.0), (0.05, 1.0), (0.045, 1.5)])
+def test_a_miss_is_measured_by_the_half_of_the_interval_on_its_side(truth: float, miss: float) -> None:
+    value = SimpleNamespace(name="fade", value=0.06, ci_low=0.05, ci_high=0.08)
+    verdict = SimpleNamespace(effects=(SimpleNamespace(name="brake_fade", parameters=(value,)),))
+    assert measure_interval_miss(verdict, "brake_fade", {"fade": truth}) == pytest.approx(miss)
+    assert measure_interval_miss(verdict, "brake_lag", {"lag": 0.1}) is None
+
+
 def answer(name: str) -> SimpleNamespace:
     effect = SimpleNamespace(name=name, port="brake_torque", variable="pressure", parameters=())
     verdict = SimpleNamespace(verdict="FOUND", effects=(effect,), rivals=(), tried=(), reasons=())
@@ -67,8 +79,8 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
     monkeypatch.setattr(
         closing_benchmark, "make_synthetic_campaign", lambda model, road, truth, seed, slots, design: seed
     )
-    monkeypatch.setattr(closing_benchmark, "find_missing_effects", judge)
-    monkeypatch.setattr(closing_benchmark, "interval_holds_truth", lambda *_: None)
+    monkeypatch.setattr(closing_benchmark, "judge_campaign", judge)
+    monkeypatch.setattr(closing_benchmark, "measure_interval_miss", lambda *_: None)
     with pytest.raises(KeyboardInterrupt):
         closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
     result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)

@@ -115,6 +115,7 @@ def test_intervals_stay_within_the_bounds_of_their_parameters(
     assert np.array_equal(compute_curvature_interval(wide)[0], h.lower)
 
 
+@pytest.mark.minutes
 def test_with_derivatives_taken_at_it_an_estimate_forgets_where_it_started() -> None:
     rolling = next(e for e in LIBRARY if e.name == "rolling_resistance")
     campaign = make_synthetic_campaign(VEHICLE, SURFACE, {"rolling_coefficient": 0.012}, 56)

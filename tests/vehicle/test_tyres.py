@@ -250,7 +250,7 @@ def test_a_curve_without_a_top_below_full_slip_is_used_to_full_slip(book):
     assert tyre.peak == compute_tyre_friction(1.0, 2 * LOAD, tyre) < 1.0
 
 
-@pytest.mark.parametrize("mode", ["paper", "coupled"])
+@pytest.mark.parametrize("mode", [pytest.param("paper", marks=pytest.mark.minutes), "coupled"])
 @pytest.mark.parametrize(("family", "friction"), [("rain", 0.347126), ("snow", 0.3)])
 def test_a_vehicle_on_the_magic_formula_stops_as_its_friction_allows(drive, car, mode, family, friction):
     """The ABS uses all but a few percent of the peak: 1.04 to 1.06 of v^2 / (2 mu_eff g), as on Burckhardt's curve."""

@@ -23,10 +23,9 @@ from tasks.identification.joint.fit import JointFit, fit_jointly, misfit_scales,
 from tasks.identification.joint.held_out import drop_what_predicts_worse, predict_held_out, summarise_held_out
 from tasks.identification.joint.numbers import CALIBRATED, JointNumber, choose_numbers, free_numbers
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
-from tasks.identification.joint.words import tell_rivals, tell_verdict, tell_what_was_used
+from tasks.identification.joint.words import tell_rivals, tell_what_was_used
 from tasks.identification.rules import DecisionRules, JointRules
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
@@ -50,7 +49,6 @@ class JointTrace:
     predicted : by held-out run, float64 [3, N, 7] readings of the frozen, the re-tuned and the grown model
     substitutes : what explains nearly as much as a named number
     agreeing : starts that reach the same fit, of all
-    sentence : the answer in plain words
     """
 
     verdict: Verdict
@@ -62,7 +60,6 @@ class JointTrace:
     predicted: tuple[NDArray[np.float64], ...]
     substitutes: tuple[Substitute, ...]
     agreeing: tuple[int, int]
-    sentence: str
 
 
 def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:
@@ -85,7 +82,6 @@ def judge_jointly(
     campaign: Campaign,
     vehicle: Vehicle,
     surface: SurfaceParameters,
-    library: Sequence[Effect],
     numbers: Sequence[JointNumber],
     rules: DecisionRules,
     *,
@@ -97,7 +93,6 @@ def judge_jointly(
     ----------
     campaign : measured runs with their split; nothing is fitted to a held-out run but its own start
     vehicle, surface : the model that is judged
-    library : names of effects
     numbers : that a fit may move
     rules : of the decision
     progress : called with the name of each stage as it begins
@@ -122,7 +117,7 @@ def judge_jointly(
     error, manoeuvres = summarise_held_out(held_out, predicted, rules)
     progress("rivals")
     substitutes = tuple(find_substitutes(train, fitted, shown, rules.rival_gain_share))
-    effects, rivals = _named(fitted, substitutes, library, joint)
+    effects, rivals = _named(fitted, substitutes, joint)
     tolerances = _tolerances(campaign)
     calibrated = tuple(e for e in effects if _is_within(e, tolerances, joint))
     effects = [e for e in effects if e not in calibrated]
@@ -160,7 +155,6 @@ def judge_jointly(
         predicted=predicted,
         substitutes=substitutes,
         agreeing=agreeing,
-        sentence=tell_verdict(fitted, kind, error, manoeuvres, joint),
     )
 
 
@@ -193,32 +187,33 @@ def _settle(
 
 
 def _named(
-    fitted: JointFit, substitutes: Sequence[Substitute], library: Sequence[Effect], rules: JointRules
+    fitted: JointFit, substitutes: Sequence[Substitute], rules: JointRules
 ) -> tuple[list[NamedEffect], list[tuple[str, NamedEffect]]]:
     """Return what is named, new physics first, and its rivals."""
-    by_number = {e.parameters[0].name: e for e in reversed(library)}
     # what every car needs anew is told whatever its size: the prediction rests on it
     named = [n for n, _ in certain_numbers(fitted, rules)] + [n for n in fitted.numbers if not n.removable]
-    effects = [_named_effect(fitted, n, by_number[n.name], rules) for n in named]
+    effects = [_named_effect(fitted, n, rules) for n in named]
     order = {"effect": 0, "sensor": 1, "retune": 2}
     effects.sort(key=lambda e: order[e.effect_class])
+    effect_of = {n.name: n.effect.name for n in fitted.numbers}
     rivals = []
     for other in substitutes:
         number = next(n for n in other.fitted.numbers if n.name == other.name)
-        rival = _named_effect(other.fitted, number, by_number[other.name], rules)
-        rivals.append((by_number[other.of].name, rival))
+        rival = _named_effect(other.fitted, number, rules)
+        rivals.append((effect_of[other.of], rival))
     friction = next((n for n in fitted.numbers if n.group == "friction"), None)
     if friction is not None:  # tyres at their limit bend the brake's curve too
-        grip = _named_effect(fitted, friction, by_number[friction.name], rules)
-        rivals += [(by_number[n.name].name, grip) for n in named if n.group == "curve"]
+        grip = _named_effect(fitted, friction, rules)
+        rivals += [(n.effect.name, grip) for n in named if n.group == "curve"]
     return effects, rivals
 
 
-def _named_effect(fitted: JointFit, number: JointNumber, effect: Effect, rules: JointRules) -> NamedEffect:
+def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> NamedEffect:
     place = fitted.numbers.index(number)
     value, error = float(fitted.values[place]), float(standard_errors(fitted, rules)[place])
     reach, row = compute_interval_quantile(fitted) * error, PARAMETERS[number.name]
     sure = float(count_standard_errors(fitted, rules)[place])
+    effect = number.effect
     return NamedEffect(
         name=effect.name,
         effect_class=effect.effect_class,

@@ -1,14 +1,12 @@
-"""A joint verdict in plain words: what was found, on what it rests, and which run would tell more."""
+"""Reasons of a joint verdict in plain words: on what it rests, and which run would tell more."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS
-from tasks.identification.decision.answer import ChannelError, NamedEffect, VerdictName
-from tasks.identification.joint.elimination import certain_numbers
-from tasks.identification.joint.fit import JointFit
+from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.joint.numbers import JointNumber, saturates_tyres
 from tasks.identification.joint.stops import Stop
 from tasks.identification.rules import JointRules
@@ -83,36 +81,3 @@ def tell_rivals(
             f" {numbers[other.name].say(other.value)}: {SEPARATE[numbers[one.name].group]}"
         )
     return sentences
-
-
-def tell_verdict(
-    fitted: JointFit,
-    kind: VerdictName,
-    error: Mapping[str, ChannelError],
-    manoeuvres: Mapping[str, ChannelError],
-    rules: JointRules,
-) -> str:
-    """Return the verdict in plain words, with what it does to the error.
-
-    Parameters
-    ----------
-    fitted : the fit that it rests on
-    kind : of the verdict
-    error, manoeuvres : on runs that no fit has seen
-    rules : of the joint fit
-    """
-    news = [n for n, _ in certain_numbers(fitted, rules)]
-    told = [n.say(fitted.by_name[n.name]) for n in news or fitted.numbers]
-    if kind == "NOTHING" or not told:
-        return "Nothing is missing that these runs can show."
-    figures = {"speed": error["speed"], **manoeuvres}
-    moved = " and ".join(
-        f"of the {name.replace('_', ' ')} from {e.frozen:.2g} to {e.after:.2g} {e.unit}"
-        for name, e in figures.items()
-    )
-    text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
-    how = "that takes" if len(told) == 1 else "together they take"
-    return (
-        f"{text[0].upper()}{text[1:]}; with the brake's gain fitted, {how} the error {moved}, on runs that no"
-        " number was fitted to."
-    )

@@ -68,6 +68,7 @@ def test_noise_and_disturbances_have_the_declared_size_and_memory():
     assert np.abs(np.diff(smooth)).max() < 10.0
 
 
+@pytest.mark.minutes
 def test_a_run_is_the_same_whenever_it_is_driven():
     plan = {"speed": 9.0, "pressure": 1.5, "duration": 2.0}
     truth, session = Truth(name="null-01"), draw_session(1, "null-01")
@@ -115,6 +116,7 @@ RUNS = {
 }
 
 
+@pytest.mark.minutes
 @pytest.mark.parametrize("name", [*EFFECTS["standard"], *EFFECTS["further"], *EFFECTS["forms"]])
 def test_every_effect_shows_beyond_noise_in_a_run_that_excites_it(name):
     plan = RUNS.get(name, {"speed": 25.0, "pressure": 2.3, "duration": 2.0, "disc": 200.0})
@@ -133,6 +135,7 @@ def null_campaign(tmp_path_factory):
     return folder, make_campaign(folder, Truth(name="null-01"), "poor", 1)
 
 
+@pytest.mark.minutes
 def test_a_null_campaign_is_accepted_by_the_reader(null_campaign):
     folder, label = null_campaign
     campaign = read_campaign(folder)
@@ -142,6 +145,7 @@ def test_a_null_campaign_is_accepted_by_the_reader(null_campaign):
     assert campaign.tolerances.session == (0.02, 0.01, 0.02, 0.005, 0.04, 0.02, 0.0015)
 
 
+@pytest.mark.minutes
 def test_a_set_of_channels_drops_columns_and_says_so(null_campaign, tmp_path):
     folder, _ = null_campaign
     assert without_channels(folder, tmp_path / "x", ()) == folder

@@ -32,6 +32,7 @@ from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction
 from tasks.vehicle.tyres.magic_formula import Longitudinal, compute_longitudinal_friction
 
+pytestmark = pytest.mark.minutes  # its kernels take half a minute to compile
 SURFACES = read_declared("car")["surfaces"]["rows"]
 
 

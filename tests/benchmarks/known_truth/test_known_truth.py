@@ -40,7 +40,9 @@ def fit(start, procedure, interval, names, errors):
     return true, report, records
 
 
-@pytest.mark.parametrize(("errors", "within"), [(False, 0.2), (True, 2.0)])
+@pytest.mark.parametrize(
+    ("errors", "within"), [pytest.param(False, 0.2, marks=pytest.mark.minutes), (True, 2.0)]
+)
 def test_drag_and_efficiency_come_back_where_a_stop_below_the_grip_limit_tells_them_apart(
     start, longitudinal, errors, within
 ):

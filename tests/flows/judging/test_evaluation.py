@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -10,6 +12,8 @@ from flows.judging.evaluation import NOT_RUN, evaluate_dataset
 from flows.judging.physics import clip_columns, clip_facts
 from flows.making.clip import catalogue_of
 from flows.making.generate import generate_dataset
+from tasks.errors import InputError
+from tasks.eval.state_agreement import WHEELS
 from tests.flows.judging.test_trajectories import tum_lines
 from tests.toy_street import write_toy_grid
 
@@ -37,8 +41,13 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu"
     )
     write_true_trajectories(folder / "made", folder / "told" / "truth")
+    write_reference(folder / "made", folder / "reference")
     evaluate_dataset(
-        str(folder / "made"), out=str(folder / "out"), trajectories=str(folder / "told"), metric=True
+        str(folder / "made"),
+        out=str(folder / "out"),
+        trajectories=str(folder / "told"),
+        metric=True,
+        reference=str(folder / "reference"),
     )
     return folder / "out"
 
@@ -51,6 +60,27 @@ def write_true_trajectories(dataset: Path, told: Path) -> None:
         poses = frames["T_world_rig"].reshape(-1, 4, 4) @ mount
         lines = tum_lines(frames["t_ns"] * 1e-9, poses)
         (told / f"{facts['clip_id']}.txt").write_text(lines)
+
+
+def write_reference(dataset: Path, folder: Path) -> None:
+    """Traces of every clip but two: its own telemetry with 1.25 times the pitch, in snow 3 % less way at the end."""
+    folder.mkdir()
+    rows = []
+    for facts in clip_facts(dataset):
+        if facts["label"].startswith("snow-1"):
+            continue
+        ticks = clip_columns(dataset, "ticks", facts)
+        time = ticks["t_ns"] * 1e-9
+        slower = 1 - 0.03 * time / time[-1] * (facts["weather"] == "snow")
+        columns = {"time": time, "station": ticks["station"] * slower, "speed": ticks["speed"]}
+        columns["pitch"] = np.rad2deg(1.25 * ticks["pitch"]) + 0.15
+        columns |= {f"{name}_{wheel}": 0 * time for name in ("slip", "wheel_load") for wheel in WHEELS}
+        name = facts["label"].replace("/", "-")
+        pq.write_table(pa.table(columns), folder / f"{name}.parquet")
+        keys = ("weather", "initial_speed_km_h", "hazard_center_m", "hazard_length_m", "hazard_height_m")
+        rows.append({key: facts[key] for key in keys} | {"case": name})
+        rows[-1]["surface_coefficient"] = round(facts["surface_friction"], 6)
+    (folder / "cases.json").write_text(json.dumps(rows))
 
 
 def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) -> None:
@@ -124,3 +154,43 @@ def test_the_paper_stands_beside_the_mean_over_its_clips_and_beside_no_single_cl
     assert [(row["value"], row["paper"], row["note"]) for row in missing] == [
         (None, 0.18, "not run: checkpoint missing")
     ]
+
+
+def test_independent_traces_are_a_second_standard_beside_the_clips_telemetry(judged: Path) -> None:
+    rows = json.loads((judged / "evaluation.json").read_text())["rows"]
+    single = {(r["metric"], r["method"], r["condition"], r["window"]): r for r in rows if not r["averaged"]}
+
+    def value(metric: str, condition: str, method: str = "telemetry", window: int = 0) -> float:
+        return single[metric, method, condition, window]["value"]
+
+    for method in (
+        "telemetry",
+        "truth",
+    ):  # the trace's pitch is 1.25 times the picture's: 0.25 / 1.25 is wrong
+        assert value("e_geometry_hump_reference", "dry/hump", method) == pytest.approx(0.2, abs=2e-3)
+        assert value("pitch_relative_error_reference", "dry/hump", method) == pytest.approx(0.2, abs=2e-3)
+        assert value("e_path_reference", "snow-3/flat", method) == pytest.approx(0, abs=1e-5)
+    assert value("e_geometry_hump", "dry/hump", "truth") == pytest.approx(0, abs=1e-3)
+    # the dry trace is the clip's own; that in snow loses 3 % of its way evenly, which bends its progress
+    u = np.linspace(0, 1, 31)
+    bent = np.sqrt(np.mean((u * (1 - 0.03 * u) / 0.97 - u) ** 2))
+    assert value("e_weather_reference", "snow-3/flat") == pytest.approx(bent, rel=0.05)
+    for method in ("photometric", "pnp", "essential"):
+        both = [value(f"e_geometry_hump{suffix}", "dry/hump", method) for suffix in ("", "_reference")]
+        assert both[0] != both[1]
+    untold = [r for r in rows if r["metric"] == "case_reference" and r["averaged"] is None]
+    assert {r["condition"] for r in untold} == {"snow-1/flat", "snow-1/hump"}
+    assert all("the nearest, snow-3" in r["note"] and "surface_coefficient" in r["note"] for r in untold)
+    paper = [
+        r
+        for r in rows
+        if r["metric"] == "e_geometry_hump_reference" and r["condition"] == "paper/dry-features"
+    ]
+    assert paper and all(r["paper"] == 0.316 for r in paper)
+
+
+def test_a_reference_for_no_clip_and_an_unknown_window_are_refused(judged: Path, tmp_path: Path) -> None:
+    made, traces = str(judged.parent / "made"), judged.parent / "reference"
+    with pytest.raises(InputError, match="event_window must be contact or paper; it is late"):
+        evaluate_dataset(made, out=str(tmp_path / "a"), event_window="late")  # type: ignore[arg-type]
+    assert not (tmp_path / "a").exists() and traces.is_dir()

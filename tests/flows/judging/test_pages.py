@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flows.drawing import NO_SCRIPTS
+from flows.drawing import make_policy
 from flows.judging.evaluation_page import render_page
 from flows.judging.evaluation_rows import figure_row
 
@@ -41,7 +41,7 @@ def assert_text_alone(html: str, hostile: str) -> Elements:
     assert not [
         value for name, value in found.attributes if name == "src" and not (value or "").startswith("data:")
     ]
-    assert NO_SCRIPTS in html
+    assert f'content="{make_policy()}"' in html
     assert any(hostile in text for text in found.text)
     return found
 

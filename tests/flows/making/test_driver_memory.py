@@ -6,6 +6,7 @@ import tracemalloc
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
 import flows.making.generate
@@ -78,6 +79,7 @@ def measure_peak(folder: Path, clips: int) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.minutes
 def test_the_peak_of_a_run_hardly_grows_with_its_clips(tmp_path, monkeypatch):
     made = CopiedClips()
     monkeypatch.setattr(flows.making.generate, "make_clip", made)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
@@ -72,7 +71,7 @@ def judged() -> tuple[JointTrace, Campaign]:
     runs = tuple(replace(r, name=f"{HOSTILE} {k}", held_out=k == 2) for k, r in enumerate(made.runs))
     campaign = replace(made, runs=runs, name=HOSTILE, vehicle=HOSTILE)
     numbers = [n for n in load_joint_numbers() if n.name in {"pressure_gain", "lag", "dead_time"}]
-    return judge_jointly(campaign, VEHICLE, SURFACE, load_effects(), numbers, load_decision_rules()), campaign
+    return judge_jointly(campaign, VEHICLE, SURFACE, numbers, load_decision_rules()), campaign
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +85,7 @@ def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(
 ) -> None:
     trace, _ = judged
     words = " ".join(Page(text).words.split())
-    assert words.index(trace.sentence) < words.index("Verdict SET")
+    assert words.index(facts(trace)["sentence"]) < words.index("Verdict SET")
     lag = facts(trace)["effects"][0]["parameters"]["lag"]
     assert f"lag {lag['value']:.3g} {lag['ci_low']:.3g} to {lag['ci_high']:.3g} s" in words
     assert "brake lag and brake dead time" in words

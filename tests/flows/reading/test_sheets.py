@@ -18,6 +18,18 @@ def test_sheets_have_a_row_a_drive_and_a_row_a_feature(toy_dataset, tmp_path):
     assert hazards.shape[:2] == (2 * row + MARGIN, 3 * column + MARGIN)
 
 
+def test_further_datasets_add_a_row_of_their_weathers_each_and_must_be_finished(toy_dataset, tmp_path):
+    made = str(toy_dataset.root)
+    alone, four = (
+        cv2.imread(draw_sheets(made, str(tmp_path / name), beside=beside)["weather"])
+        for name, beside in (("alone", None), ("four", [made, made]))
+    )
+    row = round(TILE_WIDTH * 2 / 3) + MARGIN + CAPTION
+    assert four.shape[0] == alone.shape[0] + 2 * row and four.shape[1] == alone.shape[1]
+    with pytest.raises(InputError, match=r"one: must be a finished dataset[^$]*two: must be"):
+        draw_sheets(made, str(tmp_path / "x"), beside=[str(tmp_path / "one"), str(tmp_path / "two")])
+
+
 def test_a_flat_twin_is_the_same_drive_weather_and_seed_without_the_feature():
     flat, hump = (
         {"seed": "7", "scenario": {"weather": "dry", "initial_speed_km_h": 40, "hazard_center_m": center,

@@ -117,6 +117,7 @@ def address_in(file: Path) -> str:
     raise TimeoutError("no scheduler came up in 40 s")
 
 
+@pytest.mark.minutes
 def test_a_worker_killed_in_the_middle_changes_no_byte(toy_dataset, tmp_path):
     layout = Layout(tmp_path / "data")
     told: dict[str, int] = {}

@@ -1,0 +1,65 @@
+"""What the paper prints of its vehicle model against CarSim, by split and group of cases."""
+
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, TypeAdapter
+
+from catalogs.names import Name
+from catalogs.quantities import CatalogueEntry, Number, Text, read_entries
+
+SPLITS = {
+    "development": "development",
+    "held-out": "held-out", "held_out": "held-out", "holdout": "held-out",
+    "speed_check": "initial-speed", "speed-check": "initial-speed", "initial-speed": "initial-speed",
+}  # fmt: skip
+"""The paper's split behind the name of one in a folder of traces."""
+
+COASTING = "the cases here brake, the paper's coast by their slip"
+
+
+class PrintedGroup(CatalogueEntry):
+    """Figures of a group: means and, where they are printed, largest values."""
+
+    count: Annotated[int, Field(gt=0)]
+    mean: dict[Name, Number]
+    maximum: dict[Name, Number] = Field(default_factory=dict)
+
+
+FILE = TypeAdapter(dict[Name, dict[Name, PrintedGroup | Text]])
+
+
+@cache
+def printed_agreement() -> dict[str, dict[str, PrintedGroup]]:
+    """Return the printed figures by split and group."""
+    file = read_entries(FILE, Path(__file__).with_name("agreement.yaml"), "table of printed figures")
+    return {
+        split: {name: group for name, group in groups.items() if isinstance(group, PrintedGroup)}
+        for split, groups in file.items()
+    }
+
+
+def put_beside_print(groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return a row for each printed figure of the groups that an agreement has.
+
+    Parameters
+    ----------
+    groups : rows with split, group, count, mean and maximum of every figure, and whether the split's road cases brake
+    """
+    rows: list[dict[str, Any]] = []
+    for group in groups:
+        printed = printed_agreement().get(SPLITS.get(group["split"], ""), {}).get(group["group"])
+        if printed is None:
+            continue
+        rows += [
+            {
+                "split": group["split"], "group": group["group"], "figure": figure,
+                "cases": group["count"], "mean": group.get(figure),
+                "maximum": group["maximum"].get(figure), "paper_cases": printed.count,
+                "paper_mean": printed.mean[figure], "paper_maximum": printed.maximum.get(figure),
+                "note": COASTING if group["road_cases_brake"] and SPLITS[group["split"]] == "initial-speed" else "",
+            }
+            for figure in printed.mean
+        ]  # fmt: skip
+    return rows

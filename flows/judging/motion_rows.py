@@ -1,0 +1,192 @@
+"""Figures of the motion recovered from a dataset's pictures, against a standard: own telemetry or reference traces."""
+
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+import numpy as np
+
+from catalogs.gates import load_gates
+from flows.judging.evaluation_rows import control_of, figure_row
+from flows.judging.judged_clip import JudgedClip, Row
+from flows.judging.standards import MeantMotion, Standard, opening_of
+from tasks.errors import InputError
+from tasks.eval.motion_agreement import rms
+from tasks.eval.poses.motion import RecoveredMotion, motion_of_telemetry
+from tasks.eval.video_motion import (
+    PAPER_OPENING,
+    WINDOWS,
+    geometry_error,
+    path_error,
+    reference_progress,
+    weather_error,
+)
+
+EventWindow = Literal["contact", "paper"]
+"""When the event window opens: as the front axle meets the feature, or 2.2 s into the clip, as the paper's does."""
+TELEMETRY = "telemetry"
+"""Method whose motion is the clip's own telemetry, not recovered: what a perfect recovery would score."""
+
+Judged = tuple[JudgedClip, str, RecoveredMotion, MeantMotion]
+
+
+def motion_rows(
+    clips: Sequence[JudgedClip], standard: Standard, event_window: EventWindow = "contact"
+) -> Iterator[Row]:
+    """Yield every figure of the clips' motion against a standard; a clip without one gets a row that says why.
+
+    Parameters
+    ----------
+    clips : as their judges saw them
+    standard : what their motion is compared with
+    event_window : of E_geometry
+    """
+    yield from pose_rows(clips, standard)
+    yield from weather_rows(clips, standard)
+    yield from geometry_rows(clips, standard, event_window)
+    for clip in clips:
+        if (why := standard.absent.get(clip.facts["clip_id"])) is not None:
+            yield figure_row(f"case{standard.suffix}", "-", clip.facts["label"], None, "1", note=why)
+
+
+def pose_rows(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Row]:
+    """Yield pitch and progress of each clip by each method, with uncertainty; a failure is reported, not scored."""
+    responds = load_gates().response_deg
+    for clip, method, motion, meant in _list_judged(clips, standard):
+        known = np.isfinite(meant.pitch)
+        if not known[0]:
+            continue
+        claimed = (meant.pitch - meant.pitch[0])[known]
+        way = meant.station - meant.station[0]
+        failure = _describe_failure(motion)
+        note = failure or _describe_case(meant, ends=True)
+        label = clip.facts["label"]
+        error = None if failure else float(np.rad2deg(rms(motion.pitch[known] - claimed)))
+        yield figure_row(f"pitch_rmse{standard.suffix}", method, label, error, "deg", note=note,
+                   uncertainty=float(np.rad2deg(motion.typical_pitch_std)))  # fmt: skip
+        if np.rad2deg(rms(claimed)) >= responds:
+            share = None if failure else rms(motion.pitch[known] - claimed) / rms(claimed)
+            yield figure_row(f"pitch_relative_error{standard.suffix}", method, label, share, "1", note=note)
+        if way[-1] > 0:
+            drift = None if failure else rms(motion.normalised_path[:, 0] - reference_progress(way))
+            yield figure_row(
+                f"normalised_progress_rmse{standard.suffix}", method, label, drift, "1",
+                note=failure or _describe_case(meant),
+            )  # fmt: skip
+        if np.isfinite(motion.progress).all() and np.isfinite(way).all():
+            yield figure_row(
+                f"progress_rmse{standard.suffix}", method, label, rms(motion.progress - way), "m",
+                note=_describe_case(meant),
+            )  # fmt: skip
+
+
+def weather_rows(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Row]:
+    """E_weather and E_path of each clip against the dry one of the same drive, with the perfect pose's floor.
+
+    Against reference traces E_path has no dry clip: the route itself, on which the reference drives, stands for it.
+    """
+    for clip, method, motion, meant in _list_judged(clips, standard):
+        control = control_of(clip, list(clips), weather=True)
+        dry = None if control is None else standard.motions.get(control.facts["clip_id"])
+        if control is None or dry is None:
+            continue
+        other = motion_of(control, method)
+        if other is None:
+            continue
+        label = clip.facts["label"]
+        failure = _describe_failure(motion) or _describe_failure(other)
+        station, control_station = meant.station, dry.station
+        forward = motion.normalised_path, other.normalised_path
+        for window in WINDOWS:
+            try:
+                _need_whole(meant)
+                _need_whole(dry)
+                floor = weather_error(station, control_station, station, control_station, window)
+                error = None if failure else weather_error(
+                    forward[0][:, 0], forward[1][:, 0], station, control_station, window
+                )  # fmt: skip
+                note = failure or _describe_case(meant)
+            except InputError as fault:
+                floor, error, note = None, None, str(fault)
+            yield figure_row(
+                f"e_weather{standard.suffix}",
+                method,
+                label,
+                error,
+                "1",
+                note=note,
+                window=window,
+                floor=floor,
+            )
+        route = np.column_stack([forward[0][:, 0], np.zeros(len(station))])
+        against = route if standard.suffix else forward[1][:, :2]
+        error = None if failure else path_error(forward[0][:, :2], against)
+        note = failure or ("against the route: a trace holds no lateral motion" if standard.suffix else "")
+        yield figure_row(f"e_path{standard.suffix}", method, label, error, "1", note=note, floor=0.0)
+
+
+def geometry_rows(
+    clips: Sequence[JudgedClip], standard: Standard, event_window: EventWindow = "contact"
+) -> Iterator[Row]:
+    """E_geometry of each clip with a road feature, at every smoothing window beside the perfect pose's floor."""
+    for clip, method, motion, meant in _list_judged(clips, standard):
+        height = clip.facts["hazard_height_m"]
+        if height == 0:
+            continue
+        opening = PAPER_OPENING if event_window == "paper" else opening_of(clip, meant)
+        name = f"e_geometry_{'hump' if height > 0 else 'depression'}{standard.suffix}"
+        failure = _describe_failure(motion)
+        for window in WINDOWS:
+            try:
+                floor = geometry_error(clip.times, meant.pitch, meant.pitch, opening, window)
+                error = (
+                    None
+                    if failure
+                    else geometry_error(clip.times, motion.pitch, meant.pitch, opening, window)
+                )
+                note = failure or _describe_case(meant)
+            except InputError as fault:
+                floor, error, note = None, None, str(fault)
+            yield figure_row(
+                name, method, clip.facts["label"], error, "1", note=note, window=window, floor=floor
+            )
+
+
+def motion_of(clip: JudgedClip, method: str) -> RecoveredMotion | None:
+    """Return the motion of a clip by a method; None if the method has none.
+
+    Parameters
+    ----------
+    clip : as its judges saw it
+    method : of a pose check, or `TELEMETRY`
+    """
+    if method == TELEMETRY:
+        return motion_of_telemetry(clip.frames["pitch"], clip.frames["station"])
+    return clip.motions.get(method)
+
+
+def _list_judged(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Judged]:
+    for clip in clips:
+        meant = standard.motions.get(clip.facts["clip_id"])
+        if meant is None:
+            continue
+        for method, motion in clip.motions.items():
+            yield clip, method, motion, meant
+        if standard.suffix and (told := motion_of(clip, TELEMETRY)) is not None:
+            yield clip, TELEMETRY, told, meant
+
+
+def _need_whole(meant: MeantMotion) -> None:
+    if not np.isfinite(meant.station).all():
+        raise InputError(
+            f"case {meant.name} ends at {meant.end:g} s, before the clip, and its car still rolls"
+        )
+
+
+def _describe_case(meant: MeantMotion, *, ends: bool = False) -> str:
+    until = f", to {meant.end:g} s" if ends and np.isfinite(meant.end) else ""
+    return f"against {meant.name}{until}" if meant.name else ""
+
+
+def _describe_failure(motion: RecoveredMotion) -> str:
+    failed = int(motion.failed.sum())
+    return f"{failed} of {len(motion.failed)} frames without a pose; {motion.failures[0]}" if failed else ""

@@ -1,0 +1,134 @@
+"""The motion that a dataset's pictures are compared with: the clips' own telemetry, or independent reference traces."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catalogs.reference_match import find_case
+from catalogs.references import read_reference
+from catalogs.scenario import SCENARIO_FIELDS, Scenario
+from flows.judging.judged_clip import JudgedClip
+from tasks.errors import InputError
+from tasks.vehicle.replayed_trace import ENDS_STANDING
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeantMotion:
+    """The motion that one clip's pictures are compared with, at its frames.
+
+    Parameters
+    ----------
+    pitch : float64 [F] nose-down positive; NaN where it is not known [rad]
+    station : float64 [F] NaN where it is not known [m]
+    name : of the reference case; empty for the clip's own telemetry
+    end : of what is known [s]; infinity where every frame is
+    """
+
+    pitch: Floats
+    station: Floats
+    name: str = ""
+    end: float = np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standard:
+    """What the motion of each clip is compared with.
+
+    Parameters
+    ----------
+    suffix : of the metrics' names
+    motions : by clip id; a clip without one is not scored
+    absent : why a clip has none, by clip id
+    """
+
+    suffix: str
+    motions: Mapping[str, MeantMotion]
+    absent: Mapping[str, str]
+
+
+def own_telemetry(clips: Sequence[JudgedClip]) -> Standard:
+    """Return the telemetry that the clips were rendered from.
+
+    Parameters
+    ----------
+    clips : as their judges saw them
+    """
+    motions = {
+        clip.facts["clip_id"]: MeantMotion(pitch=clip.frames["pitch"], station=clip.frames["station"])
+        for clip in clips
+    }
+    return Standard(suffix="", motions=motions, absent={})
+
+
+def reference_traces(clips: Sequence[JudgedClip], folder: Path) -> Standard:
+    """Return the reference trace whose conditions a clip has, sampled at the clip's frames and not shifted.
+
+    After the end of a trace its station is held if the car stood by then; its pitch is not, for a car that has just
+    stopped rocks back.
+
+    Parameters
+    ----------
+    clips : as their judges saw them
+    folder : of reference traces
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be read, or has the conditions of no clip.
+    """
+    reference = read_reference(folder)
+    traces = {case.case: columns for case, columns in reference}
+    motions, absent = {}, {}
+    for clip in clips:
+        key, times = clip.facts["clip_id"], clip.times
+        try:
+            case = find_case(
+                [case for case, _ in reference], _scenario_of(clip), clip.facts["surface_friction"]
+            ).case
+        except InputError as error:
+            absent[key] = "; ".join(error.problems)
+            continue
+        trace = traces[case]
+        time, stands = trace["time"], trace["speed"][-1] <= ENDS_STANDING
+        known = (times >= time[0] - 1e-9) & (times <= time[-1] + 1e-9)
+        station = np.interp(times, time, trace["station"])
+        motions[key] = MeantMotion(
+            pitch=np.where(known, np.deg2rad(np.interp(times, time, trace["pitch"])), np.nan),
+            station=np.where(known | (stands & (times > time[-1])), station, np.nan),
+            name=case,
+            end=np.inf if known.all() else float(time[-1]),
+        )
+    if not motions:
+        raise InputError(
+            [f"{folder}: no clip of the dataset has a reference case"]
+            + [f"{folder}: clip {clip.facts['label']}: {absent[clip.facts['clip_id']]}" for clip in clips[:3]]
+        )
+    return Standard(suffix="_reference", motions=motions, absent=absent)
+
+
+def opening_of(clip: JudgedClip, meant: MeantMotion) -> float:
+    """Return when the front axle of the meant motion meets the clip's road feature [s]; infinity if it never does.
+
+    Parameters
+    ----------
+    clip : with a road feature
+    meant : motion
+    """
+    edge = clip.facts["hazard_center_m"] - clip.facts["hazard_length_m"] / 2
+    known = np.isfinite(meant.station)
+    if not known.any() or meant.station[known][-1] <= edge:
+        return np.inf
+    return float(np.interp(edge, meant.station[known], clip.times[known]))
+
+
+def _scenario_of(clip: JudgedClip) -> Scenario:
+    """The scenario of a clip from its row, in which null and NaN both mean that there is no value."""
+    values: dict[str, Any] = {name: clip.facts[name] for name in SCENARIO_FIELDS}
+    known: dict[str, Any] = {name: None if value != value else value for name, value in values.items()}
+    return Scenario(**known)

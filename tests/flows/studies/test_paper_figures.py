@@ -1,0 +1,54 @@
+"""Figures of the paper's studies show what the studies found, and what was printed."""
+
+import numpy as np
+import pytest
+
+from flows.measured.dive_figure import draw_dives
+from flows.studies.sensitivity_figure import draw_sensitivity
+
+
+def test_bands_lie_about_the_nominal_curve_and_printed_figures_at_their_rates():
+    rates = {"nominal_rates_mm_h": [0, 1, 3], "rates_mm_h": [0, 3]}
+    friction = {"nominal_mu": [0.8, 0.5, 0.3], "mu_p05": [0.7, 0.2], "mu_p95": [0.9, 0.4]}
+    stops = {"nominal_stop_m": [30, 37, 63], "stop_m_p05": [29, 58], "stop_m_p95": [31, 69]}
+    printed = [
+        {"figure": "snow1_stop_m.p95", "printed": 42.53}, {"figure": "snow3_stop_m.p05", "printed": 58.39},
+        {"figure": "spearman.snow1.snow_density", "printed": -0.535}, {"figure": "rain50_mu.nominal", "printed": 0.347},
+    ]  # fmt: skip
+    figure = draw_sensitivity({"snow": rates | friction | stops}, printed)
+    above, below = figure.axes
+    assert list(above.lines[0].get_ydata()) == [0.8, 0.5, 0.3] and len(above.lines) == 1
+    assert [tuple(point) for point in below.lines[1].get_xydata()] == [(1.0, 42.53), (3.0, 58.39)]
+    assert below.collections[0].get_datalim(below.transData).y1 == 69
+
+
+def fold(drive: str, dive: list[float], predicted: list[float]) -> dict:
+    trajectory = {
+        "time_s": [0.01 * k for k in range(len(dive))],
+        "dive_deg": dive,
+        "predicted_dive_deg": predicted,
+    }
+    return {
+        "drive": drive,
+        "events": 3,
+        "peak_ratio": None if drive == "$2" else 1.1,
+        "mean_trajectory": trajectory,
+    }
+
+
+def test_each_dive_is_drawn_over_its_own_peak_and_the_mean_where_all_drives_have_values():
+    figure = draw_dives(
+        [fold("one", [0.0, -0.5, -2.0], [0.0, -1.0, -1.0]), fold("$2", [0.0, 1.0], [0.0, 0.5])]
+    )
+    first, second, mean = figure.axes
+    assert list(first.lines[0].get_ydata()) == [0.0, -0.25, -1.0] and list(first.lines[1].get_ydata()) == [
+        0.0,
+        -1.0,
+        -1.0,
+    ]
+    assert "peak ratio 1.10" in first.get_title(loc="left") and second.get_title(loc="left").startswith(
+        r"\$2: 3"
+    )
+    np.testing.assert_allclose(mean.lines[0].get_ydata(), [0.0, 0.25])
+    spread = mean.collections[0].get_datalim(mean.transData)
+    assert (spread.y0, spread.y1) == pytest.approx((-0.5, 1.0))
