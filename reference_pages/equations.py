@@ -13,4 +13,6 @@ def format_equation(source: str, *_: Any, **__: Any) -> str:
     source : LaTeX
     """
     lines = [line for line in source.split("\\\\") if line.strip()]
-    return "\n".join(f'<p class="equation">{convert(line.strip(), display="block")}</p>' for line in lines)
+    return "\n".join(
+        f'<p class="equation" tabindex="0">{convert(line.strip(), display="block")}</p>' for line in lines
+    )
