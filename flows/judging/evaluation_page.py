@@ -55,6 +55,18 @@ LEAST_SWING_DEG = 0.25
 """Half of the least pitch that a plot spans, so that a drift of hundredths looks like one [deg]."""
 
 
+def describe_metric(name: str) -> str:
+    """Return what a metric is, in a sentence; empty for one that needs none.
+
+    Parameters
+    ----------
+    name : of the metric
+    """
+    own = name.removesuffix("_reference")
+    meaning = MEANING.get(own, "")
+    return f"{meaning}; against independent traces" if own != name and meaning else meaning
+
+
 def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: str) -> str:
     """Return the HTML of the whole page.
 
@@ -70,7 +82,8 @@ def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, c
         f"<h1>Judged from the pixels: {escape(run_id)}</h1>",
         f"<p>{len(clips)} clips; pictures: {escape(codec)}.</p>",
         "<p>Smoothing acts on the estimate alone, so even a perfect pose scores its floor: read no figure without"
-        " it. Window 0 is none. The paper's figures come from VGGT on other videos.</p>",
+        " it. Window 0 is none. The paper's figures come from VGGT on other videos, and those of e_weather"
+        " and e_geometry are against CarSim, which only the rows that end in _reference ask too.</p>",
         "<h2>Summary</h2>",
         "<p>Without smoothing: means over all clips, and over the clips that the paper's protocol takes, within each"
         " visual seed and then over seeds.</p>", _render_summary(rows, names),
@@ -79,7 +92,7 @@ def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, c
         *_render_geometry(rows),
         "<h2>Clips</h2>", _render_thumbnails(clips),
         "<h2>Every figure</h2>",
-        *(f"<h3>{escape(name)}</h3><p>{escape(MEANING.get(name, ''))}</p>"
+        *(f"<h3>{escape(name)}</h3><p>{escape(describe_metric(name))}</p>"
           f"{_render_table([row for row in rows if row['metric'] == name])}" for name in names),
     ]  # fmt: skip
     return (
@@ -93,7 +106,7 @@ def _render_summary(rows: Sequence[Row], names: Sequence[str]) -> str:
     lines = []
     for name in names:
         mine = [row for row in rows if row["metric"] == name and row["window"] == 0]
-        meaning = MEANING.get(name, "")
+        meaning = describe_metric(name)
         means = [r for r in mine if r["condition"] == "all" or r["condition"].startswith("paper/")]
         for row in means or mine[:1]:
             single = [r["value"] for r in mine if r["method"] == row["method"] and _is_single(r)]

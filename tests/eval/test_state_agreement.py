@@ -199,6 +199,12 @@ def test_a_stop_s_duration_and_slip_distance_are_those_of_each_trace() -> None:
     ended = as_reference(make_drive(5.0), until=2.985)  # at .075 m/s, ticks before it stands
     late = stop_agreement(ended, make_drive(5.0), FLAT)
     assert late is not None and late.braking_time_error_s == pytest.approx(0.005, abs=1.1e-3)
+    # triggered at 10 m: the slower car, which brakes from 1 s all the same, is there at 1.2735 s and stands at 2.59 s
+    at_place = replace(FLAT, brake_onset=None, brake_onset_station=10.0)
+    slower = stop_agreement(reference, make_drive(5.0, speed=8.0), at_place)
+    assert slower is not None and slower.braking_time_error_s == pytest.approx(
+        1.99 - (2.59 - 1.2735), abs=3e-3
+    )
     assert stop_agreement(reference, make_drive(0.0), FLAT) is None
     assert stop_agreement(as_reference(make_drive(0.0)), make_drive(0.0), HUMP) is None
 
