@@ -1,5 +1,7 @@
 """A vehicle as an FMU: another simulator that loads it drives as muSync's own rollout does."""
 
+import re
+import shlex
 import shutil
 import subprocess
 import zipfile
@@ -12,6 +14,7 @@ from catalogs.entries import entry_names
 from catalogs.vehicles import load_vehicle
 from flows.exporting.fmu import write_fmu
 from flows.exporting.fmu_binary import FRAME, find_compiler, find_own_platform, format_header
+from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
@@ -37,6 +40,7 @@ effects:
   lag: {value: 0.06, unit: s, source: test}
 """
 """A vehicle file: one that was fitted, with a brake line."""
+PAGE = (SOURCE_ROOT / "docs" / "how-to" / "drive-the-car-in-another-simulator.md").read_text()
 SNOW = {"weather": 3, "road_friction": 0.3, "snow_depth": 12.0}
 HUMP = RoadHazard(center_m=12.0, length_m=3.6, height_m=0.08)
 
@@ -86,7 +90,7 @@ class Car:
 
 @pytest.fixture(scope="module")
 def car_file(tmp_path_factory):
-    path = tmp_path_factory.mktemp("fmu") / "car.yaml"
+    path = tmp_path_factory.mktemp("fmu") / "my-car.yaml"
     path.write_text(CAR)
     return path
 
@@ -98,7 +102,12 @@ def vehicle(car_file):
 
 @pytest.fixture(scope="module")
 def fmu(car_file):
-    return Path(write_fmu(str(car_file), out=str(car_file.with_suffix(".fmu")))["fmu"])
+    """Made by the command of the page."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(car_file.parent)
+        command = re.findall(r"^```\nmusync (.*?)\n```$", PAGE, flags=re.M)[0]
+        assert run_command(patch, *shlex.split(command)) == 0
+    return car_file.with_suffix(".fmu")
 
 
 @pytest.fixture
@@ -272,6 +281,22 @@ def test_the_frame_has_the_functions_of_the_standards_own_headers(vehicle, tmp_p
         [*find_compiler(find_own_platform()), *words, str(FRAME)], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_the_example_of_the_page_stops_on_snow(fmu, monkeypatch, capsys):
+    monkeypatch.chdir(fmu.parent)
+    (example,) = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.M | re.S)
+    exec(compile(example, "page", "exec"), {})  # noqa: S102
+    speed, pitch = map(float, re.findall(r"[\d.]+", capsys.readouterr().out))
+    assert 2.0 < speed < 8.0 and 0.3 < pitch < 3.0
+
+
+def test_the_page_names_every_input_and_weather(fmu):
+    said = PAGE.replace("`_length`, `_height`", "`road_feature_length`, `road_feature_height`")
+    said = said.replace("`ground_slope_f`, `_r`", "`ground_slope_f`, `ground_height_r`, `ground_slope_r`")
+    assert not [row.name for row in INPUTS if f"`{row.name}`" not in said]
+    kinds = fmpy.read_model_description(str(fmu)).typeDefinitions[0].items
+    assert ", ".join(f"{kind.value} {kind.name}" for kind in kinds) in PAGE
 
 
 def test_all_that_is_wrong_with_the_command_is_told_at_once(tmp_path, monkeypatch, capsys):
