@@ -42,7 +42,7 @@ effects:
 """A vehicle file: one that was fitted, with a brake line."""
 PAGE = (SOURCE_ROOT / "docs" / "how-to" / "drive-the-car-in-another-simulator.md").read_text()
 SNOW = {"weather": 3, "road_friction": 0.3, "snow_depth": 12.0}
-HUMP = RoadHazard(center_m=12.0, length_m=3.6, height_m=0.08)
+HUMP = RoadHazard(center_m=5.0, length_m=3.6, height_m=0.08)
 
 
 class Car:
@@ -146,31 +146,31 @@ def test_a_stop_on_snow_is_the_own_rollout(drive, vehicle, hazard):
     A row has the inputs of the step that ends there: at the moment when the speed is no longer held it still is.
     """
     command = BrakeCommand(
-        peak_pressure_mpa=1.6, ramp_s=0.3, onset_s=0.4, onset_station_m=None, hold_s=None, release_s=0.5
+        peak_pressure_mpa=1.6, ramp_s=0.3, onset_s=0.2, onset_station_m=None, hold_s=None, release_s=0.5
     )
     own = simulate_scenario(
         vehicle, SurfaceState(kind="snow", friction=0.3, snow_depth_mm=12.0),
-        Controls(initial_speed=9.0, brake=command, hold_speed_until_brake=True), hazard, mode="coupled", duration_s=3.2,
+        Controls(initial_speed=9.0, brake=command, hold_speed_until_brake=True), hazard, mode="coupled", duration_s=1.5,
     )  # fmt: skip
     car = drive(
         initial_speed=9.0, hold_speed=1, road_feature_center=hazard.center_m,
         road_feature_height=hazard.height_m, **SNOW,
     )  # fmt: skip
     rows = [car.row()]
-    for n in range(6400):
+    for n in range(3000):
         car.set(
-            brake_pressure=compute_brake_pressure((n + 1) * STEP - 0.4, command.profile),
-            hold_speed=int(n < 800),
+            brake_pressure=compute_brake_pressure((n + 1) * STEP - 0.2, command.profile),
+            hold_speed=int(n < 400),
         )
         car.step(STEP)
         if n % 2:
             rows.append(car.row())
-    assert own.columns["speed"][-1] < 3.0
-    compared = np.delete(np.array(rows), 400, axis=0)
+    assert own.columns["speed"][-1] < 7.0
+    compared = np.delete(np.array(rows), 200, axis=0)
     for name, column in zip(COLUMNS, compared.T, strict=True):
         if name in own.columns:
             np.testing.assert_allclose(
-                column, np.delete(own.columns[name], 400), rtol=1e-6, atol=1e-6, err_msg=name
+                column, np.delete(own.columns[name], 200), rtol=1e-6, atol=1e-6, err_msg=name
             )
 
 
@@ -198,15 +198,15 @@ def test_held_inputs_give_the_same_at_any_step_and_equal_a_trace_that_holds_them
 def test_a_road_told_under_the_axles_is_the_road_feature(drive, vehicle):
     """But for what this car's tyres feel beside the point that was told, where the road is taken for straight."""
     known = drive(
-        initial_speed=9.0, road_feature_center=6.0, road_feature_length=3.6, road_feature_height=0.08
+        initial_speed=9.0, road_feature_center=3.0, road_feature_length=3.6, road_feature_height=0.08
     )
     rows = []
-    for _ in range(1500):
+    for _ in range(900):
         known.step(0.001)
         rows.append(known.row())
     told, seen = drive(initial_speed=9.0), []
-    hazard = RoadHazard(center_m=6.0, length_m=3.6, height_m=0.08)
-    for _ in range(1500):
+    hazard = RoadHazard(center_m=3.0, length_m=3.6, height_m=0.08)
+    for _ in range(900):
         front = told.row()[COLUMNS.index("station")]
         for axle, s in (("f", front), ("r", front - vehicle.wheelbase)):
             told.set(**{
