@@ -115,7 +115,11 @@ def emit_model(text: str, entry: str, platform: Platform) -> tuple[bytes, list[s
     for function in module.functions:
         if not function.is_declaration:
             function.linkage = "external" if function.name == entry else "internal"
-    module.get_function(entry).name = ENTRY
+    for variable in module.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = "internal"
+    model = module.get_function(entry)
+    model.name, model.visibility = ENTRY, "hidden"  # two cars in one simulator must not find each other's
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
     passes.run(module, llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=0)))

@@ -1,5 +1,6 @@
 """A vehicle as an FMU: another simulator that loads it drives as muSync's own rollout does."""
 
+import ctypes
 import re
 import shlex
 import shutil
@@ -262,6 +263,14 @@ def test_what_is_wrong_is_an_error_with_a_sentence_and_the_drive_goes_on(drive, 
         act(car)
     assert len(car.said) == 1 and sentence in car.said[0]
     car.step(0.001)
+
+
+def test_a_library_shows_the_standards_functions_alone_so_that_two_cars_can_share_a_process(fmu, tmp_path):
+    fmpy.extract(str(fmu), str(tmp_path))
+    library = ctypes.CDLL(str(next((tmp_path / "binaries").glob("*/*"))))
+    assert library.fmi2DoStep
+    for inner in ("musync_advance", "NRT_Allocate"):
+        assert not hasattr(library, inner), inner
 
 
 def test_the_frame_has_the_functions_of_the_standards_own_headers(vehicle, tmp_path):
