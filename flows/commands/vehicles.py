@@ -1,6 +1,13 @@
-"""Commands for a car of one's own: a file for its data sheet, and what of its numbers is implausible."""
+"""Commands for a car of one's own: a file for its data sheet, what of its numbers is implausible, and an FMU of it."""
 
-from flows.commands.command import VEHICLE, Command, define_argument, define_option, require_key
+from flows.commands.command import (
+    VEHICLE,
+    Command,
+    define_argument,
+    define_option,
+    require_key,
+    select_keys,
+)
 
 GROUP = "Measured data"
 
@@ -33,5 +40,32 @@ COMMANDS = (
         options=(define_argument("vehicle", str, VEHICLE.help, known=VEHICLE.known),),
         passed=require_key("plausible"),
         output="sentences",
+    ),
+    Command(
+        name="vehicle fmu",
+        group=GROUP,
+        sentence="Write a vehicle as a co-simulation FMU (FMI 2.0), which Simulink, CarMaker or Modelica drive.",
+        function="flows.exporting.fmu:write_fmu",
+        options=(
+            define_argument("vehicle", str, VEHICLE.help, known=VEHICLE.known),
+            define_option("out", str, "File to write, NAME.fmu."),
+            define_option(
+                "platforms",
+                list[str] | None,
+                "Where it will run, by default here: linux64, win64 or darwin64; may be given more than once, and"
+                " others than this one need pip install 'musync[fmu]'.",
+                None,
+                spelling="platform",
+                known=("linux64", "win64", "darwin64"),
+            ),
+            define_option(
+                "surface",
+                str,
+                "Pavement whose dry friction is the friction at the start.",
+                "dense-asphalt",
+                known="catalogs/surfaces/*.yaml",
+            ),
+        ),
+        brief=select_keys("fmu", "vehicle", "platforms", "step_s", "weathers"),
     ),
 )

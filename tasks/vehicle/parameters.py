@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from tasks.errors import InputError
 from tasks.surface.weather import find_weather
@@ -174,6 +176,48 @@ class SurfaceResponse:
     wet: bool
 
 
+@register_jitable
+def compute_tyre_scale(
+    surface_friction: float,
+    knots: NDArray[np.float64],
+    efficiency: NDArray[np.float64],
+    slip_stiffness: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Return the tyre's peak mu_eff and its slip stiffness beta at one surface friction [1].
+
+    Parameters
+    ----------
+    surface_friction : mu_c [1]
+    knots, efficiency, slip_stiffness : float64 [K] a tyre family's tables [1]
+    """
+    peak = interpolate_knots(surface_friction, knots, efficiency) * surface_friction
+    return peak, interpolate_knots(surface_friction, knots, slip_stiffness)
+
+
+@register_jitable
+def interpolate_knots(x: float, knots: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+    """Return the value of a piecewise-linear table, constant beyond its ends [of the values].
+
+    It is `numpy.interp`, to the bit; Numba's takes memory for its result, which a compiled drive cannot have.
+
+    Parameters
+    ----------
+    x : where to look [unit of the knots]
+    knots : float64 [K] ascending [unit of x]
+    values : float64 [K] at the knots
+    """
+    last = len(knots) - 1
+    if not x < knots[last]:
+        return float(values[last])
+    if x < knots[0]:
+        return float(values[0])
+    k = 0
+    while x >= knots[k + 1]:
+        k += 1
+    slope = (values[k + 1] - values[k]) / (knots[k + 1] - knots[k])
+    return float(slope * (x - knots[k]) + values[k])
+
+
 def compute_surface_response(vehicle: Vehicle, family: str, surface_friction: float) -> SurfaceResponse:
     """Return tyre curve and pitch calibration at one surface friction: piecewise linear, constant beyond the end knots.
 
@@ -184,12 +228,14 @@ def compute_surface_response(vehicle: Vehicle, family: str, surface_friction: fl
     surface_friction : mu_c [1]
     """
     table = vehicle.find_tyre_family(family)
-    knots = table.surface_friction
+    knots = np.array(table.surface_friction)
 
     def interpolate(values: tuple[float, ...]) -> float:
-        return float(np.interp(surface_friction, knots, values))
+        return interpolate_knots(surface_friction, knots, np.array(values))
 
-    peak, slip_stiffness = interpolate(table.efficiency) * surface_friction, interpolate(table.slip_stiffness)
+    peak, slip_stiffness = compute_tyre_scale(
+        surface_friction, knots, np.array(table.efficiency), np.array(table.slip_stiffness)
+    )
     if vehicle.tyre is None:
         tyre: Tyre = scale_burckhardt(table.burckhardt, peak, slip_stiffness)
     else:

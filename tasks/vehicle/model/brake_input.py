@@ -23,6 +23,7 @@ class BrakeInput(NamedTuple):
     interval : time between the samples [s]
     hold_speed : keep the speed until the command's onset
     engine : float64 [N] torque of the engine at the wheels at the samples, driving positive; empty for none [N m]
+    begin : time of the first sample, which holds before it too [s]
     """
 
     profile: PressureProfile
@@ -30,6 +31,7 @@ class BrakeInput(NamedTuple):
     interval: float
     hold_speed: bool
     engine: NDArray[np.float64]
+    begin: float = 0.0
 
 
 def make_command_input(profile: PressureProfile, *, hold_speed: bool = False) -> BrakeInput:
@@ -70,7 +72,7 @@ def compute_input_pressure(time: float, onset: float, delay: float, drive: Brake
     """
     if len(drive.trace) == 0:
         return compute_brake_pressure(time - onset - delay, drive.profile)
-    return interpolate_trace(time - delay, drive.trace, drive.interval)
+    return interpolate_trace(time - delay - drive.begin, drive.trace, drive.interval)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -79,7 +81,7 @@ def interpolate_trace(time: float, trace: NDArray[np.float64], interval: float) 
 
     Parameters
     ----------
-    time : time since the start of the run [s]
+    time : time since the first sample [s]
     trace : float64 [N], at least one sample [unit of the trace]
     interval : time between the samples [s]
     """

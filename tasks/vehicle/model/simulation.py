@@ -6,7 +6,7 @@ measured pressure trace), in the step, and in how often they keep the motion.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isinf
+from math import isinf
 
 import numpy as np
 from numba import njit
@@ -21,12 +21,11 @@ from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
 from tasks.vehicle.model.ports import compute_ports
 from tasks.vehicle.model.states import (
     STATE_WIDTH,
-    AxleMemory,
     Instant,
-    Memory,
     Motion,
     VehicleState,
     clear_slip,
+    make_rolling_state,
     pack_state,
     unpack_state,
 )
@@ -124,12 +123,9 @@ def simulate(
     """
     tables = [form.slot for form in vehicle.forms] + list(slots)
     if start is None:
-        rolling = initial_speed / vehicle.wheel_radius
-        cold = AxleMemory(0.0, 0.0, conditions.disc_rise)
-        state = VehicleState(
-            0.0, Motion(0.0, initial_speed, rolling, rolling), Memory(cold, cold), (0.0,) * 8, 0.0, 1.0, 1.0, 0.0,
-            False, drive.profile.onset_time, inf, inf,
-        )  # fmt: skip
+        state = make_rolling_state(
+            initial_speed, vehicle.wheel_radius, conditions.disc_rise, drive.profile.onset_time
+        )
     else:
         state = unpack_state(start)
     history = np.empty((recording.samples, _WIDTH))
@@ -221,8 +217,8 @@ def integrate_motion(
         rate = (next_line - line) / step
         engine, next_engine = 0.0, 0.0
         if len(drive.engine) > 0:
-            engine = interpolate_trace(time, drive.engine, drive.interval)
-            next_engine = interpolate_trace(time + step, drive.engine, drive.interval)
+            engine = interpolate_trace(time - drive.begin, drive.engine, drive.interval)
+            next_engine = interpolate_trace(time + step - drive.begin, drive.engine, drive.interval)
         instant = Instant(time, line, rate, deceleration, standing, held, engine)
         ports = compute_ports(motion, memory, x, instant, scale_f, scale_r, step, slots, chassis, tyre, road)
         if n % substeps == 0:

@@ -1,9 +1,11 @@
 """State of the model: motion along the road, half-car, memory of tyres, discs and brake line, and events."""
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.vehicle.half_car import HalfCarState
@@ -108,6 +110,7 @@ def pack_state(state: VehicleState) -> tuple[float, ...]:
     )  # fmt: skip
 
 
+@register_jitable
 def unpack_state(row: NDArray[np.float64]) -> VehicleState:
     """Return the state that `pack_state` wrote into a row.
 
@@ -115,10 +118,29 @@ def unpack_state(row: NDArray[np.float64]) -> VehicleState:
     ----------
     row : float64 [STATE_WIDTH]
     """
-    v = [float(value) for value in row]
+    v = row
     return VehicleState(
-        v[0], Motion(*v[1:5]), Memory(AxleMemory(*v[5:8]), AxleMemory(*v[8:11])), tuple(v[11:19]),  # type: ignore[arg-type]
-        v[19], v[20], v[21], v[22], bool(v[23]), v[24], v[25], v[26],
+        v[0], Motion(v[1], v[2], v[3], v[4]), Memory(AxleMemory(v[5], v[6], v[7]), AxleMemory(v[8], v[9], v[10])),
+        (v[11], v[12], v[13], v[14], v[15], v[16], v[17], v[18]), v[19], v[20], v[21], v[22], bool(v[23]), v[24],
+        v[25], v[26],
+    )  # fmt: skip
+
+
+@register_jitable
+def make_rolling_state(speed: float, wheel_radius: float, disc_rise: float, onset: float) -> VehicleState:
+    """Return the state of a car whose wheels roll freely and whose body is at rest.
+
+    Parameters
+    ----------
+    speed : [m/s]
+    wheel_radius : [m]
+    disc_rise : temperature of the discs above ambient [K]
+    onset : brake onset; infinite before it is known [s]
+    """
+    rolling, cold = speed / wheel_radius, AxleMemory(0.0, 0.0, disc_rise)
+    return VehicleState(
+        0.0, Motion(0.0, speed, rolling, rolling), Memory(cold, cold), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0,
+        1.0, 1.0, 0.0, False, onset, inf, inf,
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from math import exp, log
 from typing import NamedTuple
 
 from numba import njit
+from numba.extending import register_jitable
 
 
 class BurckhardtTyre(NamedTuple):
@@ -23,6 +24,7 @@ class BurckhardtTyre(NamedTuple):
     target_slip: float
 
 
+@register_jitable
 def scale_burckhardt(
     burckhardt: tuple[float, float, float], peak: float, slip_stiffness: float
 ) -> BurckhardtTyre:

@@ -4,6 +4,7 @@ from math import atan, cos, inf, pi, tan
 from typing import NamedTuple
 
 from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.tyres.magic_formula import (
     Longitudinal,
@@ -37,6 +38,7 @@ class MagicFormulaTyre(NamedTuple):
     target_slip: float
 
 
+@register_jitable
 def scale_magic_formula(tyre: MagicFormula, peak: float, slip_stiffness: float) -> MagicFormulaTyre:
     """Scale a tyre to its peak and stiffness on a surface, by the formula's own factors.
 
@@ -51,16 +53,11 @@ def scale_magic_formula(tyre: MagicFormula, peak: float, slip_stiffness: float) 
     slip_stiffness : beta [1]
     """
     c = tyre.longitudinal
-    scaled = c._replace(
-        pdx1=peak,
-        pdx2=c.pdx2 * peak / c.pdx1,
-        pkx1=c.pkx1 * slip_stiffness,
-        pkx2=c.pkx2 * slip_stiffness,
-        phx1=0.0,
-        phx2=0.0,
-        pvx1=0.0,
-        pvx2=0.0,
-    )
+    scaled = Longitudinal(
+        pcx1=c.pcx1, pdx1=peak, pdx2=c.pdx2 * peak / c.pdx1, pdx3=c.pdx3, pex1=c.pex1, pex2=c.pex2, pex3=c.pex3,
+        pex4=c.pex4, pkx1=c.pkx1 * slip_stiffness, pkx2=c.pkx2 * slip_stiffness, pkx3=c.pkx3, phx1=0.0, phx2=0.0,
+        pvx1=0.0, pvx2=0.0,
+    )  # fmt: skip
     target_slip = find_peak_slip(scaled)
     return MagicFormulaTyre(
         nominal_load=2.0 * tyre.nominal_load,
@@ -70,6 +67,7 @@ def scale_magic_formula(tyre: MagicFormula, peak: float, slip_stiffness: float) 
     )
 
 
+@register_jitable
 def find_peak_slip(c: Longitudinal) -> float:
     """Return the braking slip at which friction peaks under the nominal load, by bisection; at most 1 [1].
 

@@ -1,0 +1,162 @@
+"""``musync vehicle fmu``: a vehicle as a co-simulation FMU (FMI 2.0), for simulators that are no Python.
+
+The model is not written again: its compiled kernels, as every run of muSync takes them, are put into a library of the
+platform, behind a frame in C that holds the standard's functions and no physics.
+"""
+
+import hashlib
+import platform
+import re
+import uuid
+import zipfile
+from collections.abc import Callable, Sequence
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from catalogs.sentences import shorten
+from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_provenance
+from flows.exporting.fmu_binary import (
+    FRAME,
+    PLATFORMS,
+    build_library,
+    find_compiler,
+    find_own_platform,
+    format_header,
+)
+from flows.exporting.fmu_description import format_description
+from flows.reading.suggestions import suggest_names
+from flows.store.outputs import Outputs
+from manifests.provenance import code_version
+from tasks.errors import InputError
+from tasks.kernel_cache import sources_hash
+from tasks.surface.weather import WEATHERS, Weather, surface_state
+from tasks.vehicle.model.embedded import STEP, compile_advance, find_weathers
+from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
+from tasks.vehicle.parameters import Vehicle
+
+SUFFIX = ".fmu"
+_LONG_AGO = (1980, 1, 1, 0, 0, 0)
+"""Time of every file in the archive, so that the same vehicle gives the same bytes."""
+
+
+def write_fmu(
+    vehicle: str, *, out: str, surface: str = "dense-asphalt", platforms: list[str] | None = None
+) -> dict[str, Any]:
+    """Write a vehicle as an FMU.
+
+    Parameters
+    ----------
+    vehicle : catalogue name or file
+    out : the file, NAME.fmu
+    surface : the pavement whose dry friction is the friction at the start
+    platforms : where it will run; None takes this one
+
+    Returns
+    -------
+    ``fmu``, ``vehicle``, ``platforms``, ``step_s``, and the names of ``parameters``, ``inputs``, ``outputs`` and
+    ``weathers``.
+
+    Raises
+    ------
+    InputError
+        Listing every option that is wrong; for a vehicle that was fitted in paper mode; if there is no C compiler.
+    """
+    problems = []
+    if Path(out).suffix != SUFFIX:
+        problems.append(f"--out {shorten(out)}: must end in {SUFFIX}; it does not")
+    chosen = platforms or [find_own_platform().name]
+    compilable = [name for name in dict.fromkeys(chosen) if name in PLATFORMS]
+    checks: tuple[Callable[[], Any], ...] = (
+        partial(_refuse_unknown_platforms, chosen),
+        *(partial(find_compiler, PLATFORMS[name]) for name in compilable),
+        partial(_refuse_paper_mode, vehicle),
+        partial(load_surface, surface),
+    )
+    for check in checks:
+        try:
+            check()
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    results = Outputs(Path(out).parent, "vehicle fmu", Path(out).name)
+    car = load_vehicle(vehicle)
+    results.write(Path(out).name, pack_fmu(car, vehicle_content(vehicle), surface, compilable))
+    return {
+        "fmu": out,
+        "vehicle": car.name,
+        "platforms": compilable,
+        "step_s": STEP,
+        "weathers": find_weathers(car),
+        "parameters": [row.name for row in INPUTS if row.role == "parameter"],
+        "inputs": [row.name for row in INPUTS if row.role == "input"],
+        "outputs": [row.name for row in OUTPUTS],
+    }
+
+
+def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str]) -> bytes:
+    """Return the bytes of an FMU.
+
+    Parameters
+    ----------
+    car : the vehicle
+    content : its file with everything that it inherits
+    surface : the pavement whose dry friction is the friction at the start
+    platforms : where it will run, of `PLATFORMS`
+    """
+    weathers = find_weathers(car)
+    first = surface_state(Weather(kind=weathers[0]), load_surface(surface))
+    starts = {row.name: row.start for row in INPUTS} | {
+        "weather": float(list(WEATHERS).index(weathers[0]) + 1),
+        "road_friction": first.friction,
+    }
+    guid = _make_guid(content, repr(starts).encode(), FRAME.read_bytes(), sources_hash().encode())
+    identifier = re.sub(r"\W", "_", f"musync_{car.name}", flags=re.ASCII)
+    files = {
+        "modelDescription.xml": format_description(
+            identifier=identifier,
+            name=car.name,
+            guid=guid,
+            tool=f"muSync {code_version()['version']}",
+            starts=starts,
+            weathers=weathers,
+        ),
+        "resources/vehicle.yaml": content,
+    }
+    compiled, header = compile_advance(car), format_header(car, starts.values(), guid)
+    for target in (PLATFORMS[name] for name in platforms):
+        with TemporaryDirectory() as folder:
+            place = f"binaries/{target.name}/{identifier}{target.suffix}"
+            files[place] = build_library(compiled, header, target, Path(folder))
+    archive = BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, data in files.items():
+            packed.writestr(zipfile.ZipInfo(name, _LONG_AGO), data, zipfile.ZIP_DEFLATED)
+    return archive.getvalue()
+
+
+def _make_guid(*parts: bytes) -> str:
+    digest = hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).digest()
+    return f"{{{uuid.UUID(bytes=digest[:16])}}}"
+
+
+def _refuse_unknown_platforms(names: Sequence[str]) -> None:
+    if platform.machine() not in {"x86_64", "AMD64"}:
+        raise InputError(f"an FMU is compiled on x86-64 machines only; this one is {platform.machine()}")
+    if unknown := [name for name in names if name not in PLATFORMS]:
+        raise suggest_names("--platform", unknown, list(PLATFORMS), "musync vehicle fmu --help")
+
+
+def _refuse_paper_mode(vehicle: str) -> None:
+    """Raise for a vehicle whose numbers mean something else in the physical model, which is what an FMU holds."""
+    frozen = vehicle_provenance(vehicle)
+    load_vehicle(vehicle)
+    if frozen is not None and frozen.mode != "coupled":
+        raise InputError(
+            f"{shorten(vehicle)}: was fitted in {frozen.mode} mode, and an FMU drives the physical model, in which its"
+            " numbers mean something else: take one of coupled mode, such as multibody-grown"
+        )
