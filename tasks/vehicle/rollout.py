@@ -16,6 +16,7 @@ from tasks.vehicle.history import History
 from tasks.vehicle.model.brake_input import make_command_input
 from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import COLUMNS, Recording, Simulation, simulate
+from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, sample_history
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
@@ -92,6 +93,7 @@ def simulate_scenario(
     mode: Mode,
     duration_s: float,
     step_s: float = INTERNAL_STEP_S,
+    steady: SteadyStop | None = None,
 ) -> Rollout:
     """Simulate one scenario; after a stop the vehicle stands and its body comes to rest too.
 
@@ -104,6 +106,7 @@ def simulate_scenario(
     mode : paper follows the publication, coupled is the physical model
     duration_s : length of the telemetry, whole milliseconds [s]
     step_s : internal step, a whole fraction of a millisecond [s]
+    steady : of paper mode: how the end of a stop is kept steady; None takes the published steps literally
 
     Raises
     ------
@@ -117,7 +120,7 @@ def simulate_scenario(
     if mode == "paper":
         run = run_paper_mode(
             vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile,
-            hazard, StepGrid(steps=ticks * per_tick, step=step_s),
+            hazard, StepGrid(steps=ticks * per_tick, step=step_s), steady,
         )  # fmt: skip
         history = sample_history(run, step_s, per_tick)
     else:
