@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.cameras import load_camera
+from catalogs.low_speed import load_kept_low_speed
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.surfaces import load_surface
@@ -88,8 +89,9 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         snow_depth_mm=float(row["snow_depth_mm"]),
     )
     ride = simulate_scenario(
-        vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s
-    )
+        vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s,
+        steady=load_kept_low_speed(layout.inputs),
+    )  # fmt: skip
     response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(scenario), surface, vehicle, row),

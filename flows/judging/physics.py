@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 
 from catalogs.documents import read_yaml
+from catalogs.low_speed import load_kept_low_speed
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from flows.making.plan import TICK_RATE_HZ
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
@@ -107,7 +109,8 @@ def read_constants(root: Path) -> Constants:
     vehicle = load_vehicle(files["vehicle"], layout.inputs / "weather")
     pavement = load_surface(files["surface"], layout.inputs / "weather")
     car = read_yaml(files["vehicle"], "catalogue entry")
-    mode = recorded_grid(read_plan_record(layout)["grid"], layout.plan).vehicle_mode
+    settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
+    mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
     if mode != "paper" or car.get("effects"):
         raise InputError(
             f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"
@@ -120,7 +123,11 @@ def read_constants(root: Path) -> Constants:
     families = {**vehicle.shared_families, **vehicle.families}
     tyres = {kind: TyreTables(**vars(family)) for kind, family in families.items()}
     surface = {name: value for name, value in vars(pavement).items() if isinstance(value, float)}
-    return Constants(car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode)
+    return Constants(
+        car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode,
+        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
+        steady_limit=0.0 if steady is None else steady.explicit_limit,
+    )  # fmt: skip
 
 
 def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from catalogs.cameras import load_camera
 from catalogs.gates import load_gates
 from catalogs.hazard_markings import load_marking
+from catalogs.low_speed import load_kept_low_speed
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.studies import load_sensitivity_study
@@ -48,6 +49,7 @@ from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.scene import Scene
 from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
 
@@ -64,6 +66,7 @@ class Catalogue:
     gates: PoseThresholds
     study: StudyProtocol
     marking: HazardMarking | None = None
+    steady: SteadyStop | None = None
 
     @property
     def looks(self) -> WeatherParameters:
@@ -93,6 +96,7 @@ def load_catalogue(inputs: Path, scene: str) -> Catalogue:
         gates=load_gates(inputs / "gates.yaml"),
         marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
         study=load_sensitivity_study(inputs / "study.yaml")[0],
+        steady=load_kept_low_speed(inputs),
     )
 
 
@@ -107,11 +111,10 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     catalogue = catalogue_of(layout.root)
 
     mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
-    state, ride = simulate_drive(clip.scenario, catalogue.vehicle, catalogue.surface, mode, duration_s)
+    drive = (catalogue.vehicle, catalogue.surface)
+    state, ride = simulate_drive(clip.scenario, *drive, mode, duration_s, catalogue.steady)
     facts = surface_figures(state, ride)
-    ranges = ranges_of(
-        clip.scenario, state, catalogue.vehicle, catalogue.surface, catalogue.study, mode, duration_s
-    )
+    ranges = ranges_of(clip.scenario, state, *drive, catalogue.study, mode, duration_s, catalogue.steady)
     frames = frame_rows(ride, plan, catalogue)
     buffers: dict[str, NDArray[Any]] = {}
     if plan.settings.pictures:
@@ -163,11 +166,12 @@ def warm_up(layout: Layout, scene: str) -> None:
     plan = read_plan(root)
     remember_place(plan.scene["sha256"], scene)
     catalogue = catalogue_of(root)
-    short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
+    short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2, "duration_s": None}))
     for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
         state, ride = simulate_drive(
-            clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, short.duration_s
-        )
+            clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, short.duration_s,
+            catalogue.steady,
+        )  # fmt: skip
         frames = frame_rows(ride, short, catalogue)
         if plan.settings.pictures:
             rig_at = rig_of(ride, frames, catalogue)

@@ -266,9 +266,7 @@ def integrate_superposed(
         if n + 1 == len(moment):
             break
         brake = step_half_car(brake, level, level, (moment[n], moment[n + 1]), step, car)
-        bump = step_half_car(
-            bump, (road_f[n], road_f[n + 1]), (road_r[n], road_r[n + 1]), level, step, car
-        )
+        bump = step_half_car(bump, (road_f[n], road_f[n + 1]), (road_r[n], road_r[n + 1]), level, step, car)
     return states
 
 

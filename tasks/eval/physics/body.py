@@ -164,7 +164,10 @@ def surface_laws(facts: Mapping[str, Any], constants: Constants) -> list[Law | N
 
 
 def frame_laws(
-    ticks: Mapping[str, Floats], frames: Mapping[str, NDArray[Any]], facts: Mapping[str, Any]
+    ticks: Mapping[str, Floats],
+    frames: Mapping[str, NDArray[Any]],
+    facts: Mapping[str, Any],
+    constants: Constants,
 ) -> list[Law | None]:
     """Return the laws that each frame row equals its nearest tick and that its surface is the clip's.
 
@@ -172,10 +175,11 @@ def frame_laws(
     ----------
     ticks, frames : columns of the two tables
     facts : the clip's row
+    constants : car and pavement
     """
     tick, number = frames["tick"], np.arange(len(frames["tick"]))
     last = len(ticks["speed"]) - 1
-    spacing = last / max(len(number) - 1, 1)
+    spacing = constants.ticks_per_frame
     laws = [
         evaluate_law("frames are counted", "frame", (frames["frame"] - number).astype(float), 0.5, "frames"),
         evaluate_law("frames show the nearest tick", "tick", tick - number * spacing, 0.5 + 1e-6, "frames"),

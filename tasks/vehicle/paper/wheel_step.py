@@ -13,7 +13,7 @@ from tasks.vehicle.tyres.contract import Tyre, compute_tyre_friction, compute_ty
 
 MOST_ITERATIONS = 60
 """Newton steps, each of which at least halves the bracket where it leaves it; two or three are usual [1]."""
-SLIP_TOLERANCE = 1e-8
+SLIP_TOLERANCE = 1e-10
 """Last Newton step of the slip [1]; the error that it leaves is of the order of its square."""
 
 
