@@ -41,7 +41,7 @@ class GridFile(Blocks):
     )
     low_speed: Literal["steady", "literal"] = Field(
         default="steady",
-        description="End of a stop in paper mode: steady hangs on no single sample; literal is Appendix B word by word.",
+        description="End of a stop in paper mode: steady rests on no one sample; literal is Appendix B word by word.",
     )
     seed: Whole = Field(default=2025, ge=0, lt=2**53)
     visual_seeds: Whole = Field(

@@ -28,7 +28,7 @@ from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
-from tasks.vehicle.rollout import Mode, Rollout
+from tasks.vehicle.rollout import Mode, Rollout, compute_lift_times
 
 SMALL, LARGE = (1.01, 0.99), (2.0, 0.5)
 """Factors on a line's numbers [1]: a small one, the second where a rule forbids the first; and where that moves no
@@ -134,6 +134,7 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
         "stop_time": ride.stop_time,
         "stopping_distance": ride.stopping_distance,
         "peak_pitch": float(ride.columns["pitch"].max()),
+        **compute_lift_times(ride.columns),
         "static_pitch": ride.static_pitch,
     }
     numbers = {**surface_figures(state, ride), **ride.columns, "T_world_rig": poses, **figures, **ranges}

@@ -27,7 +27,7 @@ from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, sur
 from tasks.scene.route import Route
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import compute_surface_response
-from tasks.vehicle.rollout import simulate_scenario
+from tasks.vehicle.rollout import compute_lift_times, simulate_scenario
 
 
 def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None) -> dict[str, Any]:
@@ -43,8 +43,8 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     Returns
     -------
     ``steps[]`` with quantity, symbol, paper equation, formula, unit, ``recomputed`` and ``stored``; ``agrees``,
-    whether all that must be equal is; ``effects`` that the vehicle adds to the paper's equations: where there are
-    any, a step that they enter differs by what they do.
+    whether all that must be equal is; ``wheel_lift_time_f`` and ``_r`` of the clip [s]; ``effects`` that the vehicle
+    adds to the paper's equations: where there are any, a step that they enter differs by what they do.
 
     Raises
     ------
@@ -111,6 +111,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         "asked": _list_scenario(scenario),
         "steps": [_as_row(step) for step in steps],
         "agrees": all(step.agrees for step in steps),
+        **compute_lift_times(ride.columns),
     }
     results.write_json("explain.json", result)
     results.write("explain.txt", format_text(result))
@@ -140,6 +141,16 @@ def format_text(result: Mapping[str, Any]) -> str:
             lines.append(f"    {value.rstrip()}; {word}")
     if result["effects"]:
         lines.append(f"the vehicle adds to these equations: {', '.join(result['effects'])}")
+    front, rear = (result[f"wheel_lift_time_{axle}"] * 1000 for axle in "fr")
+    if front or rear:
+        lines.append(
+            f"wheels leave the road in this clip: the front axle for {front:.0f} ms, the rear for {rear:.0f} ms"
+            + (
+                "; road and brake response are added all the same, which is exact only in contact (Appendix B)"
+                if result["vehicle_mode"] == "paper"
+                else ""
+            )
+        )
     lines.append("all stored numbers follow" if result["agrees"] else "some stored numbers do not follow")
     return "\n".join(lines) + "\n"
 

@@ -16,9 +16,16 @@ from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_plan_record, recorded_grid
 from flows.store.telemetry import read_columns, read_table
-from tasks.conventions import CLIP_CHANNELS, FRAME_CHANNELS, IDENTITY_CHANNELS, TICK_CHANNELS
+from tasks.conventions import (
+    CLIP_CHANNELS,
+    FRAME_CHANNELS,
+    IDENTITY_CHANNELS,
+    LATER_CLIP_CHANNELS,
+    TICK_CHANNELS,
+)
 from tasks.errors import InputError
 from tasks.eval.physics.audit import PhysicsVerdict, audit_clip
+from tasks.eval.physics.body import DT
 from tasks.eval.physics.constants import Constants, TyreTables
 from tasks.eval.physics.laws import finite_rows
 
@@ -52,6 +59,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         "verified": not broken,
         "clips_checked": len(rows),
         "laws_checked": sum(row["laws"] for row in rows),
+        "wheels_lifted": [row["label"] for row in rows if not row["superposition_holds"]],
         "clips": rows,
     }
     results.write_json("physics.json", result)
@@ -67,7 +75,8 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
         If the table is missing.
     """
     path = Layout(root).telemetry / "clips.parquet"
-    required = [channel.name for channel in (*IDENTITY_CHANNELS, *CLIP_CHANNELS)]
+    known = [channel.name for channel in (*IDENTITY_CHANNELS, *CLIP_CHANNELS)]
+    required = [name for name in known if name not in LATER_CLIP_CHANNELS]
     rows: list[dict[str, Any]] = read_table(path, required=required).to_pylist()
     return rows
 
@@ -145,7 +154,12 @@ def _clip_row(root: Path, facts: dict[str, Any], constants: Constants) -> dict[s
     holes = [f"ticks.{c}" for c in finite_rows(ticks)]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
         verdict = audit_clip(ticks, frames, facts, constants)
-    return {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
+    lifted = {
+        f"wheel_lift_time_{axle}": float(np.sum(~ticks[f"contact_{axle}"].astype(bool))) * DT for axle in "fr"
+    }
+    contact = lifted | {"superposition_holds": not any(lifted.values())}
+    row = {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
+    return row | contact
 
 
 def _as_row(verdict: PhysicsVerdict) -> dict[str, Any]:

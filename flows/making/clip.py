@@ -51,7 +51,7 @@ from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Rollout
+from tasks.vehicle.rollout import Rollout, compute_lift_times
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,6 +144,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
             "stop_time": ride.stop_time,
             "stopping_distance": ride.stopping_distance,
             "peak_pitch": float(ride.columns["pitch"].max()),
+            **compute_lift_times(ride.columns),
             "static_pitch": ride.static_pitch,
             "calibration_extrapolated": ride.calibration_extrapolated,
         } | ranges),

@@ -22,7 +22,7 @@ def simulate_drive(
     duration_s: float,
     steady: SteadyStop | None = None,
 ) -> tuple[SurfaceState, Rollout]:
-    """Simulate a scenario: weather to surface state to friction to vehicle motion; ``steady`` is as the rollout has it."""
+    """Simulate a scenario: weather to surface state to friction to motion; ``steady`` is as the rollout has it."""
     state = surface_state(weather_of(scenario), surface)
     return state, _simulate_vehicle(scenario, vehicle, state, mode, duration_s, steady)
 

@@ -154,13 +154,9 @@ def frozen_settings(settings: GridFile) -> dict[str, Any]:
     ----------
     settings : of the grid
     """
-    dumped = settings.model_dump(mode="json")
-    kept = settings.model_dump(mode="json", exclude_defaults=True)
-    return {
-        name: value
-        for name, value in dumped.items()
-        if (dumped[name] != BEFORE[name] if name in BEFORE else name in kept)
-    }
+    kept = settings.model_dump(mode="json", exclude_defaults=True, exclude=set(BEFORE))
+    now = settings.model_dump(mode="json", include=set(BEFORE))
+    return kept | {name: value for name, value in now.items() if value != BEFORE[name]}
 
 
 def problems_of(frozen: FrozenRun) -> list[str]:

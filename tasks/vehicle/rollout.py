@@ -1,5 +1,6 @@
 """From controls to telemetry: one rollout, logged at 1 kHz in the columns of the tick table."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Any, Literal
@@ -155,6 +156,22 @@ def simulate_scenario(
         stopping_distance=distance,
         calibration_extrapolated=response.extrapolated,
     )
+
+
+def compute_lift_times(columns: Mapping[str, NDArray[Any]]) -> dict[str, float]:
+    """Return ``wheel_lift_time_f`` and ``wheel_lift_time_r``: for how long each axle is off the road [s].
+
+    Where one is not 0 the unilateral clamp of Eq. app_unilateral_contact acts, and the sum of the responses to road and
+    brake, which paper mode forms, is no longer the response to both.
+
+    Parameters
+    ----------
+    columns : of the ticks
+    """
+    return {
+        f"wheel_lift_time_{axle}": int(np.sum(~columns[f"contact_{axle}"].astype(bool))) * TICK_NS / 1e9
+        for axle in "fr"
+    }
 
 
 def _collect_history(run: Simulation) -> History:

@@ -253,6 +253,12 @@ def outcome_laws(
         evaluate_law("static pitch is the car's", "clips.static_pitch",
             np.array([facts["static_pitch"] - constants.car["static_pitch"]]), 1e-9),
     ]  # fmt: skip
+    laws += [
+        evaluate_law(f"wheel lift is time without contact, {axle}", f"clips.wheel_lift_time_{axle} contact_{axle}",
+            np.array([facts[f"wheel_lift_time_{axle}"] - DT * np.sum(np.asarray(ticks[f"contact_{axle}"]) < 0.5)]),
+            0.5 * DT)
+        for axle in "fr" if f"wheel_lift_time_{axle}" in facts
+    ]  # fmt: skip
     standing = np.flatnonzero(v <= 0)
     if standing.size:
         laws.append(

@@ -1,4 +1,4 @@
-"""The implicit step of a wheel, for speeds at which the explicit one is too long (paper, Eq. app_longitudinal_complete).
+"""The implicit step of a wheel, where the explicit one is too long (paper, Eq. app_longitudinal_complete).
 
 Slip answers to the wheel speed within I_w v / (R^2 dF_x/dkappa), which falls with the speed to less than the published
 step. Explicit steps then throw the slip from one side of its target to the other. The implicit step solves the same
