@@ -65,8 +65,9 @@ def _measure_clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, d
     rates, values = {}, {}
     for clip in plan.clips:
         state, ride = simulate_drive(
-            clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
-        )
+            clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
+            catalogue.steady,
+        )  # fmt: skip
         frames = frame_rows(ride, plan, catalogue)
         rig_at = rig_of(ride, frames, catalogue)
         shown = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)

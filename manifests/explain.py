@@ -5,6 +5,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from catalogs.documents import parse_yaml_value
+from catalogs.grids.form import BEFORE
 from catalogs.tyres import tyre_entries
 from manifests.canonical import sha256_of
 from manifests.provenance import code_version, describe_processor, library_versions
@@ -16,6 +17,7 @@ REACHES = {
     "surface.yaml": (VEHICLE, RENDER),
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
+    "low_speed.yaml": (VEHICLE, RENDER),
     "gates.yaml": (JUDGING,),
     "study.yaml": (JUDGING,),
     "weather": (RENDER,),
@@ -26,6 +28,8 @@ REACHES = {
     "vehicle_mode": (VEHICLE, RENDER),
     "composition": (RENDER,),
     "frames": (VEHICLE, RENDER),
+    "duration_s": (VEHICLE,),
+    "low_speed": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
     "seed": (RENDER,),
     "code": (VEHICLE, RENDER, JUDGING),
@@ -67,8 +71,9 @@ def input_differences(
             )
     rows += _list_rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
     rows += _list_rows("backend", "backend", a["backend"], b["backend"])
-    for name in ("vehicle_mode", "composition", "frames", "frame_rate_hz", "seed"):
-        rows += _list_rows(name, name, a["grid"].get(name), b["grid"].get(name))
+    for name in ("vehicle_mode", "low_speed", "composition", "frames", "frame_rate_hz", "duration_s", "seed"):
+        before = BEFORE.get(name)
+        rows += _list_rows(name, name, a["grid"].get(name, before), b["grid"].get(name, before))
     return rows + tool_differences(a, b)
 
 

@@ -6,7 +6,7 @@ path is one of those that muSync writes, below the dataset's folder.
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypeVar, get_type_hints
 
 from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationError, with_config
 from typing_extensions import TypedDict
@@ -14,7 +14,7 @@ from typing_extensions import TypedDict
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from manifests.canonical import ID_LENGTH
-from tasks.conventions import CLIP_CHANNELS
+from tasks.conventions import CLIP_CHANNELS, LATER_CLIP_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseVerdict
 
@@ -55,7 +55,11 @@ else:
     ScenarioRecord = with_config(STRICT)(
         TypedDict("ScenarioRecord", get_type_hints(Scenario, include_extras=True))
     )
-    _figures = {c.name: float | None for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
+    _figures = {
+        c.name: NotRequired[float | None] if c.name in LATER_CLIP_CHANNELS else float | None
+        for c in CLIP_CHANNELS
+        if c.name not in SCENARIO_FIELDS
+    }
     FiguresRecord = with_config(STRICT)(
         TypedDict("FiguresRecord", {**_figures, "calibration_extrapolated": bool})
     )

@@ -82,6 +82,8 @@ def _leave_out(kept: dict[str, Any], place: Place, unknown: dict[Place, set[str]
             kept["name"] = "unnamed"
         if block == "frames":  # the rate's rule is about both
             kept.pop("frame_rate_hz", None)
+        if block in ("frames", "frame_rate_hz"):
+            kept.pop("duration_s", None)
         if block == "frame_rate_hz":
             kept.pop("frames", None)
         return block not in (*BLOCKS, "exclude")

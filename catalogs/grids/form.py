@@ -16,6 +16,9 @@ MOST_CLIPS = 100_000
 Reference = Annotated[str, Field(min_length=1, max_length=4096)]
 """Name or file of an entry; 4096 characters are the longest path."""
 
+BEFORE = {"low_speed": "literal"}
+"""What a record means that was written before a setting with another default; grid files mean the default."""
+
 
 class GridFile(Blocks):
     """A grid as written in YAML."""
@@ -31,6 +34,15 @@ class GridFile(Blocks):
     vehicle_mode: Literal["paper", "coupled"] = "paper"
     frames: Whole = Field(default=81, ge=2, le=int(LIMITS.frames.value))
     frame_rate_hz: LaxNumber = Field(default=10.0, gt=0, le=LIMITS.frame_rate.value, validate_default=True)
+    duration_s: LaxNumber | None = Field(
+        default=None,
+        gt=0,
+        description="Length of the telemetry from the first frame on; without it, it ends with the last frame.",
+    )
+    low_speed: Literal["steady", "literal"] = Field(
+        default="steady",
+        description="End of a stop in paper mode: steady rests on no one sample; literal is Appendix B word by word.",
+    )
     seed: Whole = Field(default=2025, ge=0, lt=2**53)
     visual_seeds: Whole = Field(
         default=1, ge=1, le=1000, description="Clips of each scenario, with visual seeds from seed upward."
@@ -56,6 +68,33 @@ class GridFile(Blocks):
         if problem := limit_problem("(frames - 1) / frame_rate_hz", (frames - 1) / rate, LIMITS.duration):
             raise ValueError(problem)
         return rate
+
+    @field_validator("duration_s")
+    @classmethod
+    def _telemetry_covers_the_frames(cls, duration: float | None, info: ValidationInfo) -> float | None:
+        if duration is None or not {"frames", "frame_rate_hz"} <= info.data.keys():
+            return duration
+        if problem := limit_problem("duration_s", duration, LIMITS.duration):
+            raise ValueError(problem)
+        if abs(duration * 1000 - round(duration * 1000)) > 1e-6:
+            raise ValueError(f"must be whole milliseconds; it is {duration} s")
+        shown = (info.data["frames"] - 1) / info.data["frame_rate_hz"]
+        if duration < shown:
+            raise ValueError(
+                f"must reach the last frame, at (frames - 1) / frame_rate_hz = {shown:g} s; it is {duration:g} s"
+            )
+        return duration
+
+    @property
+    def telemetry_s(self) -> float:
+        """Length of the telemetry of every clip [s]."""
+        shown = (self.frames - 1) / self.frame_rate_hz
+        return shown if self.duration_s is None else self.duration_s
+
+    @property
+    def keeps_stops_steady(self) -> bool:
+        """Whether the numbers of ``catalogs/low_speed.yaml`` reach the motion; coupled mode has no such rule."""
+        return self.vehicle_mode == "paper" and self.low_speed == "steady"
 
     @model_validator(mode="after")
     def _clips_are_few_enough(self) -> "GridFile":

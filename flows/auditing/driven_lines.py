@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from catalogs.low_speed import load_kept_low_speed
 from catalogs.scenario import Scenario, scenario_problems
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
@@ -25,8 +26,9 @@ from tasks.render.camera import body_poses
 from tasks.scene.route import Route
 from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
-from tasks.vehicle.rollout import Mode, Rollout
+from tasks.vehicle.rollout import Mode, Rollout, compute_lift_times
 
 SMALL, LARGE = (1.01, 0.99), (2.0, 0.5)
 """Factors on a line's numbers [1]: a small one, the second where a rule forbids the first; and where that moves no
@@ -44,6 +46,7 @@ class Entries:
     vehicle: Vehicle
     surface: SurfaceParameters
     study: StudyProtocol
+    steady: SteadyStop | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,6 +102,7 @@ def load_entries(inputs: Path) -> Entries:
         vehicle=load_vehicle(inputs / "vehicle.yaml", inputs / "weather"),
         surface=load_surface(inputs / "surface.yaml", inputs / "weather"),
         study=load_sensitivity_study(inputs / STUDY)[0],
+        steady=load_kept_low_speed(inputs),
     )
 
 
@@ -110,18 +114,27 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
     asked : the drive
     entries : that it is driven with
     """
-    vehicle, surface = entries.vehicle, entries.surface
-    state, ride = simulate_drive(asked.scenario, vehicle, surface, asked.mode, asked.duration_s)
-    ranges = ranges_of(asked.scenario, state, vehicle, surface, entries.study, asked.mode, asked.duration_s)
+    vehicle, surface, steady = entries.vehicle, entries.surface, entries.steady
+    state, ride = simulate_drive(asked.scenario, vehicle, surface, asked.mode, asked.duration_s, steady)
+    ranges = ranges_of(
+        asked.scenario, state, vehicle, surface, entries.study, asked.mode, asked.duration_s, steady
+    )
     straight = Route(station=np.array([0.0, 1.0]), T_world_rig=np.tile(np.eye(4), (2, 1, 1)))
+    # the telemetry may go on beyond the route, where no frame is
+    reached = (
+        ride.columns["station"]
+        if asked.route is None
+        else np.minimum(ride.columns["station"], asked.route.length)
+    )
     poses = body_poses(
-        asked.route or straight, ride.columns["station"], ride.columns["heave"], ride.columns["pitch"],
+        asked.route or straight, reached, ride.columns["heave"], ride.columns["pitch"],
         cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
     )  # fmt: skip
     figures = {
         "stop_time": ride.stop_time,
         "stopping_distance": ride.stopping_distance,
         "peak_pitch": float(ride.columns["pitch"].max()),
+        **compute_lift_times(ride.columns),
         "static_pitch": ride.static_pitch,
     }
     numbers = {**surface_figures(state, ride), **ride.columns, "T_world_rig": poses, **figures, **ranges}

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.cameras import load_camera
+from catalogs.low_speed import load_kept_low_speed
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.surfaces import load_surface
@@ -27,7 +28,7 @@ from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, sur
 from tasks.scene.route import Route
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import compute_surface_response
-from tasks.vehicle.rollout import simulate_scenario
+from tasks.vehicle.rollout import compute_lift_times, simulate_scenario
 
 
 def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None) -> dict[str, Any]:
@@ -43,8 +44,8 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     Returns
     -------
     ``steps[]`` with quantity, symbol, paper equation, formula, unit, ``recomputed`` and ``stored``; ``agrees``,
-    whether all that must be equal is; ``effects`` that the vehicle adds to the paper's equations: where there are
-    any, a step that they enter differs by what they do.
+    whether all that must be equal is; ``wheel_lift_time_f`` and ``_r`` of the clip [s]; ``effects`` that the vehicle
+    adds to the paper's equations: where there are any, a step that they enter differs by what they do.
 
     Raises
     ------
@@ -90,8 +91,9 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         snow_depth_mm=float(row["snow_depth_mm"]),
     )
     ride = simulate_scenario(
-        vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s
-    )
+        vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s,
+        steady=load_kept_low_speed(layout.inputs),
+    )  # fmt: skip
     response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(scenario), surface, vehicle, row),
@@ -111,6 +113,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         "asked": _list_scenario(scenario),
         "steps": [_as_row(step) for step in steps],
         "agrees": all(step.agrees for step in steps),
+        **compute_lift_times(ride.columns),
     }
     results.write_json("explain.json", result)
     results.write("explain.txt", format_text(result))
@@ -140,6 +143,16 @@ def format_text(result: Mapping[str, Any]) -> str:
             lines.append(f"    {value.rstrip()}; {word}")
     if result["effects"]:
         lines.append(f"the vehicle adds to these equations: {', '.join(result['effects'])}")
+    front, rear = (result[f"wheel_lift_time_{axle}"] * 1000 for axle in "fr")
+    if front or rear:
+        lines.append(
+            f"wheels leave the road in this clip: the front axle for {front:.0f} ms, the rear for {rear:.0f} ms"
+            + (
+                "; road and brake response are added all the same, which is exact only in contact (Appendix B)"
+                if result["vehicle_mode"] == "paper"
+                else ""
+            )
+        )
     lines.append("all stored numbers follow" if result["agrees"] else "some stored numbers do not follow")
     return "\n".join(lines) + "\n"
 

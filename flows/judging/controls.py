@@ -249,6 +249,7 @@ def _make_faulty_claims(
             catalogue.surface,
             plan.settings.vehicle_mode,
             plan.duration_s,
+            catalogue.steady,
         )
         made[variant] = Claim(pitch=ride.columns["pitch"][ticks], station=ride.columns["station"][ticks])
     for name, claim in made.items():

@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 
 from catalogs.documents import read_yaml
+from catalogs.low_speed import load_kept_low_speed
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from flows.making.plan import TICK_RATE_HZ
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading, want_telemetry
@@ -15,9 +17,16 @@ from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_plan_record, recorded_grid
 from flows.store.telemetry import read_columns, read_table
-from tasks.conventions import CLIP_CHANNELS, FRAME_CHANNELS, IDENTITY_CHANNELS, TICK_CHANNELS
+from tasks.conventions import (
+    CLIP_CHANNELS,
+    FRAME_CHANNELS,
+    IDENTITY_CHANNELS,
+    LATER_CLIP_CHANNELS,
+    TICK_CHANNELS,
+)
 from tasks.errors import InputError
 from tasks.eval.physics.audit import PhysicsVerdict, audit_clip
+from tasks.eval.physics.body import DT
 from tasks.eval.physics.constants import Constants, TyreTables
 from tasks.eval.physics.laws import finite_rows
 
@@ -52,6 +61,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         "verified": not broken,
         "clips_checked": len(rows),
         "laws_checked": sum(row["laws"] for row in rows),
+        "wheels_lifted": [row["label"] for row in rows if not row["superposition_holds"]],
         "clips": rows,
     }
     results.write_json("physics.json", result)
@@ -67,7 +77,8 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
         If the table is missing.
     """
     path = Layout(root).telemetry / "clips.parquet"
-    required = [channel.name for channel in (*IDENTITY_CHANNELS, *CLIP_CHANNELS)]
+    known = [channel.name for channel in (*IDENTITY_CHANNELS, *CLIP_CHANNELS)]
+    required = [name for name in known if name not in LATER_CLIP_CHANNELS]
     rows: list[dict[str, Any]] = read_table(path, required=required).to_pylist()
     return rows
 
@@ -109,7 +120,8 @@ def read_constants(root: Path) -> Constants:
     vehicle = load_vehicle(files["vehicle"], layout.inputs / "weather")
     pavement = load_surface(files["surface"], layout.inputs / "weather")
     car = read_yaml(files["vehicle"], "catalogue entry")
-    mode = recorded_grid(read_plan_record(layout)["grid"], layout.plan).vehicle_mode
+    settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
+    mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
     if mode != "paper" or car.get("effects"):
         raise InputError(
             f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"
@@ -122,7 +134,11 @@ def read_constants(root: Path) -> Constants:
     families = {**vehicle.shared_families, **vehicle.families}
     tyres = {kind: TyreTables(**vars(family)) for kind, family in families.items()}
     surface = {name: value for name, value in vars(pavement).items() if isinstance(value, float)}
-    return Constants(car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode)
+    return Constants(
+        car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode,
+        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
+        steady_limit=0.0 if steady is None else steady.explicit_limit,
+    )  # fmt: skip
 
 
 def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
@@ -140,7 +156,12 @@ def _clip_row(root: Path, facts: dict[str, Any], constants: Constants) -> dict[s
     holes = [f"ticks.{c}" for c in finite_rows(ticks)]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
         verdict = audit_clip(ticks, frames, facts, constants)
-    return {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
+    lifted = {
+        f"wheel_lift_time_{axle}": float(np.sum(~ticks[f"contact_{axle}"].astype(bool))) * DT for axle in "fr"
+    }
+    contact = lifted | {"superposition_holds": not any(lifted.values())}
+    row = {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
+    return row | contact
 
 
 def _as_row(verdict: PhysicsVerdict) -> dict[str, Any]:

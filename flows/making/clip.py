@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from catalogs.cameras import load_camera
 from catalogs.gates import load_gates
 from catalogs.hazard_markings import load_marking
+from catalogs.low_speed import load_kept_low_speed
 from catalogs.references import read_reference
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
@@ -51,8 +52,9 @@ from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.scene import Scene
 from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Rollout
+from tasks.vehicle.rollout import Rollout, compute_lift_times
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +70,7 @@ class Catalogue:
     study: StudyProtocol
     marking: HazardMarking | None = None
     traces: Reference | None = None
+    steady: SteadyStop | None = None
 
     @property
     def looks(self) -> WeatherParameters:
@@ -98,6 +101,7 @@ def load_catalogue(inputs: Path, scene: str) -> Catalogue:
         marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
         study=load_sensitivity_study(inputs / "study.yaml")[0],
         traces=read_reference(traces) if (traces := inputs / TRACES).is_dir() else None,
+        steady=load_kept_low_speed(inputs),
     )
 
 
@@ -115,7 +119,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     facts = surface_figures(state, ride)
     ranges = unknown_ranges() if catalogue.traces is not None else ranges_of(
         clip.scenario, state, catalogue.vehicle, catalogue.surface, catalogue.study,
-        plan.settings.vehicle_mode, plan.duration_s,
+        plan.settings.vehicle_mode, plan.duration_s, catalogue.steady,
     )  # fmt: skip
     frames = frame_rows(ride, plan, catalogue)
     buffers: dict[str, NDArray[Any]] = {}
@@ -146,6 +150,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
             "stop_time": ride.stop_time,
             "stopping_distance": ride.stopping_distance,
             "peak_pitch": float(ride.columns["pitch"].max()),
+            **compute_lift_times(ride.columns),
             "static_pitch": ride.static_pitch,
             "calibration_extrapolated": ride.calibration_extrapolated,
         } | ranges),
@@ -168,7 +173,7 @@ def warm_up(layout: Layout, scene: str) -> None:
     plan = read_plan(root)
     remember_place(plan.scene["sha256"], scene)
     catalogue = catalogue_of(root)
-    short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2}))
+    short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2, "duration_s": None}))
     for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
         state, ride = move_car(clip.scenario, short, catalogue)
         frames = frame_rows(ride, short, catalogue)
@@ -183,8 +188,9 @@ def move_car(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[Surf
     if catalogue.traces is not None:
         return replay_drive(scenario, catalogue.surface, catalogue.traces, plan.duration_s)
     return simulate_drive(
-        scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
-    )
+        scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
+        catalogue.steady,
+    )  # fmt: skip
 
 
 def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:

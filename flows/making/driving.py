@@ -9,6 +9,7 @@ from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Mode, Rollout, simulate_scenario
 
@@ -19,10 +20,11 @@ def simulate_drive(
     surface: SurfaceParameters,
     mode: Mode,
     duration_s: float,
+    steady: SteadyStop | None = None,
 ) -> tuple[SurfaceState, Rollout]:
-    """Simulate a scenario: weather to surface state to friction to vehicle motion."""
+    """Simulate a scenario: weather to surface state to friction to motion; ``steady`` is as the rollout has it."""
     state = surface_state(weather_of(scenario), surface)
-    return state, _simulate_vehicle(scenario, vehicle, state, mode, duration_s)
+    return state, _simulate_vehicle(scenario, vehicle, state, mode, duration_s, steady)
 
 
 def surface_figures(state: SurfaceState, ride: Rollout) -> dict[str, float]:
@@ -44,21 +46,29 @@ def ranges_of(
     study: StudyProtocol,
     mode: Mode,
     duration_s: float,
+    steady: SteadyStop | None = None,
 ) -> dict[str, float]:
     """Percentiles of the clip's labels under the bounds of the surface parameters; the snow's depth stays nominal."""
 
     def again(friction: float) -> tuple[float, float]:
-        ride = _simulate_vehicle(scenario, vehicle, replace(state, friction=friction), mode, duration_s)
+        ride = _simulate_vehicle(
+            scenario, vehicle, replace(state, friction=friction), mode, duration_s, steady
+        )
         return ride.stopping_distance, float(ride.columns["pitch"].max())
 
     return label_ranges(sampled_friction(weather_of(scenario), surface, study), again)
 
 
 def _simulate_vehicle(
-    scenario: Scenario, vehicle: Vehicle, state: SurfaceState, mode: Mode, duration_s: float
+    scenario: Scenario,
+    vehicle: Vehicle,
+    state: SurfaceState,
+    mode: Mode,
+    duration_s: float,
+    steady: SteadyStop | None,
 ) -> Rollout:
     return simulate_scenario(
-        vehicle, state, controls_of(scenario), hazard_of(scenario), mode=mode, duration_s=duration_s
+        vehicle, state, controls_of(scenario), hazard_of(scenario), mode=mode, duration_s=duration_s, steady=steady
     )  # fmt: skip
 
 

@@ -2,11 +2,14 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from catalogs.entries import entry_names
 from catalogs.grids import Grid, GridFile, expand_grid, load_grid
+from catalogs.grids.form import BEFORE
+from catalogs.low_speed import load_low_speed
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import simulate_drive
@@ -35,10 +38,15 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 
 SHOWN_DIFFERENCES = 8
+RULES = ("low_speed", "duration_s")
+"""Settings that grids gained after runs of them were frozen."""
 
 
 def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, Any]:
     """Freeze the run of a grid, or freeze again those that ship with the project.
+
+    A run that ships keeps the rules (`RULES`) that it was first frozen under, whatever its grid asks for today: who has
+    its name gets the bytes that it always gave. ``out`` freezes a grid as it is.
 
     Parameters
     ----------
@@ -67,10 +75,13 @@ def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, 
     rows = []
     with progress_bar("frozen", len(names)) as advance:
         for name in names:
-            run = frozen_run(load_grid(name))
-            file = Path(out) if out is not None else FOLDER / f"{run['name']}.json"
+            grid_asked = load_grid(name)
+            file = Path(out) if out is not None else FOLDER / f"{grid_asked.settings.name}.json"
             refuse_link(file)
             before = _frozen_before(file, out is None)
+            run = frozen_run(
+                grid_asked if out is not None or before is None else keep_rules(grid_asked, before)
+            )
             changed = before is None or any(
                 before[key] != run[key] for key in ("grid", "parameters", "clips")
             )
@@ -113,13 +124,39 @@ def frozen_run(grid: Grid) -> dict[str, Any]:
     ticks = ticks_of(plan, grid.settings)
     return seal_run({
         "name": grid.settings.name,
-        "grid": plan.settings.model_dump(mode="json", exclude_defaults=True),
+        "grid": frozen_settings(plan.settings),
         "parameters": _read_parameters(plan, inputs),
         "clips": [clip | {"ticks": ticks[clip["label"]]} for clip in _list_records(plan)],
         "scene": dict(plan.scene),
         "made_with": {key: dict(value) for key, value in plan.made_with.items()},
         "processor": describe_processor(),
     })  # fmt: skip
+
+
+def keep_rules(grid: Grid, before: FrozenRun) -> Grid:
+    """Return a grid under the rules that its frozen run was made by, so that a run that ships stays the same run.
+
+    Parameters
+    ----------
+    grid : as it is in the catalogue now
+    before : its frozen run
+    """
+    recorded = recorded_grid(before["grid"], f"manifest {before['name']}")
+    return replace(
+        grid, settings=grid.settings.model_copy(update={name: getattr(recorded, name) for name in RULES})
+    )
+
+
+def frozen_settings(settings: GridFile) -> dict[str, Any]:
+    """Return the settings of a grid as a frozen run has them: those that are no default, or that an older record lacks.
+
+    Parameters
+    ----------
+    settings : of the grid
+    """
+    kept = settings.model_dump(mode="json", exclude_defaults=True, exclude=set(BEFORE))
+    now = settings.model_dump(mode="json", include=set(BEFORE))
+    return kept | {name: value for name, value in now.items() if value != BEFORE[name]}
 
 
 def problems_of(frozen: FrozenRun) -> list[str]:
@@ -199,14 +236,13 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     """
     names = [channel.name for channel in TICK_CHANNELS]
     vehicle, surface = load_vehicle(asked.vehicle), load_surface(asked.surface)
+    mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
+    steady = load_low_speed() if plan.settings.keeps_stops_steady else None
+    rides = (
+        simulate_drive(clip.scenario, vehicle, surface, mode, duration_s, steady)[1] for clip in plan.clips
+    )
     return {
-        clip.label: columns_hash(
-            simulate_drive(clip.scenario, vehicle, surface, plan.settings.vehicle_mode, plan.duration_s)[
-                1
-            ].columns,
-            names,
-        )
-        for clip in plan.clips
+        clip.label: columns_hash(ride.columns, names) for clip, ride in zip(plan.clips, rides, strict=True)
     }
 
 

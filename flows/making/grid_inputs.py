@@ -10,6 +10,7 @@ from catalogs.entries import find_entry
 from catalogs.gates import GATES
 from catalogs.grids import Grid, GridFile
 from catalogs.hazard_markings import load_marking
+from catalogs.low_speed import LOW_SPEED, load_low_speed
 from catalogs.scenario import route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
@@ -28,6 +29,7 @@ LOADERS: Mapping[str, Callable[[Path], Any]] = {
     "surface.yaml": load_surface,
     "camera.yaml": load_camera,
     "hazard_marking.yaml": load_marking,
+    "low_speed.yaml": load_low_speed,
 }
 """Loaders that check the catalogue entries that a user may bring."""
 READERS: Mapping[str, Callable[[Path], bytes]] = {"vehicle.yaml": vehicle_content}
@@ -49,6 +51,7 @@ def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
         **(
             {} if marking is None else {"hazard_marking.yaml": partial(find_entry, "hazard marking", marking)}
         ),
+        **({"low_speed.yaml": lambda: LOW_SPEED} if settings.keeps_stops_steady else {}),
         **({} if (tyre := _tyre_behind(settings)) is None else {tyre.name: partial(Path, tyre)}),
     }
 
@@ -149,7 +152,7 @@ def _camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:
         camera = load_camera(settings.camera)
     except InputError:
         return []
-    ticks = int((settings.frames - 1) / settings.frame_rate_hz * tick_rate_hz) + 1
+    ticks = int(settings.telemetry_s * tick_rate_hz) + 1
     problems = memory_problems(settings, camera, ticks)
     if settings.composition == "linear" or (camera.plain and camera.sensor == Sensor()):
         return problems

@@ -59,8 +59,8 @@ class Plan:
 
     @property
     def duration_s(self) -> float:
-        """Time from the first frame to the last [s]."""
-        return (self.settings.frames - 1) / self.settings.frame_rate_hz
+        """Length of the telemetry of every clip, from the first frame on [s]."""
+        return self.settings.telemetry_s
 
     def as_json(self) -> dict[str, Any]:
         return self.head_as_json() | {"clips": [clip.as_json() for clip in self.clips]}
@@ -155,6 +155,8 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         "frame_rate_hz": settings.frame_rate_hz,
         # a default that was introduced later is left out, so that older clips keep their ids
         **({} if settings.composition == "linear" else {"composition": settings.composition}),
+        **({"low_speed": settings.low_speed} if settings.keeps_stops_steady else {}),
+        **({} if settings.duration_s is None else {"duration_s": settings.duration_s}),
     }
     clips = tuple(_clip_plans(grid, asked))
     repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()

@@ -107,8 +107,9 @@ def replay_audit(
 
 def _run_clip(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Replay:
     state, ride = simulate_drive(
-        clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s
-    )
+        clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
+        catalogue.steady,
+    )  # fmt: skip
     rows = frame_rows(ride, plan, catalogue)
     shown = {name: column[:frames] for name, column in rows.items()}
     rig_at = rig_of(ride, shown, catalogue)

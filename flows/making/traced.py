@@ -45,7 +45,7 @@ def read_trace_inputs(grid: Grid, folder: Path) -> tuple[dict[str, bytes], list[
     traces = {case.case: columns for case, columns in reference}
     used: dict[str, ReferenceCase] = {}
     problems: list[str] = []
-    last = (grid.settings.frames - 1) / grid.settings.frame_rate_hz
+    last = grid.settings.telemetry_s
     for label, scenario in grid.scenarios:
         try:
             friction = surface_state(weather_of(scenario), surface).friction
@@ -130,7 +130,7 @@ def refuse_traced(inputs: Iterable[str], place: object, command: str) -> None:
 
 
 def _find_gap(name: str, trace: Traces, last: float) -> str | None:
-    """Why a trace cannot show frames from 0 to a last time [s]; None if it can."""
+    """Why a trace cannot give the telemetry from 0 to a last time [s]; None if it can."""
     if CG_HEIGHT not in trace:
         return f"case {name} needs the column {CG_HEIGHT} [m], from which the camera's heave is taken; it is missing"
     time, speed = trace["time"], trace["speed"]
@@ -140,7 +140,7 @@ def _find_gap(name: str, trace: Traces, last: float) -> str | None:
         return f"case {name} must drive from station 0 on; it begins at {first:.2f} m"
     if time[-1] < last - 1e-9 and speed[-1] > ENDS_STANDING:
         return (
-            f"case {name} ends at {time[-1]:g} s with {speed[-1]:.2f} m/s, before the last frame at {last:g} s: make"
+            f"case {name} ends at {time[-1]:g} s with {speed[-1]:.2f} m/s, before the telemetry ends at {last:g} s: make"
             " shorter clips, or give a longer trace"
         )
     return None

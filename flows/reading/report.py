@@ -21,7 +21,7 @@ from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs, read_marker
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, recorded_grid
 from flows.store.telemetry import read_columns
 from manifests.siblings import iterate_pairs
 from tasks.conventions import TICK_CHANNELS
@@ -107,7 +107,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
         f" in {grid['vehicle_mode']} mode; run {manifest['run_id']}",
         "frame_rate_hz": grid["frame_rate_hz"],
         "tick_rate_hz": TICK_RATE_HZ,
-        "duration_s": (grid["frames"] - 1) / grid["frame_rate_hz"],
+        "duration_s": recorded_grid(grid, "manifest").telemetry_s,
         "panels": [
             {"column": t.column, "caption": t.caption, "unit": t.unit, "factor": t.factor,
              "decimals": DECIMALS[t.unit]}

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 from pydantic import ValidationError
 
 from catalogs.grids import GridFile
+from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from flows.store.arrays import arrays_of
 from flows.store.layout import STAGED_TABLES, Layout, read_json
@@ -103,7 +104,7 @@ def is_committed(layout: Layout, clip_id: str) -> bool:
 
 
 def recorded_grid(content: Mapping[str, Any], place: object) -> GridFile:
-    """The settings that a plan or manifest records.
+    """The settings that a plan, manifest or frozen run records; a setting that it does not know is as it was before.
 
     Raises
     ------
@@ -111,7 +112,7 @@ def recorded_grid(content: Mapping[str, Any], place: object) -> GridFile:
         Listing every key that breaks a rule.
     """
     try:
-        return GridFile.model_validate(content)
+        return GridFile.model_validate({**BEFORE, **content})
     except ValidationError as error:
         raise InputError(cap_problems(describe_rules(error, f"{place}: grid"))) from None
 

@@ -1,5 +1,6 @@
 """From controls to telemetry: one rollout, logged at 1 kHz in the columns of the tick table."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Any, Literal
@@ -16,6 +17,7 @@ from tasks.vehicle.history import History
 from tasks.vehicle.model.brake_input import make_command_input
 from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import COLUMNS, Recording, Simulation, simulate
+from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, sample_history
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
@@ -92,6 +94,7 @@ def simulate_scenario(
     mode: Mode,
     duration_s: float,
     step_s: float = INTERNAL_STEP_S,
+    steady: SteadyStop | None = None,
 ) -> Rollout:
     """Simulate one scenario; after a stop the vehicle stands and its body comes to rest too.
 
@@ -104,6 +107,7 @@ def simulate_scenario(
     mode : paper follows the publication, coupled is the physical model
     duration_s : length of the telemetry, whole milliseconds [s]
     step_s : internal step, a whole fraction of a millisecond [s]
+    steady : of paper mode: how the end of a stop is kept steady; None takes the published steps literally
 
     Raises
     ------
@@ -117,7 +121,7 @@ def simulate_scenario(
     if mode == "paper":
         run = run_paper_mode(
             vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile,
-            hazard, StepGrid(steps=ticks * per_tick, step=step_s),
+            hazard, StepGrid(steps=ticks * per_tick, step=step_s), steady,
         )  # fmt: skip
         history = sample_history(run, step_s, per_tick)
     else:
@@ -152,6 +156,22 @@ def simulate_scenario(
         stopping_distance=distance,
         calibration_extrapolated=response.extrapolated,
     )
+
+
+def compute_lift_times(columns: Mapping[str, NDArray[Any]]) -> dict[str, float]:
+    """Return ``wheel_lift_time_f`` and ``wheel_lift_time_r``: for how long each axle is off the road [s].
+
+    Where one is not 0 the unilateral clamp of Eq. app_unilateral_contact acts, and the sum of the responses to road and
+    brake, which paper mode forms, is no longer the response to both.
+
+    Parameters
+    ----------
+    columns : of the ticks
+    """
+    return {
+        f"wheel_lift_time_{axle}": int(np.sum(~columns[f"contact_{axle}"].astype(bool))) * TICK_NS / 1e9
+        for axle in "fr"
+    }
 
 
 def _collect_history(run: Simulation) -> History:

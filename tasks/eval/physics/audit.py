@@ -96,7 +96,7 @@ def evaluate_laws(
         *command_laws(ticks, facts, constants),
         *body_laws(ticks, facts, constants),
         *surface_laws(facts, constants),
-        *frame_laws(ticks, frames, facts),
+        *frame_laws(ticks, frames, facts, constants),
         *pose_laws(frames, constants),
         *outcome_laws(ticks, frames, facts, constants),
     ]

@@ -164,7 +164,10 @@ def surface_laws(facts: Mapping[str, Any], constants: Constants) -> list[Law | N
 
 
 def frame_laws(
-    ticks: Mapping[str, Floats], frames: Mapping[str, NDArray[Any]], facts: Mapping[str, Any]
+    ticks: Mapping[str, Floats],
+    frames: Mapping[str, NDArray[Any]],
+    facts: Mapping[str, Any],
+    constants: Constants,
 ) -> list[Law | None]:
     """Return the laws that each frame row equals its nearest tick and that its surface is the clip's.
 
@@ -172,10 +175,11 @@ def frame_laws(
     ----------
     ticks, frames : columns of the two tables
     facts : the clip's row
+    constants : car and pavement
     """
     tick, number = frames["tick"], np.arange(len(frames["tick"]))
     last = len(ticks["speed"]) - 1
-    spacing = last / max(len(number) - 1, 1)
+    spacing = constants.ticks_per_frame
     laws = [
         evaluate_law("frames are counted", "frame", (frames["frame"] - number).astype(float), 0.5, "frames"),
         evaluate_law("frames show the nearest tick", "tick", tick - number * spacing, 0.5 + 1e-6, "frames"),
@@ -248,6 +252,12 @@ def outcome_laws(
         evaluate_law("peak pitch is the largest", "clips.peak_pitch pitch", pitch.max() - facts["peak_pitch"], 1e-12),
         evaluate_law("static pitch is the car's", "clips.static_pitch",
             np.array([facts["static_pitch"] - constants.car["static_pitch"]]), 1e-9),
+    ]  # fmt: skip
+    laws += [
+        evaluate_law(f"wheel lift is time without contact, {axle}", f"clips.wheel_lift_time_{axle} contact_{axle}",
+            np.array([facts[f"wheel_lift_time_{axle}"] - DT * np.sum(np.asarray(ticks[f"contact_{axle}"]) < 0.5)]),
+            0.5 * DT)
+        for axle in "fr" if f"wheel_lift_time_{axle}" in facts
     ]  # fmt: skip
     standing = np.flatnonzero(v <= 0)
     if standing.size:

@@ -46,12 +46,16 @@ class Constants:
     surface : pavement values, units in their names
     tyres : tables of each weather family
     mode : paper or coupled
+    ticks_per_frame : ticks from one frame to the next [1]
+    steady_limit : explicit wheel step beyond which the wheels step implicitly, in time constants; 0 never [1]
     """
 
     car: Mapping[str, float]
     surface: Mapping[str, float]
     tyres: Mapping[str, TyreTables]
     mode: str
+    ticks_per_frame: float
+    steady_limit: float = 0.0
 
     @property
     def mass(self) -> float:

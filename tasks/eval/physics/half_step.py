@@ -14,6 +14,11 @@ from tasks.eval.physics.constants import (
     pressure_at,
     raised_cosine,
 )
+from tasks.eval.physics.implicit_step import (
+    compute_wheel_rate,
+    find_slowest_explicit_speed,
+    solve_wheel_speed,
+)
 
 INNER_STEP = 0.0005
 """Step of the integration behind the ticks (paper, Table frozen_physical_params) [s]."""
@@ -27,11 +32,13 @@ class HalfStep:
     ----------
     acceleration : dv/dt [N - 1] [m/s2]
     rate : wheel acceleration [N - 1] of axles f and r [rad/s2]
+    change : change of wheel speed over the whole tick [N - 1] of axles f and r [rad/s]
     load_uncertainty : largest error of each axle's load there, from its curvature over the ticks around [N - 1] [N]
     """
 
     acceleration: Floats
     rate: Mapping[str, Floats]
+    change: Mapping[str, Floats]
     load_uncertainty: Mapping[str, Floats]
 
 
@@ -57,11 +64,17 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
     pressure = pressure_at(time - find_brake_onset(ticks, facts), *pressure_shape(facts))
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     analytic = constants.mode == "paper" and hump[2] == 0.0
-    forward, rates, doubts = np.zeros(len(speed)), {}, {}
+    forward, rates, changes, doubts = np.zeros(len(speed)), {}, {}, {}
+    slowest = find_slowest_explicit_speed(facts, constants, INNER_STEP)
+    first, second = (np.flatnonzero((at < slowest) & (v[1:] > 0) & (v[:-1] > 0)) for at in (speed, v[1:]))
     for axle, behind, sign in (("f", 0.0, -1.0), ("r", L, 1.0)):
         force, torque = ticks[f"tyre_force_{axle}"], ticks[f"brake_torque_{axle}"]
-        omega = ticks[f"wheel_speed_{axle}"][:-1]
-        omega = omega + INNER_STEP * (radius * force - torque)[:-1] / car[f"wheel_inertia_{axle}"]
+        before = ticks[f"wheel_speed_{axle}"][:-1]
+        omega = before + INNER_STEP * (radius * force - torque)[:-1] / car[f"wheel_inertia_{axle}"]
+        omega[first] = solve_wheel_speed(
+            before[first], speed[first], ticks[f"tyre_load_{axle}"][first], ticks["brake_pressure_mpa"][first],
+            INNER_STEP, axle, facts, constants,
+        )  # fmt: skip
         slip = np.clip((speed - radius * omega) / np.maximum(speed, car["slip_speed_floor"]), 0.0, 1.0)
         load = ticks[f"tyre_load_{axle}"]
         between = 0.5 * (load[1:] + load[:-1])
@@ -77,10 +90,15 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
         share = np.clip((target * (1 + width) - slip) / (width * target), 0.0, 1.0)
         brake = share * constants.brake_share(axle) * car["brake_gain"] * pressure
         rates[axle] = (radius * push - brake) / car[f"wheel_inertia_{axle}"]
+        changes[axle] = omega - before + INNER_STEP * rates[axle]
+        ended = ticks[f"braking_slip_{axle}"][1:][second]
+        at_end = compute_wheel_rate(ended, between[second], pressure[second], axle, facts, constants)[0]
+        changes[axle][second] = (omega - before)[second] + INNER_STEP * at_end
         forward -= push + between * raised_cosine(station - behind, *hump)[1]
     return HalfStep(
         acceleration=forward / m - car["coast_deceleration"],
         rate=rates,
+        change=changes,
         load_uncertainty=doubts,
     )
 

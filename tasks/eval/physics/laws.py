@@ -118,7 +118,7 @@ def wheel_laws(
     rate = (radius * force - torque) / inertia
     rolls = np.flatnonzero((v[1:] > 0) & (v[:-1] > 0))
     after = half.rate[axle][rolls]
-    step = np.diff(omega)[rolls] - INNER_STEP * (rate[rolls] + after)
+    step = np.diff(omega)[rolls] - half.change[axle][rolls]
     uncertainty = radius / inertia * half.load_uncertainty[axle][rolls]
     integration_tolerance = INNER_STEP * (uncertainty + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0))
     x = f"_{axle}"

@@ -1,7 +1,11 @@
 """The low-speed pitch rule of paper mode: a steady brake-pitch input to the stop, and its release.
 
-The rule needs the time of the stop, so it is applied after the drive; it changes neither speed nor distance.
+The rule needs the time of the stop, so it is applied after the drive; it changes neither speed nor distance. It leaves
+open which value is held when the last 0.2 s were only capped. Taken literally that is the last sample, which chatters
+with the slip; steadily it is the mean over the hold time.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +14,20 @@ REFERENCE_WINDOW_S = 0.6
 TAIL_WINDOW_S = 0.1
 CAP_WINDOW_S = 0.2
 CAP_RATIO = 1.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyStop:
+    """A stop whose end does not depend on one sample; without it the published rule is taken literally.
+
+    Parameters
+    ----------
+    held_share : part of the hold time, up to the stop, over which the released deceleration is the mean [1]
+    explicit_limit : longest explicit step of a wheel, in time constants of its slip; slower wheels step implicitly [1]
+    """
+
+    held_share: float
+    explicit_limit: float
 
 
 def compute_brake_pitch_input(
@@ -21,6 +39,8 @@ def compute_brake_pitch_input(
     hold_s: float,
     release_s: float,
     hold_ratio: float,
+    held_share: float = 0.0,
+    stop_time: float | None = None,
 ) -> NDArray[np.float64]:
     """Return the deceleration d_theta that drives the body's pitch [m/s2] (paper, Appendix B, low-speed pitch rule).
 
@@ -36,6 +56,8 @@ def compute_brake_pitch_input(
     hold_s : tau_h [s]
     release_s : tau_r [s]
     hold_ratio : rho_h [1]
+    held_share : part of the hold time over which the released value is the mean; 0 takes the last sample [1]
+    stop_time : when the release begins, at or before the sample of the stop; None at that sample [s]
     """
     d = np.maximum(-acceleration, 0.0)
     if stop < 0 or not np.isfinite(onset):
@@ -56,6 +78,8 @@ def compute_brake_pitch_input(
     else:
         capped = slice(max(stop - count_samples(CAP_WINDOW_S), 0), stop)
         d[capped] = np.minimum(d[capped], CAP_RATIO * reference)
-    since_stop = np.arange(len(d) - stop) * step
-    d[stop:] = d[stop - 1] * np.maximum(1 - since_stop / release_s, 0.0)
+    first = min(max(hold, stop - count_samples(held_share * hold_s)), stop - 1)
+    early = 0.0 if stop_time is None else stop * step - stop_time
+    since_stop = np.arange(len(d) - stop) * step + early
+    d[stop:] = d[first:stop].mean() * np.maximum(1 - since_stop / release_s, 0.0)
     return d

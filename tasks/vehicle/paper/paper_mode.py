@@ -13,10 +13,17 @@ from numpy.typing import NDArray
 
 from tasks.surface.road_profile import RoadHazard, road_elevation
 from tasks.vehicle.brake import PressureProfile
-from tasks.vehicle.half_car import build_half_car, integrate_half_car
+from tasks.vehicle.half_car import (
+    build_half_car,
+    compute_contact_loads,
+    integrate_half_car,
+    integrate_superposed,
+)
 from tasks.vehicle.history import History
-from tasks.vehicle.paper.low_speed import compute_brake_pitch_input
-from tasks.vehicle.paper.wheels import DRIVE_COLUMNS, build_wheels, simulate_drive
+from tasks.vehicle.paper.drive import DRIVE_COLUMNS, simulate_drive
+from tasks.vehicle.paper.low_speed import SteadyStop, compute_brake_pitch_input
+from tasks.vehicle.paper.wheel_step import find_implicit_speed
+from tasks.vehicle.paper.wheels import build_wheels
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 from tasks.vehicle.road import make_road_feature
 
@@ -40,6 +47,7 @@ class PaperRun:
     loads : contact loads of the half-car, shape (n, 2) [N]
     onset : brake onset; infinite if there is none [s]
     stop : sample of the stop; -1 if there is none
+    stop_time : time of the stop, at or before that sample; infinite if there is none [s]
     last_change : largest change of the station in the last fixed-point pass; 0 on a flat road [m]
     """
 
@@ -49,6 +57,7 @@ class PaperRun:
     loads: NDArray[np.float64]
     onset: float
     stop: int
+    stop_time: float
     last_change: float
 
 
@@ -76,6 +85,7 @@ def run_paper_mode(
     profile: PressureProfile,
     hazard: RoadHazard,
     grid: StepGrid,
+    steady: SteadyStop | None = None,
 ) -> PaperRun:
     """Simulate one run (paper, Appendix B).
 
@@ -88,22 +98,38 @@ def run_paper_mode(
     profile : brake command
     hazard : road feature
     grid : internal steps, and passes on a road feature
+    steady : how the end of a stop is kept steady; None takes the published steps literally
     """
     wheels, road = build_wheels(vehicle), make_road_feature(hazard)
-    log, onset, stop = simulate_drive(
-        initial_speed, hold_speed, grid.steps, grid.step, profile, road, ANALYTIC_LOADS, wheels, response.tyre
-    )
-    if hazard.height_m == 0:
-        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, grid.step)
-        return PaperRun(
-            log=log, states=states, road=heights, loads=loads, onset=onset, stop=stop, last_change=0.0
+    implicit_below, held_share = 0.0, 0.0
+    if steady is not None:
+        held_share = steady.held_share
+        implicit_below = find_implicit_speed(
+            wheels, response.tyre, profile, grid.step, steady.explicit_limit, vehicle.gravity
         )
+
+    def drive(loads: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, int, float]:
+        return simulate_drive(
+            initial_speed, hold_speed, grid.steps, grid.step, profile, road, loads, implicit_below, wheels,
+            response.tyre,
+        )  # fmt: skip
+
+    def move_body() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        return simulate_body(
+            vehicle, response, hazard, log, onset, stop, grid.step, held_share=held_share, stop_time=stop_time
+        )
+
+    log, onset, stop, stop_time = drive(ANALYTIC_LOADS)
+    if hazard.height_m == 0:
+        states, heights, loads = move_body()
+        return PaperRun(
+            log=log, states=states, road=heights, loads=loads, onset=onset, stop=stop, stop_time=stop_time,
+            last_change=0.0,
+        )  # fmt: skip
     for _ in range(grid.passes):
         station = log[:, 0]
-        states, heights, loads = simulate_body(vehicle, response, hazard, log, onset, stop, grid.step)
-        log, onset, stop = simulate_drive(
-            initial_speed, hold_speed, grid.steps, grid.step, profile, road, loads, wheels, response.tyre
-        )
+        states, heights, loads = move_body()
+        log, onset, stop, stop_time = drive(loads)
     return PaperRun(
         log=log,
         states=states,
@@ -111,6 +137,7 @@ def run_paper_mode(
         loads=loads,
         onset=onset,
         stop=stop,
+        stop_time=stop_time,
         last_change=float(np.abs(log[:, 0] - station).max()),
     )
 
@@ -123,6 +150,9 @@ def simulate_body(
     onset: float,
     stop: int,
     step: float,
+    *,
+    held_share: float = 0.0,
+    stop_time: float | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return half-car states, road heights and contact loads along a drive (paper, Eqs. half_car and app_brake_pitch).
 
@@ -133,6 +163,7 @@ def simulate_body(
     onset : brake onset [s]
     stop : sample of the stop; -1 if there is none
     step : step of the grid [s]
+    held_share, stop_time : as in `compute_brake_pitch_input`
     """
     car = build_half_car(vehicle)
     d_theta = compute_brake_pitch_input(
@@ -143,18 +174,19 @@ def simulate_body(
         hold_s=response.hold_s,
         release_s=response.release_s,
         hold_ratio=vehicle.hold_ratio,
+        held_share=held_share,
+        stop_time=stop_time,
     )
     gamma = response.pitch_scale * (1.0 if hazard.height_m == 0 else vehicle.coupled_pitch_scale)
     moment = gamma * vehicle.sprung_mass * vehicle.cg_height * d_theta
     station = log[:, 0]
-    road_f, road_r = road_elevation(station, hazard), road_elevation(station - vehicle.wheelbase, hazard)
-    nothing = np.zeros_like(station)
-    states = integrate_half_car(nothing, nothing, moment, step, car)
-    if hazard.height_m != 0:
-        states += integrate_half_car(road_f, road_r, nothing, step, car)
-    deflection = np.stack([road_f - states[:, 2], road_r - states[:, 3]], axis=1)
-    static = np.array([car.static_f, car.static_r])
-    loads = static + np.maximum(np.array([car.tyre_f, car.tyre_r]) * deflection, -static)
+    if hazard.height_m == 0:
+        road_f = road_r = np.zeros_like(station)
+        states = integrate_half_car(road_f, road_r, moment, step, car)
+    else:
+        road_f, road_r = road_elevation(station, hazard), road_elevation(station - vehicle.wheelbase, hazard)
+        states = integrate_superposed(road_f, road_r, moment, step, car)
+    loads = compute_contact_loads(states, road_f, road_r, car)
     return states, np.stack([road_f, road_r], axis=1), loads
 
 
@@ -181,5 +213,5 @@ def sample_history(run: PaperRun, step: float, per_tick: int) -> History:
         columns=columns,
         onset=run.onset,
         onset_station=onset_station,
-        stop_time=run.stop * step if run.stop >= 0 else inf,
+        stop_time=run.stop_time,
     )

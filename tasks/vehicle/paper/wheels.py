@@ -1,28 +1,20 @@
-"""Wheels, brakes and longitudinal motion of paper mode, by explicit Euler steps (paper, Appendix B).
+"""Wheels and brakes of paper mode, and stops by explicit Euler steps (paper, Appendix B).
 
 One step function serves the logged rollout and the lean stopping run. It multiplies by reciprocals because they
 leave the loop, where divisions would stay in it.
 
 The published step is too long for the wheels below about 4 m/s, where they chatter around the target slip: there
-the last bit of a sum moves a stop by millimetres, up to 14 mm on light snow. Runs repeat bit by bit all the same.
+the last bit of a sum moves a stop by millimetres, up to 14 mm on light snow. Runs repeat bit by bit all the same;
+`tasks.vehicle.paper.wheel_step` is the step that does not chatter.
 """
 
-from math import isinf, nan
+from math import nan
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from tasks.vehicle.brake import (
-    PressureProfile,
-    compute_abs_command,
-    compute_brake_pressure,
-    find_onset_by_position,
-    limit_abs_rate,
-)
+from tasks.vehicle.brake import PressureProfile, compute_abs_command, compute_brake_pressure, limit_abs_rate
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.road import RoadFeature, compute_road_slope
 from tasks.vehicle.tyres.contract import Tyre, compute_braking_slip, compute_tyre_friction
 
 
@@ -189,82 +181,3 @@ def simulate_stop(
         if speed <= wheels.stop_speed:
             return distance, (n + 1) * step
     return nan, nan
-
-
-DRIVE_COLUMNS = (
-    "station", "speed", "longitudinal_acceleration", "braking_slip_f", "braking_slip_r", "wheel_speed_f",
-    "wheel_speed_r", "tyre_force_f", "tyre_force_r", "tyre_load_f", "tyre_load_r", "brake_torque_f",
-    "brake_torque_r", "abs_scale_f", "abs_scale_r", "brake_pressure_mpa", "road_force",
-)  # fmt: skip
-"""Columns of the log that ``simulate_drive`` returns."""
-
-
-@njit(cache=True, nogil=True)
-def simulate_drive(
-    initial_speed: float,
-    hold_speed: bool,
-    steps: int,
-    step: float,
-    profile: PressureProfile,
-    road: RoadFeature,
-    loads: NDArray[np.float64],
-    wheels: Wheels,
-    tyre: Tyre,
-) -> tuple[NDArray[np.float64], float, int]:
-    """Drive, brake and stand on a road, and log every sample.
-
-    Parameters
-    ----------
-    initial_speed : speed at the start [m/s]
-    hold_speed : keep the speed until the brake onset
-    steps : number of Euler steps
-    step : Euler step [s]
-    profile : brake command
-    road : road feature
-    loads : half-car loads of the front and rear axle at each sample, shape (steps + 1, 2) [N]; with shape
-        (0, 2) the analytic load transfer feeds the tyres
-    wheels, tyre : the vehicle on its surface
-
-    Returns
-    -------
-    The log, shape (steps + 1, len(DRIVE_COLUMNS)); the brake onset [s], infinite if it never comes; the sample
-    of the stop, -1 if there is none.
-    """
-    log = np.empty((steps + 1, 17))
-    station, speed = 0.0, initial_speed
-    omega_f, omega_r = initial_speed / wheels.radius, initial_speed / wheels.radius
-    scale_f, scale_r, acceleration = 1.0, 1.0, 0.0
-    onset, stop = profile.onset_time, -1
-    for n in range(steps + 1):
-        if isinf(onset):
-            onset = find_onset_by_position(n * step, station, speed, profile)
-        pressure = compute_brake_pressure(n * step - onset, profile)
-        if len(loads) > 0:
-            load_f, load_r = loads[n, 0], loads[n, 1]
-        else:
-            load_f, load_r = compute_transferred_loads(acceleration, wheels)
-        f = compute_axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
-        r = compute_axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
-        road_force = -load_f * compute_road_slope(station, road) - load_r * compute_road_slope(
-            station - wheels.wheelbase, road
-        )
-        acceleration = (road_force - (f.force + r.force)) * (1.0 / wheels.mass) - wheels.coast
-        if stop >= 0:
-            road_force, acceleration = 0.0, 0.0
-        elif hold_speed and n * step < onset:
-            acceleration = 0.0
-        log[n] = (
-            station, speed, acceleration, f.slip, r.slip, omega_f, omega_r, f.force, r.force, load_f, load_r,
-            f.torque, r.torque, f.scale, r.scale, pressure, road_force,
-        )  # fmt: skip
-        if stop >= 0 or n == steps:
-            continue
-        after = speed + step * acceleration
-        station += 0.5 * step * (speed + after)
-        speed, scale_f, scale_r = after, f.scale, r.scale
-        omega_f += step * f.rate
-        omega_r += step * r.rate
-        if speed <= wheels.stop_speed:
-            stop = n + 1
-            speed, omega_f, omega_r, acceleration, scale_f, scale_r = 0.0, 0.0, 0.0, 0.0, 1.0, 1.0
-    return log, onset, stop

@@ -10,7 +10,15 @@ from catalogs.grids import load_grid
 from catalogs.studies import load_conditions
 from flows.cli import app
 from flows.judging.physics import audit_physics
-from flows.making.freezing import freeze_run, frozen_run, problems_of, reproduce_run
+from flows.making.freezing import (
+    freeze_run,
+    frozen_run,
+    frozen_settings,
+    keep_rules,
+    problems_of,
+    reproduce_run,
+)
+from flows.store.sealed import recorded_grid
 from manifests.frozen_run import frozen_names, parameters_that_matter, read_frozen, seal_run
 from tasks.errors import InputError
 
@@ -43,7 +51,8 @@ def test_the_runs_that_the_paper_and_the_demo_need_ship():
 def test_a_frozen_run_that_ships_is_not_stale(name):
     frozen = read_frozen(name)
     stale = problems_of(frozen)
-    if frozen["grid"] != load_grid(name).settings.model_dump(mode="json", exclude_defaults=True):
+    now = keep_rules(load_grid(name), frozen)
+    if frozen["grid"] != frozen_settings(now.settings):
         stale.append(f"catalogs/grids/{name}.yaml is no longer the grid that was frozen")
     assert not stale, (
         f"{name}: if this is meant, run `musync freeze {name}` and commit it: {'; '.join(stale[:5])}"
@@ -155,8 +164,25 @@ def test_a_grid_of_one_s_own_is_frozen_into_a_file_and_made_again_from_it(tmp_pa
 
 
 def test_freezing_again_changes_nothing():
+    before = read_frozen(SMALL)
+    run = frozen_run(keep_rules(load_grid(SMALL), before))
+    assert all(before[key] == run[key] for key in ("grid", "parameters", "clips"))
+    assert freeze_run(SMALL)["frozen"][0]["changed"] is False
+
+
+def test_a_record_without_the_rule_means_the_literal_one_and_frames_to_the_end(small):
+    assert not {"low_speed", "duration_s"} & small["grid"].keys()
+    settings = recorded_grid(small["grid"], "manifest")
+    assert (settings.low_speed, settings.duration_s, settings.telemetry_s) == ("literal", None, 12.0)
+
+
+def test_a_steady_run_says_so_and_is_made_again_steady(small, tmp_path):
     run = frozen_run(load_grid(SMALL))
-    assert all(read_frozen(SMALL)[key] == run[key] for key in ("grid", "parameters", "clips"))
+    assert run["grid"]["low_speed"] == "steady"
+    assert set(run["parameters"]["low_speed.yaml"]) == {"held_share", "explicit_limit"}
+    assert [clip["seed"] for clip in run["clips"]] == [clip["seed"] for clip in small["clips"]]
+    assert all(a["ticks"] != b["ticks"] for a, b in zip(run["clips"], small["clips"], strict=True))
+    assert problems_of(read_frozen(written(run, tmp_path))) == []
 
 
 @pytest.mark.parametrize(
