@@ -24,9 +24,7 @@ def measure_rows(grid: str = "demo") -> list[dict[str, Any]]:
         resumed = time.perf_counter()
         generate_dataset(grid, str(Path(folder) / "dataset"), workers=WORKERS)
         resume_wall = time.perf_counter() - resumed
-    work = sum(cost["wall_s"] for cost in report.cost.values()) / WORKERS
-    cpu = sum(cost["cpu_s"] for cost in report.cost.values())
-    memory = max(cost["peak_memory_mib"] for cost in report.cost.values())
+    work, cpu, memory = report.cost.wall_s / WORKERS, report.cost.cpu_s, report.cost.peak_memory_mib
     peer = f"sum of the clips' wall time over {WORKERS} workers"
     return [
         {"name": "pipeline wall", "value": wall, "unit": "s", "peer": peer, "ratio": wall / work},
