@@ -1,4 +1,4 @@
-"""Datasets of many short clips at little cost: one clip is made, of each other one the record and the tables are copied."""
+"""Datasets of many short clips at little cost: one clip is made, and the others are copies of it."""
 
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -39,7 +39,7 @@ def grid_of(clips: int) -> dict[str, Any]:
 
 
 class CopiedClips:
-    """Stands in for making clips and gathering their tables, which workers do; writes what they would, where they would."""
+    """Stands in for the workers that make clips and gather tables; writes what they would, where they would."""
 
     def __init__(self) -> None:
         self.receipt: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.scale.make GRID DIR``: drive a run of copied clips; each stage's time and memory as JSON lines."""
+"""``python -m benchmarks.scale.make GRID DIR``: drive a run of copied clips; a line of JSON a stage."""
 
 import json
 import os

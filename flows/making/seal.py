@@ -197,7 +197,7 @@ def _clip_row(r: Receipt) -> dict[str, Any]:
 
 
 def _pack(values: list[Any]) -> Any:
-    """Values of some rows in an array: of floats where one is, with NaN for None, of text where all are; else as they are."""
+    """Values of some rows: floats, with NaN for None, where one is, an array where all are text, else as they are."""
     if any(isinstance(value, float) for value in values):
         return _as_floats(values)
     return pa.array(values) if all(isinstance(value, str) for value in values) else values

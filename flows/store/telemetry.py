@@ -63,6 +63,7 @@ def write_tables(tables: Iterable[pa.Table], path: Path) -> None:
     path : of the file, which is there whole or not at all
     """
     write_pieces(path, _parquet_pieces(_cut_row_groups(tables)))
+    pa.default_memory_pool().release_unused()  # what encoding took, which it would keep for the next time
 
 
 def _cut_row_groups(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
