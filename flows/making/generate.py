@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from catalogs.grids import Grid
+from catalogs.scenes import load_scene
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs
 from flows.making.places import find_scene
@@ -251,6 +252,8 @@ def open_workers(
     """
     warm = partial(warm_up, layout, find_scene(plan.scene))
     chosen = choose_runner(runner, plan.settings.pictures, scheduler)
+    if chosen != "threads":
+        load_scene.cache_clear()  # planning read its route; the workers read it again, and this process does not
     with hold_plan(layout.root, plan), open_executor(chosen, workers, scheduler, warm) as executor:
         yield executor
 
