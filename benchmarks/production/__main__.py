@@ -1,7 +1,7 @@
 """``python -m benchmarks.production [--clips N] [--workers N] [--measure]``: what a large production takes.
 
-With ``--measure`` the scheduler's share is measured (a minute or more), and the requests are counted on a server of this
-machine; else the constants of docs/how-to/plan-a-million-clips.md stand.
+With ``--measure`` the scheduler's share is measured (a minute or more), and the requests are counted on a server here;
+else the constants of docs/how-to/plan-a-million-clips.md stand.
 """
 
 import argparse

@@ -12,8 +12,8 @@ from unittest.mock import patch
 
 import psutil
 
+import flows.making.gathering as gathering
 import flows.making.generate as generate
-import flows.making.seal as seal
 from benchmarks.scale.copies import CopiedClips
 
 EVERY_S = 0.02
@@ -63,7 +63,7 @@ def measure_stages(grid: str, folder: str) -> None:
         # as on processes, whose work a thread does here
         patch.object(generate, "open_executor", lambda *_: ThreadPoolExecutor(1)),
         patch.object(generate, "make_clip", copied.make_clip),
-        patch.object(seal, "gather_part", copied.gather_part),
+        patch.object(gathering, "gather_part", copied.gather_part),
         patch.object(generate, "make_plan", measured(generate.make_plan)),
         patch.object(generate, "run_as_stage", measured),
         open(os.devnull, "w") as silence,

@@ -10,14 +10,14 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from flows.making.gathering import gather_tables
 from flows.making.plan import ClipPlan, Plan
-from flows.running.runner import run_unordered
-from flows.store.address import fetch_files, find_local, remove_files, send_files
+from flows.store.address import fetch_files, remove_files, send_files
 from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_atomically, write_pieces
 from flows.store.sealed import read_receipt
 from flows.store.staging import remove_staged, remove_staging, staged_files
-from flows.store.telemetry import labelled_table, read_columns, read_parts, write_parquet, write_tables
+from flows.store.telemetry import labelled_table, read_columns, write_parquet, write_tables
 from manifests.canonical import sha256_of_file
 from manifests.environment import environment_bom
 from manifests.manifest import freeze_manifest, is_quarantined
@@ -27,7 +27,6 @@ from manifests.siblings import FIGURES, iterate_pairs
 from tasks.conventions import PAIR_CHANNELS
 from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
-CLIPS_PER_FILE = 100
 BATCH = 200
 """Rows and files that are held at once where there is one a clip or a pair [1]."""
 PREVIEW_FRAMES = (0, 20, 40, 80)
@@ -124,55 +123,6 @@ def _read_here(layout: Layout, plan: Plan) -> Iterator[Path]:
     for clip in pick_evenly(plan.clips, PREVIEW_CLIPS) if plan.settings.pictures else []:
         yield layout.staged(clip.clip_id, "frames")
         yield layout.frame_shard("rgb", clip.index)
-
-
-def gather_tables(layout: Layout, plan: Plan, executor: Executor | None) -> dict[str, str]:
-    """Gather the staged tables of all clips into the dataset's files; returns the SHA-256 of each by its path."""
-    parts = [
-        (layout, table, path, clip_ids)
-        for table in STAGED_TABLES
-        for path, clip_ids in table_parts(plan, table).items()
-    ]
-    if executor is None:
-        return {part[2]: gather_part(*part) for part in parts}
-    return {part[2]: future.result() for part, future in run_unordered(executor, gather_part, parts)}
-
-
-def gather_part(layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -> str:
-    """Gather the staged tables of some clips into one file, where their store is; returns its SHA-256.
-
-    Parameters
-    ----------
-    layout : of the dataset, which may lie on another machine
-    table : ticks or frames
-    path : of the file in the dataset
-    clip_ids : whose rows it gets, in this order
-    """
-    local = find_local(layout)
-    fetch_files(local, [local.staged(clip_id, table) for clip_id in clip_ids])
-    file = write_part(local, table, path, clip_ids)
-    send_files(local, [file])
-    return sha256_of_file(file)
-
-
-def table_parts(plan: Plan, table: str) -> dict[str, list[str]]:
-    """The files of one kind of table and the clips in each: one a weather and hundred clips, in plan order."""
-    by_weather: dict[str, list[str]] = {}
-    for clip in plan.clips:
-        by_weather.setdefault(clip.scenario.weather, []).append(clip.clip_id)
-    return {
-        f"telemetry/{table}/family={weather}/part-{part:04d}.parquet": clip_ids[
-            start : start + CLIPS_PER_FILE
-        ]
-        for weather, clip_ids in by_weather.items()
-        for part, start in enumerate(range(0, len(clip_ids), CLIPS_PER_FILE))
-    }
-
-
-def write_part(layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -> Path:
-    """Gather the staged tables of some clips into one file of the dataset."""
-    write_tables(read_parts([layout.staged(clip_id, table) for clip_id in clip_ids]), layout.root / path)
-    return layout.root / path
 
 
 def clips_table(receipts: Iterable[Receipt]) -> pa.Table:

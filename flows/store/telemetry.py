@@ -134,7 +134,8 @@ def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
     InputError
         If one is missing, or is no table as muSync writes it.
     """
-    files = [(path, _read_file(path, pq.ParquetFile, path)) for path in paths]
+    # without buffers ahead, which a file would hold until it is closed
+    files = [(path, _read_file(path, pq.ParquetFile, path, pre_buffer=False)) for path in paths]
     encoded = [field.name for field in files[0][1].schema_arrow if pa.types.is_dictionary(field.type)]
     constants = pa.concat_tables(
         _read_file(path, file.read, encoded, use_threads=False) for path, file in files
@@ -142,6 +143,7 @@ def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
     common = {name: constants[name].chunk(0).slice(0, 0) for name in encoded}
     for path, file in files:
         table = _read_file(path, file.read, use_threads=False)
+        file.close()
         _refuse_columns(table, path)
         for name, empty in common.items():
             chunks = pa.chunked_array([empty, *table[name].chunks]).unify_dictionaries().chunks[1:]
