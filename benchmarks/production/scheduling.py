@@ -10,7 +10,7 @@ from distributed import Client, LocalCluster
 from flows.running.runner import run_unordered
 from flows.store.layout import Layout
 
-WORKERS, CALLS = 500, 5000
+WORKERS, CALLS = 100, 1500
 
 
 def do_nothing(layout: Layout, index: int, scene: str) -> dict[str, Any]:
