@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-mutants study-exports study-calibration study-editors freeze bench lock clean
+.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-scale study-production study-mutants study-exports study-calibration study-editors freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -71,6 +71,13 @@ study-faults: $(READY)
 study-double-track: $(READY)
 	$(BIN)/python -m benchmarks.double_track --make datasets/double-track
 	$(BIN)/python -m benchmarks.double_track --judge datasets/double-track
+
+# How memory and time grow with the clips; SCALE="100000 --folder /dev/shm" takes some 4 CPU-minutes.
+study-scale: $(READY)
+	$(BIN)/python -m benchmarks.scale $(SCALE)
+
+study-production: $(READY)
+	$(BIN)/python -m benchmarks.production
 
 study-mutants: $(READY)
 	$(BIN)/python -m benchmarks.mutants

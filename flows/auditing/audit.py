@@ -10,7 +10,7 @@ from flows.auditing.audit_facts import collect_facts, tell_time
 from flows.auditing.audit_report import format_text, tell_verdict, write_audit_page
 from flows.auditing.signing import signature_findings
 from flows.auditing.verify import compare_files
-from flows.making.generate import create_frame_arrays, fan_out
+from flows.making.generate import create_frame_arrays, fan_out, open_workers
 from flows.making.input_changes import input_changes
 from flows.making.plan import Plan, read_plan
 from flows.running.orchestration import run_as_stage
@@ -166,7 +166,8 @@ def remake_and_compare(
             raise InputError(f"{layout.plan}: must plan the clips of the manifest; it plans others")
         create_frame_arrays(remade, plan)
         indices = sorted((clip["index"] for clip in chosen), reverse=True)
-        fan_out(remade, plan, indices, runner, workers, scheduler)
+        with open_workers(remade, plan, runner, workers, scheduler) as executor:
+            fan_out(remade, plan, indices, executor)
         return [
             difference
             for clip in chosen

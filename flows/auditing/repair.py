@@ -8,11 +8,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flows.auditing.verify import compare_files
-from flows.making.generate import create_frame_arrays, fan_out
+from flows.making.gathering import table_parts, write_part
+from flows.making.generate import create_frame_arrays, fan_out, open_workers
 from flows.making.grid_inputs import input_sources
 from flows.making.input_changes import recorded_input
 from flows.making.plan import Plan, read_plan
-from flows.making.seal import clips_table, pairs_table, preview_sheet, table_parts, write_part
+from flows.making.seal import clips_table, pairs_table, preview_sheet
 from flows.running.orchestration import run_as_stage
 from flows.running.runner import RunnerName
 from flows.store.address import open_for_writing, send_files, want_everything
@@ -141,7 +142,8 @@ def restore_files(
         again |= {clip["clip_id"] for clip in manifest["clips"] if wanted.keys() & clip["artifacts"].keys()}
         indices = [clip.index for clip in plan.clips if clip.clip_id in again]
         if indices:
-            fan_out(scratch, plan, indices, runner, workers, scheduler)
+            with open_workers(scratch, plan, runner, workers, scheduler) as executor:
+                fan_out(scratch, plan, indices, executor)
         move_in(scratch, [path for clip in manifest["clips"] for path in clip["artifacts"]])
         for table, path, ids in broken:
             write_part(scratch, table, path, ids)

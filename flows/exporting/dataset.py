@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from catalogs.cameras import load_camera
 from catalogs.scenario import Scenario
 from catalogs.vehicles import load_vehicle
+from flows.making.gathering import table_parts
 from flows.making.plan import Plan, read_plan
-from flows.making.seal import table_parts
 from flows.store.arrays import arrays_of
 from flows.store.frames import read_clip
 from flows.store.layout import Layout

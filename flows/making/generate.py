@@ -1,23 +1,24 @@
 """A grid to a dataset: plan, make the missing clips, seal."""
 
 import shutil
-from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 
 from catalogs.grids import Grid
+from catalogs.scenes import load_scene
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs
 from flows.making.places import find_scene
 from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
-from flows.making.seal import needed_to_seal, seal_dataset
+from flows.making.seal import seal_dataset
 from flows.running.failures import ClipsFailed, disk_full_sentence
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
 from flows.running.runner import RunnerChoice, choose_runner, open_executor, run_unordered
 from flows.store.address import (
-    fetch_files,
     forget_begun,
     open_for_reading,
     open_for_writing,
@@ -39,6 +40,29 @@ SHOWN = 8
 
 
 @dataclass(frozen=True, kw_only=True)
+class RunCost:
+    """What clips cost together; nothing of a single clip is kept.
+
+    Parameters
+    ----------
+    cpu_s, wall_s : sums over the clips [s]
+    peak_memory_mib : of the largest worker [MiB]
+    """
+
+    cpu_s: float = 0.0
+    wall_s: float = 0.0
+    peak_memory_mib: float = 0.0
+
+    def with_clip(self, cost: Mapping[str, float]) -> "RunCost":
+        """The cost with that of one more clip."""
+        return RunCost(
+            cpu_s=self.cpu_s + cost["cpu_s"],
+            wall_s=self.wall_s + cost["wall_s"],
+            peak_memory_mib=max(self.peak_memory_mib, cost["peak_memory_mib"]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class RunReport:
     """Result of a generating run.
 
@@ -48,7 +72,7 @@ class RunReport:
     run_id : of its frozen plan
     clips, made : clips of the dataset, and of these those made now
     quarantined : why the pose check failed, by label of the clip; they stay in the dataset, marked
-    cost : CPU and wall seconds and peak memory by label of what was made now
+    cost : of what was made now
     """
 
     layout: Layout
@@ -56,7 +80,7 @@ class RunReport:
     clips: int
     made: int
     quarantined: dict[str, list[str]]
-    cost: dict[str, dict[str, float]] = field(default_factory=dict)
+    cost: RunCost
 
 
 def generate_dataset(
@@ -84,7 +108,7 @@ def generate_dataset(
         If clips failed, and not for want of an input; run the same command again to make just those.
     """
     missing: list[int] = []
-    cost: dict[str, dict[str, float]] = {}
+    cost = RunCost()
     quarantined: dict[str, list[str]] | None = None
     with open_for_writing(out, want_progress) as layout:
         plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
@@ -97,9 +121,9 @@ def generate_dataset(
                 run_as_stage(prepare_dataset)(layout, plan, inputs)
                 if not layout.manifest.is_file():  # or another run has ended just now
                     missing = [clip.index for clip in plan.clips if not is_committed(layout, clip.clip_id)]
-                    cost = run_as_stage(fan_out)(layout, plan, missing, runner, workers, scheduler)
-                    fetch_files(layout, needed_to_seal(layout, plan))
-                    quarantined = run_as_stage(seal_dataset)(layout, plan)
+                    with open_workers(layout, plan, runner, workers, scheduler) as executor:
+                        cost = run_as_stage(fan_out)(layout, plan, missing, executor)
+                        quarantined = run_as_stage(seal_dataset)(layout, plan, executor)
     finished = open_for_reading(out, is_preview)
     return RunReport(
         layout=finished,
@@ -216,32 +240,39 @@ def create_frame_arrays(layout: Layout, plan: Plan) -> None:
     create_arrays(layout.frames, clips, frames, camera.height, camera.width, plan.settings.labels, attributes)
 
 
-def fan_out(
-    layout: Layout,
-    plan: Plan,
-    indices: list[int],
-    runner: RunnerChoice,
-    workers: int | None,
-    scheduler: str | None,
-) -> dict[str, dict[str, float]]:
-    """Make the clips on the runner; returns what each cost (CPU and wall seconds, peak memory)."""
-    cost: dict[str, dict[str, float]] = {}
+@contextmanager
+def open_workers(
+    layout: Layout, plan: Plan, runner: RunnerChoice, workers: int | None, scheduler: str | None
+) -> Iterator[Executor]:
+    """An executor whose workers make clips of a plan and gather their tables.
+
+    Parameters
+    ----------
+    layout, plan : of the dataset
+    runner, workers, scheduler : as of `generate_dataset`
+    """
+    warm = partial(warm_up, layout, find_scene(plan.scene))
+    chosen = choose_runner(runner, plan.settings.pictures, scheduler)
+    if chosen != "threads":
+        load_scene.cache_clear()  # planning read its route; the workers read it again, and this process does not
+    with hold_plan(layout.root, plan), open_executor(chosen, workers, scheduler, warm) as executor:
+        yield executor
+
+
+def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) -> RunCost:
+    """Make the clips on the runner; returns what they cost."""
+    cost, committed = RunCost(), 0
     failures: dict[str, BaseException] = {}
     scene = find_scene(plan.scene)
     jobs = ((layout, index, scene) for index in indices)
-    chosen = choose_runner(runner, plan.settings.pictures, scheduler)
-    with (
-        hold_plan(layout.root, plan),
-        open_executor(chosen, workers, scheduler, partial(warm_up, layout, scene)) as executor,
-        progress_bar("clips", len(indices)) as advance,
-    ):
+    with progress_bar("clips", len(indices)) as advance:
         for (_, index, _), future in run_unordered(executor, make_clip, jobs):
             label, error = plan.clips[index].label, future.exception()
             if error is None:
-                cost[label] = future.result()["cost"]
+                cost, committed = cost.with_clip(future.result()["cost"]), committed + 1
                 advance(label)
             elif (told := disk_full_sentence(error)) is not None:
-                raise InputError(f"{layout}: {len(cost)} of {len(indices)} clips are committed; {told}")
+                raise InputError(f"{layout}: {committed} of {len(indices)} clips are committed; {told}")
             else:
                 failures[label] = error
                 advance(f"{label} failed")

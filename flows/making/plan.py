@@ -27,7 +27,7 @@ _HELD: dict[Path, "Plan"] = {}
 """Plans of the runs of this process, which it need not read again."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class ClipPlan:
     """One clip to be made; ``calibration`` is its place in the calibrated range."""
 

@@ -1,6 +1,7 @@
 """Sealing: staged clips become the dataset's tables, preview and frozen manifest."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, TypeVar
@@ -9,13 +10,14 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from flows.making.gathering import gather_tables
 from flows.making.plan import ClipPlan, Plan
-from flows.store.address import remove_files, send_files
+from flows.store.address import fetch_files, remove_files, send_files
 from flows.store.frames import read_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_atomically, write_pieces
 from flows.store.sealed import read_receipt
 from flows.store.staging import remove_staged, remove_staging, staged_files
-from flows.store.telemetry import labelled_table, read_columns, read_table, write_parquet
+from flows.store.telemetry import labelled_table, read_columns, write_parquet, write_tables
 from manifests.canonical import sha256_of_file
 from manifests.environment import environment_bom
 from manifests.manifest import freeze_manifest, is_quarantined
@@ -25,7 +27,6 @@ from manifests.siblings import FIGURES, iterate_pairs
 from tasks.conventions import PAIR_CHANNELS
 from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
-CLIPS_PER_FILE = 100
 BATCH = 200
 """Rows and files that are held at once where there is one a clip or a pair [1]."""
 PREVIEW_FRAMES = (0, 20, 40, 80)
@@ -34,30 +35,31 @@ PREVIEW_CLIPS = 24
 Item = TypeVar("Item")
 
 
-def seal_dataset(layout: Layout, plan: Plan) -> dict[str, list[str]]:
-    """Collect the staged tables, draw the contact sheet, and freeze the manifest last.
+def seal_dataset(layout: Layout, plan: Plan, executor: Executor | None = None) -> dict[str, list[str]]:
+    """Gather the staged tables, draw the contact sheet, and freeze the manifest last.
 
     Receipts are read one at a time, once for the tables and once for the manifest: memory grows by the numbers of a
     clip's row, not by its record.
+
+    Parameters
+    ----------
+    layout, plan : of the dataset, every clip of which is made
+    executor : whose workers gather the tables of a hundred clips each; None gathers them here
 
     Returns
     -------
     Why the pose check failed, by label of the clip that it failed for.
     """
-    tables = [
-        write_part(layout, table, path, clip_ids)
-        for table in STAGED_TABLES
-        for path, clip_ids in table_parts(plan, table).items()
-    ]
-    clips = clips_table(_read_receipts(layout, plan.clips))
-    write_parquet(clips, layout.telemetry / "clips.parquet")
-    write_parquet(pairs_table(Outcomes(plan.clips, clips)), layout.telemetry / "pairs.parquet")
+    parts = gather_tables(layout, plan, executor)
+    fetch_files(layout, _read_here(layout, plan))
+    outcomes = _write_clips(layout, plan)
+    write_tables(pairs_tables(outcomes), layout.telemetry / "pairs.parquet")
+    del outcomes
     sheet = layout.previews / "contact_sheet.png"
     if plan.settings.pictures:
         shown = list(_read_receipts(layout, pick_evenly(plan.clips, PREVIEW_CLIPS)))
         write_atomically(sheet, preview_sheet(layout, layout.frames, plan, shown))
     made = [
-        *tables,
         layout.telemetry / "clips.parquet",
         layout.telemetry / "pairs.parquet",
         *([sheet] if plan.settings.pictures else []),
@@ -68,7 +70,7 @@ def seal_dataset(layout: Layout, plan: Plan) -> dict[str, list[str]]:
         *sorted(path for path in layout.inputs.rglob("*") if path.is_file()),
         *sorted(layout.frames.rglob("zarr.json")),
     ]
-    artifacts = {layout.relative(path): sha256_of_file(path) for path in shared}
+    artifacts = parts | {layout.relative(path): sha256_of_file(path) for path in shared}
     made_on = {"processor": describe_processor(), "git": git_commit(), "environment": environment_bom()}
     quarantined: dict[str, list[str]] = {}
     receipts = _note_quarantined(_read_receipts(layout, plan.clips), quarantined)
@@ -107,34 +109,20 @@ def batched(items: Iterable[Item], size: int | None = None) -> Iterator[list[Ite
         yield batch
 
 
-def needed_to_seal(layout: Layout, plan: Plan) -> Iterator[Path]:
-    """The files of finished clips that sealing reads."""
-    shown = pick_evenly(plan.clips, PREVIEW_CLIPS) if plan.settings.pictures else []
+def _write_clips(layout: Layout, plan: Plan) -> "Outcomes":
+    """Write the table of the clips; returns what pairs of them need."""
+    table = clips_table(_read_receipts(layout, plan.clips))
+    write_parquet(table, layout.telemetry / "clips.parquet")
+    return Outcomes(plan.clips, table)
+
+
+def _read_here(layout: Layout, plan: Plan) -> Iterator[Path]:
+    """The files of finished clips that sealing reads beside their tables, and those of clips on the contact sheet."""
     for clip in plan.clips:
-        yield from _staged_by(layout, clip.clip_id)
-    for clip in shown:
+        yield layout.receipt(clip.clip_id)
+    for clip in pick_evenly(plan.clips, PREVIEW_CLIPS) if plan.settings.pictures else []:
+        yield layout.staged(clip.clip_id, "frames")
         yield layout.frame_shard("rgb", clip.index)
-
-
-def table_parts(plan: Plan, table: str) -> dict[str, list[str]]:
-    """The files of one kind of table and the clips in each: one a weather and hundred clips, in plan order."""
-    by_weather: dict[str, list[str]] = {}
-    for clip in plan.clips:
-        by_weather.setdefault(clip.scenario.weather, []).append(clip.clip_id)
-    return {
-        f"telemetry/{table}/family={weather}/part-{part:04d}.parquet": clip_ids[
-            start : start + CLIPS_PER_FILE
-        ]
-        for weather, clip_ids in by_weather.items()
-        for part, start in enumerate(range(0, len(clip_ids), CLIPS_PER_FILE))
-    }
-
-
-def write_part(layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -> Path:
-    """Gather the staged tables of some clips into one file of the dataset."""
-    staged = [read_table(layout.staged(clip_id, table)) for clip_id in clip_ids]
-    write_parquet(pa.concat_tables(staged).unify_dictionaries().combine_chunks(), layout.root / path)
-    return layout.root / path
 
 
 def clips_table(receipts: Iterable[Receipt]) -> pa.Table:
@@ -144,7 +132,8 @@ def clips_table(receipts: Iterable[Receipt]) -> pa.Table:
         rows = [_clip_row(receipt) for receipt in batch]
         for name in rows[0]:
             columns.setdefault(name, []).append(_pack([row[name] for row in rows]))
-    return labelled_table({name: _join(parts) for name, parts in columns.items()})
+    # each column's parts go when it is whole
+    return labelled_table({name: _join(columns.pop(name)) for name in list(columns)})
 
 
 def _clip_row(r: Receipt) -> dict[str, Any]:
@@ -158,15 +147,19 @@ def _clip_row(r: Receipt) -> dict[str, Any]:
 
 
 def _pack(values: list[Any]) -> Any:
-    """Values of some rows as an array where one is a float, with NaN for None; else as they are."""
-    return _as_floats(values) if any(isinstance(value, float) for value in values) else values
+    """Values of some rows: floats, with NaN for None, where one is, an array where all are text, else as they are."""
+    if any(isinstance(value, float) for value in values):
+        return _as_floats(values)
+    return pa.array(values) if all(isinstance(value, str) for value in values) else values
 
 
 def _join(parts: list[Any]) -> Any:
     """The packed parts of one column: floats where any part is, or where nothing is represented."""
     if any(isinstance(part, np.ndarray) for part in parts) or all(v is None for part in parts for v in part):
         return np.concatenate([part if isinstance(part, np.ndarray) else _as_floats(part) for part in parts])
-    return [value for part in parts for value in part]
+    if all(isinstance(part, pa.Array) for part in parts):
+        return pa.concat_arrays(parts)
+    return [value for part in parts for value in (part.to_pylist() if isinstance(part, pa.Array) else part)]
 
 
 def _as_floats(values: list[Any]) -> NDArray[np.float64]:
@@ -202,14 +195,16 @@ class Outcomes(Sequence[Mapping[str, Any]]):
 
 def pairs_table(receipts: Sequence[Mapping[str, Any]]) -> pa.Table:
     """One row a pair of clips that differ in exactly one control: what that control changes."""
+    return pa.concat_tables(pairs_tables(receipts)).combine_chunks()
+
+
+def pairs_tables(receipts: Sequence[Mapping[str, Any]]) -> Iterator[pa.Table]:
+    """Yield the rows of `pairs_table` in tables of some of them; the first one has none."""
     kinds = {channel.name: float if channel.name.endswith("_change") else str for channel in PAIR_CHANNELS}
-    batches = chain(
-        batched(iterate_pairs(receipts)), [[]]
-    )  # the last one: a table without rows has columns too
-    return pa.concat_tables(
-        labelled_table({name: np.array([row[name] for row in rows], kind) for name, kind in kinds.items()})
-        for rows in batches
-    ).combine_chunks()
+    for rows in chain([[]], batched(iterate_pairs(receipts))):
+        yield labelled_table(
+            {name: np.array([row[name] for row in rows], kind) for name, kind in kinds.items()}
+        )
 
 
 def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Sequence[Receipt]) -> bytes:

@@ -140,7 +140,7 @@ def _find_gap(name: str, trace: Traces, last: float) -> str | None:
         return f"case {name} must drive from station 0 on; it begins at {first:.2f} m"
     if time[-1] < last - 1e-9 and speed[-1] > ENDS_STANDING:
         return (
-            f"case {name} ends at {time[-1]:g} s with {speed[-1]:.2f} m/s, before the telemetry ends at {last:g} s: make"
-            " shorter clips, or give a longer trace"
+            f"case {name} ends at {time[-1]:g} s with {speed[-1]:.2f} m/s, before the telemetry ends at {last:g} s:"
+            " make shorter clips, or give a longer trace"
         )
     return None

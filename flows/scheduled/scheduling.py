@@ -110,7 +110,7 @@ def _make_at(place: str, grid: str, *, runner: RunnerName = "dask", **execution:
     started = process_time()
     report = generate_dataset(grid, place, runner=runner, **execution)
     # clips that threads make side by side each count the whole process
-    workers_s = 0.0 if runner == "threads" else sum(cost["cpu_s"] for cost in report.cost.values())
+    workers_s = 0.0 if runner == "threads" else report.cost.cpu_s
     clips = read_manifest(report.layout)["clips"]
     return {
         "dataset": str(report.layout),

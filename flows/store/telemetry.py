@@ -1,6 +1,7 @@
 """Telemetry as Arrow tables and Parquet files, labelled from the one table of conventions."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from catalogs.sentences import shorten
-from flows.store.layout import write_atomically
+from flows.store.layout import write_pieces
 from manifests.canonical import sha256_of
 from tasks.conventions import CHANNELS_BY_NAME, Channel
 from tasks.errors import InputError
@@ -32,8 +33,8 @@ def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | No
         array = pa.repeat(pa.scalar(value, type=_constant_type(value)), rows)
         arrays[name] = array.dictionary_encode() if isinstance(value, str) else array
     for name, values in columns.items():
-        values = np.asarray(values)
-        if values.ndim == 2:
+        values = values if isinstance(values, pa.Array) else np.asarray(values)
+        if isinstance(values, np.ndarray) and values.ndim == 2:
             arrays[name] = pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
         else:
             arrays[name] = pa.array(values)
@@ -50,19 +51,105 @@ def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | No
 
 def write_parquet(table: pa.Table, path: Path) -> None:
     """Write a table as Parquet; the file is there whole or not at all."""
-    buffer = pa.BufferOutputStream()
-    floats = [field.name for field in table.schema if pa.types.is_floating(field.type)]
-    pq.write_table(
-        table,
-        buffer,
+    write_pieces(path, _parquet_pieces([table]))
+
+
+def write_tables(tables: Iterable[pa.Table], path: Path) -> None:
+    """Write the bytes that `write_parquet` writes of all the tables in one; a row group at a time is in memory.
+
+    Parameters
+    ----------
+    tables : at least one, of one schema and with common dictionaries
+    path : of the file, which is there whole or not at all
+    """
+    write_pieces(path, _parquet_pieces(_cut_row_groups(tables)))
+    pa.default_memory_pool().release_unused()  # what encoding took, which it would keep for the next time
+
+
+def _cut_row_groups(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
+    """Yield the rows of tables again in tables of `ROW_GROUP_ROWS`, the last one shorter."""
+    held: list[pa.Table] = []
+    rows, is_cut = 0, False
+    for table in tables:
+        held.append(table)
+        rows += len(table)
+        while rows >= ROW_GROUP_ROWS:
+            whole, is_cut = pa.concat_tables(held), True
+            yield whole.slice(0, ROW_GROUP_ROWS).combine_chunks()
+            held, rows = [whole.slice(ROW_GROUP_ROWS)], rows - ROW_GROUP_ROWS
+    if rows or not is_cut:  # a table without rows has a row group too
+        yield pa.concat_tables(held).combine_chunks()
+
+
+class _Pieces:
+    """What a Parquet writer has written and nobody has taken yet."""
+
+    closed = False
+
+    def __init__(self) -> None:
+        self.written: list[bytes] = []
+
+    def write(self, content: bytes) -> int:
+        self.written.append(bytes(content))
+        return len(content)
+
+    def flush(self) -> None:
+        """Nothing waits: what is written is there to be taken."""
+
+    def take(self) -> list[bytes]:
+        taken, self.written = self.written, []
+        return taken
+
+
+def _parquet_pieces(tables: Iterable[pa.Table]) -> Iterator[bytes]:
+    """The bytes of a Parquet file, each table's as soon as it is encoded."""
+    left = iter(tables)
+    first = next(left)
+    pieces, schema = _Pieces(), first.schema
+    floats = [field.name for field in schema if pa.types.is_floating(field.type)]
+    with pq.ParquetWriter(
+        pa.PythonFile(pieces, "w"),
+        schema,
         compression="zstd",
         compression_level=3,
-        row_group_size=ROW_GROUP_ROWS,
-        use_dictionary=[field.name for field in table.schema if pa.types.is_dictionary(field.type)],
+        use_dictionary=[field.name for field in schema if pa.types.is_dictionary(field.type)],
         column_encoding=dict.fromkeys(floats, "BYTE_STREAM_SPLIT"),
         write_page_checksum=True,
-    )
-    write_atomically(path, memoryview(buffer.getvalue()))
+    ) as writer:
+        for table in chain([first], left):
+            writer.write_table(table, row_group_size=ROW_GROUP_ROWS)
+            yield from pieces.take()
+    yield from pieces.take()
+
+
+def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
+    """Yield the tables of files one at a time, with common dictionaries: together they are one table.
+
+    Parameters
+    ----------
+    paths : Parquet files of one schema, fewer than a process may have open
+
+    Raises
+    ------
+    InputError
+        If one is missing, or is no table as muSync writes it.
+    """
+    # without buffers ahead, which a file would hold until it is closed
+    files = [(path, _read_file(path, pq.ParquetFile, path, pre_buffer=False)) for path in paths]
+    encoded = [field.name for field in files[0][1].schema_arrow if pa.types.is_dictionary(field.type)]
+    constants = pa.concat_tables(
+        _read_file(path, file.read, encoded, use_threads=False) for path, file in files
+    ).unify_dictionaries()
+    common = {name: constants[name].chunk(0).slice(0, 0) for name in encoded}
+    for path, file in files:
+        table = _read_file(path, file.read, use_threads=False)
+        file.close()
+        _refuse_columns(table, path)
+        for name, empty in common.items():
+            chunks = pa.chunked_array([empty, *table[name].chunks]).unify_dictionaries().chunks[1:]
+            place = table.schema.get_field_index(name)
+            table = table.set_column(place, table.schema.field(place), pa.chunked_array(chunks))
+        yield table
 
 
 def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] = ()) -> pa.Table:
@@ -80,14 +167,27 @@ def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] =
         If there is no such file, it is no table as muSync writes it, lacks a column, or has no row of the clip.
     """
     filters = None if clip_id is None else [("clip_id", "==", clip_id)]
+    table = _read_file(path, pq.read_table, path, filters=filters)
+    _refuse_columns(table, path, required, clip_id)
+    return table
+
+
+def _read_file(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """Call a reader of Parquet, whose errors become sentences about the file."""
     try:
-        table = pq.read_table(path, filters=filters)
+        return read(*arguments, **options)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; is this a finished muSync dataset?") from None
     except (pa.ArrowException, OSError, ValueError, TypeError) as error:
         raise InputError(
             f"{path}: must be a Parquet table as muSync writes it; {shorten(error)}: musync repair makes it again"
         ) from None
+
+
+def _refuse_columns(
+    table: pa.Table, path: Path, required: Iterable[str] = (), clip_id: str | None = None
+) -> None:
+    """Raise `InputError` for a table that lacks a column or a clip, or has text where numbers belong."""
     odd = [
         field.name
         for field in table.schema
@@ -107,7 +207,6 @@ def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] =
     ]
     if problems:
         raise InputError(problems)
-    return table
 
 
 def read_columns(

@@ -127,7 +127,7 @@ def test_a_pose_that_does_not_follow_the_station_is_named(dataset: Path) -> None
 
 
 def test_a_folder_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"vehicle\.yaml: no such file"):
+    with pytest.raises(InputError, match=r"plan\.json: no such file"):
         audit_physics(str(tmp_path))
 
 

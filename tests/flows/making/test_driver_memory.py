@@ -83,7 +83,7 @@ def measure_peak(folder: Path, clips: int) -> int:
 def test_the_peak_of_a_run_hardly_grows_with_its_clips(tmp_path, monkeypatch):
     made = CopiedClips()
     monkeypatch.setattr(flows.making.generate, "make_clip", made)
-    monkeypatch.setattr("flows.making.seal.write_part", write_nothing)
+    monkeypatch.setattr("flows.making.gathering.write_part", write_nothing)
     monkeypatch.setattr("flows.making.seal.BATCH", 50)
     monkeypatch.setattr("flows.running.runner.IN_FLIGHT", 100)
     measure_peak(tmp_path, 30)

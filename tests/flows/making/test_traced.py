@@ -103,7 +103,7 @@ def test_what_the_traces_do_not_show_is_said_at_once(tmp_path: Path) -> None:
     assert "the nearest, bump, differs in hazard_height_m (0.05 there, 0.08 here)" in refused(
         "other", HUMP | {"hazard_height_m": 0.05}, trace_columns()
     )
-    assert "bump ends at 0.6 s with 11.00 m/s, before the last frame at 0.8 s" in refused(
+    assert "bump ends at 0.6 s with 11.00 m/s, before the telemetry ends at 0.8 s" in refused(
         "short", HUMP, trace_columns(end=0.6)
     )
     low = trace_columns()

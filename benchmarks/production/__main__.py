@@ -1,0 +1,30 @@
+"""``python -m benchmarks.production [--clips N] [--workers N] [--measure]``: what a large production takes.
+
+With ``--measure`` the scheduler's share is measured (a minute or more), and the requests are counted on a server here;
+else the constants of docs/how-to/plan-a-million-clips.md stand.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from benchmarks.production.plan import ClipCosts, plan_production
+from benchmarks.production.requests import count_requests
+from benchmarks.production.scheduling import CALLS, WORKERS, measure_scheduling
+from catalogs.grids.form import MOST_CLIPS
+from flows.store.layout import Layout
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--clips", type=int, default=1_000_000)
+    parser.add_argument("--workers", type=int, default=500)
+    parser.add_argument("--cpu-s", type=float, default=ClipCosts().cpu_s)
+    parser.add_argument("--measure", action="store_true")
+    asked = parser.parse_args()
+    costs = ClipCosts(cpu_s=asked.cpu_s)
+    if asked.measure:
+        found = measure_scheduling(Layout(Path("/shared/sets/million")), WORKERS, CALLS)
+        print(found, count_requests(), sep="\n")
+        costs = replace(costs, scheduler_cpu_s=found["cpu_ms_per_call"] / 1e3)
+    for name, value, unit in plan_production(asked.clips, asked.workers, MOST_CLIPS, costs):
+        print(f"{name:36} {value:12,.1f} {unit}")
