@@ -103,8 +103,12 @@ def _twin_step_s(vehicle: Vehicle) -> float:
 
     def run() -> None:
         reference.simulate_paper_drive(
-            still, LONGEST_STOP[0], response, SPEED, lambda t: 2.3 * min(t / 0.5, 1.0), lambda n, a: loads,
-            FLAT_ROAD, steps=TWIN_STEPS, step=INTERNAL_STEP_S,
+            still, LONGEST_STOP[0], response,
+            reference.ReferenceDrive(
+                initial_speed=SPEED, pressure=lambda t: 2.3 * min(t / 0.5, 1.0), loads=lambda n, a: loads,
+                hazard=FLAT_ROAD,
+            ),
+            steps=TWIN_STEPS, step=INTERNAL_STEP_S,
         )  # fmt: skip
 
     return _cpu_s(run, repeats=3) / TWIN_STEPS

@@ -4,6 +4,7 @@ Arrays of two hold the front and the rear axle.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,14 +60,29 @@ def compute_abs_scale(
     return np.clip(before + change, 0, 1)
 
 
+@dataclass(frozen=True, kw_only=True)
+class ReferenceDrive:
+    """A drive of the twin.
+
+    Parameters
+    ----------
+    initial_speed : speed at the start [m/s]
+    pressure : brake pressure [MPa] of time [s]
+    loads : axle loads [N] of the sample and of the last acceleration [m/s2]
+    hazard : road feature
+    """
+
+    initial_speed: float
+    pressure: Callable[[float], float]
+    loads: Callable[[int, float], Array]
+    hazard: RoadHazard
+
+
 def simulate_paper_drive(
     vehicle: Vehicle,
     family: str,
     response: SurfaceResponse,
-    initial_speed: float,
-    pressure: Callable[[float], float],
-    loads: Callable[[int, float], Array],
-    hazard: RoadHazard,
+    drive: ReferenceDrive,
     *,
     steps: int,
     step: float,
@@ -76,25 +92,22 @@ def simulate_paper_drive(
     Parameters
     ----------
     vehicle, family, response : the vehicle on its surface
-    initial_speed : [m/s]
-    pressure : brake pressure [MPa] of time [s]
-    loads : axle loads [N] of the sample and of the last acceleration [m/s2]
-    hazard : road feature
+    drive : speed, brake, loads and road
     steps, step : number and length of the steps [s]
     """
     radius, floor = vehicle.wheel_radius, vehicle.slip_speed_floor
     inertia = np.array([vehicle.wheel_inertia_f, vehicle.wheel_inertia_r])
     share = np.array([vehicle.front_brake_share, 1 - vehicle.front_brake_share])
-    speed, station, omega = initial_speed, 0.0, np.full(2, initial_speed / radius)
+    speed, station, omega = drive.initial_speed, 0.0, np.full(2, drive.initial_speed / radius)
     scale, acceleration = np.ones(2), 0.0
     history = []
     for n in range(steps + 1):
         slip = np.clip((speed - radius * omega) / max(speed, floor), 0, 1)
         scale = compute_abs_scale(slip, scale, step, vehicle, response)
-        load = loads(n, acceleration)
+        load = drive.loads(n, acceleration)
         force = compute_reference_friction(slip, vehicle, family, response) * load
-        torque = share * scale * vehicle.brake_gain * pressure(n * step)
-        slope = road_slope(station - np.array([0, vehicle.wheelbase]), hazard)
+        torque = share * scale * vehicle.brake_gain * drive.pressure(n * step)
+        slope = road_slope(station - np.array([0, vehicle.wheelbase]), drive.hazard)
         acceleration = -(force + load * slope).sum() / vehicle.mass - vehicle.coast_deceleration
         history.append([speed, station, *omega, *slip, *force, *load, *scale])
         station += step * (speed + step * acceleration / 2)

@@ -10,6 +10,7 @@ from catalogs.surfaces import load_surface
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle import reference
+from tasks.vehicle.paper.low_speed import BrakedStop
 from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, simulate_body
 from tasks.vehicle.paper.wheels import build_wheels, simulate_stop
 from tasks.vehicle.parameters import compute_surface_response
@@ -105,7 +106,11 @@ def test_fast_motion_agrees_with_the_twin(vehicle):
         return np.array([weight * 1.5 - transfer * acceleration, weight * 1.2 + transfer * acceleration])
 
     twin = reference.simulate_paper_drive(
-        vehicle, "rain", response, 60 / 3.6, lambda t: 2.3 * min(t / 0.5, 1.0), loads, FLAT_ROAD, steps=steps, step=5e-4
+        vehicle, "rain", response,
+        reference.ReferenceDrive(
+            initial_speed=60 / 3.6, pressure=lambda t: 2.3 * min(t / 0.5, 1.0), loads=loads, hazard=FLAT_ROAD
+        ),
+        steps=steps, step=5e-4,
     )  # fmt: skip
     fast = twin["speed"][:, 0] > 5
     assert fast.sum() > 3000
@@ -126,8 +131,12 @@ def test_road_feature_motion_agrees_with_the_twin(vehicle):
         vehicle, response, 40 / 3.6, False, command(onset=1.5).profile, HUMP, StepGrid(steps=steps, step=5e-4)
     )
     twin = reference.simulate_paper_drive(
-        vehicle, "dry", response, 40 / 3.6, lambda t: 2.3 * min(max(t - 1.5, 0) / 0.5, 1.0),
-        lambda n, _: run.log[n, 9:11], HUMP, steps=steps, step=5e-4,
+        vehicle, "dry", response,
+        reference.ReferenceDrive(
+            initial_speed=40 / 3.6, pressure=lambda t: 2.3 * min(max(t - 1.5, 0) / 0.5, 1.0),
+            loads=lambda n, _: run.log[n, 9:11], hazard=HUMP,
+        ),
+        steps=steps, step=5e-4,
     )  # fmt: skip
     np.testing.assert_allclose(run.log[:, 1], twin["speed"][:, 0], atol=1e-5)
     np.testing.assert_allclose(run.log[:, 5:7], twin["omega"], atol=1e-4)
@@ -168,7 +177,9 @@ def test_the_body_response_is_that_of_road_and_brake_together(vehicle):
     run = run_paper_mode(
         vehicle, response, 40 / 3.6, True, command().profile, HUMP, StepGrid(steps=6000, step=5e-4)
     )
-    states, road, loads = simulate_body(vehicle, response, HUMP, run.log, run.onset, run.stop, 5e-4)
+    states, road, loads = simulate_body(
+        vehicle, response, HUMP, run.log, BrakedStop(onset=run.onset, sample=run.stop), 5e-4
+    )
     assert (loads > 0).all()
     rates = np.gradient(states, 5e-4, axis=0)
     sample = slice(3500, 5000, 100)

@@ -9,7 +9,7 @@ from catalogs.low_speed import load_low_speed
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
-from tasks.vehicle.paper.low_speed import SteadyStop, compute_brake_pitch_input
+from tasks.vehicle.paper.low_speed import BrakedStop, SteadyStop, compute_brake_pitch_input
 from tasks.vehicle.paper.wheel_step import find_implicit_speed, solve_wheel_speed
 from tasks.vehicle.paper.wheels import build_wheels, compute_axle_step
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
@@ -127,9 +127,9 @@ def test_the_released_value_is_the_mean_over_the_hold_time():
     acceleration[1000:3000] = -5.0
     acceleration[2998:3000] = -3.0
     rule = {"hold_s": 0.2, "release_s": 0.1, "hold_ratio": 0.8}
-    literal = compute_brake_pitch_input(acceleration, 0.001, 1.0, 3000, **rule)
+    literal = compute_brake_pitch_input(acceleration, 0.001, BrakedStop(onset=1.0, sample=3000), **rule)
     steady = compute_brake_pitch_input(
-        acceleration, 0.001, 1.0, 3000, **rule, held_share=1.0, stop_time=2.9996
+        acceleration, 0.001, BrakedStop(onset=1.0, sample=3000, time=2.9996), **rule, held_share=1.0
     )
     assert literal[3000] == 3.0
     assert steady[3000] == pytest.approx((198 * 5 + 2 * 3) / 200 * (1 - 0.0004 / 0.1))
@@ -140,7 +140,9 @@ def test_a_brake_shorter_than_the_hold_time_is_averaged_from_its_onset():
     rule = {"hold_s": 0.2, "release_s": 0.1, "hold_ratio": 0.8}
     acceleration = np.full(1000, -0.004)
     acceleration[450:500] = -4.0
-    d = compute_brake_pitch_input(acceleration, 0.001, 0.45, 500, **rule, held_share=1.0)
+    d = compute_brake_pitch_input(
+        acceleration, 0.001, BrakedStop(onset=0.45, sample=500), **rule, held_share=1.0
+    )
     assert d[500] == pytest.approx(1.05 * 0.004), "of the samples since the onset, all capped"
 
 

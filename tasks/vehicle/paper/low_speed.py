@@ -30,17 +30,31 @@ class SteadyStop:
     explicit_limit: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class BrakedStop:
+    """The brake onset and the stop of a drive.
+
+    Parameters
+    ----------
+    onset : brake onset; infinite if there is none [s]
+    sample : sample of the stop; -1 if there is none
+    time : of the stop, at or before that sample; None at that sample [s]
+    """
+
+    onset: float
+    sample: int
+    time: float | None = None
+
+
 def compute_brake_pitch_input(
     acceleration: NDArray[np.float64],
     step: float,
-    onset: float,
-    stop: int,
+    braked: BrakedStop,
     *,
     hold_s: float,
     release_s: float,
     hold_ratio: float,
     held_share: float = 0.0,
-    stop_time: float | None = None,
 ) -> NDArray[np.float64]:
     """Return the deceleration d_theta that drives the body's pitch [m/s2] (paper, Appendix B, low-speed pitch rule).
 
@@ -51,22 +65,21 @@ def compute_brake_pitch_input(
     ----------
     acceleration : dv/dt on the internal grid, shape (n,) [m/s2]
     step : grid interval [s]
-    onset : brake onset; infinite if there is none [s]
-    stop : sample of the stop; -1 if there is none
+    braked : when the brake begins, and the stop, with which the release begins
     hold_s : tau_h [s]
     release_s : tau_r [s]
     hold_ratio : rho_h [1]
     held_share : part of the hold time over which the released value is the mean; 0 takes the last sample [1]
-    stop_time : when the release begins, at or before the sample of the stop; None at that sample [s]
     """
     d = np.maximum(-acceleration, 0.0)
-    if stop < 0 or not np.isfinite(onset):
+    stop = braked.sample
+    if stop < 0 or not np.isfinite(braked.onset):
         return d
 
     def count_samples(seconds: float) -> int:
         return round(seconds / step)
 
-    hold = max(min(count_samples(onset), stop), stop - count_samples(hold_s))
+    hold = max(min(count_samples(braked.onset), stop), stop - count_samples(hold_s))
     before = d[max(hold - count_samples(REFERENCE_WINDOW_S), 0) : hold]
     before = before[before > 0]
     if len(before) == 0:
@@ -79,7 +92,7 @@ def compute_brake_pitch_input(
         capped = slice(max(stop - count_samples(CAP_WINDOW_S), 0), stop)
         d[capped] = np.minimum(d[capped], CAP_RATIO * reference)
     first = min(max(hold, stop - count_samples(held_share * hold_s)), stop - 1)
-    early = 0.0 if stop_time is None else stop * step - stop_time
+    early = 0.0 if braked.time is None else stop * step - braked.time
     since_stop = np.arange(len(d) - stop) * step + early
     d[stop:] = d[first:stop].mean() * np.maximum(1 - since_stop / release_s, 0.0)
     return d

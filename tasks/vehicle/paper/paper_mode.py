@@ -21,7 +21,7 @@ from tasks.vehicle.half_car import (
 )
 from tasks.vehicle.history import History
 from tasks.vehicle.paper.drive import DRIVE_COLUMNS, simulate_drive
-from tasks.vehicle.paper.low_speed import SteadyStop, compute_brake_pitch_input
+from tasks.vehicle.paper.low_speed import BrakedStop, SteadyStop, compute_brake_pitch_input
 from tasks.vehicle.paper.wheel_step import find_implicit_speed
 from tasks.vehicle.paper.wheels import build_wheels
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
@@ -116,8 +116,9 @@ def run_paper_mode(
 
     def move_body() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         return simulate_body(
-            vehicle, response, hazard, log, onset, stop, grid.step, held_share=held_share, stop_time=stop_time
-        )
+            vehicle, response, hazard, log, BrakedStop(onset=onset, sample=stop, time=stop_time), grid.step,
+            held_share=held_share,
+        )  # fmt: skip
 
     log, onset, stop, stop_time = drive(ANALYTIC_LOADS)
     if hazard.height_m == 0:
@@ -147,12 +148,10 @@ def simulate_body(
     response: SurfaceResponse,
     hazard: RoadHazard,
     log: NDArray[np.float64],
-    onset: float,
-    stop: int,
+    braked: BrakedStop,
     step: float,
     *,
     held_share: float = 0.0,
-    stop_time: float | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return half-car states, road heights and contact loads along a drive (paper, Eqs. half_car and app_brake_pitch).
 
@@ -160,22 +159,19 @@ def simulate_body(
     ----------
     vehicle, response, hazard : as in ``run_paper_mode``
     log : log of `simulate_drive`, shape (n, 17)
-    onset : brake onset [s]
-    stop : sample of the stop; -1 if there is none
+    braked : brake onset and stop of the drive
     step : step of the grid [s]
-    held_share, stop_time : as in `compute_brake_pitch_input`
+    held_share : as in `compute_brake_pitch_input`
     """
     car = build_half_car(vehicle)
     d_theta = compute_brake_pitch_input(
         log[:, 2],
         step,
-        onset,
-        stop,
+        braked,
         hold_s=response.hold_s,
         release_s=response.release_s,
         hold_ratio=vehicle.hold_ratio,
         held_share=held_share,
-        stop_time=stop_time,
     )
     gamma = response.pitch_scale * (1.0 if hazard.height_m == 0 else vehicle.coupled_pitch_scale)
     moment = gamma * vehicle.sprung_mass * vehicle.cg_height * d_theta
