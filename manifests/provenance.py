@@ -40,7 +40,7 @@ def source_hash() -> str:
 
 def code_version() -> dict[str, str]:
     """The project's version and the hash of its source."""
-    return {"version": importlib.metadata.version("musync"), "source_sha256": source_hash()}
+    return {"version": importlib.metadata.version("musync-gs"), "source_sha256": source_hash()}
 
 
 @lru_cache

@@ -154,5 +154,5 @@ def import_package(package: str, kind: str, extra: str) -> ModuleType:
         return import_module(package)
     except ImportError:
         raise InputError(
-            f'reading {kind} needs the package {package}: install it with pip install "musync[{extra}]"'
+            f'reading {kind} needs the package {package}: install it with pip install "musync-gs[{extra}]"'
         ) from None

@@ -53,7 +53,7 @@ COMMANDS = (
                 "platforms",
                 list[str] | None,
                 "Where it will run, by default here: linux64, win64 or darwin64; may be given more than once, and"
-                " others than this one need pip install 'musync[fmu]'.",
+                " others than this one need pip install 'musync-gs[fmu]'.",
                 None,
                 spelling="platform",
                 known=("linux64", "win64", "darwin64"),

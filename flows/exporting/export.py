@@ -99,7 +99,7 @@ def import_writer(chosen: ExportFormat) -> Writer:
     if chosen.package and find_spec(chosen.package) is None:
         raise InputError(
             f"--to {chosen.name}: needs the package {chosen.package}, which is not installed:"
-            " pip install 'musync[export]'"
+            " pip install 'musync-gs[export]'"
         )
     module, _, name = chosen.writer.partition(":")
     writer: Writer = getattr(import_module(f"flows.exporting.{module}"), name)

@@ -164,7 +164,7 @@ class Dataset:
         try:
             import polars as pl
         except ImportError:
-            raise InputError("Polars is not installed: pip install 'musync[analysts]'") from None
+            raise InputError("Polars is not installed: pip install 'musync-gs[analysts]'") from None
         return self._evaluated(
             table, columns, clip, lambda relation: pl.from_arrow(relation.to_arrow_table())
         )
@@ -240,7 +240,7 @@ class Dataset:
         try:
             import xarray
         except ImportError:
-            raise InputError("xarray is not installed: pip install 'musync[analysts]'") from None
+            raise InputError("xarray is not installed: pip install 'musync-gs[analysts]'") from None
         try:
             pixels = xarray.open_zarr(
                 self._checked_frames(), consolidated=False, zarr_format=3, chunks=None, decode_cf=False

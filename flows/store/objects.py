@@ -46,7 +46,7 @@ class Objects:
             import obstore
             from obstore.store import S3Store
         except ImportError:
-            raise InputError(f"{address}: needs the package obstore: pip install 'musync[s3]'") from None
+            raise InputError(f"{address}: needs the package obstore: pip install 'musync-gs[s3]'") from None
         parts = urlsplit(address)
         prefix = parts.path.strip("/")
         if parts.scheme != SCHEME or not parts.netloc or not prefix or ".." in PurePosixPath(prefix).parts:

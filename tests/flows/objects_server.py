@@ -20,7 +20,7 @@ START_S = 60.0
 def s3_server(folder: Path) -> Iterator[str]:
     """The server's address, with the bucket ``data``; skips where the packages are missing."""
     for package in ("obstore", "moto", "flask_cors"):
-        pytest.importorskip(package, reason=f"{package} is not installed: pip install 'musync[s3,dev]'")
+        pytest.importorskip(package, reason=f"{package} is not installed: pip install 'musync-gs[s3,dev]'")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]

@@ -34,7 +34,7 @@ def test_the_schema_has_every_column_and_every_array():
 
 
 def test_docstrings_name_meanings_where_numpy_has_types():
-    pytest.importorskip("griffe", reason="griffe reads docstrings: pip install 'musync[docs]'")
+    pytest.importorskip("griffe", reason="griffe reads docstrings: pip install 'musync-gs[docs]'")
     from reference_pages.docstrings import rewrite_docstring
 
     text = "Do it [1].\n\nParameters\n----------\na, b : two [m],\n    both `x[0]`\nc : [s]\n\n"
@@ -49,7 +49,7 @@ def test_docstrings_name_meanings_where_numpy_has_types():
 
 
 def test_every_equation_of_the_documents_becomes_mathml():
-    pytest.importorskip("latex2mathml", reason="latex2mathml draws equations: pip install 'musync[docs]'")
+    pytest.importorskip("latex2mathml", reason="latex2mathml draws equations: pip install 'musync-gs[docs]'")
     from reference_pages.equations import format_equation
 
     blocks = [block for document in DOCUMENTS for block in list_blocks(document, "math")]
@@ -63,7 +63,7 @@ def test_every_equation_of_the_documents_becomes_mathml():
 
 @pytest.mark.minutes
 def test_the_site_builds_without_a_warning(tmp_path):
-    pytest.importorskip("mkdocs", reason="mkdocs builds the site: pip install 'musync[docs]'")
+    pytest.importorskip("mkdocs", reason="mkdocs builds the site: pip install 'musync-gs[docs]'")
     import subprocess
     import sys
 

@@ -202,6 +202,6 @@ def test_without_rosbags_the_reader_says_what_to_install(tmp_path, monkeypatch):
     (tmp_path / "log.mcap").write_bytes(b"")
     monkeypatch.setitem(sys.modules, "rosbags", None)
     assert (
-        'reading ROS bags and MCAP needs the package rosbags: install it with pip install "musync[ros]"'
+        'reading ROS bags and MCAP needs the package rosbags: install it with pip install "musync-gs[ros]"'
         in read_refusal(tmp_path / "log.mcap", "/car.speed")
     )

@@ -215,7 +215,7 @@ def test_a_damaged_file_is_one_sentence(tmp_path, content):
 def test_without_h5py_the_reader_says_what_to_install(tmp_path, monkeypatch):
     write_hdf(tmp_path / "log.mat", {"t": TIME})
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
-    assert 'pip install "musync[mat]"' in read_refusal(tmp_path / "log.mat", "v")
+    assert 'pip install "musync-gs[mat]"' in read_refusal(tmp_path / "log.mat", "v")
 
 
 @either

@@ -13,7 +13,7 @@ from catalogs.cameras import load_camera
 from tasks.conventions import TICK_CHANNELS
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
-reader = pytest.importorskip("mcap.reader", reason="pip install 'musync[export]'")
+reader = pytest.importorskip("mcap.reader", reason="pip install 'musync-gs[export]'")
 jsonschema = pytest.importorskip("jsonschema")
 
 

@@ -6,7 +6,7 @@ import pytest
 from tasks.conventions import TICK_CHANNELS
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
-asammdf = pytest.importorskip("asammdf", reason="pip install 'musync[export]'")
+asammdf = pytest.importorskip("asammdf", reason="pip install 'musync-gs[export]'")
 
 
 def test_every_tick_and_pose_reads_back_with_unit_and_meaning(export, stored):

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from tasks.conventions import TICK_CHANNELS
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
-chunk = pytest.importorskip("rerun.chunk", reason="pip install 'musync[export]'")
+chunk = pytest.importorskip("rerun.chunk", reason="pip install 'musync-gs[export]'")
 
 
 @pytest.fixture(scope="module")

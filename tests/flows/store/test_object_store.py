@@ -242,7 +242,7 @@ def test_faults_of_the_store_are_one_sentence_each(server, machine, grid, monkey
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
     assert "no object store answers at http://127.0.0.1:9" in told("s3://data/nothing")
     monkeypatch.setitem(__import__("sys").modules, "obstore", None)
-    assert "pip install 'musync[s3]'" in told("s3://data/nothing")
+    assert "pip install 'musync-gs[s3]'" in told("s3://data/nothing")
 
 
 def test_a_command_whose_output_must_be_a_folder_says_so(stored, machine, monkeypatch, capsys):
