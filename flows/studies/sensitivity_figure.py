@@ -50,9 +50,9 @@ def draw_sensitivity(
 
 def _place_print(row: Mapping[str, Any]) -> tuple[str, str, float, float] | None:
     """Return kind, quantity, rate and value of a figure such as ``snow1_stop_m.p05``; None for a correlation."""
-    place, _, edge = str(row["figure"]).partition(".")
+    place = str(row["figure"]).partition(".")[0]
     where, _, quantity = place.partition("_")
     kind = where.rstrip("0123456789")
-    if kind not in COLOURS or not edge:
+    if kind not in COLOURS:
         return None
     return kind, quantity, float(where.removeprefix(kind)), float(row["printed"])

@@ -46,6 +46,14 @@ def assert_text_alone(html: str, hostile: str) -> Elements:
     return found
 
 
+def test_a_policy_runs_the_pages_own_scripts_and_fetches_nothing():
+    own = "'sha256-5KYv+PUboo5h+0+YAtGRPbwv5d/QxzHslP4YGnUaxRw='"  # openssl dgst -sha256 -binary | base64
+    closed = {"default-src 'none'", "base-uri 'none'", "form-action 'none'", "img-src data:"}
+    assert set(make_policy().split("; ")) == closed | {"style-src 'unsafe-inline'"}
+    assert f"style-src {own}" in make_policy(style="go()").split("; ")
+    assert set(make_policy(scripts=["go()"]).split("; ")) >= {f"script-src {own}", "default-src 'none'"}
+
+
 @pytest.mark.parametrize("hostile", HOSTILE)
 def test_the_evaluation_takes_labels_as_text(hostile):
     times = np.linspace(0, 1, 5)

@@ -26,6 +26,10 @@ def test_further_datasets_add_a_row_of_their_weathers_each_and_must_be_finished(
     )
     row = round(TILE_WIDTH * 2 / 3) + MARGIN + CAPTION
     assert four.shape[0] == alone.shape[0] + 2 * row and four.shape[1] == alone.shape[1]
+    first = alone[MARGIN : MARGIN + row]
+    assert all((four[MARGIN + k * row :][:row] == first).all() for k in (2, 3)), (
+        "all weathers of its first drive"
+    )
     with pytest.raises(InputError, match=r"one: must be a finished dataset[^$]*two: must be"):
         draw_sheets(made, str(tmp_path / "x"), beside=[str(tmp_path / "one"), str(tmp_path / "two")])
 
