@@ -87,7 +87,7 @@ def find_compiler(platform: Platform) -> list[str]:
         return [own]
     if find_spec("ziglang") is None:
         raise InputError(
-            f"--platform {platform.name}: needs a C compiler, and none for it is installed: pip install 'musync-gs[fmu]'"
+            f"--platform {platform.name}: needs a C compiler, and none is installed: pip install 'musync-gs[fmu]'"
         )
     return [sys.executable, "-m", "ziglang", "cc", "-target", platform.target]
 
