@@ -18,6 +18,7 @@ REACHES = {
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
     "low_speed.yaml": (VEHICLE, RENDER),
+    "ablation.yaml": (VEHICLE, RENDER),
     "gates.yaml": (JUDGING,),
     "study.yaml": (JUDGING,),
     "weather": (RENDER,),
@@ -30,6 +31,7 @@ REACHES = {
     "frames": (VEHICLE, RENDER),
     "duration_s": (VEHICLE,),
     "low_speed": (VEHICLE, RENDER),
+    "variant": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
     "seed": (RENDER,),
     "code": (VEHICLE, RENDER, JUDGING),
@@ -71,7 +73,9 @@ def input_differences(
             )
     rows += _list_rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
     rows += _list_rows("backend", "backend", a["backend"], b["backend"])
-    for name in ("vehicle_mode", "low_speed", "composition", "frames", "frame_rate_hz", "duration_s", "seed"):
+    for name in (
+        "vehicle_mode", "low_speed", "variant", "composition", "frames", "frame_rate_hz", "duration_s", "seed"
+    ):  # fmt: skip
         before = BEFORE.get(name)
         rows += _list_rows(name, name, a["grid"].get(name, before), b["grid"].get(name, before))
     return rows + tool_differences(a, b)

@@ -157,9 +157,17 @@ PAIR_CHANNELS: tuple[Channel, ...] = (
     Channel(name="peak_pitch_change", unit="rad", symbol="", description="largest nose-down pitch, b minus a"),
 )  # fmt: skip
 
+VARIANT_CHANNEL = Channel(
+    name="variant",
+    unit="",
+    symbol="",
+    description="coupling that is cut on purpose, as in the paper's ablation: the picture is the scenario's, the motion is not; a sound dataset has no such column",
+)
+"""Column of the clips table of a dataset in which a coupling is cut."""
+
 CHANNELS_BY_NAME: dict[str, Channel] = {
     c.name: c
     for c in (
-        *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS
+        VARIANT_CHANNEL, *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS
     )
 }  # fmt: skip

@@ -9,6 +9,7 @@ from catalogs.grids.blocks import Number as LaxNumber
 from catalogs.grids.selection import Condition
 from catalogs.names import Name
 from catalogs.physical_limits import limit_problem, load_physical_limits
+from catalogs.variants import Variant
 
 LIMITS = load_physical_limits()
 MOST_CLIPS = 100_000
@@ -16,8 +17,8 @@ MOST_CLIPS = 100_000
 Reference = Annotated[str, Field(min_length=1, max_length=4096)]
 """Name or file of an entry; 4096 characters are the longest path."""
 
-BEFORE = {"low_speed": "literal"}
-"""What a record means that was written before a setting with another default; grid files mean the default."""
+BEFORE = {"low_speed": "literal", "variant": "full"}
+"""What a record means that lacks a setting; for ``low_speed`` grid files mean another default."""
 
 
 class GridFile(Blocks):
@@ -42,6 +43,12 @@ class GridFile(Blocks):
     low_speed: Literal["steady", "literal"] = Field(
         default="steady",
         description="End of a stop in paper mode: steady rests on no one sample; literal is Appendix B word by word.",
+    )
+    variant: Variant = Field(
+        default="full",
+        exclude_if=lambda variant: variant == "full",
+        description="Coupling that is cut on purpose (the paper's ablation): the picture stays that of the scenario,"
+        " the motion is the variant's. full cuts none.",
     )
     seed: Whole = Field(default=2025, ge=0, lt=2**53)
     visual_seeds: Whole = Field(

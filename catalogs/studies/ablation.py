@@ -1,25 +1,20 @@
 """The paper's ablation: which coupling each variant cuts, and where the variants are compared."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 
 from catalogs.names import WeatherName
 from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
 from catalogs.scenario import Scenario
-from catalogs.studies import Condition, load_conditions, load_sensitivity_study
+from catalogs.studies import SENSITIVITY, Condition, load_conditions, load_sensitivity_study
+from catalogs.variants import Variant
 from tasks.surface.weather import DRY, find_weather
 
-Variant = Literal["appearance-only", "vertical-only", "fixed-mu", "full"]
-VARIANTS: dict[Variant, str] = {
-    "appearance-only": "the weather is seen and not felt: dry friction",
-    "vertical-only": "the road moves the body, nobody brakes",
-    "fixed-mu": "one friction for all rain, one for all snow",
-    "full": "nothing is cut",
-}
-"""Effect of each variant (paper, Section 4.4)."""
+ABLATION = Path(__file__).with_name("ablation.yaml")
 
 Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
@@ -49,9 +44,23 @@ class Ablation:
     reference_pitch_rmse_deg: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class FamilyWeather:
+    """The one weather that stands for all of a kind in ``fixed-mu``.
+
+    Parameters
+    ----------
+    rates_mm_h : rate by kind of weather [mm/h]
+    accumulation_h : time over which snow has fallen [h]
+    """
+
+    rates_mm_h: Mapping[str, float]
+    accumulation_h: float
+
+
 def load_ablation() -> Ablation:
     """The study of the paper's Section 4.4."""
-    entry, protocol = _load_entry(), load_sensitivity_study()[0]
+    entry, protocol = load_ablation_entry(), load_sensitivity_study()[0]
     conditions = {condition.name: condition for condition in load_conditions()}
     dry = conditions[entry.stop_condition].scenario
     stops: dict[str, tuple[Scenario, ...]] = {}
@@ -70,26 +79,71 @@ def load_ablation() -> Ablation:
     )
 
 
-def cut_coupling(scenario: Scenario, variant: Variant) -> Scenario:
+def load_ablation_entry(path: Path = ABLATION) -> AblationEntry:
+    """Read the ablation's file.
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file.
+    """
+    return read_entry(AblationEntry, path, "study")
+
+
+def load_families(ablation: Path = ABLATION, study: Path = SENSITIVITY) -> FamilyWeather:
+    """Read what stands for each kind of weather in ``fixed-mu``.
+
+    Parameters
+    ----------
+    ablation, study : files of the ablation, and of the study whose snow has fallen for so long
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the files.
+    """
+    rates = {kind: rate.value for kind, rate in load_ablation_entry(ablation).family_rates.items()}
+    return FamilyWeather(
+        rates_mm_h=rates, accumulation_h=load_sensitivity_study(study)[0].snow_accumulation_h
+    )
+
+
+def load_kept_families(inputs: Path, variant: Variant) -> FamilyWeather | None:
+    """Read `load_families` among a dataset's kept inputs; None where its variant has none.
+
+    Parameters
+    ----------
+    inputs : folder of the kept catalogue files
+    variant : of the dataset
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the files.
+    """
+    if variant != "fixed-mu":
+        return None
+    return load_families(inputs / ABLATION.name, inputs / "study.yaml")
+
+
+def cut_coupling(scenario: Scenario, variant: Variant, families: FamilyWeather | None = None) -> Scenario:
     """Return the scenario that a variant drives; the appearance stays that of the original scenario.
 
     Parameters
     ----------
     scenario : as it is seen
     variant : which coupling is cut
+    families : of ``fixed-mu``; None takes the catalogue's
     """
     dry = replace(scenario, weather=DRY, precipitation_mm_h=0.0, snow_accumulation_h=0.0)
     if variant == "appearance-only":
         return dry
     if variant == "vertical-only":
         return replace(dry, peak_pressure_mpa=0.0, brake_onset_s=None, brake_onset_m=None)
-    rate = _load_entry().family_rates.get(scenario.weather) if variant == "fixed-mu" else None
-    if rate is not None:
-        accumulates = find_weather(scenario.weather).accumulates
-        hours = load_sensitivity_study()[0].snow_accumulation_h if accumulates else 0.0
-        return replace(scenario, precipitation_mm_h=rate.value, snow_accumulation_h=hours)
-    return scenario
-
-
-def _load_entry() -> AblationEntry:
-    return read_entry(AblationEntry, Path(__file__).with_name("ablation.yaml"), "study")
+    if variant == "full":
+        return scenario
+    families = families or load_families()
+    if (rate := families.rates_mm_h.get(scenario.weather)) is None:
+        return scenario
+    hours = families.accumulation_h if find_weather(scenario.weather).accumulates else 0.0
+    return replace(scenario, precipitation_mm_h=rate, snow_accumulation_h=hours)

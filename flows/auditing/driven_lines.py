@@ -11,11 +11,13 @@ import numpy as np
 from catalogs.low_speed import load_kept_low_speed
 from catalogs.scenario import Scenario, scenario_problems
 from catalogs.studies import load_sensitivity_study
+from catalogs.studies.ablation import FamilyWeather, cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
+from catalogs.variants import Variant
 from catalogs.vehicles import load_vehicle
 from catalogs.weather.grip import GRIP_SECTIONS
 from flows.auditing.kept_lines import Line, is_number, scale_line
-from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures, weather_of
+from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures, surface_of, weather_of
 from flows.running.progress import progress_bar
 from flows.store.layout import write_atomically
 from manifests.explain import REACHES, VEHICLE, kind_of_input
@@ -47,6 +49,7 @@ class Entries:
     surface: SurfaceParameters
     study: StudyProtocol
     steady: SteadyStop | None
+    families: FamilyWeather | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,20 +58,22 @@ class Asked:
 
     Parameters
     ----------
-    scenario, mode, duration_s : of the clip
+    scenario, mode, variant, duration_s : of the clip
     route : of the scene; None where the scene is not at hand, and a straight road stands in for it
     """
 
     scenario: Scenario
     mode: Mode
+    variant: Variant
     duration_s: float
     route: Route | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """A clip, driven again: the surface, the ride, and every number by its column."""
+    """A clip, driven again: the scenario and surface that are driven, the ride, and every number by its column."""
 
+    scenario: Scenario
     state: SurfaceState
     ride: Rollout
     numbers: Mapping[str, Any]
@@ -90,8 +95,8 @@ class Moved:
     beyond: tuple[str, ...] = ()
 
 
-def load_entries(inputs: Path) -> Entries:
-    """Read vehicle, pavement and study of a folder as a dataset keeps them.
+def load_entries(inputs: Path, variant: Variant) -> Entries:
+    """Read vehicle, pavement and study of a folder as a dataset keeps them, and what its variant needs.
 
     Raises
     ------
@@ -103,6 +108,7 @@ def load_entries(inputs: Path) -> Entries:
         surface=load_surface(inputs / "surface.yaml", inputs / "weather"),
         study=load_sensitivity_study(inputs / STUDY)[0],
         steady=load_kept_low_speed(inputs),
+        families=load_kept_families(inputs, variant),
     )
 
 
@@ -115,10 +121,10 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
     entries : that it is driven with
     """
     vehicle, surface, steady = entries.vehicle, entries.surface, entries.steady
-    state, ride = simulate_drive(asked.scenario, vehicle, surface, asked.mode, asked.duration_s, steady)
-    ranges = ranges_of(
-        asked.scenario, state, vehicle, surface, entries.study, asked.mode, asked.duration_s, steady
-    )
+    driven = cut_coupling(asked.scenario, asked.variant, entries.families)
+    state, ride = simulate_drive(driven, vehicle, surface, asked.mode, asked.duration_s, steady)
+    ranges = ranges_of(driven, state, vehicle, surface, entries.study, asked.mode, asked.duration_s, steady)
+    seen = surface_of(asked.scenario, surface)
     straight = Route(station=np.array([0.0, 1.0]), T_world_rig=np.tile(np.eye(4), (2, 1, 1)))
     # the telemetry may go on beyond the route, where no frame is
     reached = (
@@ -137,8 +143,8 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
         **compute_lift_times(ride.columns),
         "static_pitch": ride.static_pitch,
     }
-    numbers = {**surface_figures(state, ride), **ride.columns, "T_world_rig": poses, **figures, **ranges}
-    return Drive(state=state, ride=ride, numbers=numbers)
+    numbers = {**surface_figures(seen, ride), **ride.columns, "T_world_rig": poses, **figures, **ranges}
+    return Drive(scenario=driven, state=state, ride=ride, numbers=numbers)
 
 
 def list_steps(asked: Asked, entries: Entries, drive: Drive) -> list[Step]:
@@ -151,10 +157,10 @@ def list_steps(asked: Asked, entries: Entries, drive: Drive) -> list[Step]:
     tick = int(np.argmin(drive.ride.columns["longitudinal_acceleration"]))
     row = {name: column[tick] for name, column in drive.ride.columns.items()} | {"tick": tick}
     row |= surface_figures(drive.state, drive.ride)
-    vehicle, hazard = entries.vehicle, hazard_of(asked.scenario)
+    vehicle, hazard = entries.vehicle, hazard_of(drive.scenario)
     response = compute_surface_response(vehicle, drive.state.kind, drive.state.friction)
     return [
-        *surface_steps(weather_of(asked.scenario), entries.surface, vehicle, row),
+        *surface_steps(weather_of(drive.scenario), entries.surface, vehicle, row),
         *force_steps(vehicle, response, hazard, asked.mode, row),
         *pitch_steps(vehicle, response, hazard, asked.mode, row, drive.ride.columns),
     ]
@@ -219,11 +225,11 @@ def _change_line(
 ) -> tuple[Asked, Entries]:
     if line.file != ASKED:
         (inputs / line.file).write_bytes(scale_line(line.file, kept[line.file], line.place, factor))
-        return asked, load_entries(inputs)
+        return asked, load_entries(inputs, asked.variant)
     scenario = replace(asked.scenario, **{line.key: line.value * factor})
     if problems := scenario_problems(scenario):
         raise InputError(problems)
-    return replace(asked, scenario=scenario), load_entries(inputs)
+    return replace(asked, scenario=scenario), load_entries(inputs, asked.variant)
 
 
 def _find_moved(before: Mapping[str, Any], after: Mapping[str, Any]) -> set[str]:

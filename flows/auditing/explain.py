@@ -11,9 +11,11 @@ from catalogs.cameras import load_camera
 from catalogs.low_speed import load_kept_low_speed
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
+from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
+from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
-from flows.making.driving import controls_of, hazard_of, weather_of
+from flows.making.driving import controls_of, hazard_of, surface_depths, surface_of, weather_of
 from flows.making.places import find_scene
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import refuse_traced
@@ -66,7 +68,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         problems.append(f"frame must lie in 0 to {plan.settings.frames - 1}; it is {frame}")
     if problems or planned is None:
         raise InputError(problems)
-    scenario = planned.scenario
+    scenario, variant = planned.scenario, plan.settings.variant
     folder = layout.telemetry / "frames" / f"family={scenario.weather}"
     columns = read_columns(folder, planned.clip_id, [channel.name for channel in VIEWS["frames"]])
     if len(columns["frame"]) != plan.settings.frames:
@@ -83,20 +85,23 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         )
     vehicle = load_vehicle(layout.inputs / "vehicle.yaml", layout.inputs / "weather")
     mode = plan.settings.vehicle_mode
-    hazard = hazard_of(scenario)
     surface = load_surface(layout.inputs / "surface.yaml", layout.inputs / "weather")
+    driven = cut_coupling(scenario, variant, load_kept_families(layout.inputs, variant))
+    if variant != "full":  # the stored depths are those of the picture, which the motion does not follow from
+        row = row | surface_depths(surface_of(driven, surface))
+    hazard = hazard_of(driven)
     state = SurfaceState(
-        kind=scenario.weather,
+        kind=driven.weather,
         friction=float(row["surface_friction"]),
         snow_depth_mm=float(row["snow_depth_mm"]),
     )
     ride = simulate_scenario(
-        vehicle, state, controls_of(scenario), hazard, mode=mode, duration_s=plan.duration_s,
+        vehicle, state, controls_of(driven), hazard, mode=mode, duration_s=plan.duration_s,
         steady=load_kept_low_speed(layout.inputs),
     )  # fmt: skip
     response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
-        *surface_steps(weather_of(scenario), surface, vehicle, row),
+        *surface_steps(weather_of(driven), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row),
         *pitch_steps(vehicle, response, hazard, mode, row, ride.columns),
         *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, find_route(plan.scene)),
@@ -109,6 +114,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         "frame": frame,
         "t_s": int(row["t_ns"]) / 1e9,
         "vehicle_mode": mode,
+        "variant": variant,
         "effects": sorted(vehicle.effects) + [form.name for form in vehicle.forms],
         "asked": _list_scenario(scenario),
         "steps": [_as_row(step) for step in steps],
@@ -132,6 +138,7 @@ def format_text(result: Mapping[str, Any]) -> str:
     lines = [
         f"{result['label']} frame {result['frame']}, t = {result['t_s']:g} s, {result['vehicle_mode']} mode",
         asked,
+        *([warning] if (warning := warn_of_variant(result["variant"])) else []),
     ]
     for step in result["steps"]:
         lines.append(f"{step['quantity']}  [Eq. {step['equation']}]")

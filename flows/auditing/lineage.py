@@ -84,10 +84,10 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     planned = find_clip(plan, clip, dataset)
     kept = _read_kept(layout, manifest)
     asked = Asked(
-        scenario=planned.scenario, mode=plan.settings.vehicle_mode, duration_s=plan.duration_s,
-        route=find_route(plan.scene),
+        scenario=planned.scenario, mode=plan.settings.vehicle_mode, variant=plan.settings.variant,
+        duration_s=plan.duration_s, route=find_route(plan.scene),
     )  # fmt: skip
-    entries = load_entries(layout.inputs)
+    entries = load_entries(layout.inputs, asked.variant)
     drive = drive_clip(asked, entries)
     units = {name: channel.unit for name, channel in CHANNELS_BY_NAME.items()}
     lines = list_asked(planned.scenario, units, manifest["grid"]["name"])

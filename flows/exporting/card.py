@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from catalogs.variants import warn_of_variant
 from flows.exporting.dataset import TICK_COLUMNS, ExportedDataset, describe_columns
 
 CARD = "musync-export.json"
@@ -15,12 +16,14 @@ def describe_export(dataset: ExportedDataset, to: str) -> dict[str, Any]:
     dataset : that is exported
     to : name of the format
     """
-    camera = dataset.camera
+    camera, variant = dataset.camera, dataset.plan.settings.variant
     return {
         "format": to,
         "dataset": dataset.name,
         "run_id": dataset.manifest["run_id"],
         "seal": dataset.manifest["seal"],
+        "variant": variant,
+        **({"warning": warning} if (warning := warn_of_variant(variant)) else {}),
         "frame_rate_hz": dataset.frame_rate_hz,
         "camera": {
             "name": camera.name,

@@ -16,6 +16,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from catalogs.variants import warn_of_variant
 from flows.exporting.dataset import ExportedDataset
 from flows.exporting.whole_dataset import require_every_clip
 from flows.store.layout import write_json
@@ -75,7 +76,7 @@ def _describe_dataset(dataset: ExportedDataset) -> dict[str, Any]:
         "@type": "sc:Dataset",
         "name": dataset.name,
         "description": f"Telemetry of {len(dataset)} simulated drives on {facts.scene} with {facts.vehicle},"
-        " in step with rendered video; made by muSync.",
+        f" in step with rendered video; made by muSync. {warn_of_variant(facts.variant)}".rstrip(),
         "conformsTo": CONFORMS_TO,
         "identifier": dataset.manifest["run_id"],
         "version": "1.0.0",

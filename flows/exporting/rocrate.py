@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from catalogs.variants import warn_of_variant
 from flows.exporting.dataset import ExportedDataset
 from flows.exporting.whole_dataset import require_every_clip
 from flows.store.layout import write_json
@@ -116,7 +117,8 @@ def _describe_root(dataset: ExportedDataset, names: list[str]) -> dict[str, Any]
         "@id": "./",
         "@type": "Dataset",
         "name": f"muSync dataset {dataset.name}",
-        "description": f"{len(dataset)} simulated drives on {facts.scene} with {facts.vehicle}: telemetry and record.",
+        "description": f"{len(dataset)} simulated drives on {facts.scene} with {facts.vehicle}: telemetry and record."
+        f" {warn_of_variant(facts.variant)}".rstrip(),
         "identifier": dataset.manifest["run_id"],
         "datePublished": datetime.now(UTC).date().isoformat(),
         "license": "not stated",

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from catalogs.gates import load_gates
-from catalogs.studies.ablation import VARIANTS, Variant, cut_coupling
+from catalogs.studies.ablation import cut_coupling
+from catalogs.variants import VARIANTS, Variant
 from flows.drawing import as_svg
 from flows.judging.controls_figure import roc_figure
 from flows.judging.evaluation_rows import control_of

@@ -7,9 +7,12 @@ import numpy as np
 
 from catalogs.documents import read_yaml
 from catalogs.low_speed import load_kept_low_speed
+from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
+from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
-from flows.making.plan import TICK_RATE_HZ
+from flows.making.driving import surface_depths, surface_of
+from flows.making.plan import TICK_RATE_HZ, Plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading, want_telemetry
@@ -30,9 +33,15 @@ from tasks.eval.physics.body import DT
 from tasks.eval.physics.constants import Constants, TyreTables
 from tasks.eval.physics.laws import finite_rows
 
+DEPTHS = ("film_depth_mm", "snow_depth_mm", "snow_coverage")
+"""Columns of what lies on the road that is seen."""
+
 
 def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """Work every stored column out again from the others, and name the column of a clip that breaks a law.
+
+    Where a coupling is cut on purpose, the motion is held against the scenario that its variant drives, and the result
+    says so; the depths of film and snow are then the picture's, and are held against nothing.
 
     Parameters
     ----------
@@ -46,7 +55,8 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """
     results = Outputs(out, "audit-physics", "physics.json")
     root = open_for_reading(dataset, want_telemetry).root
-    refuse_traced(read_plan_record(Layout(root))["inputs"], dataset, "audit-physics")
+    plan = Plan.of(read_plan_record(Layout(root)), Layout(root).plan)
+    refuse_traced(plan.inputs, dataset, "audit-physics")
     constants = read_constants(root)
     clips = clip_facts(root)
     held = [facts["label"] for facts in clips if facts["hold_speed"]]
@@ -55,10 +65,15 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
             f"{dataset}: {len(held)} clips hold their speed until the brake ({held[0]} first), by a force that no"
             " column records: the physics audit knows coasting cars only"
         )
-    rows = [run_as_stage(_clip_row)(root, facts, constants) for facts in clips]
+    driven = drive_facts(root, plan)
+    rows = [
+        run_as_stage(_clip_row)(root, facts, driven.get(facts["clip_id"], {}), constants) for facts in clips
+    ]
     broken = [row for row in rows if not row["passed"]]
     result = {
         "verified": not broken,
+        "variant": plan.settings.variant,
+        **({"warning": warning} if (warning := warn_of_variant(plan.settings.variant)) else {}),
         "clips_checked": len(rows),
         "laws_checked": sum(row["laws"] for row in rows),
         "wheels_lifted": [row["label"] for row in rows if not row["superposition_holds"]],
@@ -81,6 +96,26 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
     required = [name for name in known if name not in LATER_CLIP_CHANNELS]
     rows: list[dict[str, Any]] = read_table(path, required=required).to_pylist()
     return rows
+
+
+def drive_facts(root: Path, plan: Plan) -> dict[str, dict[str, Any]]:
+    """Return the facts of each clip that its variant drives otherwise than it is seen, by id.
+
+    Parameters
+    ----------
+    root, plan : of the dataset
+    """
+    layout, variant = Layout(root), plan.settings.variant
+    if variant == "full":
+        return {}
+    surface = load_surface(layout.inputs / "surface.yaml", layout.inputs / "weather")
+    families = load_kept_families(layout.inputs, variant)
+    driven = {clip.clip_id: cut_coupling(clip.scenario, variant, families) for clip in plan.clips}
+    return {
+        name: {key: np.nan if value is None else value for key, value in scenario.as_row().items()}
+        | surface_depths(surface_of(scenario, surface))
+        for name, scenario in driven.items()
+    }
 
 
 def clip_columns(root: Path, table: str, facts: dict[str, Any]) -> dict[str, np.ndarray]:
@@ -151,8 +186,12 @@ def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
     }
 
 
-def _clip_row(root: Path, facts: dict[str, Any], constants: Constants) -> dict[str, Any]:
-    ticks, frames = clip_columns(root, "ticks", facts), clip_columns(root, "frames", facts)
+def _clip_row(
+    root: Path, seen: dict[str, Any], driven: dict[str, Any], constants: Constants
+) -> dict[str, Any]:
+    ticks, frames = clip_columns(root, "ticks", seen), clip_columns(root, "frames", seen)
+    facts = seen | driven
+    frames |= {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
     holes = [f"ticks.{c}" for c in finite_rows(ticks)]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
         verdict = audit_clip(ticks, frames, facts, constants)

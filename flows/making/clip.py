@@ -24,10 +24,12 @@ from catalogs.references import read_reference
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.studies import load_sensitivity_study
+from catalogs.studies.ablation import FamilyWeather, cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
+from catalogs.variants import Variant
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
-from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures
+from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures, surface_of
 from flows.making.edited_scene import edit_scene
 from flows.making.places import find_scene, remember_place
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
@@ -71,6 +73,7 @@ class Catalogue:
     marking: HazardMarking | None = None
     traces: Reference | None = None
     steady: SteadyStop | None = None
+    families: FamilyWeather | None = None
 
     @property
     def looks(self) -> WeatherParameters:
@@ -86,11 +89,12 @@ def _looks(folder: Path) -> WeatherParameters:
 @lru_cache(maxsize=2)
 def catalogue_of(root: Path) -> Catalogue:
     """Load a dataset's frozen inputs and its scene."""
-    return load_catalogue(Layout(root).inputs, find_scene(read_plan(root).scene))
+    plan = read_plan(root)
+    return load_catalogue(Layout(root).inputs, find_scene(plan.scene), plan.settings.variant)
 
 
-def load_catalogue(inputs: Path, scene: str) -> Catalogue:
-    """Load frozen inputs from their folder, and a scene."""
+def load_catalogue(inputs: Path, scene: str, variant: Variant = "full") -> Catalogue:
+    """Load frozen inputs from their folder, with those of a variant, and a scene."""
     return Catalogue(
         vehicle=load_vehicle(inputs / "vehicle.yaml", inputs / "weather"),
         surface=load_surface(inputs / "surface.yaml", inputs / "weather"),
@@ -102,6 +106,7 @@ def load_catalogue(inputs: Path, scene: str) -> Catalogue:
         study=load_sensitivity_study(inputs / "study.yaml")[0],
         traces=read_reference(traces) if (traces := inputs / TRACES).is_dir() else None,
         steady=load_kept_low_speed(inputs),
+        families=load_kept_families(inputs, variant),
     )
 
 
@@ -117,8 +122,9 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
 
     state, ride = move_car(clip.scenario, plan, catalogue)
     facts = surface_figures(state, ride)
+    driven = cut_coupling(clip.scenario, plan.settings.variant, catalogue.families)
     ranges = unknown_ranges() if catalogue.traces is not None else ranges_of(
-        clip.scenario, state, catalogue.vehicle, catalogue.surface, catalogue.study,
+        driven, surface_of(driven, catalogue.surface), catalogue.vehicle, catalogue.surface, catalogue.study,
         plan.settings.vehicle_mode, plan.duration_s, catalogue.steady,
     )  # fmt: skip
     frames = frame_rows(ride, plan, catalogue)
@@ -184,13 +190,14 @@ def warm_up(layout: Layout, scene: str) -> None:
 
 
 def move_car(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, Rollout]:
-    """Return the surface, and the motion of the vehicle on it or that of the trace which the dataset shows instead."""
+    """Return the surface that is seen, and the motion: of the vehicle, its variant, or the dataset's trace."""
     if catalogue.traces is not None:
         return replay_drive(scenario, catalogue.surface, catalogue.traces, plan.duration_s)
-    return simulate_drive(
-        scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
-        catalogue.steady,
+    _, ride = simulate_drive(
+        cut_coupling(scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
+        catalogue.surface, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady,
     )  # fmt: skip
+    return surface_of(scenario, catalogue.surface), ride
 
 
 def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:

@@ -23,18 +23,26 @@ def simulate_drive(
     steady: SteadyStop | None = None,
 ) -> tuple[SurfaceState, Rollout]:
     """Simulate a scenario: weather to surface state to friction to motion; ``steady`` is as the rollout has it."""
-    state = surface_state(weather_of(scenario), surface)
+    state = surface_of(scenario, surface)
     return state, _simulate_vehicle(scenario, vehicle, state, mode, duration_s, steady)
 
 
+def surface_of(scenario: Scenario, surface: SurfaceParameters) -> SurfaceState:
+    """Return the road surface that the weather of the scenario makes."""
+    return surface_state(weather_of(scenario), surface)
+
+
 def surface_figures(state: SurfaceState, ride: Rollout) -> dict[str, float]:
-    """Return what tables and receipts record of the surface and the tyre on it."""
+    """Return what tables and receipts record of the surface that is seen, and of the friction that is driven on."""
+    return surface_depths(state) | {"surface_friction": ride.surface_friction, "tyre_peak": ride.tyre_peak}
+
+
+def surface_depths(state: SurfaceState) -> dict[str, float]:
+    """Return what lies on the road, of which the picture shows every part."""
     return {
         "film_depth_mm": state.film_depth_mm,
         "snow_depth_mm": state.snow_depth_mm,
         "snow_coverage": state.snow_coverage,
-        "surface_friction": state.friction,
-        "tyre_peak": ride.tyre_peak,
     }
 
 

@@ -10,6 +10,7 @@ from catalogs.entries import entry_names
 from catalogs.grids import Grid, GridFile, expand_grid, load_grid
 from catalogs.grids.form import BEFORE
 from catalogs.low_speed import load_low_speed
+from catalogs.studies.ablation import cut_coupling
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import simulate_drive
@@ -239,7 +240,10 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
     steady = load_low_speed() if plan.settings.keeps_stops_steady else None
     rides = (
-        simulate_drive(clip.scenario, vehicle, surface, mode, duration_s, steady)[1] for clip in plan.clips
+        simulate_drive(
+            cut_coupling(clip.scenario, plan.settings.variant), vehicle, surface, mode, duration_s, steady
+        )[1]
+        for clip in plan.clips
     )
     return {
         clip.label: columns_hash(ride.columns, names) for clip, ride in zip(plan.clips, rides, strict=True)

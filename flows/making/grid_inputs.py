@@ -14,6 +14,7 @@ from catalogs.low_speed import LOW_SPEED, load_low_speed
 from catalogs.scenario import route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
+from catalogs.studies.ablation import ABLATION, cut_coupling, load_families
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
 from catalogs.weather import FOLDER as WEATHER_FOLDER
@@ -30,6 +31,7 @@ LOADERS: Mapping[str, Callable[[Path], Any]] = {
     "camera.yaml": load_camera,
     "hazard_marking.yaml": load_marking,
     "low_speed.yaml": load_low_speed,
+    "ablation.yaml": load_families,
 }
 """Loaders that check the catalogue entries that a user may bring."""
 READERS: Mapping[str, Callable[[Path], bytes]] = {"vehicle.yaml": vehicle_content}
@@ -52,6 +54,7 @@ def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
             {} if marking is None else {"hazard_marking.yaml": partial(find_entry, "hazard marking", marking)}
         ),
         **({"low_speed.yaml": lambda: LOW_SPEED} if settings.keeps_stops_steady else {}),
+        **({"ablation.yaml": lambda: ABLATION} if settings.variant == "fixed-mu" else {}),
         **({} if (tyre := _tyre_behind(settings)) is None else {tyre.name: partial(Path, tyre)}),
     }
 
@@ -97,7 +100,9 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
     -------
     Name under ``inputs/`` to the file's bytes; name and hash of the scene; one sentence for each problem.
     """
-    weathers = {scenario.weather for _, scenario in grid.scenarios}
+    scenarios = [scenario for _, scenario in grid.scenarios]
+    driven = [cut_coupling(scenario, grid.settings.variant) for scenario in scenarios]
+    weathers = {scenario.weather for scenario in (*scenarios, *driven)}
     inputs, scene, problems = _read_entries(grid.settings, weathers)
     if not problems:
         problems += _weather_problems(grid.settings, weathers)
@@ -106,6 +111,11 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
     if grid.poses is not None:
         traces, found = read_trace_inputs(grid, grid.poses)
         inputs, problems = inputs | traces, problems + found
+        if grid.settings.variant != "full":
+            problems.append(
+                "variant must be full where --poses gives the motion, which is not driven;"
+                f" it is {grid.settings.variant}"
+            )
     return inputs, scene, problems + _camera_problems(grid.settings, tick_rate_hz)
 
 

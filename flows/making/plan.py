@@ -157,6 +157,7 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         **({} if settings.composition == "linear" else {"composition": settings.composition}),
         **({"low_speed": settings.low_speed} if settings.keeps_stops_steady else {}),
         **({} if settings.duration_s is None else {"duration_s": settings.duration_s}),
+        **({} if settings.variant == "full" else {"variant": settings.variant}),
     }
     clips = tuple(_clip_plans(grid, asked))
     repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.grids import load_grid
+from catalogs.studies.ablation import cut_coupling
 from flows.making.clip import Catalogue, frame_rows, load_catalogue, render_frames, rig_of
-from flows.making.driving import simulate_drive, surface_figures
+from flows.making.driving import simulate_drive, surface_figures, surface_of
 from flows.making.plan import ClipPlan, Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.store.frames import buffer_hash
@@ -77,7 +78,7 @@ def replay_audit(
             plan, inputs = freeze_grid(replace(checked, settings=settings), grid, name)
             for file, content in inputs.items():
                 write_atomically(Path(folder) / file, content)
-            catalogue = load_catalogue(Path(folder), checked.settings.scene)
+            catalogue = load_catalogue(Path(folder), settings.scene, settings.variant)
             for clip in plan.clips:
                 runs.append(_run_clip(clip, plan, catalogue, frames))
                 advance(f"{clip.label} seed {seed}")
@@ -106,10 +107,12 @@ def replay_audit(
 
 
 def _run_clip(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Replay:
-    state, ride = simulate_drive(
-        clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
+    driven = cut_coupling(clip.scenario, plan.settings.variant, catalogue.families)
+    _, ride = simulate_drive(
+        driven, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
         catalogue.steady,
     )  # fmt: skip
+    state = surface_of(clip.scenario, catalogue.surface)
     rows = frame_rows(ride, plan, catalogue)
     shown = {name: column[:frames] for name, column in rows.items()}
     rig_at = rig_of(ride, shown, catalogue)

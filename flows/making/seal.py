@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from catalogs.variants import Variant
 from flows.making.gathering import gather_tables
 from flows.making.plan import ClipPlan, Plan
 from flows.store.address import fetch_files, remove_files, send_files
@@ -111,7 +112,7 @@ def batched(items: Iterable[Item], size: int | None = None) -> Iterator[list[Ite
 
 def _write_clips(layout: Layout, plan: Plan) -> "Outcomes":
     """Write the table of the clips; returns what pairs of them need."""
-    table = clips_table(_read_receipts(layout, plan.clips))
+    table = clips_table(_read_receipts(layout, plan.clips), plan.settings.variant)
     write_parquet(table, layout.telemetry / "clips.parquet")
     return Outcomes(plan.clips, table)
 
@@ -125,15 +126,22 @@ def _read_here(layout: Layout, plan: Plan) -> Iterator[Path]:
         yield layout.frame_shard("rgb", clip.index)
 
 
-def clips_table(receipts: Iterable[Receipt]) -> pa.Table:
-    """One row a clip: controls, surface, outcome and verdict."""
+def clips_table(receipts: Iterable[Receipt], variant: Variant = "full") -> pa.Table:
+    """One row a clip: controls, surface, outcome and verdict; where a coupling is cut, also which.
+
+    Parameters
+    ----------
+    receipts : of the clips
+    variant : of the dataset
+    """
     columns: dict[str, list[Any]] = {}
     for batch in batched(receipts):
         rows = [_clip_row(receipt) for receipt in batch]
         for name in rows[0]:
             columns.setdefault(name, []).append(_pack([row[name] for row in rows]))
     # each column's parts go when it is whole
-    return labelled_table({name: _join(columns.pop(name)) for name in list(columns)})
+    cut = {} if variant == "full" else {"variant": variant}
+    return labelled_table({name: _join(columns.pop(name)) for name in list(columns)}, cut)
 
 
 def _clip_row(r: Receipt) -> dict[str, Any]:

@@ -4,9 +4,10 @@ from collections import Counter
 from typing import Any
 
 from catalogs.cameras import load_camera
+from catalogs.variants import warn_of_variant
 from flows.making.plan import TICK_RATE_HZ, make_plan
 from flows.store.address import open_for_reading, stored_bytes, want_manifest
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, recorded_grid
 
 CPU_SECONDS_PER_MEGAPIXEL = 1.3
 """Of a finished frame with its pose check, measured on the built-in street at 480 x 320."""
@@ -27,12 +28,15 @@ def describe_dataset(dataset: str) -> dict[str, Any]:
     layout = open_for_reading(dataset, want_manifest)
     manifest = read_manifest(layout)
     settings = manifest["grid"]
+    variant = recorded_grid(settings, layout.manifest).variant
     return {
         "run_id": manifest["run_id"],
         "grid": settings["name"],
         "scene": settings["scene"],
         "vehicle": settings["vehicle"],
         "vehicle_mode": settings["vehicle_mode"],
+        "variant": variant,
+        **({"warning": warning} if (warning := warn_of_variant(variant)) else {}),
         "camera": settings["camera"],
         "frames_per_clip": settings["frames"],
         "frame_rate_hz": settings["frame_rate_hz"],
@@ -68,6 +72,7 @@ def validate_grid(grid: str) -> dict[str, Any]:
     return {
         "grid": settings.name,
         "run_id": plan.run_id,
+        **({"warning": warning} if (warning := warn_of_variant(settings.variant)) else {}),
         "clips": len(plan.clips),
         "frames": frames,
         "ticks": ticks,

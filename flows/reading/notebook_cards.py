@@ -6,6 +6,7 @@ from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from catalogs.sentences import shorten
+from catalogs.variants import warn_of_variant
 from tasks.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def dataset_card(data: "Dataset") -> str:
         ("in quarantine", f"{failed} clips, whose pose check failed" if failed else "no clip"),
         ("scene", grid["scene"]),
         ("vehicle", f"{grid['vehicle']}, {grid['vehicle_mode']} mode"),
+        *([("warning", warning)] if (warning := warn_of_variant(grid.get("variant", "full"))) else []),
         ("run", data.manifest["run_id"]),
     ]
     return _render_card(f"muSync dataset {grid['name']}: {data.place}", pictures, rows)

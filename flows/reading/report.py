@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.variants import warn_of_variant
 from flows.making.plan import TICK_RATE_HZ
 from flows.making.seal import pick_evenly
 from flows.reading.film import write_film
@@ -97,6 +98,8 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     pictures : whether there are films of these
     """
     grid, rows = manifest["grid"], manifest["clips"]
+    settings = recorded_grid(grid, "manifest")
+    warning = warn_of_variant(settings.variant)
     place = {row["clip_id"]: k for k, row in enumerate(rows)}
     kept = (
         "clip_id", "label", "seed", "split", "calibration", "scenario", "figures", "verdict", "content"
@@ -104,10 +107,11 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     return {
         "name": grid["name"],
         "summary": f"{len(rows)} clips of {grid['frames']} frames on {grid['scene']}, vehicle {grid['vehicle']}"
-        f" in {grid['vehicle_mode']} mode; run {manifest['run_id']}",
+        f" in {grid['vehicle_mode']} mode; run {manifest['run_id']}"
+        + (f". {warning}" if warning else ""),
         "frame_rate_hz": grid["frame_rate_hz"],
         "tick_rate_hz": TICK_RATE_HZ,
-        "duration_s": recorded_grid(grid, "manifest").telemetry_s,
+        "duration_s": settings.telemetry_s,
         "panels": [
             {"column": t.column, "caption": t.caption, "unit": t.unit, "factor": t.factor,
              "decimals": DECIMALS[t.unit]}

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from catalogs.references import Traces, read_reference
 from catalogs.studies import Condition
-from catalogs.studies.ablation import VARIANTS, Ablation, Variant, cut_coupling, load_ablation
+from catalogs.studies.ablation import Ablation, cut_coupling, load_ablation
 from catalogs.surfaces import load_surface
+from catalogs.variants import VARIANTS, Variant
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.drawing import as_svg
 from flows.making.driving import simulate_drive

@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.scenario import Scenario
-from catalogs.studies.ablation import VARIANTS, cut_coupling
+from catalogs.studies.ablation import cut_coupling
+from catalogs.variants import VARIANTS
 from flows.studies.ablation import run_ablation
 from tasks.errors import InputError
 
