@@ -13,8 +13,9 @@ from catalogs.scenes import write_scene
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.auditing.audit import audit_dataset
+from flows.auditing.driven_lines import Asked, drive_clip, is_driven, load_entries, move_lines
 from flows.auditing.explain import explain_frame
-from flows.auditing.lineage import trace_lineage
+from flows.auditing.kept_lines import list_lines
 from flows.exporting.export import export_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.clip import catalogue_of
@@ -34,7 +35,7 @@ from tests.toy_street import TOY_CAMERA, toy_street
 GRID = """
 name: cut
 scene: {folder}/scene
-camera: {folder}/camera.yaml
+camera: {camera}
 frames: 3
 frame_rate_hz: 5
 duration_s: 6
@@ -63,7 +64,13 @@ def write_grid(street, tmp_path_factory):
     def write(variant, scenarios, pictures=False, grid=GRID):
         path = tmp_path_factory.mktemp("grid") / "grid.yaml"
         path.write_text(
-            grid.format(folder=street, variant=variant, scenarios=scenarios, pictures=str(pictures).lower())
+            grid.format(
+                folder=street,
+                camera=street / "camera.yaml" if pictures else "dashcam-480x320",
+                variant=variant,
+                scenarios=scenarios,
+                pictures=str(pictures).lower(),
+            )
         )
         return str(path)
 
@@ -145,10 +152,23 @@ def test_a_cut_dataset_is_made_again_byte_for_byte_and_obeys_the_laws_of_what_it
 
 
 def test_lineage_drives_the_variant_and_finds_its_rates(made):
-    told = trace_lineage(str(made["fixed-mu"].root), "heavy")
-    assert told["follows"]
-    lines = {row["key"]: row["moves"] for row in told["lines"] if row["file"] == "ablation.yaml"}
-    assert "surface_friction" in next(moves for key, moves in lines.items() if "rain" in key)
+    layout = made["fixed-mu"]
+    plan, kept = (
+        read_plan(layout.root),
+        {name: (layout.inputs / name).read_bytes() for name in read_manifest(layout)["inputs"]},
+    )
+    asked = Asked(
+        scenario=plan.clips[1].scenario,
+        mode="paper",
+        variant="fixed-mu",
+        duration_s=6.0,
+        route=toy_street().route,
+    )
+    drive = drive_clip(asked, load_entries(layout.inputs, "fixed-mu"))
+    np.testing.assert_array_equal(drive.numbers["pitch"], ticks_of(layout, 1)["pitch"])
+    lines = [line for line in list_lines("ablation.yaml", kept["ablation.yaml"]) if "rain" in line.place]
+    (moved,) = move_lines(asked, kept, [line for line in lines if is_driven(line)], drive)
+    assert "surface_friction" in moved.columns and "film_depth_mm" not in moved.columns
 
 
 @pytest.mark.parametrize("variant", CUTS)
@@ -161,8 +181,9 @@ def test_everything_that_shows_a_cut_dataset_says_so(made, variant, tmp_path):
     assert words in describe_dataset(str(layout.root))["warning"]
     assert words in page_data(manifest, set(), False)["summary"]
     assert words in audit_physics(str(layout.root))["warning"]
-    for to, file in (("croissant", "croissant.json"), ("rocrate", "ro-crate-metadata.json")):
-        export_dataset(str(layout.root), to=to, out=str(tmp_path / to))
+    labels = [clip["label"] for clip in manifest["clips"]]
+    for to, file in (("croissant", "croissant.json"), ("ro-crate", "ro-crate-metadata.json")):
+        export_dataset(str(layout.root), to=to, out=str(tmp_path / to), clips=labels)
         assert words in (tmp_path / to / file).read_text()
         card = json.loads((tmp_path / to / "musync-export.json").read_text())
         assert card["variant"] == variant and words in card["warning"]
