@@ -1,15 +1,17 @@
-"""How long a question about many clips takes: DuckDB on a telemetry-only dataset beside pandas over CSV.
+"""How long a question about many clips takes: DuckDB on a telemetry-only dataset beside pandas over CSV and SQLite.
 
 ``python -m benchmarks.queries 10000`` makes 10,000 clips of one second (ten million ticks) and asks; the CSV holds
-only the columns that the questions need, which is kind to pandas.
+only the columns that the questions need, which is kind to pandas. SQLite's table too, and it has an index of clips.
 """
 
+import sqlite3
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 import yaml
@@ -64,7 +66,8 @@ def measure_rows(clips: int = CLIPS) -> list[dict[str, Any]]:
         )
         opening, opening_cpu, data = _measure_time(lambda: _open_dataset(place / "data"))
         wanted = ", ".join(COLUMNS)
-        data.connection.execute(f"COPY (SELECT {wanted} FROM ticks) TO '{place / 'ticks.csv'}'")
+        with musync.open(place / "data", allow_files=True).connection as writing:
+            writing.execute(f"COPY (SELECT {wanted} FROM ticks) TO '{place / 'ticks.csv'}'")
         clip = data.manifest["clips"][report.clips // 2]["clip_id"]
         one = f"SELECT max(braking_slip_f) FROM ticks WHERE clip_id = '{clip}'"
         first, first_cpu, answer = _measure_time(lambda: data.sql(AGGREGATE).fetchall())
@@ -78,8 +81,11 @@ def measure_rows(clips: int = CLIPS) -> list[dict[str, Any]]:
             and abs(slip - theirs) < 1e-12
         )
         data.connection.close()
+        sqlite = _measure_sqlite(place / "ticks.csv", clip)
+        same &= all(abs(a[1] - b[1]) < 1e-9 for a, b in zip(answer, sqlite.table, strict=True))
+        same &= abs(slip - sqlite.slip) < 1e-12
     if not same:
-        raise RuntimeError("DuckDB and pandas answered differently")
+        raise RuntimeError("DuckDB, pandas and SQLite answered differently")
     peer = "pandas over CSV, both questions"
     limit = f"limit {LIMIT_S}"
     return [
@@ -96,7 +102,46 @@ def measure_rows(clips: int = CLIPS) -> list[dict[str, Any]]:
         _make_row("aggregate, again, CPU", again_cpu, "s", limit, LIMIT_S),
         _make_row("one clip, CPU", single_cpu, "s", peer, csv_cpu),
         _make_row("pandas over CSV, CPU", csv_cpu, "s"),
+        _make_row("SQLite, aggregate, CPU", sqlite.aggregate_s, "s", "ours, again", again_cpu),
+        _make_row("SQLite, one clip, CPU", sqlite.single_s, "s", "ours", single_cpu),
+        _make_row("SQLite, filled and indexed, CPU", sqlite.filling_s, "s"),
     ]
+
+
+class _OfSqlite(NamedTuple):
+    """Processor time of filling and of both questions [CPU-s], and the answers."""
+
+    filling_s: float
+    aggregate_s: float
+    single_s: float
+    table: list[tuple[Any, ...]]
+    slip: float
+
+
+def _measure_sqlite(csv: Path, clip: str) -> _OfSqlite:
+    """The same questions to SQLite, on disk and indexed by clip."""
+    with closing(sqlite3.connect(csv.with_suffix(".sqlite"))) as connection:
+
+        def fill() -> None:
+            names = ", ".join(COLUMNS)
+            connection.execute(f"CREATE TABLE ticks ({names})")
+            for rows in pd.read_csv(csv, chunksize=500_000):
+                connection.executemany(
+                    f"INSERT INTO ticks ({names}) VALUES (?, ?, ?, ?)",
+                    rows[list(COLUMNS)].itertuples(index=False, name=None),
+                )
+            connection.execute("CREATE INDEX clips ON ticks (clip_id)")
+            connection.commit()
+
+        _, filling_s, _ = _measure_time(fill)
+        _, aggregate_s, table = min(
+            _measure_time(lambda: connection.execute(AGGREGATE).fetchall()) for _ in range(REPEATS)
+        )
+        one = "SELECT max(braking_slip_f) FROM ticks WHERE clip_id = ?"
+        _, single_s, [(slip,)] = min(
+            _measure_time(lambda: connection.execute(one, (clip,)).fetchall()) for _ in range(REPEATS)
+        )
+    return _OfSqlite(filling_s, aggregate_s, single_s, table, slip)
 
 
 def _make_row(

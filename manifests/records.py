@@ -129,8 +129,8 @@ class PlanRecord(TypedDict):
 
 
 @with_config(STRICT)
-class Manifest(TypedDict):
-    """The content of ``manifest.json``; the form of ``grid`` is checked with the catalogue.
+class ManifestHead(TypedDict):
+    """The content of ``manifest.json`` without its clips; the form of ``grid`` is checked with the catalogue.
 
     ``processor``, ``git`` and ``environment`` say on what, from which commit and beside which packages the bytes were
     made: they decide nothing, and explain a difference.
@@ -146,9 +146,15 @@ class Manifest(TypedDict):
     processor: dict[Text, Text]
     git: "GitCommit | None"
     environment: dict[str, Any]
-    clips: Annotated[list[Receipt], Field(min_length=1)]
     artifacts: dict[RecordedPath, Sha256]
     seal: Sha256
+
+
+@with_config(STRICT)
+class Manifest(ManifestHead):
+    """The content of ``manifest.json``."""
+
+    clips: Annotated[list[Receipt], Field(min_length=1)]
 
 
 @with_config(STRICT)
@@ -178,7 +184,7 @@ class FrozenRun(TypedDict):
     seal: Sha256
 
 
-Record = TypeVar("Record", Receipt, PlanRecord, Manifest, FrozenRun)
+Record = TypeVar("Record", Receipt, PlanRecord, ManifestHead, Manifest, FrozenRun)
 
 
 def check_record(form: type[Record], value: Any, place: object) -> Record:
@@ -186,7 +192,7 @@ def check_record(form: type[Record], value: Any, place: object) -> Record:
 
     Parameters
     ----------
-    form : `Receipt`, `PlanRecord`, `Manifest` or `FrozenRun`
+    form : `Receipt`, `PlanRecord`, `ManifestHead`, `Manifest` or `FrozenRun`
     value : parsed JSON
     place : what messages call it
 
@@ -206,7 +212,7 @@ def check_record(form: type[Record], value: Any, place: object) -> Record:
 
 
 _ADAPTERS: dict[Any, TypeAdapter[Any]] = {
-    form: TypeAdapter(form) for form in (Receipt, PlanRecord, Manifest, FrozenRun)
+    form: TypeAdapter(form) for form in (Receipt, PlanRecord, ManifestHead, Manifest, FrozenRun)
 }
 
 

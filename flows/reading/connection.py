@@ -12,7 +12,7 @@ from catalogs.sentences import shorten
 from flows.reading.table_files import SCHEME, TableFiles, table_files
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest_head
 from tasks.conventions import CHECK_CHANNELS
 from tasks.errors import InputError
 
@@ -45,13 +45,13 @@ def connect_views(dataset: str | Path, *, allow_files: bool = False) -> duckdb.D
         If the folder is no sealed dataset.
     """
     layout = open_for_reading(dataset, want_telemetry)
-    return connect_sealed(layout, read_manifest(layout), allow_files=allow_files)
+    return connect_sealed(layout, read_manifest_head(layout), allow_files=allow_files)
 
 
 def connect_sealed(
     layout: Layout, manifest: Mapping[str, Any], *, allow_files: bool = False
 ) -> duckdb.DuckDBPyConnection:
-    """`connect_views` to a dataset whose manifest has been read.
+    """`connect_views` to a dataset whose manifest has been read, with its clips or without.
 
     Queries reach the recorded tables and nothing else: no file, network, extension or Python variable. They use at most
     half of the machine's memory, and none of its disk: a query that needs more ends with an error.

@@ -20,7 +20,7 @@ from flows.store.address import frames_store, open_for_reading, want_telemetry
 from flows.store.frame_metadata import check_frames, read_local_metadata
 from flows.store.layout import Layout
 from flows.store.objects import Objects
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, read_manifest_head
 from tasks.conventions import CHANNELS_BY_NAME
 from tasks.errors import InputError
 
@@ -42,13 +42,13 @@ class Dataset:
     Parameters
     ----------
     root : its folder
-    manifest : its frozen manifest
+    head : its frozen manifest without the clips
     origin : its address in an object store; ``root`` then holds what has been read of it
     allow_files : SQL may read and write files of this machine; else it reaches the dataset's tables alone
     """
 
     root: Path
-    manifest: Mapping[str, Any]
+    head: Mapping[str, Any]
     origin: str | None = None
     allow_files: bool = False
 
@@ -80,6 +80,20 @@ class Dataset:
         """
         return Clip(dataset=self, record=find_clip(self.manifest["clips"], name, self.place))
 
+    @cached_property
+    def manifest(self) -> Mapping[str, Any]:
+        """Its frozen manifest, of which the clips are read when they are first asked for: 6 CPU-s for 100,000.
+
+        Raises
+        ------
+        InputError
+            If a clip's record breaks a rule, or the dataset was sealed anew since it was opened.
+        """
+        manifest = read_manifest(self._layout)
+        if manifest["seal"] != self.head["seal"]:
+            raise InputError(f"{self.place}: must stay as it was opened; it was sealed anew: open it again")
+        return manifest
+
     @property
     def place(self) -> str:
         """Its folder, or its address in an object store."""
@@ -96,7 +110,7 @@ class Dataset:
         _check_names(table, STORED)
         from pyarrow import dataset  # it imports pandas, which takes a third of a second
 
-        paths = list(table_files(self._layout, self.manifest)[table].values())
+        paths = list(table_files(self._layout, self.head)[table].values())
         try:
             # without the metadata of the whole: libraries read settings for other libraries there
             schema = pq.read_schema(paths[0]).remove_metadata()
@@ -112,7 +126,7 @@ class Dataset:
     @cached_property
     def connection(self) -> duckdb.DuckDBPyConnection:
         """A DuckDB connection with the views clips, ticks, frames, verdicts and pairs; it reaches nothing else."""
-        return connect_sealed(self._layout, self.manifest, allow_files=self.allow_files)
+        return connect_sealed(self._layout, self.head, allow_files=self.allow_files)
 
     def sql(self, query: str) -> duckdb.DuckDBPyRelation:
         """A query over the views, as a relation that is evaluated when its rows are asked for.
@@ -329,7 +343,7 @@ def open(dataset: str | Path, *, allow_files: bool = False) -> Dataset:
     """
     layout = open_for_reading(dataset, want_telemetry)
     return Dataset(
-        root=layout.root, manifest=read_manifest(layout), origin=layout.origin, allow_files=allow_files
+        root=layout.root, head=read_manifest_head(layout), origin=layout.origin, allow_files=allow_files
     )
 
 

@@ -14,6 +14,8 @@ from flows.store.arrays import arrays_of
 STAGED_TABLES = ("ticks", "frames")
 PARTIAL = ".musync-partial"
 """End of the name of a file that is being written."""
+RECORD = "file of a muSync dataset"
+"""How messages call plan, receipts and manifest."""
 
 
 @dataclass(frozen=True)
@@ -133,4 +135,4 @@ def read_json(path: Path) -> Any:
     InputError
         If it is missing, no regular file, or not JSON.
     """
-    return read_json_document(path, "file of a muSync dataset")
+    return read_json_document(path, RECORD)

@@ -7,13 +7,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import ValidationError
 
+from catalogs.documents import LARGEST_JSON, parse_json, read_content
 from catalogs.grids import GridFile
 from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from flows.store.arrays import arrays_of
-from flows.store.layout import STAGED_TABLES, Layout, read_json
-from manifests.manifest import MANIFEST_FORMAT
-from manifests.records import Manifest, PlanRecord, Receipt, check_record
+from flows.store.layout import RECORD, STAGED_TABLES, Layout, read_json
+from manifests.manifest import MANIFEST_FORMAT, head_of_sealed
+from manifests.records import Manifest, ManifestHead, PlanRecord, Receipt, check_record
 from tasks.errors import InputError
 
 PLAN_FORMAT = "musync-plan/2"
@@ -27,6 +28,33 @@ def read_manifest(layout: Layout) -> Manifest:
     InputError
         If the run is unfinished, or the manifest is missing, of another format, or breaks a rule.
     """
+    _refuse_unfinished(layout)
+    return check_manifest(read_json(layout.manifest), layout.manifest)
+
+
+def read_manifest_head(layout: Layout) -> ManifestHead:
+    """The manifest of a sealed dataset without its clips, which are neither parsed nor checked.
+
+    That is what a reader of the tables needs. The rest has the same form as with `read_manifest`, and the seal is
+    that of the file's bytes; where it is not, the whole manifest is read and held to its form.
+
+    Raises
+    ------
+    InputError
+        If the run is unfinished, or the manifest is missing, of another format, or breaks a rule.
+    """
+    _refuse_unfinished(layout)
+    content = read_content(layout.manifest, RECORD, LARGEST_JSON)
+    head = head_of_sealed(content)
+    if head is None:
+        return check_manifest(parse_json(content, layout.manifest, RECORD), layout.manifest)
+    parsed = parse_json(head, layout.manifest, RECORD)
+    record = check_record(ManifestHead, _of_format(parsed, MANIFEST_FORMAT, layout.manifest), layout.manifest)
+    recorded_grid(record["grid"], layout.manifest)
+    return record
+
+
+def _refuse_unfinished(layout: Layout) -> None:
     if layout.plan.is_file() and not layout.manifest.is_file():
         clips = read_plan_record(layout)["clips"]
         done = sum(layout.receipt(clip["clip_id"]).is_file() for clip in clips)
@@ -34,7 +62,6 @@ def read_manifest(layout: Layout) -> Manifest:
             f"{layout}: the dataset must be finished; {done} of {len(clips)} clips are made:"
             " run its musync generate command again"
         )
-    return check_manifest(read_json(layout.manifest), layout.manifest)
 
 
 def check_manifest(content: Any, place: object) -> Manifest:

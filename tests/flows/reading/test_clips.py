@@ -29,7 +29,14 @@ def with_clip(data: musync.Dataset, index: int, **fields: object) -> musync.Data
     """The dataset with one clip's record changed."""
     clips = copy.deepcopy(data.manifest["clips"])
     clips[index].update(fields)
-    return replace(data, manifest=data.manifest | {"clips": clips})
+    return with_manifest(data, clips=clips)
+
+
+def with_manifest(data: musync.Dataset, **fields: object) -> musync.Dataset:
+    """The dataset with other fields in its manifest."""
+    other = replace(data)
+    vars(other)["manifest"] = data.manifest | fields
+    return other
 
 
 def test_a_dataset_is_a_mapping_of_labels_to_clips(data):
@@ -137,7 +144,7 @@ def test_a_card_of_a_clip_has_its_figures(data):
 def test_what_a_dataset_says_of_itself_is_text_in_cards_and_plots(data):
     evil = '"><script>alert(1)</script>{{ 7 * 7 }}'
     odd = with_clip(data, 0, label=evil, scenario=data["dry/flat"].record["scenario"] | {"weather": evil})
-    odd = replace(odd, manifest=odd.manifest | {"grid": odd.manifest["grid"] | {"name": evil, "scene": evil}})
+    odd = with_manifest(odd, grid=odd.manifest["grid"] | {"name": evil, "scene": evil})
     for card in (odd._repr_html_(), odd[evil]._repr_html_()):
         assert "<script" not in card and "&lt;script&gt;" in card
         assert "{{ 7 * 7 }}" in card and 'alt="&#34;&gt;' in card
@@ -145,7 +152,7 @@ def test_what_a_dataset_says_of_itself_is_text_in_cards_and_plots(data):
 
 
 def test_a_dataset_without_readable_pictures_still_shows_its_figures(data):
-    bare = replace(data, manifest=data.manifest | {"grid": data.manifest["grid"] | {"pictures": False}})
+    bare = with_manifest(data, grid=data.manifest["grid"] | {"pictures": False})
     for card in (bare._repr_html_(), bare["dry/flat"]._repr_html_()):
         assert "<img" not in card and "was made without frames" in card and ">dry" in card
 
