@@ -13,7 +13,7 @@ from benchmarks.learn_friction.comparison import PAINTED, compare_predictors, fo
 from benchmarks.learn_friction.network import train_network
 from benchmarks.learn_friction.samples import FRAMES, Samples, forget_physics, read_samples, split_samples
 from catalogs.grids import load_grid
-from manifests.provenance import SOURCE_ROOT
+from tests.documents import DOCS, list_blocks
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_no_drive_is_in_both_splits(drawn: Samples) -> None:
 
 
 def test_the_shipped_grid_holds_out_whole_drives_farther_on(drawn: Samples) -> None:
-    grid = load_grid(SOURCE_ROOT / GRID)
+    grid = load_grid(GRID)
     onsets: dict[str, set[float]] = {"train": set(), "test": set()}
     rates: dict[str, set[tuple[str, float]]] = {"train": set(), "test": set()}
     for (_, scenario), (split, _) in zip(grid.scenarios, grid.tags, strict=True):
@@ -57,6 +57,10 @@ def test_the_shipped_grid_holds_out_whole_drives_farther_on(drawn: Samples) -> N
         rates[split].add((scenario.weather, scenario.precipitation_mm_h))
     assert max(onsets["train"]) + 4 <= min(onsets["test"]) and len(onsets["test"]) >= 5
     assert rates["test"] - rates["train"] == {("rain", 25.0), ("snow", 1.5)}
+
+
+def test_the_tutorial_shows_the_grid_that_the_study_makes() -> None:
+    assert list_blocks(DOCS / "tutorial" / "learn-friction.md", "yaml") == [GRID.read_text()]
 
 
 def test_a_world_without_physics_brakes_as_the_dry_one(drawn: Samples) -> None:
