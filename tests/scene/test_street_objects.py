@@ -36,7 +36,9 @@ def test_every_gaussian_of_an_object_lies_in_its_box_and_has_its_class() -> None
         assert np.all(reach <= thing.size / 2 + 0.01) and np.all(reach >= thing.size / 2 - 0.25)
         assert set(classes[owners == number]) == {CLASS.get(thing.kind, SemanticClass.POLE)}
     bollard = next(thing for thing in objects if thing.kind == "bollard")
-    assert bollard.size == pytest.approx([0.1, 0.1, 0.9], abs=0.02)  # to the edge of its surface, not of its middles
+    assert bollard.size == pytest.approx(
+        [0.1, 0.1, 0.9], abs=0.02
+    )  # to the edge of its surface, not of its middles
     cars = [thing for thing in objects if thing.kind == "car"]
     assert [round(np.cos(thing.heading)) for thing in cars] == [car.facing for car in plan.cars]
 
