@@ -1,13 +1,18 @@
-"""COCO: one ``annotations.json`` with a mask of each semantic class in each frame, and the pictures.
+"""COCO: one ``annotations.json`` with masks of the classes and of the objects in each frame, and the pictures.
 
 A mask is an uncompressed run-length code, column by column, as COCO counts it. Category ids are our class codes plus 1,
 because trainers take 0 for "nothing". A class is no set of objects: where it appears in several places it is still one
 mask (``iscrowd`` 1). Boxes are x, y, width, height in pixels, from the picture's upper left corner.
 
+Parked cars, lamps, signs, bollards, bins and the letter box of the built-in street are objects. Each has a mask and a
+box of its own (``iscrowd`` 0, categories from 101 on), ``instance_id``, ``visibility``, ``truncation`` (null where too
+little of it is seen). ``objects`` has their 3D boxes in the world, and each image its ``T_world_camera``.
+
 Format: https://cocodataset.org/#format-data
 """
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flows.exporting.dataset import ExportedDataset
+from flows.exporting.instances import describe_object, find_scene_objects, to_share
 from flows.exporting.json_array import open_array
 from tasks.conventions import SemanticClass
 from tasks.render.contact_sheet import encode_png
+from tasks.render.instances import Instances
+from tasks.scene.street.objects import KINDS, StreetObject
+
+FIRST_KIND = 100
+"""Category ids of objects begin after it [1]; those of classes lie below."""
 
 
 def write_coco(dataset: ExportedDataset, folder: Path) -> None:
@@ -31,28 +42,42 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
     (folder / "images").mkdir()
     images: list[dict[str, Any]] = []
     count = 0
+    scene = find_scene_objects(dataset)
     with (folder / "annotations.json").open("w") as stream:
         stream.write('{"annotations": ')
         with open_array(stream) as annotations:
             for clip in dataset:
-                classes = clip.read_array("class")
+                classes, poses = clip.read_array("class"), clip.T_world_camera
+                depth = clip.read_array("depth") if scene else None
                 for frame, picture in enumerate(clip.read_array("rgb")):
                     name = f"{clip.name}_{frame:06d}.png"
                     (folder / "images" / name).write_bytes(encode_png(picture))
-                    images.append(_describe_image(len(images) + 1, name, clip.label, frame, picture))
-                    for kind in np.unique(classes[frame]).tolist():
+                    images.append(
+                        _describe_image(len(images) + 1, name, clip.label, frame, picture)
+                        | {"T_world_camera": poses[frame].tolist()}
+                    )
+                    masks = [
+                        describe_mask(classes[frame] == kind, kind)
+                        for kind in np.unique(classes[frame]).tolist()
+                    ]
+                    if scene is not None and depth is not None:
+                        found = scene.finder.find(depth[frame], classes[frame], clip.camera.K, poses[frame])
+                        masks += describe_instances(found, scene.objects)
+                    for mask in masks:
                         count += 1
-                        annotations.append(
-                            {"id": count, "image_id": len(images)}
-                            | describe_mask(classes[frame] == kind, kind)
-                        )
+                        annotations.append({"id": count, "image_id": len(images)} | mask)
         categories = [{"id": kind + 1, "name": kind.name.lower()} for kind in SemanticClass]
+        if scene is not None:
+            categories += [
+                {"id": FIRST_KIND + 1 + place, "name": kind, "supercategory": "object"}
+                for place, kind in enumerate(KINDS)
+            ]
         rest = {
             "images": images,
             "categories": categories,
             "info": {"description": f"muSync {dataset.name}", "version": dataset.manifest["run_id"]},
             "licenses": [],
-        }
+        } | ({} if scene is None else {"objects": [describe_object(thing) for thing in scene.objects]})
         stream.write(f", {json.dumps(rest, allow_nan=False)[1:]}")
 
 
@@ -77,6 +102,26 @@ def describe_mask(mask: NDArray[np.bool_], kind: int) -> dict[str, Any]:
         "bbox": [int(value) for value in box],
         "iscrowd": 1,
     }
+
+
+def describe_instances(found: Instances, objects: Sequence[StreetObject]) -> list[dict[str, Any]]:
+    """Return mask, box, visibility and truncation of every object of a frame.
+
+    Parameters
+    ----------
+    found : in the frame
+    objects : of the scene, in the order of their numbers
+    """
+    return [
+        describe_mask(found.pixels == number, FIRST_KIND + KINDS.index(objects[number - 1].kind))
+        | {
+            "iscrowd": 0,
+            "instance_id": number,
+            "visibility": to_share(visibility),
+            "truncation": to_share(found.truncation[number]),
+        }
+        for number, visibility in found.visibility.items()
+    ]
 
 
 def _describe_image(

@@ -25,13 +25,25 @@ def build_furniture(layout: StreetLayout, plan: Plan, seed: int) -> Surfels:
     plan : positions of everything on the street
     seed : the street's seed [1]
     """
-    parts = [part for station, side in plan.lamps for part in _build_lamp(layout, station, side)]
-    parts += _build_crossing_signs(layout)
+    return join_surfels([surfels for _, surfels in list_furniture(layout, plan, seed)])
+
+
+def list_furniture(layout: StreetLayout, plan: Plan, seed: int) -> list[tuple[str, Surfels]]:
+    """Build each piece of the street furniture; return its kind and its surfels.
+
+    Parameters
+    ----------
+    layout : dimensions
+    plan : positions of everything on the street
+    seed : the street's seed [1]
+    """
+    pieces = [("lamp", join_surfels(_build_lamp(layout, station, side))) for station, side in plan.lamps]
+    pieces += _build_crossing_signs(layout)
     rng = named_generator(seed, "bins")
     for station, side in plan.lamps[::2]:
-        parts += _build_bin(layout, station + rng.uniform(1.2, 2.2), side)
-    parts.append(_build_letter_box(layout, layout.crossing_station - 12.0))
-    return join_surfels(parts)
+        pieces.append(("bin", join_surfels(_build_bin(layout, station + rng.uniform(1.2, 2.2), side))))
+    pieces.append(("letter box", _build_letter_box(layout, layout.crossing_station - 12.0)))
+    return pieces
 
 
 def post_boxes(layout: StreetLayout, plan: Plan) -> Floats:
@@ -74,23 +86,21 @@ def _build_lamp(layout: StreetLayout, station: float, side: int) -> list[Surfels
     ]
 
 
-def _build_crossing_signs(layout: StreetLayout) -> list[Surfels]:
+def _build_crossing_signs(layout: StreetLayout) -> list[tuple[str, Surfels]]:
     """Build a sign at either end of the crossing, facing the traffic that keeps right, and bollards beside it."""
     pole, up = SemanticClass.POLE, np.array([0.0, 0.0, 1.0])
     start, stop = layout.crossing_station, layout.crossing_station + layout.crossing_length
-    parts = []
+    pieces = []
     for side, station, outward in ((-1, start - 0.5, -1.0), (1, stop + 0.5, 1.0)):
         foot = np.array([station, _post_line(layout, side), layout.kerb_height])
-        parts.append(
-            build_tube(foot + np.linspace(0, 2.9, 16)[:, None] * up, 0.038, 6, pole, palette.METAL_GREY)
-        )
-        parts += _build_sign(foot + np.array([0.06 * outward, 0, 2.5]), outward)
+        post = build_tube(foot + np.linspace(0, 2.9, 16)[:, None] * up, 0.038, 6, pole, palette.METAL_GREY)
+        board = _build_sign(foot + np.array([0.06 * outward, 0, 2.5]), outward)
+        pieces.append(("sign", join_surfels([post, *board])))
         for s in (start - 1.6, start - 3.2, stop + 1.6, stop + 3.2):
             base = np.array([s, layout.kerb_position(side) + side * 0.4, layout.kerb_height])
-            parts.append(
-                build_tube(base + np.linspace(0, 0.9, 10)[:, None] * up, 0.05, 8, pole, _banded_albedo(10))
-            )
-    return parts
+            tube = build_tube(base + np.linspace(0, 0.9, 10)[:, None] * up, 0.05, 8, pole, _banded_albedo(10))
+            pieces.append(("bollard", tube))
+    return pieces
 
 
 def _build_sign(middle: Floats, outward: float) -> list[Surfels]:

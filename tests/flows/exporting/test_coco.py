@@ -6,7 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from flows.exporting.coco import describe_mask
+from flows.exporting.coco import describe_instances, describe_mask
+from tasks.render.instances import Instances
+from tasks.scene.street.objects import StreetObject
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
 
@@ -49,3 +51,23 @@ def test_the_file_is_one_json_document(export):
     content = json.loads((export("coco") / "annotations.json").read_text())
     assert [image["clip"] for image in content["images"]] == [BRAKING] * 11 + [HUMP] * 11
     assert len({row["id"] for row in content["annotations"]}) == len(content["annotations"])
+
+
+def test_only_the_built_in_street_has_objects(export):
+    content = json.loads((export("coco") / "annotations.json").read_text())
+    assert "objects" not in content and max(row["id"] for row in content["categories"]) < 100
+    assert all(row["iscrowd"] == 1 for row in content["annotations"])
+
+
+def test_an_object_has_its_own_mask_box_and_share_that_is_seen():
+    pixels = np.zeros((4, 6), np.int32)
+    pixels[1:3, 2:5] = 2
+    pixels[3, 0] = 1
+    found = Instances(pixels=pixels, visibility={1: float("nan"), 2: 0.61249}, truncation={1: 0.5, 2: 0.0})
+    box = {"centre": np.zeros(3), "size": np.ones(3), "heading": 0.0}
+    things = [StreetObject(number=1, kind="car", **box), StreetObject(number=2, kind="sign", **box)]
+    car, sign = describe_instances(found, things)
+    np.testing.assert_array_equal(decode_runs(sign["segmentation"]), pixels == 2)
+    assert (car["category_id"], sign["category_id"]) == (101, 103)
+    assert (car["instance_id"], car["visibility"], car["truncation"], car["iscrowd"]) == (1, None, 0.5, 0)
+    assert (sign["bbox"], sign["area"], sign["visibility"]) == ([2, 1, 3, 2], 6, 0.612)

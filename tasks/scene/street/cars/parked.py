@@ -32,7 +32,19 @@ def build_cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> Surf
     parked : the cars
     seed : the street's seed [1]
     """
-    return join_surfels([_build_car(layout, car, seed) for car in parked])
+    return join_surfels(list_cars(layout, parked, seed))
+
+
+def list_cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> list[Surfels]:
+    """Build the surfels of each parked car.
+
+    Parameters
+    ----------
+    layout : dimensions
+    parked : the cars
+    seed : the street's seed [1]
+    """
+    return [_build_car(layout, car, seed) for car in parked]
 
 
 def car_boxes(parked: tuple[Car, ...]) -> Floats:

@@ -1,0 +1,34 @@
+"""``python -m benchmarks.learn_friction [DATASET]``: how hard will the car brake, told from the pictures before?
+
+A dataset of the grid beside this file is made first, unless it is there; docs/tutorial/learn-friction.md walks through.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import torch
+
+import musync
+from benchmarks.learn_friction.comparison import compare_predictors, format_errors, format_promises
+from benchmarks.learn_friction.samples import read_samples
+from flows.making.generate import generate_dataset
+
+GRID = Path(__file__).with_name("grid.yaml")
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.learn_friction", description=__doc__)
+    parser.add_argument("dataset", nargs="?", default="datasets/learn-friction")
+    parser.add_argument("--seeds", type=int, default=3, help="networks trained in each world")
+    asked = parser.parse_args()
+    started = time.perf_counter()
+    if not Path(asked.dataset, "manifest.json").is_file():
+        generate_dataset(str(GRID), asked.dataset, runner="threads")
+    torch.set_num_threads(
+        1
+    )  # small pictures: a second thread costs more than it gives, and sums in another order
+    made = time.perf_counter()
+    samples = read_samples(musync.open(asked.dataset))
+    found = compare_predictors(samples, seeds=range(1, asked.seeds + 1))
+    print(format_errors(found), format_promises(found), sep="\n\n")
+    print(f"\ndataset {made - started:.0f} s, training and test {time.perf_counter() - made:.0f} s")
