@@ -153,7 +153,7 @@ def _make_row(
 
 def _open_dataset(folder: Path) -> musync.Dataset:
     data = musync.open(folder)
-    data.connection.execute("SELECT 1")
+    data.connection.execute("SELECT 1").fetchall()
     return data
 
 
