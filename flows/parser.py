@@ -100,7 +100,7 @@ def _print_version(wanted: bool) -> None:
     checkout = git_commit()
     changed = ", changed since" if checkout and checkout["changed"] else ""
     commit = f" (commit {checkout['commit'][:12]}{changed})" if checkout else ""
-    print_lines(f"musync {version('musync')}{commit}")
+    print_lines(f"musync {version('musync-gs')}{commit}")
     raise typer.Exit
 
 

@@ -20,6 +20,7 @@ from tasks.conventions import (
     IDENTITY_CHANNELS,
     PAIR_CHANNELS,
     TICK_CHANNELS,
+    VARIANT_CHANNEL,
     Channel,
 )
 from tasks.errors import InputError
@@ -191,6 +192,7 @@ def list_columns(*, grid: bool = False) -> dict[str, Any]:
 
         return grid_schema()
     views = {view: [_describe_channel(channel) for channel in channels] for view, channels in VIEWS.items()}
+    views["clips"].append(_describe_channel(VARIANT_CHANNEL))  # of a dataset in which a coupling is cut
     return views | {
         "arrays": [
             _describe_channel(array.channel)

@@ -30,7 +30,7 @@ def test_a_package_that_is_missing_is_named_with_how_to_install_it(toy_dataset, 
     monkeypatch.setattr(module, "find_spec", lambda name: None)
     for row in FORMATS:
         if row.package:
-            with pytest.raises(InputError, match=rf"{row.package}.*pip install 'musync\[export\]'"):
+            with pytest.raises(InputError, match=rf"{row.package}.*pip install 'musync-gs\[export\]'"):
                 export_dataset(str(toy_dataset.root), row.name)
 
 

@@ -105,7 +105,7 @@ def test_without_asammdf_the_reader_says_what_to_install(
 ) -> None:
     (tmp_path / "log.mf4").write_bytes(b"")
     monkeypatch.setitem(sys.modules, "asammdf", None)
-    with pytest.raises(InputError, match=r'pip install "musync\[mdf\]"'):
+    with pytest.raises(InputError, match=r'pip install "musync-gs\[mdf\]"'):
         import_measurements(str(tmp_path / "log.mf4"), map=write_map(tmp_path), out=str(tmp_path / "out"))
 
 
