@@ -56,7 +56,10 @@ def test_the_normal_is_the_shortest_axis(tmp_path):
     np.testing.assert_allclose(cloud.normals, shortest, atol=1e-5)
 
 
-@pytest.mark.parametrize(("ending", "tolerance"), [("compressed.ply", 5e-3), ("splat", 1e-6), ("spz", 5e-4)])
+@pytest.mark.parametrize(
+    ("ending", "tolerance"),
+    [("compressed.ply", 5e-3), ("splat", 1e-6), pytest.param("spz", 5e-4, marks=pytest.mark.minutes)],
+)
 def test_packed_formats_hold_the_same_cloud(tmp_path, ending, tolerance):
     ply(tmp_path / "a.ply")
     forge = gaussforge.GaussForge()
