@@ -204,7 +204,7 @@ def write_set(folder: Path) -> dict[str, dict[str, float]]:
 
 
 def expect_figures(stops: dict[str, Motion], passes: dict[str, Motion]) -> dict[str, dict[str, float]]:
-    """What the equations of Appendix A.5 say of the editors' motion, without any picture."""
+    """Return the figures that the equations of Appendix A.5 give for the editors' motion, without any picture."""
     dry = stops["sunny"].progress
     wet = [motion for name, motion in stops.items() if name != "sunny"]
     times = np.arange(FRAMES) / GEOMETRY_HZ

@@ -222,7 +222,7 @@ def _compare(name: str, value: float, unit: str, own: float) -> dict[str, Any]:
 
 
 def _measure_form(form: StoredFrames, frames: np.ndarray) -> Iterator[tuple[str, tuple[float, str]]]:
-    """What is measured of a form: its name, value and unit."""
+    """Return the measurements of a form, each with its name, value and unit."""
     with patch.object(os, "fsync", lambda descriptor: None):
         yield "write, frames", (len(frames) / least_cpu_s(lambda: form.write(frames), REPEATS), "1/CPU-s")
     back = form.read(0, len(frames))

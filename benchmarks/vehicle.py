@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.side_by_side import make_row, print_rows
 from benchmarks.vehicle_modes import simulate_condition
 from catalogs.studies import Condition, load_conditions, load_sensitivity_study
 from catalogs.surfaces import load_surface
@@ -61,7 +62,7 @@ def measure_rows() -> list[dict[str, Any]]:
     protocol, _ = load_sensitivity_study()
     study_s = _cpu_s(lambda: sensitivity_study(vehicle, surface, protocol), repeats=3)
     limit = f"limit {STUDY_LIMIT_S:g} CPU-s"
-    result.append(_make_row("sensitivity study, 4,434 stops", study_s, "CPU-s", limit, STUDY_LIMIT_S))
+    result.append(make_row("sensitivity study, 4,434 stops", study_s, "CPU-s", limit, STUDY_LIMIT_S))
     return result
 
 
@@ -83,16 +84,16 @@ def _stop_rows(vehicle: Vehicle) -> list[dict[str, Any]]:
 
     asked = f"asked {STOPS_PER_CPU_S:g}"
     mean = 1 / stop_s(*FLAT_SURFACES, LONGEST_STOP)  # snow 2 and snow 3 are the same surface
-    result = [_make_row("stops, paper mode, nine surfaces", mean, "1/CPU-s", asked, STOPS_PER_CPU_S)]
+    result = [make_row("stops, paper mode, nine surfaces", mean, "1/CPU-s", asked, STOPS_PER_CPU_S)]
     for surface in (FLAT_SURFACES[0], ("rain", 0.347126), LONGEST_STOP):
         rate = 1 / stop_s(surface)
         result.append(
-            _make_row("stops, paper mode, {} {:g}".format(*surface), rate, "1/CPU-s", asked, STOPS_PER_CPU_S)
+            make_row("stops, paper mode, {} {:g}".format(*surface), rate, "1/CPU-s", asked, STOPS_PER_CPU_S)
         )
     seconds = simulate_stop(SPEED, INTERNAL_STEP_S, LONGEST, brake, wheels, tyres[LONGEST_STOP])[1]
     twin_s = _twin_step_s(vehicle) * ceil(seconds / INTERNAL_STEP_S)
     name = "stops, paper mode, {} {:g}".format(*LONGEST_STOP)
-    return [*result, _make_row(name, rate, "1/CPU-s", "NumPy twin", 1 / twin_s)]
+    return [*result, make_row(name, rate, "1/CPU-s", "NumPy twin", 1 / twin_s)]
 
 
 def _twin_step_s(vehicle: Vehicle) -> float:
@@ -123,8 +124,8 @@ def _rollout_rows(condition: Condition) -> list[dict[str, Any]]:
     )
     limit = f"limit {COUPLED_LIMIT_MS:g} CPU-ms"
     return [
-        _make_row(f"10 s rollout, coupled, {condition.name}", coupled_ms, "CPU-ms", limit, COUPLED_LIMIT_MS),
-        _make_row(f"10 s rollout, paper, {condition.name}", paper_ms, "CPU-ms", "coupled", coupled_ms),
+        make_row(f"10 s rollout, coupled, {condition.name}", coupled_ms, "CPU-ms", limit, COUPLED_LIMIT_MS),
+        make_row(f"10 s rollout, paper, {condition.name}", paper_ms, "CPU-ms", "coupled", coupled_ms),
     ]
 
 
@@ -145,11 +146,7 @@ def _inference_row(vehicle: Vehicle, surface: SurfaceParameters) -> dict[str, An
             simulate_run(model, theta)
 
     limit = f"limit {INFERENCE_LIMIT_MS:g} CPU-ms"
-    return _make_row("6 s run for inference", 1000 * _cpu_s(work) / 20, "CPU-ms", limit, INFERENCE_LIMIT_MS)
-
-
-def _make_row(name: str, value: float, unit: str, peer: str, peer_value: float) -> dict[str, Any]:
-    return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": value / peer_value}
+    return make_row("6 s run for inference", 1000 * _cpu_s(work) / 20, "CPU-ms", limit, INFERENCE_LIMIT_MS)
 
 
 def _cpu_s(work: Callable[[], object], repeats: int = REPEATS) -> float:
@@ -164,5 +161,4 @@ def _cpu_s(work: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 if __name__ == "__main__":
-    for row in measure_rows():
-        print(f"{row['name']:36} {row['value']:10.4g} {row['unit']:8} {row['ratio']:8.3g} of {row['peer']}")
+    print_rows(measure_rows())

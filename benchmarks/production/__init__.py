@@ -1,1 +1,1 @@
-"""What a dataset of a million clips takes on five hundred workers: measured constants, and the table that follows."""
+"""The cost of a million clips on five hundred workers: measured constants, and the table that follows."""

@@ -11,7 +11,7 @@ SECONDS_PER_HOUR = 3600
 
 @dataclass(frozen=True, kw_only=True)
 class ClipCosts:
-    """What one clip takes; the defaults are of 81 frames at 480 x 320 on the built-in street (docs/how-to).
+    """Cost of one clip; the defaults are of 81 frames at 480 x 320 on the built-in street (docs/how-to).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a Dask scheduler takes for each clip: hundreds of workers in this process, and clips that do nothing."""
+"""Time that a Dask scheduler takes for each clip: hundreds of workers in this process, and clips that do nothing."""
 
 import time
 from concurrent.futures import Executor

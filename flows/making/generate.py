@@ -41,7 +41,7 @@ SHOWN = 8
 
 @dataclass(frozen=True, kw_only=True)
 class RunCost:
-    """What clips cost together; nothing of a single clip is kept.
+    """Cost of all clips together; nothing of a single clip is kept.
 
     Parameters
     ----------
