@@ -59,6 +59,11 @@ def test_bytes_that_were_not_sealed_have_no_head(toy_dataset, change):
     assert head_of_sealed(change(content)) is None
 
 
+def test_a_sealed_manifest_whose_clips_are_followed_by_something_else_has_no_head(dataset):
+    reseal(dataset, lambda manifest: manifest.pop("environment"))
+    assert head_of_sealed(dataset.manifest.read_bytes()) is None
+
+
 def test_without_its_seal_the_whole_manifest_is_held_to_its_form(dataset):
     content = json.loads(dataset.manifest.read_text())
     content["clips"][0]["index"] = -1
