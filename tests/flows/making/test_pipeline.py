@@ -94,7 +94,7 @@ def test_the_hump_is_both_seen_and_felt(dataset):
 
 def test_processes_make_the_same_bytes_as_threads(dataset, grid, tmp_path):
     """Dask does so with a worker killed in ``tests/flows/running``, and below Prefect in ``tests/flows/scheduled``."""
-    again = generate_dataset(grid, str(tmp_path / "again"), runner="processes", workers=2).layout
+    again = generate_dataset(grid, str(tmp_path / "again"), runner="processes", workers=1).layout
     assert again.manifest.read_bytes() == dataset.manifest.read_bytes()
     for path in manifest_of(dataset)["artifacts"]:
         assert sha256_of_file(again.root / path) == sha256_of_file(dataset.root / path), path
