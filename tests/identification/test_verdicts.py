@@ -33,14 +33,14 @@ LIBRARY = {
 }  # fmt: skip
 """One or two for each verdict and what may be taken for them: all 55 take ten times as long."""
 LEAN = (
-    RunPlan(speed=32.0, peak=0.0, duration=5.0), RunPlan(speed=14.0, peak=0.0, duration=5.0),
-    RunPlan(speed=25.0, peak=2.0, disc_rise=350.0, duration=5.0), RunPlan(speed=26.4, peak=-2.4, duration=5.0),
-    RunPlan(speed=13.9, peak=2.3, duration=4.0), RunPlan(weather="rain", rate=10.0, speed=20.0, peak=2.3, duration=4.0),
-    RunPlan(weather="snow", rate=1.0, speed=9.7, peak=0.6, duration=4.0),
-    RunPlan(speed=11.1, peak=0.0, duration=3.0, hazard=(12.0, 3.7, 0.075)),
-    RunPlan(speed=9.7, peak=0.0, duration=3.0, hazard=(10.0, 2.0, -0.08)),
-    RunPlan(speed=25.0, peak=0.0, duration=5.0), RunPlan(speed=22.2, peak=2.6, disc_rise=250.0, duration=4.0),
-    RunPlan(speed=8.9, peak=0.8, duration=3.0, hazard=(9.0, 3.7, 0.05)),
+    RunPlan(speed=32.0, peak=0.0, duration=2.5), RunPlan(speed=14.0, peak=0.0, duration=2.5),
+    RunPlan(speed=25.0, peak=2.0, disc_rise=350.0, duration=2.5), RunPlan(speed=26.4, peak=-2.4, duration=2.5),
+    RunPlan(speed=13.9, peak=2.3, duration=2.0), RunPlan(weather="rain", rate=10.0, speed=20.0, peak=2.3, duration=2.0),
+    RunPlan(weather="snow", rate=1.0, speed=9.7, peak=0.6, duration=2.0),
+    RunPlan(speed=11.1, peak=0.0, duration=2.0, hazard=(12.0, 3.7, 0.075)),
+    RunPlan(speed=9.7, peak=0.0, duration=2.0, hazard=(10.0, 2.0, -0.08)),
+    RunPlan(speed=25.0, peak=0.0, duration=2.5), RunPlan(speed=22.2, peak=2.6, disc_rise=250.0, duration=2.0),
+    RunPlan(speed=8.9, peak=0.8, duration=2.0, hazard=(9.0, 3.7, 0.05)),
 )  # fmt: skip
 """Every port is excited by nine training runs; three are held out."""
 LEVEL = tuple(plan for plan in LEAN if plan.hazard[1] == 0.0 and plan.weather == "dry")

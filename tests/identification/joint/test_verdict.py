@@ -43,8 +43,8 @@ def campaign_of(
 
 
 def shortened(run: Run) -> Run:
-    """Two seconds of braking, after one without, say as much of the brakes as three."""
-    return replace(run, pressure=run.pressure[:300], response=run.response[:300])
+    """One second of braking, after one without, says as much of the brakes as three."""
+    return replace(run, pressure=run.pressure[:200], response=run.response[:200])
 
 
 def own_channels(run: Run, channels: tuple[str, ...], held_out: bool) -> Run:
