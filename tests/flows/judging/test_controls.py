@@ -53,7 +53,7 @@ axes:
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("controls")
     generate_dataset(
-        write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, backend="cpu"
+        write_toy_grid(folder, GRID), str(folder / "made"), runner="threads", workers=1, pictures=False
     )
     return folder / "made"
 

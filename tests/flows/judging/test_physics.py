@@ -32,7 +32,7 @@ axes:
     hump: {{initial_speed_km_h: 30, peak_pressure_mpa: 2.3, brake_onset_m: 6.0,
             hazard_center_m: 8.0, hazard_length_m: 3.7, hazard_height_m: 0.075}}
 """
-TRIALS = 100
+TRIALS = 60
 
 
 @pytest.fixture(scope="module")
