@@ -4,6 +4,7 @@ from collections import Counter
 from typing import Any
 
 from catalogs.cameras import load_camera
+from catalogs.grids import load_grid
 from catalogs.variants import warn_of_variant
 from flows.making.plan import TICK_RATE_HZ, make_plan
 from flows.store.address import open_for_reading, stored_bytes, want_manifest
@@ -63,7 +64,9 @@ def validate_grid(grid: str) -> dict[str, Any]:
     """
     plan, _ = make_plan(grid, "cpu")
     settings = plan.settings
-    camera = load_camera(settings.camera)
+    camera = load_camera(
+        load_grid(grid).settings.camera
+    )  # of a file the plan records the name, without its folder
     frames = len(plan.clips) * settings.frames if settings.pictures else 0
     ticks = len(plan.clips) * (int(plan.duration_s * TICK_RATE_HZ) + 1)
     pixels = frames * camera.width * camera.height

@@ -5,7 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from flows.reading.describe import BYTES_PER_PIXEL, BYTES_PER_TICK
 from tests.flows.shell import run_command
+from tests.toy_street import write_toy_grid
 
 
 @pytest.fixture
@@ -25,6 +27,18 @@ def test_validate_counts_clips_and_frames(musync):
     assert done.code == 0, done.err
     facts = json.loads(done.out)
     assert (facts["clips"], facts["frames"]) == (15, 15 * 81)
+
+
+def test_validate_counts_the_pixels_of_a_camera_given_by_an_absolute_path(musync, tmp_path):
+    (tmp_path / "folder").mkdir()
+    grid = write_toy_grid(tmp_path / "folder", frames=10)
+    done = musync("validate", grid, "--json")
+    assert done.code == 0, done.err
+    facts = json.loads(done.out)
+    assert facts["frames"] == 40
+    assert facts["megabytes_estimate"] == pytest.approx(
+        (BYTES_PER_PIXEL * 40 * 96 * 64 + BYTES_PER_TICK * facts["ticks"]) / 1e6, abs=0.06
+    )
 
 
 @pytest.mark.parametrize(
