@@ -1,20 +1,30 @@
 """``python -m benchmarks.learn_friction [DATASET]``: how hard will the car brake, told from the pictures before?
 
-A dataset of the grid beside this file is made first, unless it is there; docs/tutorial/learn-friction.md walks through.
+A dataset of the grid beside this file is made first, unless it is there, and beside it the telemetry of the same grid
+with ``variant: appearance-only``; docs/tutorial/learn-friction.md walks through.
 """
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 
 import musync
 from benchmarks.learn_friction.comparison import compare_predictors, format_errors, format_promises
-from benchmarks.learn_friction.samples import read_samples
+from benchmarks.learn_friction.samples import read_brakes, read_samples, relabel_samples
+from catalogs.grids import Grid, load_grid
 from flows.making.generate import generate_dataset
 
 GRID = Path(__file__).with_name("grid.yaml")
+
+
+def paint_grid() -> Grid:
+    """Return the grid of the world in which weather is seen and not felt."""
+    grid = load_grid(GRID)
+    return replace(grid, settings=grid.settings.model_copy(update={"variant": "appearance-only"}))
+
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m benchmarks.learn_friction", description=__doc__)
@@ -24,11 +34,14 @@ if __name__ == "__main__":
     started = time.perf_counter()
     if not Path(asked.dataset, "manifest.json").is_file():
         generate_dataset(str(GRID), asked.dataset, runner="threads")
+    painted = f"{asked.dataset}-appearance-only"  # before the brake its pictures are those of the other: none is made
+    generate_dataset(paint_grid(), painted, runner="threads", pictures=False)
     torch.set_num_threads(
         1
     )  # small pictures: a second thread costs more than it gives, and sums in another order
     made = time.perf_counter()
     samples = read_samples(musync.open(asked.dataset))
-    found = compare_predictors(samples, seeds=range(1, asked.seeds + 1))
+    relabelled = relabel_samples(samples, read_brakes(musync.open(painted)))
+    found = compare_predictors(samples, relabelled, seeds=range(1, asked.seeds + 1))
     print(format_errors(found), format_promises(found), sep="\n\n")
     print(f"\ndataset {made - started:.0f} s, training and test {time.perf_counter() - made:.0f} s")

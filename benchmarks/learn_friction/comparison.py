@@ -14,7 +14,7 @@ from benchmarks.learn_friction.baselines import (
     predict_mean,
 )
 from benchmarks.learn_friction.network import train_network
-from benchmarks.learn_friction.samples import Samples, forget_physics, split_samples
+from benchmarks.learn_friction.samples import Samples, split_samples
 
 NETWORK, PAINTED = "network", "network, appearance-only world"
 BASELINES: Mapping[str, Callable[[Samples, Samples], NDArray[np.float64]]] = {
@@ -44,16 +44,17 @@ class Comparison:
     clips: tuple[int, int]
 
 
-def compare_predictors(samples: Samples, *, seeds: Iterable[int]) -> Comparison:
+def compare_predictors(samples: Samples, painted: Samples, *, seeds: Iterable[int]) -> Comparison:
     """Train every predictor on the training drives and ask it about the test drives.
 
     Parameters
     ----------
     samples : of both splits
+    painted : the same with the labels of the appearance-only world
     seeds : of the networks, a pair of them each
     """
     train, test = split_samples(samples)
-    painted_train, painted_test = split_samples(forget_physics(samples))
+    painted_train, painted_test = split_samples(painted)
     answers = {name: [predict(train, test)] for name, predict in BASELINES.items()}
     answers |= {NETWORK: [], PAINTED: []}
     for seed in seeds:

@@ -1,5 +1,6 @@
 """Pictures before the brake, the brake command, and the deceleration that follows: samples, and how they are split."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -49,6 +50,56 @@ class Samples:
         return replace(self, **{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
 
+@dataclass(frozen=True, kw_only=True)
+class Brake:
+    """How a clip brakes.
+
+    Parameters
+    ----------
+    onset_s : when [s]
+    speed : then [m/s]
+    deceleration : mean from then on, over the time that was asked for [m/s2]
+    """
+
+    onset_s: float
+    speed: float
+    deceleration: float
+
+
+def read_brakes(data: musync.Dataset, *, over_s: float = OVER_S) -> dict[str, Brake]:
+    """Return how each clip brakes, by its label; clips that never do are left out.
+
+    Parameters
+    ----------
+    data : dataset, with frames or without
+    over_s : time over which the deceleration is averaged [s]
+
+    Raises
+    ------
+    InputError
+        If the telemetry of a clip ends before that time.
+    """
+    brakes, short = {}, []
+    for clip in data.pandas("clips").sort_values("index").to_dict("records"):
+        ticks = data.pandas("ticks", ["t_ns", "speed", "brake_pressure_mpa"], clip=clip["clip_id"])
+        pressed = np.flatnonzero(ticks["brake_pressure_mpa"].to_numpy() > 0)
+        if not len(pressed):
+            continue
+        seconds, speed = ticks["t_ns"].to_numpy() * 1e-9, ticks["speed"].to_numpy()
+        onset = seconds[pressed[0]]
+        if onset + over_s > seconds[-1] + 1e-9:
+            short.append(clip["label"])
+            continue
+        start, end = np.interp([onset, onset + over_s], seconds, speed)
+        brakes[clip["label"]] = Brake(onset_s=onset, speed=start, deceleration=(start - end) / over_s)
+    if short:
+        raise musync.InputError(
+            f"the telemetry must reach {over_s:g} s past the brake onset; that of {len(short)} clips"
+            f" ({', '.join(short[:3])}) ends before: give the grid a longer duration_s"
+        )
+    return brakes
+
+
 def read_samples(data: musync.Dataset, *, over_s: float = OVER_S) -> Samples:
     """Read the samples of every clip that brakes and has enough frames before.
 
@@ -69,32 +120,22 @@ def read_samples(data: musync.Dataset, *, over_s: float = OVER_S) -> Samples:
     drives = clips.groupby(DRIVE, dropna=False, sort=True).ngroup().to_numpy()
     windows = data.torch(window=FRAMES, stride=1, columns=["speed"], arrays=["rgb"], quarantined=True)
     rate_hz = data.manifest["grid"]["frame_rate_hz"]
-    rows, pictures, short = [], [], []
+    brakes = read_brakes(data, over_s=over_s)
+    rows, pictures = [], []
     for clip, drive in zip(clips.to_dict("records"), drives, strict=True):
-        ticks = data.pandas("ticks", ["t_ns", "speed", "brake_pressure_mpa"], clip=clip["clip_id"])
-        pressed = np.flatnonzero(ticks["brake_pressure_mpa"].to_numpy() > 0)
-        if not len(pressed):
+        if (brake := brakes.get(clip["label"])) is None:
             continue
-        seconds, speed = ticks["t_ns"].to_numpy() * 1e-9, ticks["speed"].to_numpy()
-        onset = seconds[pressed[0]]
-        if onset + over_s > seconds[-1] + 1e-9:
-            short.append(clip["label"])
-            continue
-        start, end = np.interp([onset, onset + over_s], seconds, speed)
-        last = min(int(onset * rate_hz), windows.starts[-1] + FRAMES - 1)  # the last frame before the onset
+        last = min(
+            int(brake.onset_s * rate_hz), windows.starts[-1] + FRAMES - 1
+        )  # the last frame before the onset
         for first in range(last - FRAMES + 1, max(last - FRAMES + 1 - WINDOWS, -1), -1):
             shown = windows[windows.clips.index(clip["index"]) * len(windows.starts) + first]["rgb"]
             pictures.append(shown.permute(0, 3, 1, 2).flatten(0, 1))
             rows.append({
-                "command": (start, clip["peak_pressure_mpa"]), "deceleration": (start - end) / over_s,
+                "command": (brake.speed, clip["peak_pressure_mpa"]), "deceleration": brake.deceleration,
                 "drive": drive, "weather": clip["weather"], "split": clip["split"], "clip": clip["label"],
                 "rate": clip["precipitation_mm_h"],
             })  # fmt: skip
-    if short:
-        raise musync.InputError(
-            f"the telemetry must reach {over_s:g} s past the brake onset; that of {len(short)} clips"
-            f" ({', '.join(short[:3])}) ends before: give the grid a longer duration_s"
-        )
     if not rows:
         raise musync.InputError(f"a sample needs {FRAMES} frames before a brake onset; no clip has them")
     return Samples(
@@ -131,22 +172,21 @@ def split_samples(samples: Samples) -> tuple[Samples, Samples]:
     return train, test
 
 
-def forget_physics(samples: Samples) -> Samples:
-    """Return the same pictures with the deceleration of the drive's dry clip: weather that is painted on.
+def relabel_samples(samples: Samples, brakes: Mapping[str, Brake]) -> Samples:
+    """Return the same pictures with the deceleration of a world that looks the same before the brake.
 
     Parameters
     ----------
-    samples : with a dry clip of every drive
+    samples : whose pictures are kept
+    brakes : of that world, by label of the clip
 
     Raises
     ------
     InputError
-        If a drive has no dry clip.
+        If a clip of the samples does not brake there.
     """
-    dry = samples.take(samples.weather == "dry")
-    known = dict(zip(dry.drive, dry.deceleration, strict=True))
-    if lacking := sorted(set(samples.clip[~np.isin(samples.drive, dry.drive)])):
+    if lacking := sorted(set(samples.clip) - brakes.keys()):
         raise musync.InputError(
-            f"every drive needs its dry clip; {len(lacking)} clips ({', '.join(lacking[:3])}) have none"
+            f"both worlds must have the same clips; {len(lacking)} ({', '.join(lacking[:3])}) brake in one alone"
         )
-    return replace(samples, deceleration=np.array([known[drive] for drive in samples.drive]))
+    return replace(samples, deceleration=np.array([brakes[label].deceleration for label in samples.clip]))

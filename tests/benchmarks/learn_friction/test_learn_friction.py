@@ -7,12 +7,21 @@ import pytest
 import torch
 
 import musync
-from benchmarks.learn_friction.__main__ import GRID
+from benchmarks.learn_friction.__main__ import GRID, paint_grid
 from benchmarks.learn_friction.baselines import describe_command, fit_ridge, predict_by_ridge
 from benchmarks.learn_friction.comparison import PAINTED, compare_predictors, format_errors
 from benchmarks.learn_friction.network import train_network
-from benchmarks.learn_friction.samples import FRAMES, Samples, forget_physics, read_samples, split_samples
+from benchmarks.learn_friction.samples import (
+    FRAMES,
+    Brake,
+    Samples,
+    read_brakes,
+    read_samples,
+    relabel_samples,
+    split_samples,
+)
 from catalogs.grids import load_grid
+from flows.making.generate import generate_dataset
 from tests.documents import DOCS, list_blocks
 
 
@@ -63,12 +72,54 @@ def test_the_tutorial_shows_the_grid_that_the_study_makes() -> None:
     assert list_blocks(DOCS / "tutorial" / "learn-friction.md", "yaml") == [GRID.read_text()]
 
 
-def test_a_world_without_physics_brakes_as_the_dry_one(drawn: Samples) -> None:
-    painted = forget_physics(drawn)
-    assert torch.equal(painted.pictures, drawn.pictures)
-    assert np.array_equal(painted.deceleration, np.repeat(drawn.deceleration[::2], 2))
-    with pytest.raises(musync.InputError, match=r"12 clips \(snow/0"):
-        forget_physics(drawn.take(drawn.weather == "snow"))
+def paint(samples: Samples) -> Samples:
+    """The samples with the deceleration of their drive's dry clip."""
+    return replace(samples, deceleration=np.repeat(samples.deceleration[::2], 2))
+
+
+@pytest.fixture(scope="module")
+def worlds(tmp_path_factory) -> tuple[musync.Dataset, musync.Dataset]:
+    """Telemetry of one drive of the shipped grid, dry and on snow, and the same of the appearance-only world."""
+    folder, opened = tmp_path_factory.mktemp("worlds"), []
+    for name, grid in (("sound", load_grid(GRID)), ("painted", paint_grid())):
+        rows = [
+            number
+            for number, (label, _) in enumerate(grid.scenarios)
+            if label.endswith(grid.scenarios[0][0].rpartition("/")[2])
+            and label.startswith(("dry/", "snow-3/"))
+        ]
+        few = replace(
+            grid, scenarios=tuple(grid.scenarios[n] for n in rows), tags=tuple(grid.tags[n] for n in rows)
+        )
+        generate_dataset(few, str(folder / name), runner="threads", workers=1, pictures=False)
+        opened.append(musync.open(folder / name))
+    return opened[0], opened[1]
+
+
+def test_an_appearance_only_world_brakes_as_the_dry_one_and_looks_the_same_before(drawn, worlds) -> None:
+    sound, painted = (read_brakes(world) for world in worlds)
+    dry, snow = sorted(sound)
+    assert painted[dry].deceleration == painted[snow].deceleration == sound[dry].deceleration
+    assert sound[snow].deceleration < 0.7 * sound[dry].deceleration
+    clips = sorted((world[snow] for world in worlds), key=lambda clip: clip.clip_id)
+    assert clips[0].record["seed"] == clips[1].record["seed"], "the same drops and flakes"
+    poses = [
+        np.stack(frames["T_world_rig"][frames["t_ns"] < sound[snow].onset_s * 1e9])
+        for frames in (clip.pandas("frames") for clip in clips)
+    ]
+    assert len(poses[0]) >= FRAMES and np.array_equal(*poses)
+
+
+def test_samples_take_the_labels_of_another_world_clip_by_clip(drawn: Samples) -> None:
+    brakes = {
+        str(label): Brake(onset_s=1.0, speed=15.0, deceleration=float(number))
+        for number, label in enumerate(drawn.clip)
+    }
+    painted = relabel_samples(drawn, brakes)
+    assert torch.equal(painted.pictures, drawn.pictures) and list(painted.deceleration) == list(range(24))
+    del brakes["snow/0"]
+    with pytest.raises(musync.InputError, match=r"1 \(snow/0\) brake in one alone"):
+        relabel_samples(drawn, brakes)
 
 
 def test_samples_end_before_the_brake_and_carry_what_follows(toy_dataset) -> None:
@@ -103,7 +154,7 @@ def test_ridge_meets_a_product_that_it_is_given(drawn: Samples) -> None:
 
 
 def test_the_comparison_judges_the_painted_world_by_what_the_car_does(drawn: Samples) -> None:
-    found = compare_predictors(drawn, seeds=[1])
+    found = compare_predictors(drawn, paint(drawn), seeds=[1])
     table = {
         row.split(" | ")[0].strip("| "): row.split(" | ")[1:] for row in format_errors(found).splitlines()[4:]
     }
