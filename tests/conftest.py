@@ -1,10 +1,10 @@
 """Where test data outside the repository lies, one thread for linear algebra, and a small finished dataset."""
 
-import fcntl
 import os
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 # small matrices: more threads than one cost twice the time (read by numpy when it is first imported)
 for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -33,12 +33,11 @@ def compiled_kernels(tmp_path_factory):
     jobs = [kernels.compile_rasteriser, kernels.compile_vehicle, kernels.compile_weather]
     first = int(worker.removeprefix("gw")) % len(jobs)
     for job in jobs[first:] + jobs[:first]:
-        with (tmp_path_factory.getbasetemp().parent / f"{job.__name__}.lock").open("a+") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            lock.seek(0)
-            if not lock.read():
+        done = tmp_path_factory.getbasetemp().parent / f"{job.__name__}.done"
+        with FileLock(done.with_suffix(".lock")):
+            if not done.exists():
                 job(tmp_path_factory.mktemp("kernels"))
-                lock.write("done")
+                done.touch()
 
 
 @pytest.fixture

@@ -1,15 +1,13 @@
 """The built-in street: generated once, kept in the user's cache, and generated again if it is damaged."""
 
-import fcntl
 import hashlib
 import os
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import scipy
+from filelock import FileLock
 
 import tasks.scene
 from catalogs.scenes.folder import ARRAY_FILES, OPTIONAL_FILES, array_damage, read_facts, write_scene
@@ -107,16 +105,10 @@ def _remove_street(folder: Path) -> bool:
     return True
 
 
-@contextmanager
-def _only_maker(root: Path) -> Iterator[None]:
+def _only_maker(root: Path) -> FileLock:
     """Hold the cache for making a street; the lock goes with the process, however it ends."""
     root.mkdir(parents=True, exist_ok=True)
-    lock = os.open(root / "street.lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(lock)
+    return FileLock(root / "street.lock", mode=0o644)
 
 
 def _recipe_hash() -> str:

@@ -6,7 +6,6 @@ filled from the store alone; clips go to the store as they are made, the receipt
 """
 
 import atexit
-import fcntl
 import shutil
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -14,6 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from catalogs.documents import parse_json
 from flows.store.layout import Layout
@@ -249,9 +250,9 @@ def _work_folder() -> Iterator[Path]:
 def _try_lock(folder: Path, stack: ExitStack) -> bool:
     """Lock a work folder for as long as the stack lives, if no live process holds it."""
     try:
-        stream = stack.enter_context((folder / "alive").open("w"))
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+        # whichever thread ends the run lets go
+        stack.enter_context(FileLock(folder / "alive", blocking=False, thread_local=False))
+    except (OSError, Timeout):
         return False
     return True
 
