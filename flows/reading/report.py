@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.cameras import load_camera
 from catalogs.variants import warn_of_variant
 from flows.making.plan import TICK_RATE_HZ
 from flows.making.seal import pick_evenly
@@ -66,6 +67,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     folder = _choose_folder(layout, out)
     pictures = manifest["grid"].get("pictures", True)
     data = page_data(manifest, {row["clip_id"] for row in brought}, pictures)
+    data["horizon"] = locate_horizon(layout) if pictures else None
     fixed = {source.name: source.read_bytes() for source in sorted(PAGE.iterdir())} | {
         "plotly.min.js": _read_plotly().encode(),
         "data.js": f"const REPORT = {_format_script(data)};\n".encode(),
@@ -128,6 +130,27 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
         "pairs": [[place[p["clip_id_a"]], place[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
         "manifest": _manifest_facts(manifest),
     }  # fmt: skip
+
+
+def locate_horizon(layout: Layout) -> dict[str, float] | None:
+    """Return where a level car's horizon stands in the picture, and how far it moves; None without a camera file.
+
+    Parameters
+    ----------
+    layout : of the dataset
+
+    Returns
+    -------
+    ``level``, from the top in heights of the picture [1], and ``per_slope``: by how many heights it rises per tangent
+    of the body's pitch [1], for a camera that looks nearly level; a lens bends neither at the middle of the picture.
+    """
+    path = layout.inputs / "camera.yaml"
+    if not path.is_file():
+        return None
+    camera = load_camera(path)
+    ahead, _, up = camera.T_rig_camera[:3, 2]
+    focal, middle = camera.K[1, 1] / camera.height, camera.K[1, 2] / camera.height
+    return {"level": float(middle + focal * up / ahead), "per_slope": float(focal)}
 
 
 def pack_columns(columns: Mapping[str, NDArray[Any]], names: Sequence[str]) -> dict[str, Any]:

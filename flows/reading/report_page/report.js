@@ -97,11 +97,21 @@ function drawHead() {
   })));
 }
 
+/** A clip's own address, to be copied or opened in another tab; the row takes plain clicks and the keyboard. */
+function linkTo(clip) {
+  const link = el("a", { href: `#${encodeURIComponent(clip.clip_id)}`, tabIndex: -1, textContent: clip.label });
+  link.onclick = (event) => {
+    if (event.ctrlKey || event.metaKey || event.shiftKey) event.stopPropagation();
+    else event.preventDefault();
+  };
+  return link;
+}
+
 function drawRows() {
   const list = kept();
   $("clips").tBodies[0].replaceChildren(...list.slice(0, MOST_ROWS).map((clip) => {
     const row = el("tr", { tabIndex: 0, dataset: { clip: clip.clip_id } },
-      ...COLUMNS.map(({ text }) => el("td", { textContent: text(clip) })));
+      ...COLUMNS.map(({ text }, k) => el("td", {}, k === 0 ? linkTo(clip) : text(clip))));
     row.lastChild.className = row.lastChild.ariaLabel = verdictOf(clip);
     row.onclick = () => select(clip);
     row.onkeydown = (event) => {
@@ -174,6 +184,7 @@ async function beside(clip, sibling) {
   player.load(films);
   const traced = clip.traced ? pair.filter((c) => c.traced) : [];
   $("player").hidden = !clip.traced;
+  $("horizon").hidden = !REPORT.horizon || films.length === 0;
   $("untraced").hidden = pair.every((c) => c.traced);
   $("untraced").textContent = `No traces of ${pair.filter((c) => !c.traced).map((c) => c.label).join(" and ")} in this report: `
     + "musync report with --clip brings those that you name.";
@@ -181,6 +192,7 @@ async function beside(clip, sibling) {
   if (current.clip !== clip || current.sibling !== sibling) return;
   await traces.show(traced.map((c, k) => ({ label: c.label, columns: columns[k] })));
   traces.point(player.time);
+  drawHorizons(player.time);
 }
 
 const LABELS = [["friction", "surface_friction", 3, "", 1], ["stop", "stopping_distance", 1, " m", 1], ["peak pitch", "peak_pitch", 2, "°", 180 / Math.PI]];
@@ -230,6 +242,26 @@ function drawRunFacts() {
     [el("h3", { textContent: title }), facts(rows)]));
 }
 
+// ---- the horizon, exaggerated
+
+const EXAGGERATION = 10;
+
+/** Over each film: dashed, where the horizon of a level car stands; solid, where it would stand if the body pitched ten times as much. */
+function drawHorizons(time) {
+  document.querySelectorAll("svg.horizon").forEach((svg, k) => {
+    const pitch = traces.shown[k]?.columns.get("pitch");
+    const shown = Boolean($("horizon").firstElementChild.checked && !$("horizon").hidden && pitch);
+    svg.toggleAttribute("hidden", !shown);
+    if (!shown) return;
+    const { level, per_slope } = REPORT.horizon;
+    const now = pitch[Math.min(Math.round(time * REPORT.tick_rate_hz), pitch.length - 1)];
+    for (const [line, y] of [[svg.children[0], level], [svg.children[1], level - EXAGGERATION * per_slope * Math.tan(now)]]) {
+      line.setAttribute("y1", `${100 * y}%`);
+      line.setAttribute("y2", `${100 * y}%`);
+    }
+  });
+}
+
 // ---- one time for all
 
 const player = new Player([$("film-a"), $("film-b")], (time) => {
@@ -238,6 +270,7 @@ const player = new Player([$("film-a"), $("film-b")], (time) => {
   $("play").textContent = player.running ? "Pause" : "Play";
   $("play").ariaLabel = $("play").textContent;
   traces.point(time);
+  drawHorizons(time);
 });
 const traces = new Traces($("traces"), (time) => scrub(time));
 
@@ -273,6 +306,8 @@ $("play").onclick = () => (player.running ? player.pause() : player.play());
 $("time").oninput = () => scrub($("time").valueAsNumber);
 $("csv").title = "Every telemetry column of this clip, a row a millisecond";
 $("csv").onclick = saveCsv;
+$("horizon").title = "Dashed: the horizon of a level car. Solid: with ten times the body's pitch; it rises as the nose goes down.";
+$("horizon").onchange = () => drawHorizons(player.time);
 addEventListener("keydown", (event) => {
   if (event.target.closest("input, select, button, table, summary")) return;
   const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
@@ -281,9 +316,12 @@ addEventListener("keydown", (event) => {
   else return;
   event.preventDefault();
 });
-// #CLIP+SIBLING opens the page at a pair
-const [first, second] = location.hash.slice(1).split("+").map((id) => clips.find((c) => c.clip_id === id));
+/** #CLIP opens the page at a clip, #CLIP+SIBLING at a pair. */
+async function openAddress() {
+  const [first, second] = location.hash.slice(1).split("+").map((id) => clips.find((c) => c.clip_id === decodeURIComponent(id)));
+  await select(first ?? clips[0]);
+  if (first && second) await beside(first, second);
+}
+addEventListener("hashchange", openAddress);
 drawRows();
-select(first ?? clips[0])
-  .then(() => second && beside(first, second))
-  .finally(() => { document.body.dataset.ready = "true"; });
+openAddress().finally(() => { document.body.dataset.ready = "true"; });

@@ -139,6 +139,38 @@ def test_the_cursor_follows_the_film_and_the_readout_is_the_telemetry_of_that_mo
     assert shown == pytest.approx(3.6 * columns["speed"][round(1000 * time)], abs=0.051)
 
 
+def test_each_clip_has_an_address_that_opens_the_page_at_it(page):
+    link = page.locator("#clips tbody tr:nth-child(4) a")
+    address = f"{page.url.partition('#')[0]}{link.get_attribute('href')}"
+    link.click()
+    page.wait_for_function("traces.shown[0]?.label === 'snow-3/hump'")
+    page.click("#clips tbody tr:nth-child(1)")
+    page.wait_for_function("traces.shown[0]?.label === 'dry/flat'")
+    page.evaluate("(address) => { location.href = address; }", address)  # typed into the open page
+    page.wait_for_function("traces.shown[0]?.label === 'snow-3/hump'")
+    page.goto("about:blank")
+    page.goto(address)
+    page.wait_for_selector("body[data-ready]")
+    assert page.inner_text("#label") == "snow-3/hump"
+
+
+def test_the_exaggerated_horizon_rises_by_ten_times_the_pitch_and_only_where_asked_for(page, toy_dataset):
+    clip = json.loads(toy_dataset.manifest.read_bytes())["clips"][0]
+    pitch = read_columns(toy_dataset.telemetry / "ticks" / "family=dry", clip["clip_id"])["pitch"]
+    assert page.locator("svg.horizon:visible").count() == 0
+    page.check("#horizon input")
+    page.evaluate("scrub(0.9)")
+    assert page.locator("svg.horizon:visible").count() == 2
+    level, now = (
+        float(page.locator(f"figure.a line.{name}").get_attribute("y1").rstrip("%")) / 100
+        for name in ("level", "pitched")
+    )
+    assert level == pytest.approx(0.5)  # a level mount
+    assert level - now == pytest.approx(10 * 80 / 64 * np.tan(pitch[900])) and level - now > 0.02
+    page.uncheck("#horizon input")
+    assert page.locator("svg.horizon:visible").count() == 0
+
+
 def test_dragging_in_the_traces_moves_the_cursor_and_both_films(page):
     box = page.locator("#plot .nsewdrag").first.bounding_box()
     page.mouse.move(box["x"] + 5, box["y"] + 30)
