@@ -244,9 +244,9 @@ function drawRunFacts() {
 
 // ---- the horizon, exaggerated
 
-const EXAGGERATION = 10;
+const EXAGGERATION = 5;
 
-/** Over each film: dashed, where the horizon of a level car stands; solid, where it would stand if the body pitched ten times as much. */
+/** Over each film: dashed, where the horizon of a level car stands; solid, where it would stand if the body pitched five times as much. */
 function drawHorizons(time) {
   document.querySelectorAll("svg.horizon").forEach((svg, k) => {
     const pitch = traces.shown[k]?.columns.get("pitch");
@@ -306,7 +306,7 @@ $("play").onclick = () => (player.running ? player.pause() : player.play());
 $("time").oninput = () => scrub($("time").valueAsNumber);
 $("csv").title = "Every telemetry column of this clip, a row a millisecond";
 $("csv").onclick = saveCsv;
-$("horizon").title = "Dashed: the horizon of a level car. Solid: with ten times the body's pitch; it rises as the nose goes down.";
+$("horizon").title = "Dashed: the horizon of a level car. Solid: with five times the body's pitch; it rises as the nose goes down.";
 $("horizon").onchange = () => drawHorizons(player.time);
 addEventListener("keydown", (event) => {
   if (event.target.closest("input, select, button, table, summary")) return;
