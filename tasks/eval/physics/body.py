@@ -10,6 +10,7 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.eval.physics.constants import SURFACE_FORMS, Constants, Floats, derive_surface
 from tasks.eval.physics.half_step import INNER_STEP, find_brake_onset
 from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
+from tasks.eval.physics.superposition import sum_contact_changes
 from tasks.eval.poses.rigid import invert_pose
 
 DT = 0.001
@@ -47,7 +48,10 @@ def body_laws(
             evaluate_law(f"{name} is the integral of its rate", f"{name} {name}_rate", step, tolerance)
         )
 
-    forces = {}
+    forces: dict[str, Floats] = {}
+    lifted = not all(np.all(ticks[f"axle_load_{axle}"] > 0) for axle in "fr")
+    moment = _brake_moment(ticks, facts, constants)
+    pushed = sum_contact_changes(ticks, moment, constants) if lifted and constants.mode == "paper" else {}
     for axle, lever in (("f", -car["cg_to_front_axle"]), ("r", car["cg_to_rear_axle"])):
         u = ticks[f"unsprung_heave_{axle}"]
         du = np.full_like(u, np.nan)
@@ -69,7 +73,7 @@ def body_laws(
         mass = car[f"unsprung_mass_{axle}"]
         inner = slice(3, -3)
         bend = (u[2:] - 2 * u[1:-1] + u[:-2])[2:-2] / DT**2
-        push = forces[axle] + load - static
+        push = forces[axle] + pushed.get(axle, load - static)
         size = np.abs(load - static).max() + np.abs(forces[axle][inner]).max() + 1e-6
         laws.append(
             evaluate_law(f"axle's own motion, {axle}",
@@ -86,9 +90,7 @@ def _sprung_laws(
     facts: Mapping[str, Any], constants: Constants, jumpy: Floats,
 ) -> list[Law | None]:  # fmt: skip
     car, tyre = constants.car, constants.tyres[facts["weather"]]
-    gamma = tyre.at(tyre.pitch_scale, facts["surface_friction"])
-    gamma *= 1.0 if facts["hazard_height_m"] == 0 else car["coupled_pitch_scale"]
-    moment = gamma * car["sprung_mass"] * car["cg_height"] * np.maximum(-a, 0.0)
+    moment = _brake_moment(ticks, facts, constants)
     up = -(forces["f"] + forces["r"]) / car["sprung_mass"]
     nose = car["cg_to_front_axle"] * forces["f"] - car["cg_to_rear_axle"] * forces["r"] + moment
     nose = nose / car["pitch_inertia"]
@@ -111,6 +113,17 @@ def _sprung_laws(
         braking = " longitudinal_acceleration" if name == "pitch" else ""
         laws.append(evaluate_law(f"body's {name} equation", columns + braking, step - drive, tolerance))
     return laws
+
+
+def _brake_moment(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> Floats:
+    """Pitch moment that each tick's deceleration asks for, [N] [N m]; at the end the low-speed rule replaces it."""
+    car, tyre = constants.car, constants.tyres[facts["weather"]]
+    gamma = tyre.at(tyre.pitch_scale, facts["surface_friction"])
+    gamma *= 1.0 if facts["hazard_height_m"] == 0 else car["coupled_pitch_scale"]
+    moment: Floats = (
+        gamma * car["sprung_mass"] * car["cg_height"] * np.maximum(-ticks["longitudinal_acceleration"], 0.0)
+    )
+    return moment
 
 
 def _largest_input_changes(
