@@ -241,7 +241,13 @@ def apply_weather(
     cloudy = environment_view(overcast.environment, view, shutter.K, shutter.width, shutter.height)
     layers = [light_layer(picture, gbuffer, clear_sky, cloudy, sky)]
     if film is not None:
-        on_road = RoadFilm(depth_mm=weather.state.film_depth_mm, parameters=film, seed=weather.seed)
+        state = weather.state
+        on_road = RoadFilm(
+            depth_mm=state.film_depth_mm,
+            parameters=film,
+            seed=weather.seed,
+            rate_mm_h=state.precipitation_mm_h,
+        )
         light = LightOnRoad(environment=overcast.environment, sky=sky, extinction=air.extinction)
         dry = recompose_layers(picture, layers)
         layers.append(wet_layer(dry, gbuffer, shutter, rays, on_road, light))
