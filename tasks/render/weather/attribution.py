@@ -11,7 +11,7 @@ from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import Layer, recompose_layers
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
-from tasks.render.weather.snow.bearing import GROUND_CLASSES, SOFT_GROUND, steepest_bearing
+from tasks.render.weather.snow.bearing import GROUND_CLASSES, steepest_bearing
 from tasks.render.weather.snow.field import coverage_rank, tracks_at
 
 LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
@@ -80,8 +80,7 @@ def snow_on(
     if overcast is None or overcast.snow is None or overcast.look.snow_cover is None:
         return mask
     road = np.isin(gbuffer.class_id, ROAD_CLASSES)
-    level = road | np.isin(gbuffer.class_id, SOFT_GROUND)
-    bears = level | (gbuffer.normal[..., 2] > steepest_bearing(overcast.look.snow_cover.anchors))
+    bears = road | (gbuffer.normal[..., 2] > steepest_bearing(overcast.look.snow_cover.anchors))
     ground = np.isin(gbuffer.class_id, list(classes)) & bears & (gbuffer.alpha > 0.5)
     place = shutter.T_world_camera[:3, 3] + gbuffer.depth[ground, None] * pixel_rays(shutter)[ground]
     field, x, y = overcast.snow, place[:, 0], place[:, 1]

@@ -103,7 +103,7 @@ def _disc_areas(gaussians: Gaussians, index: NDArray[np.int64]) -> NDArray[np.fl
 def _cell_keys(means: NDArray[np.floating]) -> tuple[NDArray[np.int64], tuple[int, int]]:
     """A number for each point's cell, and by how much it grows from a cell to the next one along x and y."""
     cell = np.floor(means / CELL_M).astype(np.int64)
-    cell -= cell.min(axis=0) - 1
+    cell = cell - cell.min(axis=0) + 1
     _, across, high = cell.max(axis=0) + 2
     steps = int(across * high), int(high)
     return cell @ np.array((*steps, 1)), steps
