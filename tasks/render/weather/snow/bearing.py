@@ -114,7 +114,9 @@ def _mean_up(gaussians: Gaussians, index: NDArray[np.int64]) -> NDArray[np.float
     keys, (along, across) = _cell_keys(gaussians.means[index])
     filled, cell = np.unique(keys, return_inverse=True)
     area = _disc_areas(gaussians, index)
-    own: NDArray[np.float64] = np.column_stack([np.bincount(cell, area * part) for part in gaussians.normals[index].T])
+    own: NDArray[np.float64] = np.column_stack(
+        [np.bincount(cell, area * part) for part in gaussians.normals[index].T]
+    )
     total = np.zeros(own.shape)
     for x in (-along, 0, along):
         for y in (-across, 0, across):
