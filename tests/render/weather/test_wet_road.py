@@ -261,3 +261,13 @@ def test_a_lobe_is_as_wide_across_as_it_is_steep_and_seen_flat(parameters):
     out = wet_road._lobe_mean(light, view, 0, across)
     assert [(row > 0).sum() for row in out[..., 0]] == [1, 3, 9, 19]
     assert out.sum(axis=1) == pytest.approx(np.ones((4, 3)), rel=1e-5)
+
+
+def test_refraction_in_the_deepest_film_stays_below_a_tenth_of_a_pixel():
+    """Closed form, for the eye of the dashcam at 480x320: why the film is drawn without it."""
+    film, eye, focal = 1.263e-3, 1.4, 400.0
+    distance = np.linspace(1.4 * 400 / 160, 60, 500)
+    steep = np.arctan(distance / eye)
+    inside = np.arcsin(np.sin(steep) / 1.333)
+    along = film * (np.tan(steep) - np.tan(inside))
+    assert 0.05 < (along * focal * eye / distance**2).max() < 0.1
