@@ -25,6 +25,8 @@ CELL_M = 0.15
 """Edge of the cells over which normals are averaged, three by three by three, and in which tops are sought."""
 AGREEMENT_DEG = 5.0
 """Median angle between the normals of Gaussians of one cell up to which a scene's normals are taken as exact."""
+ASKED = 7
+"""Of so many cells one is asked whether its normals agree."""
 TOP_M = 0.12
 """Depth below the highest edge within reach at which half a cover is left."""
 OPAQUE_SHARE = 0.5
@@ -87,7 +89,8 @@ def normals_agree(gaussians: Gaussians) -> bool:
     if not len(index):
         return True
     keys, _ = _cell_keys(gaussians.means[index])
-    order = np.argsort(keys)
+    asked = np.flatnonzero(keys % ASKED == 0)
+    order = asked[np.argsort(keys[asked])]
     together = np.diff(keys[order]) == 0
     normal = gaussians.normals[index[order]]
     cosine = (normal[1:] * normal[:-1]).sum(axis=1)[together]
@@ -117,13 +120,12 @@ def _mean_up(gaussians: Gaussians, index: NDArray[np.int64]) -> NDArray[np.float
     own: NDArray[np.float64] = np.column_stack(
         [np.bincount(cell, area * part) for part in gaussians.normals[index].T]
     )
-    total = np.zeros(own.shape)
+    total, below = np.zeros(own.shape), np.vstack((np.zeros(3), np.cumsum(own, axis=0)))
     for x in (-along, 0, along):
         for y in (-across, 0, across):
             # cells above one another are next to one another
             low = np.searchsorted(filled, filled + x + y - 1)
             high = np.searchsorted(filled, filled + x + y + 1, side="right")
-            below = np.vstack((np.zeros(3), np.cumsum(own, axis=0)))
             total += below[high] - below[low]
     return (total[:, 2] / np.maximum(np.sqrt((total**2).sum(axis=1)), 1e-12))[cell]
 
