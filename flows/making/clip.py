@@ -29,7 +29,14 @@ from catalogs.surfaces import load_surface
 from catalogs.variants import Variant
 from catalogs.vehicles import load_vehicle
 from catalogs.weather import load_weather
-from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures, surface_of
+from flows.making.driving import (
+    hazard_of,
+    ranges_of,
+    simulate_drive,
+    surface_figures,
+    surface_of,
+    weather_of,
+)
 from flows.making.edited_scene import edit_scene
 from flows.making.places import find_scene, remember_place
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
@@ -53,6 +60,7 @@ from tasks.render.weather.layers import ClipConditions
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.scene import Scene
 from tasks.studies.sensitivity import StudyProtocol
+from tasks.surface.anchors import adjacent_anchors
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
@@ -245,12 +253,22 @@ def render_frames(
             frame_rate_hz=plan.settings.frame_rate_hz,
             rig_at=rig_at,
         ),
-        ClipConditions(state=state, parameters=catalogue.looks, seed=seed),
+        ClipConditions(
+            state=state, parameters=catalogue.looks, seed=seed, anchors=_anchors_of(scenario, plan, catalogue)
+        ),
         select_backend(plan.backend),
         relief=relief,
         labels=plan.settings.labels,
         composition=plan.settings.composition,
     )
+
+
+def _anchors_of(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, ...]:
+    """Return the anchors about the clip's rate that the paper's composition blends."""
+    look = catalogue.looks.find_look(scenario.weather)
+    if plan.settings.composition != "paper" or look is None or look.anchors_mm_h is None:
+        return ()
+    return adjacent_anchors(weather_of(scenario), look.anchors_mm_h, catalogue.surface)
 
 
 def judge_motion(

@@ -11,8 +11,8 @@ from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import Layer, recompose_layers
 from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
+from tasks.render.weather.snow.bearing import GROUND_CLASSES, steepest_bearing
 from tasks.render.weather.snow.field import coverage_rank, tracks_at
-from tasks.render.weather.snow.layer import GROUND_CLASSES, steepest_bearing
 
 LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
 """Bit of each layer in an attribution picture."""
@@ -80,7 +80,7 @@ def snow_on(
     if overcast is None or overcast.snow is None or overcast.look.snow_cover is None:
         return mask
     road = np.isin(gbuffer.class_id, ROAD_CLASSES)
-    bears = road | (gbuffer.normal[..., 2] > steepest_bearing(overcast.look.snow_cover))
+    bears = road | (gbuffer.normal[..., 2] > steepest_bearing(overcast.look.snow_cover.anchors))
     ground = np.isin(gbuffer.class_id, list(classes)) & bears & (gbuffer.alpha > 0.5)
     place = shutter.T_world_camera[:3, 3] + gbuffer.depth[ground, None] * pixel_rays(shutter)[ground]
     field, x, y = overcast.snow, place[:, 0], place[:, 1]
@@ -93,7 +93,9 @@ def paper_picture(frame: WeatherFrame) -> NDArray[np.uint8]:
     """Return the 8-bit picture as the paper composes it (Appendix A.4).
 
     The particles are isolated in display space, as the signed difference of a pair of 8-bit renders of the
-    street in its air with and without them, and that difference is added last to the finished still picture.
+    street in its air with and without them, and that difference is added last to the finished still picture. Between
+    two anchors both are those of the anchors, blended: the still pictures by the rate, the differences by the number
+    of particles.
 
     Parameters
     ----------
@@ -103,13 +105,25 @@ def paper_picture(frame: WeatherFrame) -> NDArray[np.uint8]:
     -------
     uint8 [H, W, 3] sRGB
     """
-    still = [layer for layer in frame.layers if layer.name != "particles"]
+    still, residual = _still_and_residual(frame)
+    if (blend := frame.blend) is not None:
+        pair = _still_and_residual(blend.low), _still_and_residual(blend.high)
+        still, residual = (
+            low + weight * (high - low)
+            for low, high, weight in zip(*pair, (blend.still, blend.falling), strict=True)
+        )
+    return np.clip(np.rint(still + residual), 0, 255).astype(np.uint8)
+
+
+def _still_and_residual(frame: WeatherFrame) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    """Return the 8-bit picture without particles, and what the particles add to that without water on the road."""
+    layers = [layer for layer in frame.layers if layer.name != "particles"]
     falling = [layer for layer in frame.layers if layer.name == "particles"]
-    without = recompose_layers(frame.base, [layer for layer in still if layer.name != "wet"])
+    without = recompose_layers(frame.base, [layer for layer in layers if layer.name != "wet"])
     residual = _codes(recompose_layers(without, falling)) - _codes(without)
-    return np.clip(_codes(recompose_layers(frame.base, still)) + residual, 0, 255).astype(np.uint8)
+    return _codes(recompose_layers(frame.base, layers)), residual
 
 
-def _codes(picture: NDArray[np.float32]) -> NDArray[np.int16]:
+def _codes(picture: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return 8-bit sRGB codes as signed numbers."""
-    return encode_8bit(picture).astype(np.int16)
+    return encode_8bit(picture).astype(np.float32)

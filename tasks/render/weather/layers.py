@@ -10,40 +10,35 @@ over distance), particles (drops and flakes near the camera). Snow on the ground
 weather the scene and the picture are returned unchanged.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
-from tasks.errors import InputError
 from tasks.render.camera import world_to_camera
 from tasks.render.environment import environment_view
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.road_edit import RoadRelief, measure_road_lift
-from tasks.render.weather.atmosphere import Air, air_layer, light_layer, precipitating_air
+from tasks.render.weather.atmosphere import air_layer, light_layer
+from tasks.render.weather.controls import road_controls
 from tasks.render.weather.falling.particles import Shutter, visible_streaks
-from tasks.render.weather.falling.precipitation import Population, make_population
+from tasks.render.weather.falling.precipitation import Population
 from tasks.render.weather.falling.streaks import draw_streaks
 from tasks.render.weather.layer import Layer, recompose_layers
-from tasks.render.weather.parameters import KindLook, WeatherParameters
+from tasks.render.weather.overcast import Overcast, make_overcast
+from tasks.render.weather.parameters import WeatherParameters
 from tasks.render.weather.relief import clear_light, overcast_light, relight_gaussians
 from tasks.render.weather.scene_light import ground_light, without_sun
-from tasks.render.weather.sky import (
-    SkyLight,
-    cloud_transmittance,
-    light_from,
-    overcast_environment,
-    sky_light,
-)
-from tasks.render.weather.snow.field import SnowField, snow_field
+from tasks.render.weather.sky import SkyLight, light_from
+from tasks.render.weather.snow.field import snow_field
 from tasks.render.weather.snow.layer import snow_layer, snowed_over, whiten_gaussians
 from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 from tasks.surface.state import SurfaceState
-from tasks.surface.weather import DRY
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,33 +70,13 @@ class ClipConditions:
     state : what falls, and what lies on the road
     parameters : optical parameters of the weather, of the catalogue
     seed : visual seed; it moves particles and snow, and nothing else [1]
+    anchors : states of the two anchors that the paper's composition blends; none for a picture of its own rate
     """
 
     state: SurfaceState
     parameters: WeatherParameters
     seed: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Overcast:
-    """Light, air and falling particles of a clip under cloud.
-
-    Parameters
-    ----------
-    look : appearance of its kind of weather
-    population : falling particles; None without precipitation
-    air : extinction and veil
-    sky : light of the sky
-    environment : float32 [h, w, 3] environment under cloud [1]
-    snow : coverage field of the scene; None where no snow lies
-    """
-
-    look: KindLook
-    population: Population | None
-    air: Air
-    sky: SkyLight
-    environment: NDArray[np.float32]
-    snow: SnowField | None
+    anchors: tuple[SurfaceState, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,12 +89,14 @@ class ClipWeather:
     parameters : numbers of the catalogue
     seed : visual seed of the clip [1]
     overcast : None under a clear sky
+    anchors : weathers of the two anchors, in one scene and of one seed, that the paper's composition blends
     """
 
     state: SurfaceState
     parameters: WeatherParameters
     seed: int
     overcast: Overcast | None
+    anchors: "tuple[ClipWeather, ...]" = ()
 
     @property
     def reads_normals(self) -> bool:
@@ -136,11 +113,30 @@ class WeatherFrame:
     base : float32 [H, W, 3] the clear linear picture [1]
     layers : from the scene to the lens
     picture : float32 [H, W, 3] the linear picture in its weather [1]
+    blend : the two anchors that the paper's composition blends; None where the frame is its own anchor
     """
 
     base: NDArray[np.float32]
     layers: tuple[Layer, ...]
     picture: NDArray[np.float32]
+    blend: "AnchorBlend | None" = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnchorBlend:
+    """Two frames of one pose at the rates about that of the clip (paper, Appendix A.4).
+
+    Parameters
+    ----------
+    low, high : frames at the lower and at the higher rate
+    still : weight of the higher one's still picture, linear in the rate [1]
+    falling : weight of its particles, linear in their number [1]
+    """
+
+    low: WeatherFrame
+    high: WeatherFrame
+    still: float
+    falling: float
 
 
 def weather_scene(
@@ -174,37 +170,28 @@ def weather_scene(
         return relight_gaussians(
             gaussians, relief, clear_light(gaussians, environment, p.sky, clear.to_sun)
         ), dry
-    if look.particles is not None and state.precipitation_mm_h == 0:
-        raise InputError(f"weather: {state.kind} needs precipitation_mm_h above 0; it is 0: use {DRY}")
-    falls = None if look.particles is None else make_population(look.particles, state.precipitation_mm_h)
-    air = precipitating_air(falls, p.air.near, focal_px, p.air.haze_visual_range_m)
     white = ground_light(gaussians, SemanticClass.ROAD).lit / p.sky.asphalt_albedo
-    cover = look.snow_cover
-    covered = 0.0 if cover is None else state.snow_coverage
-    ground = p.sky.asphalt_albedo
-    if cover is not None:
-        ground = (1 - covered) * ground + covered * float(np.mean(cover.albedo))
-    level = cloud_transmittance(state.precipitation_mm_h, p.sky) * 2**look.exposure_ev
-    sky = sky_light(white, level, air.extinction, ground, p.sky)
     scene = without_sun(gaussians, p.sky.shadow_kept)
     field = None
-    if cover is not None:
+    if (cover := look.snow_cover) is not None:
         field = snow_field(gaussians, cover.patches, cover.tracks, cover.anchors, clear.route, seed)
-        amount = (state.snow_coverage, state.snow_depth_mm, cover)
+        xi_road = road_controls(state, look)
+        amount = (xi_road.snow_coverage, xi_road.snow_depth_mm, cover)
         lift = None if relief is None else measure_road_lift(scene, relief)
         snow = snow_layer(scene, field, white, *amount, lift)
         scene = snowed_over(whiten_gaussians(scene, field, white, *amount), snow)
-    overcast = Overcast(
-        look=look,
-        population=falls,
-        air=air,
-        sky=sky,
-        environment=overcast_environment(environment, sky, air.extinction, p.sky, seed, covered),
-        snow=field,
+    own, *anchors = (
+        ClipWeather(
+            state=one,
+            parameters=p,
+            seed=seed,
+            overcast=make_overcast(look, one, p, seed, environment, white, field, focal_px),
+        )
+        for one in (state, *conditions.anchors)
     )
-    if relief is not None:
-        scene = relight_gaussians(scene, relief, overcast_light(overcast.environment, sky))
-    return scene, ClipWeather(state=state, parameters=p, seed=seed, overcast=overcast)
+    if relief is not None and own.overcast is not None:
+        scene = relight_gaussians(scene, relief, overcast_light(own.overcast.environment, own.overcast.sky))
+    return scene, replace(own, anchors=tuple(anchors))
 
 
 def apply_weather(
@@ -241,14 +228,41 @@ def apply_weather(
     cloudy = environment_view(overcast.environment, view, shutter.K, shutter.width, shutter.height)
     layers = [light_layer(picture, gbuffer, clear_sky, cloudy, sky)]
     if film is not None:
-        on_road = RoadFilm(depth_mm=weather.state.film_depth_mm, parameters=film, seed=weather.seed)
+        state = weather.state
+        on_road = RoadFilm(
+            depth_mm=state.film_depth_mm,
+            parameters=film,
+            seed=weather.seed,
+            rate_mm_h=state.precipitation_mm_h,
+        )
         light = LightOnRoad(environment=overcast.environment, sky=sky, extinction=air.extinction)
         dry = recompose_layers(picture, layers)
         layers.append(wet_layer(dry, gbuffer, shutter, rays, on_road, light))
     layers.append(air_layer(gbuffer, cloudy, air, sky, rays))
     if particles and overcast.population is not None:
         layers.append(particle_layer(weather, overcast.population, overcast.sky, gbuffer.depth, shutter))
-    return WeatherFrame(base=picture, layers=tuple(layers), picture=recompose_layers(picture, layers))
+    return WeatherFrame(
+        base=picture,
+        layers=tuple(layers),
+        picture=recompose_layers(picture, layers),
+        blend=_blend_anchors(weather, overcast, (picture, clear_sky, gbuffer, shutter)),
+    )
+
+
+def _blend_anchors(weather: ClipWeather, overcast: Overcast, view: Any) -> AnchorBlend | None:
+    """The frames of the anchors in a view, and how much the higher one weighs."""
+    if not weather.anchors:
+        return None
+    low, high = weather.anchors
+    rates, counts = [], []
+    for one in (low, weather, high):
+        air = overcast.atmosphere if one.overcast is None else one.overcast.atmosphere
+        rates.append(one.state.precipitation_mm_h)
+        counts.append(air.particles_m3)
+    still, falling = ((own - least) / (most - least) for least, own, most in (rates, counts))
+    return AnchorBlend(
+        low=apply_weather(low, *view), high=apply_weather(high, *view), still=still, falling=falling
+    )
 
 
 def particle_layer(

@@ -37,12 +37,14 @@ class KindLook:
     particles : what falls, with its extinction
     film : the film on the road, of water or of ice
     snow_cover : snow on the ground
+    anchors_mm_h : rates, ascending, between which the paper's composition blends pictures [mm/h]
     """
 
     exposure_ev: float
     particles: ParticleParameters | None = None
     film: RoadFilmParameters | None = None
     snow_cover: SnowCoverParameters | None = None
+    anchors_mm_h: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ from tasks.errors import InputError
 from tasks.render.composition import encode_8bit, to_linear
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.attribution import LAYER_BITS, attribute_pixels, paper_picture, snow_on
+from tasks.render.weather.controls import air_controls
 from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import apply_weather
 from tasks.render.weather.scene_light import append_gaussians, to_display_unclipped
@@ -46,9 +47,9 @@ def street():
     return append_gaussians(road(), wall)
 
 
-def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005):
+def frame(street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005, anchors=()):
     view = shutter(time_s=time_s, exposure_s=exposure_s, speed=speed, **SIZE)
-    scene, weather = weather_over(street, SKY, state, parameters, seed)
+    scene, weather = weather_over(street, SKY, state, parameters, seed, anchors=anchors)
     gbuffer = rasterise_view(
         prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height
     )
@@ -200,3 +201,29 @@ def test_a_scene_without_road_is_refused(street, parameters):
     bare = replace(street, class_id=np.full(len(street), SemanticClass.BUILDING, np.uint8))
     with pytest.raises(InputError, match="no Gaussian of the scene has class road"):
         weather_over(bare, SKY, RAIN[10], parameters)
+
+
+def test_between_two_anchors_the_papers_picture_blends_theirs(street, parameters):
+    """Still pictures by the rate, particles by their number; the frames of the anchors are those of their rates."""
+    pair = RAIN[10], RAIN[25]
+    _, drawn, _, _ = frame(street, replace(RAIN[10], precipitation_mm_h=15), parameters, anchors=pair)
+    low, high = drawn.blend.low, drawn.blend.high
+    for state, shown in zip(pair, (low, high), strict=True):
+        assert frame(street, state, parameters)[1].picture.tobytes() == shown.picture.tobytes()
+    less, own, more = (air_controls("rain", rate, parameters).particles_m3 for rate in (10, 15, 25))
+    assert drawn.blend.still == pytest.approx((15 - 10) / (25 - 10))
+    assert drawn.blend.falling == pytest.approx((own - less) / (more - less))
+    assert drawn.blend.still < drawn.blend.falling
+
+    still, falls = [], []
+    for shown in (low, high):
+        without = [layer for layer in shown.layers if layer.name in {"light", "air"}]
+        dry = encode_8bit(recompose_layers(shown.base, without)).astype(float)
+        falls.append(encode_8bit(recompose_layers(shown.base, [*without, shown.layers[-1]])) - dry)
+        still.append(encode_8bit(recompose_layers(shown.base, shown.layers[:-1])).astype(float))
+    expected = still[0] + (still[1] - still[0]) / 3
+    expected += falls[0] + drawn.blend.falling * (falls[1] - falls[0])
+    assert np.abs(paper_picture(drawn) - np.clip(expected, 0, 255)).max() <= 0.51
+    assert np.array_equal(
+        paper_picture(replace(drawn, blend=replace(drawn.blend, still=0, falling=0))), paper_picture(low)
+    )

@@ -10,7 +10,7 @@ from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.layers import pixel_rays
 from tasks.render.weather.sky import LUMINANCE, sky_light
 from tasks.render.weather.wet import wet_road
-from tasks.render.weather.wet.puddles import compute_wetness, water_surface
+from tasks.render.weather.wet.puddles import compute_struck_slope, compute_wetness, water_surface
 from tasks.render.weather.wet.reflection import mirrored_scene
 from tasks.render.weather.wet.road_view import RoadView
 from tasks.render.weather.wet.wet_road import (
@@ -191,7 +191,7 @@ def test_puddles_stay_where_they_are_as_the_car_drives(parameters):
     for x in (0.0, 1.0):
         view = shutter(width=160, height=108, focal=133.0, x=x)
         _, gbuffer = flat_gbuffer(view)
-        surface = water_surface(see_road(gbuffer, view), 0.6, p, 3)
+        surface = water_surface(see_road(gbuffer, view), 0.6, p, 8)
         column = 80
         place = x + gbuffer.depth[:, column] * pixel_rays(view)[:, column, 0]
         near = (gbuffer.class_id[:, column] == 1) & (place > 4.5) & (place < 7.0)
@@ -225,3 +225,49 @@ def test_a_pixel_that_leaves_its_own_mirrored_light_out_has_that_of_its_neighbou
     else:
         assert not np.array_equal(layer.add, whole.add)
         assert np.sqrt(((layer.add - whole.add) ** 2).mean()) < 0.5 / 255
+
+
+def test_drops_blur_what_a_film_mirrors_and_leave_its_share(parameters, sky):
+    """Mirrored stripes lose contrast as the rate rises; the gain, which is the share's, stays."""
+    view = shutter()
+    picture, gbuffer = flat_gbuffer(view, 12.0)
+    rows = np.arange(len(picture))[:, None, None]
+    picture = np.where(rows > 160, picture, (rows // 8 % 2).astype(np.float32))
+    light, layers = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0), []
+    for rate in (0.0, 10.0, 50.0):
+        film = RoadFilm(depth_mm=4.0, parameters=parameters.kinds["rain"].film, seed=1, rate_mm_h=rate)
+        layers.append(wet_layer(picture, gbuffer, view, pixel_rays(view), film, light))
+    # where the part of the wall above the horizon is mirrored
+    contrast = [np.abs(np.diff(layer.add[265:295, :, 0], axis=0)).mean() for layer in layers]
+    assert contrast[0] > 1.5 * max(contrast[1:])
+    assert all(np.array_equal(layer.gain, layers[0].gain) for layer in layers)
+
+
+def test_a_struck_film_is_as_steep_as_its_own_ripples_and_the_drops_rings_together(parameters):
+    water = parameters.kinds["rain"].film.water
+    assert compute_struck_slope(0.0, water) == pytest.approx(water.ripple_slope)
+    assert compute_struck_slope(50.0, water) == pytest.approx(
+        np.hypot(water.ripple_slope, water.impact_slope * np.sqrt(50))
+    )
+
+
+def test_a_lobe_is_as_wide_across_as_it_is_steep_and_seen_flat(parameters):
+    """One bright column, mirrored by a whole road: it spreads over the reach of its row, and no light is lost."""
+    road = np.ones((4, 61), dtype=bool)
+    light = np.zeros((4, 61, 3), np.float32)
+    light[:, 30] = 1
+    view = replace(see_road(flat_gbuffer(VIEW)[1]), road=road, mirrors=road)
+    across = np.repeat(np.array([0, 1.5, 4, 9], np.float32)[:, None], 61, axis=1)
+    out = wet_road._lobe_mean(light, view, 0, across)
+    assert [(row > 0).sum() for row in out[..., 0]] == [1, 3, 9, 19]
+    assert out.sum(axis=1) == pytest.approx(np.ones((4, 3)), rel=1e-5)
+
+
+def test_refraction_in_the_deepest_film_stays_below_a_tenth_of_a_pixel():
+    """Closed form, for the eye of the dashcam at 480x320: why the film is drawn without it."""
+    film, eye, focal = 1.263e-3, 1.4, 400.0
+    distance = np.linspace(1.4 * 400 / 160, 60, 500)
+    steep = np.arctan(distance / eye)
+    inside = np.arcsin(np.sin(steep) / 1.333)
+    along = film * (np.tan(steep) - np.tan(inside))
+    assert 0.05 < (along * focal * eye / distance**2).max() < 0.1

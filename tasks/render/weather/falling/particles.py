@@ -2,8 +2,8 @@
 
 All particles of a size class move with one velocity, so they are at rest in a lattice of cells that drifts with
 fall and wind. The random generator Philox, with seed and stream as key and the cell as counter, gives the particles of
-a cell. No state passes from frame to frame: a frame drawn alone has the same bits as in a sequence, and a higher
-rate adds particles to those of a lower one.
+a cell. No state passes from frame to frame: a frame drawn alone has the same bits as in a sequence, and a
+class that is denser at a higher rate keeps its particles of a lower one: every class of rain, the large flakes of snow.
 """
 
 from dataclasses import dataclass

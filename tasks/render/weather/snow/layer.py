@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.conventions import ROAD_CLASSES, SemanticClass
+from tasks.conventions import ROAD_CLASSES
 from tasks.render.weather.coverage_field import FieldParameters, height_field
 from tasks.render.weather.scene_light import (
     append_gaussians,
@@ -13,6 +13,7 @@ from tasks.render.weather.scene_light import (
     remove_gaussians,
     to_display_unclipped,
 )
+from tasks.render.weather.snow.bearing import GROUND_CLASSES, bearing_share
 from tasks.render.weather.snow.field import SnowField, coverage_rank, local_depth_mm, tracks_at
 from tasks.render.weather.snow.road_anchors import AnchorParameters, road_anchors
 from tasks.render.weather.snow.shelter import open_share
@@ -25,7 +26,6 @@ EDGE_WIDTHS = 1.4
 """Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
 BURIED = 0.98
 """Share of an anchor that its snow hides from which on the anchor itself need not be drawn."""
-GROUND_CLASSES = (*ROAD_CLASSES, SemanticClass.KERB, SemanticClass.SIDEWALK, SemanticClass.TERRAIN)
 NARROWEST = 0.35
 """Width of the narrowest Gaussian, at the very edge, by that of its anchor."""
 
@@ -222,9 +222,7 @@ def whiten_gaussians(
     """
     p = parameters
     road = np.isin(gaussians.class_id, ROAD_CLASSES)
-    up = np.where(gaussians.class_id == SemanticClass.SKY, 0.0, gaussians.normals[:, 2])
-    limit = steepest_bearing(p)
-    facing = np.clip((up - limit) / limit, 0, 1)
+    facing = bearing_share(gaussians, p.anchors)
     bears = np.flatnonzero(facing > 0)
     place = gaussians.means[bears]
     x, y = place[:, 0], place[:, 1]
@@ -240,11 +238,6 @@ def whiten_gaussians(
     even = np.zeros(len(gaussians))
     snow = _snow_colour(even, even, white, p)
     return recolour_gaussians(gaussians, (1 - hidden) * damp, hidden[:, None] * snow)
-
-
-def steepest_bearing(parameters: SnowCoverParameters) -> float:
-    """Upward part of a normal from which on a surface bears some snow; at twice that it bears all [1]."""
-    return 0.5 * float(np.cos(np.deg2rad(parameters.anchors.tilt_limit_deg)))
 
 
 def _steepness(

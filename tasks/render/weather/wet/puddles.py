@@ -25,6 +25,7 @@ class RoadWaterParameters:
     unevenness : waves of that level
     ripple_slope : standard deviation of the slope of standing water and smooth film [1]
     ripple_m : length of those ripples [m]
+    impact_slope : standard deviation of the slope that drops of 1 mm/h leave; it grows with the root of the rate [1]
     """
 
     wetting_mm: float
@@ -34,6 +35,7 @@ class RoadWaterParameters:
     unevenness: FieldParameters
     ripple_slope: float
     ripple_m: float
+    impact_slope: float
 
 
 def compute_wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> float:
@@ -50,6 +52,19 @@ def compute_wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> fl
         Share [1].
     """
     return 1 - exp(-film_depth_mm / parameters.wetting_mm)
+
+
+def compute_struck_slope(rate_mm_h: float, parameters: RoadWaterParameters) -> float:
+    """Return the standard deviation of the slope of a smooth film that drops strike [1].
+
+    Rings of drops that fall independently add up in the square, so that the slope grows with the root of the rate.
+
+    Parameters
+    ----------
+    rate_mm_h : rate of the rain [mm/h]
+    parameters : parameters of the film
+    """
+    return sqrt(parameters.ripple_slope**2 + parameters.impact_slope**2 * rate_mm_h)
 
 
 @dataclass(frozen=True, kw_only=True)
