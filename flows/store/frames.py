@@ -25,6 +25,10 @@ from flows.store.telemetry import channel_labels
 from manifests.canonical import sha256_of
 from tasks.errors import InputError
 
+COMPRESSION_LEVEL = 1
+"""Of Zstandard. With the bytes of a number apart, frames of a clip take 397 kB at 3.6 CPU-ms; level 3 with the bits
+apart takes 404 kB at 8.7 [1]."""
+
 
 def create_arrays(
     path: Path, clips: int, frames: int, height: int, width: int, labels: bool, attributes: Mapping[str, Any]
@@ -43,7 +47,12 @@ def create_arrays(
             dtype=dtype,
             fill_value=float("nan") if dtype == "float32" else 0,
             compressors=[
-                BloscCodec(cname="zstd", clevel=3, shuffle="bitshuffle", typesize=np.dtype(dtype).itemsize),
+                BloscCodec(
+                    cname="zstd",
+                    clevel=COMPRESSION_LEVEL,
+                    shuffle="shuffle",
+                    typesize=np.dtype(dtype).itemsize,
+                ),
                 Crc32cCodec(),
             ],
             dimension_names=("clip", "frame", "y", "x", *array.dimensions),

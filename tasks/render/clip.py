@@ -1,14 +1,15 @@
 """A clip's frames, one after the other, from rig poses to finished pictures in their weather."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
 from tasks.render.camera import Camera, RigAt, world_to_camera
-from tasks.render.composition import compose_over_sky, encode_8bit, round_depth
+from tasks.render.composition import compose_over_sky, round_depth
+from tasks.render.display_bytes import encode_picture
 from tasks.render.environment import environment_view
 from tasks.render.labels import clip_flow, forward_flow, frame_labels, row_flow
 from tasks.render.rasterise.backend import Backend
@@ -85,7 +86,7 @@ def render_clip(
     T_world_camera = motion.T_world_rig @ camera.T_rig_camera
     T_world_rows = _row_poses(camera, T_world_camera, motion.rig_at)
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
-    frames: list[dict[str, NDArray[np.generic]]] = []
+    clip: dict[str, NDArray[Any]] = {}
     for frame, pose in enumerate(T_world_camera):
         view = world_to_camera(pose)
         gbuffer = backend.rasterise_view(
@@ -111,7 +112,7 @@ def render_clip(
         developed = (
             paper_picture(finished)
             if composition == "paper"
-            else encode_8bit(apply_sensor(seen.picture, camera.sensor, conditions.seed, frame))
+            else encode_picture(apply_sensor(seen.picture, camera.sensor, conditions.seed, frame))
         )
         buffers: dict[str, NDArray[np.generic]] = {
             "rgb": developed,
@@ -123,8 +124,10 @@ def render_clip(
             buffers |= frame_labels(
                 seen.normal, seen.class_id, seen.points, seen.changes, scene.route, elevation
             )
-        frames.append(buffers)
-    clip = {name: np.stack([buffers[name] for buffers in frames]) for name in frames[0]}
+        for name, values in buffers.items():
+            if not frame:
+                clip[name] = np.empty((len(T_world_camera), *values.shape), values.dtype)
+            clip[name][frame] = values
     if labels:
         clip["flow"], occluded = _label_flow(clip["depth"], camera, field, T_world_camera, T_world_rows)
         clip["marks"] |= occluded

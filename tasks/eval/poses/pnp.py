@@ -76,12 +76,11 @@ class PnpSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class _Frame:
-    """One frame: grey levels [H, W] [1], inverse depth [H, W] [1/m], corner strength [H, W] and its least value [1]."""
+    """One frame: grey levels [H, W] [1], inverse depth [H, W] [1/m] and its corners on smooth surfaces [N, 2] [px]."""
 
     grey: NDArray[np.uint8]
     inverse_depth: NDArray[np.float32]
-    strength: NDArray[np.float32]
-    least_strength: float
+    corners: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,9 +128,16 @@ def recover_motion_pnp(
     """
     check_clip(frames, K, T_rig_camera, depth, unusable, route_rotations)
     chosen = settings or PnpSettings()
-    prepared = prepare_on_demand(
-        lambda k: _prepare_frame(frames[k], depth[k], None if unusable is None else unusable[k], chosen)
-    )
+    corners: dict[int, NDArray[np.int64]] = {}  # they are small, and found once
+
+    def prepare_frame(k: int) -> _Frame:
+        grey = cv2.cvtColor(frames[k], cv2.COLOR_RGB2GRAY)
+        inverse_depth = invert_depth(depth[k], None if unusable is None else unusable[k])
+        if k not in corners:
+            corners[k] = _find_smooth_corners(grey, inverse_depth, chosen)
+        return _Frame(grey=grey, inverse_depth=inverse_depth, corners=corners[k])
+
+    prepared = prepare_on_demand(prepare_frame)
 
     def attempt_step(earlier: _Frame, later: _Frame, guess: Floats, levels: int) -> Attempt:
         step = _place_frame(earlier, later, guess, K, levels, chosen)
@@ -154,33 +160,21 @@ def recover_motion_pnp(
     return integrate_motion("pnp", link_placements(placements, links), T_rig_camera, route_rotations)
 
 
-def _prepare_frame(
-    rgb: NDArray[np.uint8],
-    depth: NDArray[np.float32],
-    hidden: NDArray[np.bool_] | None,
-    settings: PnpSettings,
-) -> _Frame:
-    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-    strength = corner_strength(grey)
-    return _Frame(
-        grey=grey,
-        inverse_depth=invert_depth(depth, hidden),
-        strength=strength,
-        least_strength=least_strength(strength, settings.corner_quality),
-    )
-
-
 def _find_smooth_corners(
-    frame: _Frame, settings: PnpSettings, hidden: NDArray[np.bool_] | None = None
+    grey: NDArray[np.uint8],
+    inverse_depth: NDArray[np.float32],
+    settings: PnpSettings,
+    hidden: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int64]:
     """Return the corners whose patch lies on one smooth surface, [N, 2] as x, y [px]."""
-    reach, q_map = settings.window // 2, frame.inverse_depth
-    corners = grid_corners(frame.strength, settings.cells_across, reach, frame.least_strength, hidden)
+    strength, reach = corner_strength(grey), settings.window // 2
+    least = least_strength(strength, settings.corner_quality)
+    corners = grid_corners(strength, settings.cells_across, reach, least, hidden)
     x, y = corners.T
-    q = q_map[y, x]
+    q = inverse_depth[y, x]
     # 1/z of a plane is linear in the picture, so any bend is an edge or a curve
-    bend_x = np.abs(q_map[y, x - reach] + q_map[y, x + reach] - 2 * q)
-    bend_y = np.abs(q_map[y - reach, x] + q_map[y + reach, x] - 2 * q)
+    bend_x = np.abs(inverse_depth[y, x - reach] + inverse_depth[y, x + reach] - 2 * q)
+    bend_y = np.abs(inverse_depth[y - reach, x] + inverse_depth[y + reach, x] - 2 * q)
     return corners[(q > 0) & (np.maximum(bend_x, bend_y) <= settings.depth_kink * q)]
 
 
@@ -188,7 +182,7 @@ def _place_frame(
     anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats, levels: int, settings: PnpSettings
 ) -> FrameStep:
     """Find the way to the frame by every second corner, then place it by all of them, less what things fly before."""
-    corners = _find_smooth_corners(frame, settings)
+    corners = frame.corners
     for some in (corners[:: settings.coarse_stride], corners):
         view, step = _follow_prediction(anchor, frame, some, predicted, K, levels, settings)
         if not step.failure:
@@ -198,7 +192,7 @@ def _place_frame(
     if step.inliers < (1 - settings.crowded) * len(some):
         strange = (cv2.absdiff(view.grey, frame.grey) > settings.crowded_contrast).astype(np.uint8)
         hidden = cv2.dilate(strange, np.ones((settings.window, settings.window), np.uint8)) > 0
-        unhidden = _find_smooth_corners(frame, settings, hidden)
+        unhidden = _find_smooth_corners(frame.grey, frame.inverse_depth, settings, hidden)
         placed = _track_and_solve(anchor, frame, unhidden, view, K, 0, settings)
         if placed.inliers > settings.coarse_stride * step.inliers and not placed.failure:
             return placed

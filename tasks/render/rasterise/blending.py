@@ -58,9 +58,9 @@ def _compile_blend_strips(normals):  # type: ignore[no-untyped-def]
     """Return the inner loop with or without normals: decided when it is compiled, it costs no branch."""
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def blend_strips(s, records, splats, listed, strips):  # type: ignore[no-untyped-def]
+    def blend_strips(s, records, listed, strips):  # type: ignore[no-untyped-def]
         for i in range(listed):
-            splat, first = np.uint64(splats[strips.entry[i]]), np.uint64(strips.pixel[i])
+            splat, first = np.uint64(strips.splat[i]), np.uint64(strips.pixel[i])
             middle, log_alpha, falloff = strips.middle[i], strips.log_alpha[i], records[splat, COLUMN_FALLOFF]
             z, number = records[splat, DEPTH], np.float32(splat + _FIRST)
             r, g, b = records[splat, RED], records[splat, GREEN], records[splat, BLUE]
@@ -109,7 +109,7 @@ def blend_tiles(records, rays, starts, splats, normals, buffers):  # type: ignor
     records : float32 [V, 16] splat records
     rays : float32 [3, 3] world directions of the picture, see `View.rays` [1]
     starts, splats : tile lists, see `tasks.render.rasterise.binning.bin_splats`
-    normals : False leaves the normals 0, for a fifth less time
+    normals : False leaves the normals as they are, for a tenth less time
     buffers : overwritten
     """
     rgb, depth, expected_depth, alpha, normal, class_id = buffers
@@ -126,17 +126,14 @@ def blend_tiles(records, rays, starts, splats, normals, buffers):  # type: ignor
             end = min(start + BATCH, last)
             listed = list_strips(records, splats, start, end, x_tile, y_tile, strips)
             if normals:
-                _blend_strips(s, records, splats, listed, strips)
+                _blend_strips(s, records, listed, strips)
             else:
-                _blend_strips_flat(s, records, splats, listed, strips)
+                _blend_strips_flat(s, records, listed, strips)
             start = end
         for y in range(row_count):
             for x in range(column_count):
                 l = np.uint64(y * TILE_WIDTH + x)
                 i, j = y_tile + y, x_tile + x
-                nx, ny, nz = s[_NX + l], s[_NY + l], s[_NZ + l]
-                length = np.sqrt(nx * nx + ny * ny + nz * nz)
-                scale = _ONE / length if length > _ZERO else _ZERO
                 alpha[i, j] = s[_ALPHA + l]
                 z = s[_DEPTH + l] / s[_ALPHA + l]  # NaN where no splat contributes
                 expected_depth[i, j] = z
@@ -147,4 +144,8 @@ def blend_tiles(records, rays, starts, splats, normals, buffers):  # type: ignor
                     z = _plane_depth(records[front], rays, np.float32(j) + _HALF, np.float32(i) + _HALF)
                 depth[i, j] = z
                 rgb[i, j, 0], rgb[i, j, 1], rgb[i, j, 2] = s[_RED + l], s[_GREEN + l], s[_BLUE + l]
-                normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = nx * scale, ny * scale, nz * scale
+                if normals:
+                    nx, ny, nz = s[_NX + l], s[_NY + l], s[_NZ + l]
+                    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+                    scale = _ONE / length if length > _ZERO else _ZERO
+                    normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = nx * scale, ny * scale, nz * scale

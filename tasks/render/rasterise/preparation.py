@@ -1,7 +1,9 @@
 """Preparation of a cloud of Gaussians: the packed blocks that the rasteriser reads."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,6 @@ OFFSET, AXES, LOG_OPACITY, NORMAL, SURROUNDINGS, SH = 0, 3, 12, 13, 16, 18
 """First plane of each quantity inside a block; SH coefficient k of channel c is plane ``SH + 3 k + c``."""
 
 _MORTON_BITS = 21
-_BLOCKS_AT_ONCE = 256
 _NEVER_VISIBLE = -1e30
 """Logarithmic opacity of the padding in the last block [1]."""
 
@@ -50,6 +51,18 @@ class PreparedGaussians:
 
     def __len__(self) -> int:
         return len(self.order)
+
+
+class _Cloud(NamedTuple):
+    """The arrays of `Gaussians` as the kernel takes them, with logarithms of opacity [N] and SH as [N, 3 K]."""
+
+    means: NDArray[np.float32]
+    quats_wxyz: NDArray[np.float32]
+    scales: NDArray[np.float32]
+    log_opacities: NDArray[np.float64]
+    normals: NDArray[np.float32]
+    surroundings: NDArray[np.float32]
+    sh: NDArray[np.float32]
 
 
 def rotation_matrices(quats_wxyz: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -132,9 +145,19 @@ def prepare_gaussians(gaussians: Gaussians) -> PreparedGaussians:
     members.ravel()[n:] = order[-1:]
     blocks = np.empty((block_count, SH + 3 * gaussians.sh.shape[1], BLOCK), dtype=np.float32)
     origins, radii, reach = np.empty((block_count, 3)), np.empty(block_count), np.empty(block_count)
-    for first in range(0, block_count, _BLOCKS_AT_ONCE):
-        part = slice(first, first + _BLOCKS_AT_ONCE)
-        origins[part], radii[part], reach[part] = _pack_blocks(gaussians, members[part], blocks[part])
+    with_surroundings = gaussians.surroundings is not None
+    cloud = _Cloud(
+        means=np.ascontiguousarray(gaussians.means),
+        quats_wxyz=np.ascontiguousarray(gaussians.quats_wxyz),
+        scales=np.ascontiguousarray(gaussians.scales),
+        log_opacities=np.log(gaussians.opacities.astype(np.float64)),
+        normals=np.ascontiguousarray(gaussians.normals),
+        surroundings=np.ascontiguousarray(gaussians.surroundings)
+        if gaussians.surroundings is not None
+        else np.empty((0, 2), dtype=np.float32),
+        sh=np.ascontiguousarray(gaussians.sh).reshape(n, 3 * gaussians.sh.shape[1]),
+    )
+    _pack_blocks(cloud, members, with_surroundings, blocks, origins, radii, reach)
     if n % BLOCK:
         blocks[-1, LOG_OPACITY, n % BLOCK :] = _NEVER_VISIBLE
     return PreparedGaussians(
@@ -150,22 +173,44 @@ def prepare_gaussians(gaussians: Gaussians) -> PreparedGaussians:
     )
 
 
-def _pack_blocks(
-    gaussians: Gaussians, members: NDArray[np.int64], blocks: NDArray[np.float32]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Fill the blocks [B, P, 64] with the members [B, 64]; return their origins, radii and reach."""
-    count = len(members)
-    means = gaussians.means[members].astype(np.float64)
-    scales = gaussians.scales[members].astype(np.float64)
-    origins = (means.min(axis=1) + means.max(axis=1)) / 2
-    offsets = means - origins[:, None, :]
-    rotations = rotation_matrices(gaussians.quats_wxyz[members.ravel()]).reshape(count, BLOCK, 3, 3)
-    axes = rotations * scales[:, :, None, :]
-    blocks[:, OFFSET:AXES] = offsets.transpose(0, 2, 1)
-    blocks[:, AXES:LOG_OPACITY] = axes.transpose(0, 3, 2, 1).reshape(count, 9, BLOCK)
-    blocks[:, LOG_OPACITY] = np.log(gaussians.opacities[members].astype(np.float64))
-    blocks[:, NORMAL:SURROUNDINGS] = gaussians.normals[members].transpose(0, 2, 1)
-    if gaussians.surroundings is not None:
-        blocks[:, SURROUNDINGS:SH] = gaussians.surroundings[members].transpose(0, 2, 1)
-    blocks[:, SH:] = gaussians.sh[members].reshape(count, BLOCK, -1).transpose(0, 2, 1)
-    return origins, np.sqrt((offsets**2).sum(axis=2)).max(axis=1), scales.max(axis=(1, 2))
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _pack_blocks(cloud, members, with_surroundings, blocks, origins, radii, reach):  # type: ignore[no-untyped-def]
+    """Fill the blocks [B, P, 64] with the members [B, 64], and their origins, radii and reach."""
+    means, quats, scales, log_opacities, normals, surroundings, sh = cloud
+    for b in range(len(members)):
+        block = blocks[b]
+        for axis in range(3):
+            low = high = np.float64(means[members[b, 0], axis])
+            for l in range(BLOCK):
+                at = np.float64(means[members[b, l], axis])
+                low, high = min(low, at), max(high, at)
+            origins[b, axis] = (low + high) / 2
+        furthest = largest = 0.0
+        for l in range(BLOCK):
+            i = members[b, l]
+            square = 0.0
+            for axis in range(3):
+                offset = means[i, axis] - origins[b, axis]
+                square += offset * offset
+                block[OFFSET + axis, l] = offset
+                block[NORMAL + axis, l] = normals[i, axis]
+            furthest = max(furthest, square)
+            w, x, y, z = quats[i]
+            length = np.sqrt(np.float64(w) * w + np.float64(x) * x + np.float64(y) * y + np.float64(z) * z)
+            w, x, y, z = w / length, x / length, y / length, z / length
+            turn = (
+                (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+                (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+                (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+            )
+            for k in range(3):
+                size = np.float64(scales[i, k])
+                largest = max(largest, size)
+                for axis in range(3):
+                    block[AXES + 3 * k + axis, l] = turn[axis][k] * size
+            block[LOG_OPACITY, l] = log_opacities[i]
+            if with_surroundings:
+                block[SURROUNDINGS, l], block[SURROUNDINGS + 1, l] = surroundings[i]
+            for plane in range(sh.shape[1]):
+                block[SH + plane, l] = sh[i, plane]
+        radii[b], reach[b] = np.sqrt(furthest), largest

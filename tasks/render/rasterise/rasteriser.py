@@ -49,7 +49,7 @@ def rasterise_view(
         depth=np.empty((height, width), dtype=np.float32),
         expected_depth=np.empty((height, width), dtype=np.float32),
         alpha=np.empty((height, width), dtype=np.float32),
-        normal=np.empty((height, width, 3), dtype=np.float32),
+        normal=np.zeros((height, width, 3), dtype=np.float32),
         class_id=np.empty((height, width), dtype=np.uint8),
     )
     blend_tiles(records, view.rays.astype(np.float32), starts, splats, normals, buffers)

@@ -54,7 +54,7 @@ class Strips(NamedTuple):
 
     Parameters
     ----------
-    entry : place of the splat in the tile's list
+    splat : its record
     pixel : first pixel of the strip within the tile
     middle : where the splat's middle crosses the row, from that pixel [px]
     log_alpha : logarithm of the splat's opacity there
@@ -62,8 +62,8 @@ class Strips(NamedTuple):
     is_open : rows of the tile where light still passes
     """
 
-    entry: NDArray[np.int64]
-    pixel: NDArray[np.int64]
+    splat: NDArray[np.uint32]
+    pixel: NDArray[np.uint32]
     middle: NDArray[np.float32]
     log_alpha: NDArray[np.float32]
     rows: NDArray[np.int64]
@@ -115,8 +115,8 @@ def new_strips():  # type: ignore[no-untyped-def]
     """Return room for the strips of a batch."""
     size = BATCH * TILE_HEIGHT + 1
     return Strips(
-        np.empty(size, np.int64),
-        np.empty(size, np.int64),
+        np.empty(size, np.uint32),
+        np.empty(size, np.uint32),
         np.empty(size, np.float32),
         np.empty(size, np.float32),
         np.empty((BATCH, 2), np.int64),
@@ -139,22 +139,17 @@ def list_strips(records, splats, start, end, x_tile, y_tile, strips):  # type: i
     for i in range(end - start):
         splat = np.uint64(splats[start + i])
         x0, y0 = records[splat, X] - x_first, records[splat, Y] - y_first
-        slope, falloff, log_alpha = (
-            records[splat, SLOPE],
-            records[splat, ROW_FALLOFF],
-            records[splat, LOG_ALPHA],
-        )
-        spread = _ONE / records[splat, COLUMN_FALLOFF]
+        slope, log_alpha = records[splat, SLOPE], records[splat, LOG_ALPHA]
+        row_falloff, falloff = records[splat, ROW_FALLOFF], records[splat, COLUMN_FALLOFF]
         for y in range(rows[i, 0], rows[i, 1] + 1):
             dy = np.float32(y) - y0
-            p = log_alpha - falloff * dy * dy
+            p = log_alpha - row_falloff * dy * dy
             middle = x0 + slope * dy
-            half = np.sqrt(max(p - _LOG_CUT, _ZERO) * spread)
-            left, right = np.ceil(max(middle - half, _ZERO)), np.floor(min(middle + half, _RIGHT))
-            strips.entry[listed] = start + i
+            off = min(max(np.rint(middle), _ZERO), _RIGHT) - middle
+            strips.splat[listed] = splat
             strips.pixel[listed] = y * TILE_WIDTH
             strips.middle[listed] = middle
             strips.log_alpha[listed] = p
             # Counting instead of branching: the next strip overwrites one that is not wanted.
-            listed += np.uint64((left <= right) & is_open[y])
+            listed += np.uint64((p - falloff * off * off >= _LOG_CUT) & is_open[y])
     return np.int64(listed)

@@ -46,14 +46,14 @@ def blend_transposed(records, starts, splats, residual, sums):  # type: ignore[n
         while start < last and find_open_rows(s, strips.is_open) > 0:
             end = min(start + BATCH, last)
             listed = list_strips(records, splats, start, end, x_tile, y_tile, strips)
-            _gather_strips(s, records, splats, listed, strips, weights, sums)
+            _gather_strips(s, records, listed, strips, weights, sums)
             start = end
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _gather_strips(s, records, splats, listed, strips, weights, sums):  # type: ignore[no-untyped-def]
+def _gather_strips(s, records, listed, strips, weights, sums):  # type: ignore[no-untyped-def]
     for i in range(listed):
-        splat, first = np.uint64(splats[strips.entry[i]]), np.uint64(strips.pixel[i])
+        splat, first = np.uint64(strips.splat[i]), np.uint64(strips.pixel[i])
         middle, log_alpha, falloff = strips.middle[i], strips.log_alpha[i], records[splat, COLUMN_FALLOFF]
         for x in range(TILE_WIDTH):
             l = first + np.uint64(x)
