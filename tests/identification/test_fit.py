@@ -30,7 +30,11 @@ from tasks.identification.inference.forward import (
     prepare_run,
 )
 from tasks.identification.inference.hypothesis import make_library_hypothesis
-from tasks.identification.inference.linearisation import compute_whitened_residuals, fit_disturbance
+from tasks.identification.inference.linearisation import (
+    compute_whitened_residuals,
+    differentiate_about_fit,
+    fit_disturbance,
+)
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
@@ -189,3 +193,26 @@ def test_a_bump_is_in_the_grammar() -> None:
     best = fit_residual_splines(evidence, null)[0]
     assert (best.port, best.variable) == ("brake_torque", "speed")
     assert "a exp(-(4x - 2)^2)" in make_form_hypotheses(best, evidence.samples)[0].name
+
+
+def test_what_a_stop_at_the_limit_of_friction_tells_of_the_brake_does_not_hang_on_its_noise() -> None:
+    curve = LIBRARY["pressure_nonlinearity"]
+    stops = ((25.0, 2.0, 0.0), (28.0, 1.2, 0.0), (12.0, 3.5, 0.05), (24.0, 2.6, -0.04))
+    widths = []
+    for seed in (0, 20):
+        models = [
+            measured(plain_run(speed, peak), build_parameter_vector({"pressure_curve": 0.04, "friction": mu}), seed + i)
+            for i, (speed, peak, mu) in enumerate(stops)
+        ]  # fmt: skip
+        evidence = evidence_of(models, (curve,))
+        first = fit_hypotheses(
+            evidence.train, (make_library_hypothesis(curve, 0.04),), evidence.session_sigma
+        )
+        here = differentiate_about_fit(evidence, first)
+        fitted = fit_hypotheses(
+            here.train, first.parts, here.session_sigma, values=first.values, session=first.session,
+            offsets=first.offsets,
+        )  # fmt: skip
+        widths.append(np.sqrt(fitted.covariance[0, 0]))
+        assert abs(fitted.values[0] - 0.04) < 3.0 * widths[-1]
+    assert widths[0] == pytest.approx(widths[1], rel=0.05)

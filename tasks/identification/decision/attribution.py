@@ -130,7 +130,7 @@ def assess_fit(
     """
     gain = 0.5 * (base.objective - fitted.objective)
     own = _compute_own_scores(evidence, fitted, hypothesis)
-    factor = compute_inflation(evidence, fitted, own)
+    factor = compute_own_inflation(evidence, fitted, hypothesis)
     penalty = float(len(hypothesis.names) * np.log(evidence.samples))
     if gain / factor - penalty > evidence.rules.accept_score and base_held_out is not None:
         # a fall of the misfit that the base reaches from here too is no gain of the hypothesis
@@ -143,6 +143,18 @@ def assess_fit(
         hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
         informed=len(own) or len(evidence.train), rules=evidence.rules,
     )  # fmt: skip
+
+
+def compute_own_inflation(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> float:
+    """Return the factor by which the runs disagree about one part of a fit beyond their noise [1].
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at the fit
+    fitted : the fit
+    hypothesis : part of it
+    """
+    return compute_inflation(evidence, fitted, _compute_own_scores(evidence, fitted, hypothesis))
 
 
 def _refit_base(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> Fit:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.identification.decision.attribution import Candidate, judge_hypothesis
+from tasks.identification.decision.attribution import Candidate, compute_own_inflation, judge_hypothesis
 from tasks.identification.decision.forms import (
     differentiate_by_splines,
     fit_residual_splines,
@@ -37,6 +37,24 @@ PORT_OF_NUMBER = {
 
 class ForeignCarError(Exception):
     """The runs disagree about every direction even with the best effects: the model's equations do not fit the car."""
+
+
+def check_agreement(evidence: Evidence, fitted: Fit) -> None:
+    """Check that the runs agree about everything that a fit holds.
+
+    Parameters
+    ----------
+    evidence : the runs
+    fitted : fit of all that is named
+
+    Raises
+    ------
+    ForeignCarError
+        If the runs disagree about a part of it so much that the model's equations do not fit the car.
+    """
+    inflation = max((compute_own_inflation(evidence, fitted, part) for part in fitted.parts), default=1.0)
+    if inflation > evidence.rules.disputed_inflation:
+        raise ForeignCarError
 
 
 def search_forms(
@@ -180,7 +198,7 @@ def search_library_and_forms(
     Raises
     ------
     ForeignCarError
-        If the model's own misfit exceeds any effect that could be found.
+        If the model's own misfit exceeds any effect that could be found, or the runs disagree about one that was found.
     """
     if np.max(null.pulls) > evidence.rules.relinearisation_pull:
         evidence = differentiate_at(evidence, null, library=True)
@@ -211,4 +229,5 @@ def search_library_and_forms(
     if not found.rounds:
         found = replace(find_retune(start, reasons), tried=found.tried)
     found, near = search_forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
+    check_agreement(found.evidence, found.base)
     return start, found, near

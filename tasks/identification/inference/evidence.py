@@ -57,6 +57,7 @@ class RunEvidence:
     factor : Cholesky factor (lower) of information + prior precision
     session_q : float64 [D, 7] factor^-1 nuisance' session
     library_q, others_q : float64 [D, E], [D, X] factor^-1 nuisance' library, and others
+    origin : float64 [D] the run's offsets about which the derivatives are taken; None for 0
     """
 
     model: RunModel
@@ -72,6 +73,7 @@ class RunEvidence:
     session_q: NDArray[np.float64]
     library_q: NDArray[np.float64]
     others_q: NDArray[np.float64]
+    origin: NDArray[np.float64] | None = None
 
     def compute_residual(
         self,
@@ -96,16 +98,7 @@ class RunEvidence:
             if not np.isfinite(y).all():
                 return np.full(len(self.nuisance), BROKEN)
             return whiten_channels(self.model.measured - y, self.rho, self.sigma)
-        moved = theta.copy()
-        moved[PARAMETER_INDEX["friction"]] += offsets[1]
-        at = N_OFFSETS
-        for port, count, spacing in zip(DISTURBED, self.knots, KNOT_SPACING, strict=True):
-            slots += (
-                Slot(
-                    port=port, variable="time", origin=0.0, spacing=spacing, values=offsets[at : at + count]
-                ),
-            )
-            at += count
+        moved, slots = _add_offsets(theta, slots, offsets, self.knots)
         speed = compute_starting_speed(self.model, theta) + offsets[0]
         simulated = simulate_run(self.model, moved, slots=slots, initial_speed=speed)
         y = compute_instrument_readings(self.model, moved, simulated)
@@ -230,6 +223,46 @@ def differentiate_run(
         others_q=np.empty(0),
     )
     return set_disturbance_prior(evidence, tolerances, disturbance)
+
+
+def differentiate_about_offsets(
+    run: RunEvidence,
+    base: NDArray[np.float64],
+    slots: tuple[Slot, ...],
+    offsets: NDArray[np.float64],
+    tolerances: Tolerances,
+    disturbance: Disturbance,
+) -> RunEvidence:
+    """Differentiate a run again about a point that its own offsets and disturbances belong to.
+
+    Parameters
+    ----------
+    run : the run; the derivatives by the library are kept
+    base : float64 [len(EFFECT_TABLE)] parameters at which derivatives are taken
+    slots : forms that belong to that point
+    offsets : float64 [D] the run's offsets and disturbance knots
+    tolerances, disturbance : prior of its offsets and disturbances
+    """
+    moved, forms = _add_offsets(base, slots, offsets, run.knots)
+    faster = offsets[0] * (1.0 + float(base[PARAMETER_INDEX["speed_scale"]]))
+    model = replace(run.model, initial_speed=run.model.initial_speed + faster)
+    fresh = differentiate_run(model, run.rho, run.sigma, moved, (), tolerances, disturbance, forms)
+    kept = replace(fresh, model=run.model, library=run.library, others=run.others, origin=offsets)
+    return set_disturbance_prior(kept, tolerances, disturbance)
+
+
+def _add_offsets(
+    theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64], knots: tuple[int, ...]
+) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+    """Return parameters and forms of a run with its own friction and disturbances."""
+    moved = theta.copy()
+    moved[PARAMETER_INDEX["friction"]] += offsets[1]
+    at = N_OFFSETS
+    for port, count, spacing in zip(DISTURBED, knots, KNOT_SPACING, strict=True):
+        own = Slot(port=port, variable="time", origin=0.0, spacing=spacing, values=offsets[at : at + count])
+        slots = (*slots, own)
+        at += count
+    return moved, slots
 
 
 def set_disturbance_prior(

@@ -178,8 +178,8 @@ def _differentiate_runs(
 ) -> list[Slopes]:
     """Return the derivatives of every run by parameters and session, and their projection on its nuisances.
 
-    They are taken at the same point as those of the nuisances, with the run's offsets at 0. On a road feature that the
-    vehicle reaches a moment later, derivatives about other offsets cannot be projected on the nuisances, and the
+    They are taken at the same point as those of the nuisances, with the same offsets of the run. On a road feature that
+    the vehicle reaches a moment later, derivatives about other offsets cannot be projected on the nuisances, and the
     information would come out many times too large.
     """
     slopes = []
@@ -192,8 +192,11 @@ def _differentiate_runs(
         if not moved:
             slopes.append((run.session, run.session_q))
             continue
-        r = run.compute_residual(*there)
-        a = [(r - run.compute_residual(*far)) / step for far, step in zip(moved, steps, strict=True)]
+        r = run.compute_residual(*there, run.origin)
+        a = [
+            (r - run.compute_residual(*far, run.origin)) / step
+            for far, step in zip(moved, steps, strict=True)
+        ]
         columns = np.column_stack((*a, run.session))
         slopes.append(
             (columns, np.column_stack((run.project_on_nuisances(columns[:, : len(x)]), run.session_q)))

@@ -25,6 +25,10 @@ STEP = 0.002
 """Longest integration step [s]; `compute_step_misfit` checks it by halving."""
 
 
+SENSOR_INDEX = {name: row.index for name, row in PARAMETERS.items() if row.port == "sensor"}
+"""Position of every error of an instrument in a parameter vector."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunModel:
     """A run prepared for simulation.
@@ -176,9 +180,7 @@ def compute_instrument_readings(
     float64 [samples, 7] in the order and units of `CHANNELS`
     """
     g = model.vehicle.gravity
-    e = {
-        name: float(theta[PARAMETER_INDEX[name]]) for name, row in PARAMETERS.items() if row.port == "sensor"
-    }
+    e = {name: float(theta[i]) for name, i in SENSOR_INDEX.items()}
     speed, pitch, pitch_rate = (simulated.column(name) for name in ("speed", "pitch", "pitch_rate"))
     felt = (
         simulated.column("longitudinal_acceleration")

@@ -10,7 +10,12 @@ from tasks.campaign.campaign import SESSION, Campaign, Tolerances
 from tasks.campaign.gauge import denoise_pressure
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance, compute_prior_precision
-from tasks.identification.inference.evidence import RunEvidence, differentiate_run, set_disturbance_prior
+from tasks.identification.inference.evidence import (
+    RunEvidence,
+    differentiate_about_offsets,
+    differentiate_run,
+    set_disturbance_prior,
+)
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
 from tasks.identification.inference.hypothesis import compose_parameters
@@ -123,6 +128,25 @@ def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
         evidence,
         train=tuple(differentiate_again(run, evidence.effects if library else ()) for run in evidence.train),
         held_out=tuple(differentiate_again(run, ()) for run in evidence.held_out),
+    )
+
+
+def differentiate_about_fit(evidence: Evidence, at: Fit) -> Evidence:
+    """Return the same runs with derivatives about a fit and, of the training runs, about their own offsets there.
+
+    Parameters
+    ----------
+    evidence : the runs; the derivatives by the library are kept
+    at : fit, the new linearisation point
+    """
+    theta, slots = compose_parameters(at.parts, at.values, at.session)
+    here = evidence.tolerances, evidence.disturbance
+    return replace(
+        differentiate_at(replace(evidence, train=()), at, library=False),
+        train=tuple(
+            differentiate_about_offsets(run, theta, slots, offsets, *here)
+            for run, offsets in zip(evidence.train, at.offsets, strict=True)
+        ),
     )
 
 
