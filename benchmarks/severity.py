@@ -61,18 +61,18 @@ def _measure_clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, d
     with tempfile.TemporaryDirectory() as folder:
         for name, content in inputs.items():
             write_atomically(Path(folder) / name, content)
-        catalogue = load_catalogue(Path(folder), scene)
-    rates, values = {}, {}
-    for clip in plan.clips:
-        state, ride = simulate_drive(
-            clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
-            catalogue.steady,
-        )  # fmt: skip
-        frames = frame_rows(ride, plan, catalogue)
-        rig_at = rig_of(ride, frames, catalogue)
-        shown = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)
-        rates[clip.label] = clip.scenario.precipitation_mm_h
-        values[clip.label] = image_statistics(shown["rgb"], np.isin(shown["class"], ROAD_CLASSES))
+        catalogue = load_catalogue(Path(folder), scene)  # reads how a weather looks when it first draws it
+        rates, values = {}, {}
+        for clip in plan.clips:
+            state, ride = simulate_drive(
+                clip.scenario, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
+                catalogue.steady,
+            )  # fmt: skip
+            frames = frame_rows(ride, plan, catalogue)
+            rig_at = rig_of(ride, frames, catalogue)
+            shown = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)
+            rates[clip.label] = clip.scenario.precipitation_mm_h
+            values[clip.label] = image_statistics(shown["rgb"], np.isin(shown["class"], ROAD_CLASSES))
     return rates, values
 
 
