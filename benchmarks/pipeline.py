@@ -19,7 +19,8 @@ camera: dashcam-{width}x{height}
 frames: {frames}
 frame_rate_hz: 10
 seed: 2025
-base: {{weather: dry, initial_speed_km_h: 60, peak_pressure_mpa: 2.3, brake_onset_s: 1.0}}
+scenarios:
+  dry: {{weather: dry, initial_speed_km_h: 60, peak_pressure_mpa: 2.3, brake_onset_s: 1.0}}
 """
 """One braking stop on the built-in street in dry weather."""
 FRAMES = 81
