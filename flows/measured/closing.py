@@ -121,7 +121,11 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     library, verdict = load_effects(), trace.verdict
     train, held_out = predict_runs(trace)
     rivals = [rival for _, rival in verdict.rivals]
-    sentence = tell_verdict(verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error)
+    planned_for = verdict.experiment.between[0] if verdict.experiment else None
+    suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
+    sentence = tell_verdict(
+        verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested
+    )
     if isinstance(trace, Trace):
         residual = compute_residual_rmse((*train, *held_out))
         return {"search": SEARCHES[0], "sentence": sentence, "residual_rmse": residual}

@@ -31,7 +31,7 @@ MEANING = {
     "UNKNOWN_FORM": "the model lacks a term outside the library: this port, this variable, this shape",
     "RETUNE": "no physics is missing; a number of the vehicle is wrong",
     "SENSOR": "no physics is missing; an instrument has an error",
-    "NOTHING": "these runs show nothing that the model lacks",
+    "NOTHING": "nothing is proven to be missing",
 }
 
 

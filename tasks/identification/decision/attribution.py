@@ -56,6 +56,12 @@ class Candidate:
         enough = self.score > self.rules.accept_score and self.held_out_gain > self.rules.held_out_gain
         return enough and not self.fitted.at_bound
 
+    @property
+    def is_open(self) -> bool:
+        """Return whether the training runs show it and the held-out runs neither confirm nor contradict it."""
+        undecided = abs(self.held_out_gain) <= self.rules.held_out_gain
+        return self.score > self.rules.accept_score and undecided and not self.fitted.at_bound
+
 
 def judge_hypothesis(
     evidence: Evidence,

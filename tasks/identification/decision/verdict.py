@@ -27,6 +27,7 @@ from tasks.identification.decision.intervals import (
 from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals, find_detectable_sizes
 from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded
+from tasks.identification.decision.words import say_rejection
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import prepare_evidence
@@ -143,13 +144,13 @@ def find_missing_effects(
             f" {rules.rival_gain_share:.0%} of the gain or win too many resamples"
         )
     if not named and not reasons:
-        reasons.append("no candidate passes the score, held-out and bound gates together")
+        reasons.append(say_rejection(tried))
     present = [name for name, value in vehicle.effects.items() if value] + [f.name for f in vehicle.forms]
     if present:
         reasons.append(f"{vehicle.name} already has {', '.join(present)}: what is named comes on top of that")
     experiment = None
-    if compared:
-        pair = _to_tell_apart(compared, near_form, start)
+    pair = _to_tell_apart(compared, near_form, start) if compared else _to_confirm(tried, start)
+    if pair is not None:
         experiment = plan_next_experiment(start.evidence, *pair, vehicle, surface)
     theta, slots = compose_parameters(found.base.parts, found.base.values, np.zeros(len(SESSION)))
     grown = compose_parameters(found.base.parts, found.base.values, found.base.session)
@@ -223,6 +224,12 @@ def _to_tell_apart(
         return first, start.base
     own, other = max(near or others, key=lambda pair: pair[1].score)
     return own.fitted, other.fitted
+
+
+def _to_confirm(tried: Sequence[Candidate], start: SearchState) -> tuple[Fit, Fit] | None:
+    """The best candidate that further runs could confirm, and the plain model; None if there is none."""
+    best = max((c for c in tried if c.is_open), key=lambda c: c.score, default=None)
+    return None if best is None else (best.fitted, start.base)
 
 
 def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from tasks.identification.decision.answer import ChannelError, NamedEffect
+from tasks.identification.decision.attribution import Candidate
 from tasks.vehicle.effects.library import Effect
 
 
@@ -27,6 +28,7 @@ def tell_verdict(
     library: Sequence[Effect],
     error: Mapping[str, ChannelError],
     manoeuvres: Mapping[str, ChannelError],
+    suggested: NamedEffect | None = None,
 ) -> str:
     """Return the verdict in plain words.
 
@@ -36,7 +38,13 @@ def tell_verdict(
     rivals : that cannot be told from them
     library : effects that may be named
     error, manoeuvres : on runs to which no number was fitted
+    suggested : what the training runs show and the held-out runs neither confirm nor contradict, if nothing is named
     """
+    if not effects and suggested is not None:
+        return (
+            "These runs prove nothing that the model lacks. The training runs suggest that"
+            f" {say_effect(suggested, library)}; the held-out runs do not confirm it."
+        )
     if not effects:
         return "These runs show nothing that the model lacks."
     told = [say_effect(effect, library) for effect in effects]
@@ -52,6 +60,31 @@ def tell_verdict(
     )
     how = "that takes" if len(told) == 1 else "together they take"
     return f"{text[0].upper()}{text[1:]}; {how} the error {moved}, on runs to which no number was fitted."
+
+
+def say_rejection(tried: Sequence[Candidate]) -> str:
+    """Return by which rule the best of the candidates was refused, with its figure and what to do.
+
+    Parameters
+    ----------
+    tried : candidates of which none was accepted
+    """
+    if not tried:
+        return "no effect of the library acts on what these runs measured"
+    best = max(tried, key=lambda c: c.score)
+    name, rules = best.hypothesis.name, best.rules
+    if best.score <= rules.accept_score:
+        return f"the best candidate, {name}, scores {best.score:.1f}; a name needs {rules.accept_score:g}"
+    shown = f"{name} scores {best.score:.1f} on the training runs (a name needs {rules.accept_score:g}), but"
+    if best.fitted.at_bound:
+        return f"{shown} with a number at the end of its range: not named"
+    gain = f"gain {best.held_out_gain:.1f}, a name needs {rules.held_out_gain:g}"
+    if not best.is_open:
+        return f"{shown} the held-out runs contradict it: {gain}"
+    return (
+        f"{shown} the held-out runs do not confirm it: {gain}; if none of them excites it, record another run that"
+        " does, or give one of the training runs to the held-out runs"
+    )
 
 
 def join_phrases(phrases: Iterable[str]) -> str:

@@ -1,0 +1,57 @@
+"""A verdict of NOTHING says by which rule the best candidate was refused."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from catalogs.decision_rules import load_decision_rules
+from tasks.identification.decision.answer import NamedEffect
+from tasks.identification.decision.attribution import Candidate
+from tasks.identification.decision.words import say_rejection, tell_verdict
+
+RULES = load_decision_rules()
+
+
+def refused(name: str, score: float, *, held_out_gain: float = 0.0, at_bound: bool = False) -> Candidate:
+    return Candidate(
+        hypothesis=SimpleNamespace(name=name), fitted=SimpleNamespace(at_bound=at_bound), gain=2.0 * score,
+        inflation=1.5, score=score, held_out_gain=held_out_gain, informed=5, rules=RULES,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("candidate", "says"),
+    [
+        (refused("brake_lag", 20.14), "the best candidate, brake_lag, scores 20.1; a name needs 25"),
+        (refused("anti_dive", 45.6, held_out_gain=0.44), "do not confirm it: gain 0.4, a name needs 4"),
+        (refused("bump_stop", 158.4, held_out_gain=-14.8), "the held-out runs contradict it: gain -14.8"),
+        (refused("tyre_heating", 40.0, held_out_gain=9.0, at_bound=True), "a number at the end of its range"),
+    ],
+)
+def test_a_refusal_names_the_rule_and_the_figure(candidate: Candidate, says: str) -> None:
+    assert says in say_rejection([refused("pad_drag", 1.0), candidate])
+
+
+def test_without_any_candidate_the_refusal_says_that_nothing_acts_on_the_channels() -> None:
+    assert "acts on what these runs measured" in say_rejection([])
+
+
+def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
+    suggested = NamedEffect(
+        name="anti_dive_form", effect_class="form", port="pitch_moment", variable="speed", parameters=(),
+        score=45.6, gain=89.0, inflation=1.6, held_out_gain=0.4, win_share=0.0,
+    )  # fmt: skip
+    told = tell_verdict((), (), (), {}, {}, suggested)
+    assert told.startswith("These runs prove nothing")
+    assert "the pitch moment depends on speed" in told
+    assert tell_verdict((), (), (), {}, {}) == "These runs show nothing that the model lacks."
+
+
+@pytest.mark.parametrize(
+    ("gain", "at_bound", "is_open"), [(0.4, False, True), (-14.8, False, False), (0.4, True, False)]
+)
+def test_only_a_candidate_that_held_out_runs_neither_confirm_nor_contradict_is_open(
+    gain: float, at_bound: bool, is_open: bool
+) -> None:
+    assert refused("anti_dive", 45.6, held_out_gain=gain, at_bound=at_bound).is_open is is_open
+    assert not refused("anti_dive", 20.0, held_out_gain=gain, at_bound=at_bound).is_open
