@@ -67,6 +67,7 @@ class DecisionRulesEntry(CatalogueEntry):
     worse_limit: Level
     noticed_share: Share
     longest_lag: Annotated[Scalar, require_quantity("s", above=0)]
+    interval_widening: Annotated[Scalar, require_quantity("1", minimum=1)]
     profile_points: Count
     profile_tolerance: Share
     forked_misfit: Level

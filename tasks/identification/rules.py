@@ -84,6 +84,8 @@ class DecisionRules:
     worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
     noticed_share : share of a held-out error below which an effect makes a noticeable difference to it [1]
     longest_lag : longest lag at which residual and brake pressure are correlated [s]
+    interval_widening : factor on the length of intervals for what the likelihood does not hold, such as the noise of
+        the pressure gauge [1]
     profile_points : points of the profile likelihood tried on each side of an estimate [1]
     profile_tolerance : relative error of the root deviance at which the profile is followed no further [1]
     forked_misfit : misfit by halving the step from which a run counts as sensitive to the step and is left out [1]
@@ -120,6 +122,7 @@ class DecisionRules:
     worse_limit: float
     noticed_share: float
     longest_lag: float
+    interval_widening: float
     profile_points: int
     profile_tolerance: float
     forked_misfit: float

@@ -76,7 +76,7 @@ def test_an_effect_whose_score_excludes_zero_has_an_interval_that_does(
 ) -> None:
     evidence, candidate, none = valley
     root = np.sqrt((none - candidate.fitted.objective) / candidate.inflation)
-    assert candidate.passes and root > compute_student_quantile(candidate)
+    assert candidate.passes and root > compute_student_quantile(candidate) * candidate.rules.interval_widening
     low, high = compute_profile_interval(candidate, evidence)
     assert low[0] > 0.0
     assert low[0] < 0.01 < high[0] and low[1] < 8.0 < high[1]
@@ -101,7 +101,8 @@ def test_at_an_end_of_the_interval_the_best_fit_is_worse_by_the_quantile(
                     fit_hypotheses(evidence.train, (held,), evidence.session_sigma, iterations=1).objective
                 )
             root = np.sqrt((min(rises) - best) / candidate.inflation)
-            assert root == pytest.approx(compute_student_quantile(candidate), rel=0.15), (j, ends[j])
+            wanted = compute_student_quantile(candidate) * candidate.rules.interval_widening
+            assert root == pytest.approx(wanted, rel=0.15), (j, ends[j])
 
 
 def test_intervals_stay_within_the_bounds_of_their_parameters(

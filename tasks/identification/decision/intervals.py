@@ -63,7 +63,9 @@ def compute_student_quantile(candidate: Candidate) -> float:
 
 
 def compute_curvature_interval(candidate: Candidate) -> Bounds:
-    """Return intervals from the curvature at the estimate, widened by the runs' disagreement, cut at the bounds.
+    """Return intervals from the curvature at the estimate, cut at the bounds.
+
+    They are widened by the runs' disagreement, and by the rules for what the likelihood does not hold.
 
     Parameters
     ----------
@@ -76,7 +78,8 @@ def compute_curvature_interval(candidate: Candidate) -> Bounds:
     h = candidate.hypothesis
     k = len(h.names)
     values = candidate.fitted.values[-k:]
-    variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * candidate.inflation
+    widening = candidate.inflation * candidate.rules.interval_widening**2
+    variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * widening
     # the session's tolerance of the same number adds to the uncertainty of the vehicle's
     tolerance = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
     reach = np.sqrt(variance + np.square(tolerance)) * compute_student_quantile(candidate)
@@ -86,10 +89,10 @@ def compute_curvature_interval(candidate: Candidate) -> Bounds:
 def compute_profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
     """Return intervals of an effect of several parameters from its profile likelihood.
 
-    A value belongs to the interval if the best fit with that value is worse by less than t^2 times the inflation
-    (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter acts only together with another, the
-    curvature at the estimate does not tell whether there is an effect. The profile does, in agreement with the score:
-    its deviance at 0 is twice the gain.
+    A value belongs to the interval if the best fit with that value is worse by less than t^2 times the inflation, t
+    widened by the rules (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter acts only together with
+    another, the curvature at the estimate does not tell whether there is an effect. The profile does, in agreement with
+    the score: its deviance at 0 is twice the gain.
 
     Parameters
     ----------
@@ -121,7 +124,7 @@ def _find_limit(
 ) -> float:
     """Return the value between estimate and bound where the root deviance reaches the quantile, by false position."""
     k = len(candidate.hypothesis.names)
-    wanted = compute_student_quantile(candidate)
+    wanted = compute_student_quantile(candidate) * candidate.rules.interval_widening
     inside, outside = float(centre.values[place - k]), float(bound)
     if inside == outside:
         return outside
