@@ -2,14 +2,17 @@
 
 from typing import Literal
 
-Variant = Literal["appearance-only", "vertical-only", "fixed-mu", "full"]
+Variant = Literal["appearance-only", "vertical-only", "fixed-mu", "no-low-speed-rule", "full"]
 VARIANTS: dict[Variant, str] = {
     "appearance-only": "the weather is seen and not felt: dry friction",
     "vertical-only": "the road moves the body, nobody brakes",
     "fixed-mu": "one friction for all rain, one for all snow",
+    "no-low-speed-rule": "the pitch follows the deceleration to the stop, without the rule of Appendix B",
     "full": "nothing is cut",
 }
-"""Effect of each variant (paper, Section 4.4)."""
+"""Effect of each variant (paper, Section 4.4; the low-speed rule is this project's own)."""
+COUPLINGS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu", "full")
+"""Variants of the paper's figure, which cut a coupling or nothing; they hold for every vehicle mode."""
 
 
 def warn_of_variant(variant: Variant) -> str:
@@ -22,6 +25,6 @@ def warn_of_variant(variant: Variant) -> str:
     if variant == "full":
         return ""
     return (
-        f"A coupling is cut on purpose: variant {variant}, {VARIANTS[variant]}."
+        f"Something is cut on purpose: variant {variant}, {VARIANTS[variant]}."
         " The picture is that of the scenario, the motion is not."
     )

@@ -19,6 +19,7 @@ REACHES = {
     "hazard_marking.yaml": (RENDER,),
     "low_speed.yaml": (VEHICLE, RENDER),
     "ablation.yaml": (VEHICLE, RENDER),
+    "no_low_speed_rule.yaml": (VEHICLE, RENDER),
     "gates.yaml": (JUDGING,),
     "study.yaml": (JUDGING,),
     "weather": (RENDER,),

@@ -140,7 +140,7 @@ def cut_coupling(scenario: Scenario, variant: Variant, families: FamilyWeather |
         return dry
     if variant == "vertical-only":
         return replace(dry, peak_pressure_mpa=0.0, brake_onset_s=None, brake_onset_m=None)
-    if variant == "full":
+    if variant in ("full", "no-low-speed-rule"):
         return scenario
     families = families or load_families()
     if (rate := families.rates_mm_h.get(scenario.weather)) is None:

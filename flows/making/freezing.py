@@ -9,7 +9,7 @@ from typing import Any
 from catalogs.entries import entry_names
 from catalogs.grids import Grid, GridFile, expand_grid, load_grid
 from catalogs.grids.form import BEFORE
-from catalogs.low_speed import load_low_speed
+from catalogs.low_speed import cut_low_speed, load_low_speed
 from catalogs.studies.ablation import cut_coupling
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
@@ -238,7 +238,9 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     names = [channel.name for channel in TICK_CHANNELS]
     vehicle, surface = load_vehicle(asked.vehicle), load_surface(asked.surface)
     mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
-    steady = load_low_speed() if plan.settings.keeps_stops_steady else None
+    steady = (
+        cut_low_speed(load_low_speed(), plan.settings.variant) if plan.settings.keeps_stops_steady else None
+    )
     rides = (
         simulate_drive(
             cut_coupling(clip.scenario, plan.settings.variant), vehicle, surface, mode, duration_s, steady

@@ -10,7 +10,7 @@ from catalogs.entries import find_entry
 from catalogs.gates import GATES
 from catalogs.grids import Grid, GridFile
 from catalogs.hazard_markings import load_marking
-from catalogs.low_speed import LOW_SPEED, load_low_speed
+from catalogs.low_speed import LOW_SPEED, NO_LOW_SPEED_RULE, is_rule_applied, load_low_speed
 from catalogs.scenario import route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
@@ -32,6 +32,7 @@ LOADERS: Mapping[str, Callable[[Path], Any]] = {
     "hazard_marking.yaml": load_marking,
     "low_speed.yaml": load_low_speed,
     "ablation.yaml": load_families,
+    NO_LOW_SPEED_RULE.name: is_rule_applied,
 }
 """Loaders that check the catalogue entries that a user may bring."""
 READERS: Mapping[str, Callable[[Path], bytes]] = {"vehicle.yaml": vehicle_content}
@@ -55,6 +56,11 @@ def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
         ),
         **({"low_speed.yaml": lambda: LOW_SPEED} if settings.keeps_stops_steady else {}),
         **({"ablation.yaml": lambda: ABLATION} if settings.variant == "fixed-mu" else {}),
+        **(
+            {NO_LOW_SPEED_RULE.name: lambda: NO_LOW_SPEED_RULE}
+            if settings.variant == "no-low-speed-rule"
+            else {}
+        ),
         **({} if (tyre := _tyre_behind(settings)) is None else {tyre.name: partial(Path, tyre)}),
     }
 
@@ -116,6 +122,11 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
                 "variant must be full where --poses gives the motion, which is not driven;"
                 f" it is {grid.settings.variant}"
             )
+    if grid.settings.variant == "no-low-speed-rule" and not grid.settings.keeps_stops_steady:
+        problems.append(
+            "variant no-low-speed-rule leaves out a rule of vehicle_mode: paper with low_speed: steady; this grid"
+            f" drives vehicle_mode: {grid.settings.vehicle_mode} with low_speed: {grid.settings.low_speed}"
+        )
     return inputs, scene, problems + _camera_problems(grid.settings, tick_rate_hz)
 
 

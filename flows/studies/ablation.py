@@ -12,7 +12,7 @@ from catalogs.references import Traces, read_reference
 from catalogs.studies import Condition
 from catalogs.studies.ablation import Ablation, cut_coupling, load_ablation
 from catalogs.surfaces import load_surface
-from catalogs.variants import VARIANTS, Variant
+from catalogs.variants import COUPLINGS, Variant
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.drawing import as_svg
 from flows.making.driving import simulate_drive
@@ -58,7 +58,7 @@ def run_ablation(
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
     oracle = None if traces is None else oracle_trace(Path(traces), study.pitch)
     stops = stop_rows(study, car, surface, chosen)
-    rides = {name: _simulate_variant(study.pitch, name, car, surface, chosen) for name in VARIANTS}
+    rides = {name: _simulate_variant(study.pitch, name, car, surface, chosen) for name in COUPLINGS}
     pitch = [pitch_row(name, ride, study.pitch, car) for name, ride in rides.items()]
     curves: dict[str, NDArray[np.float64]] = {
         name: np.rad2deg(ride.columns["pitch"] + ride.static_pitch) for name, ride in rides.items()
@@ -70,7 +70,7 @@ def run_ablation(
     else:
         curves["reference"] = np.interp(time, oracle["time"], oracle["pitch"], right=np.nan)
         reference |= {
-            f"{name}_pitch_rmse_deg": _compute_rmse(curves[name], curves["reference"]) for name in VARIANTS
+            f"{name}_pitch_rmse_deg": _compute_rmse(curves[name], curves["reference"]) for name in COUPLINGS
         }
     result = {
         "vehicle": vehicle, "mode": chosen, "pitch_condition": study.pitch.name,
@@ -95,7 +95,7 @@ def stop_rows(study: Ablation, car: Vehicle, surface: SurfaceParameters, mode: M
     """
     rows: Rows = []
     for kind, scenarios in study.stops.items():
-        for variant in VARIANTS:
+        for variant in COUPLINGS:
             if variant == "vertical-only":
                 continue
             for scenario in scenarios:

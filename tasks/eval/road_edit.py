@@ -3,7 +3,7 @@
 A feature clip is compared with its flat control: registered by the background, compared in Lab, masked.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -123,9 +123,7 @@ def detect_edit(
     The detected mask, empty where the change is below the thresholds; and whether the registration converged.
     """
     height, width = target.shape
-    reach = 2 * settings.dilation_px + 1
-    ball = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
-    wide = cv2.dilate(target.astype(np.uint8), ball) > 0
+    wide = _widen(target, settings)
     background = ~wide
     background[round((1 - settings.lower_share) * height) :] = False
     laid, converged = register_background(flat, feature, background, settings)
@@ -136,18 +134,37 @@ def detect_edit(
     side = round(settings.search_side * width)
     search = wide.copy()
     search[round(settings.search_top * height) :, side : width - side] = True
-    changed = ((residual > max(settings.floor, middle + settings.mads * spread)) & search).astype(np.uint8)
-    changed = cv2.morphologyEx(changed, cv2.MORPH_OPEN, np.ones(settings.opening[::-1], np.uint8))
+    changed = (residual > max(settings.floor, middle + settings.mads * spread)) & search
+    return keep_components(changed, target, settings), converged
+
+
+def keep_components(changed: Mask, target: Mask, settings: RoadEditSettings) -> Mask:
+    """Return what the metric's morphology leaves of changed pixels at the target; empty where too little.
+
+    Parameters
+    ----------
+    changed : bool [H, W] pixels above the threshold [1]
+    target : bool [H, W] where the feature is prescribed [1]
+    settings : constants
+    """
+    wide, pixels = _widen(target, settings), changed.astype(np.uint8)
+    changed = cv2.morphologyEx(pixels, cv2.MORPH_OPEN, np.ones(settings.opening[::-1], np.uint8))
     changed = cv2.morphologyEx(changed, cv2.MORPH_CLOSE, np.ones(settings.closing[::-1], np.uint8))
     count, label, facts, _ = cv2.connectedComponentsWithStats(changed)
     kept = [
         i for i in range(1, count)
         if facts[i, cv2.CC_STAT_AREA] >= settings.component_px and (wide & (label == i)).any()
     ]  # fmt: skip
-    mask = np.isin(label, kept) & wide
+    mask: Mask = np.isin(label, kept) & wide
     if (mask & target).sum() < settings.coverage * target.sum():
         mask[:] = False
-    return mask, converged
+    return mask
+
+
+def _widen(target: Mask, settings: RoadEditSettings) -> Mask:
+    reach = 2 * settings.dilation_px + 1
+    ball = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
+    return cv2.dilate(target.astype(np.uint8), ball) > 0
 
 
 def temporal_iou(
@@ -185,11 +202,28 @@ def score_road_edit(
     active = [k for k, target in enumerate(targets) if target.sum() >= chosen.active_px]
     if not active:
         return None
+    found = {k: detect_edit(feature[k], flat[k], targets[k], chosen) for k in active}
+    masks = {k: mask for k, (mask, _) in found.items()}
+    return score_masks(masks, feature, targets, sum(not converged for _, converged in found.values()))
+
+
+def score_masks(
+    masks: Mapping[int, Mask],
+    feature: Sequence[NDArray[np.uint8]],
+    targets: Sequence[Mask],
+    unregistered: int = 0,
+) -> RoadEditScore:
+    """Return the score of the masks that were detected in the active frames.
+
+    Parameters
+    ----------
+    masks : bool [H, W] by frame; empty where nothing was detected [1]
+    feature, targets : as `score_road_edit` takes them
+    unregistered : frames whose registration did not converge [1]
+    """
+    active, distances = sorted(masks), []
     diagonal = float(np.hypot(*targets[0].shape))
-    masks, distances, unregistered = {}, [], 0
     for k in active:
-        masks[k], converged = detect_edit(feature[k], flat[k], targets[k], chosen)
-        unregistered += not converged
         if masks[k].any():
             apart = np.argwhere(masks[k]).mean(axis=0) - np.argwhere(targets[k]).mean(axis=0)
             distances.append(float(np.linalg.norm(apart)) / diagonal)

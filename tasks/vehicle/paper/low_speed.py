@@ -24,10 +24,12 @@ class SteadyStop:
     ----------
     held_share : part of the hold time, up to the stop, over which the released deceleration is the mean [1]
     explicit_limit : longest explicit step of a wheel, in time constants of its slip; slower wheels step implicitly [1]
+    pitch_rule : whether the rule replaces the deceleration that drives the pitch; without it none is replaced
     """
 
     held_share: float
     explicit_limit: float
+    pitch_rule: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +46,10 @@ class BrakedStop:
     onset: float
     sample: int
     time: float | None = None
+
+
+NO_STOP = BrakedStop(onset=np.inf, sample=-1)
+"""A drive whose pitch follows the deceleration as it is."""
 
 
 def compute_brake_pitch_input(

@@ -21,7 +21,7 @@ from tasks.vehicle.half_car import (
 )
 from tasks.vehicle.history import History
 from tasks.vehicle.paper.drive import DRIVE_COLUMNS, simulate_drive
-from tasks.vehicle.paper.low_speed import BrakedStop, SteadyStop, compute_brake_pitch_input
+from tasks.vehicle.paper.low_speed import NO_STOP, BrakedStop, SteadyStop, compute_brake_pitch_input
 from tasks.vehicle.paper.wheel_step import find_implicit_speed
 from tasks.vehicle.paper.wheels import build_wheels
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
@@ -101,8 +101,9 @@ def run_paper_mode(
     steady : how the end of a stop is kept steady; None takes the published steps literally
     """
     wheels, road = build_wheels(vehicle), make_road_feature(hazard)
-    implicit_below, held_share = 0.0, 0.0
+    implicit_below, held_share, pitch_rule = 0.0, 0.0, True
     if steady is not None:
+        pitch_rule = steady.pitch_rule
         held_share = steady.held_share
         implicit_below = find_implicit_speed(
             wheels, response.tyre, profile, grid.step, steady.explicit_limit, vehicle.gravity
@@ -115,10 +116,8 @@ def run_paper_mode(
         )  # fmt: skip
 
     def move_body() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        return simulate_body(
-            vehicle, response, hazard, log, BrakedStop(onset=onset, sample=stop, time=stop_time), grid.step,
-            held_share=held_share,
-        )  # fmt: skip
+        braked = BrakedStop(onset=onset, sample=stop, time=stop_time) if pitch_rule else NO_STOP
+        return simulate_body(vehicle, response, hazard, log, braked, grid.step, held_share=held_share)
 
     log, onset, stop, stop_time = drive(ANALYTIC_LOADS)
     if hazard.height_m == 0:
@@ -159,7 +158,7 @@ def simulate_body(
     ----------
     vehicle, response, hazard : as in ``run_paper_mode``
     log : log of `simulate_drive`, shape (n, 17)
-    braked : brake onset and stop of the drive
+    braked : brake onset and stop of the drive; `NO_STOP` leaves the low-speed rule out
     step : step of the grid [s]
     held_share : as in `compute_brake_pitch_input`
     """

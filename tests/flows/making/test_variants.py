@@ -46,7 +46,7 @@ scenarios: {scenarios}
 """
 WET = "{light: {weather: rain, precipitation_mm_h: 5}, heavy: {weather: rain, precipitation_mm_h: 50}}"
 SNOW = "{snow: {weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1}}"
-CUTS = {"appearance-only": SNOW, "fixed-mu": WET, "vertical-only": WET}
+CUTS = {"appearance-only": SNOW, "fixed-mu": WET, "vertical-only": WET, "no-low-speed-rule": WET}
 
 
 @pytest.fixture(scope="module")
@@ -142,6 +142,28 @@ def test_vertical_only_never_brakes(made):
     assert all(np.isnan(row["stopping_distance"] or np.nan) for row in clip_facts(made["vertical-only"].root))
 
 
+def test_without_the_low_speed_rule_the_stop_is_the_same_and_the_pitch_follows_the_deceleration(made):
+    layout = made["no-low-speed-rule"]
+    for number, clip in enumerate(read_plan(layout.root).clips):
+        vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+        _, sound = simulate_drive(clip.scenario, vehicle, surface, "paper", 6.0, load_low_speed())
+        ticks = ticks_of(layout, number)
+        for name in ("speed", "station", "longitudinal_acceleration", "brake_torque_f", "wheel_speed_f"):
+            np.testing.assert_array_equal(ticks[name], sound.columns[name], err_msg=name)
+        hold = round(1000 * (sound.stop_time - 0.5))
+        np.testing.assert_array_equal(ticks["pitch"][:hold], sound.columns["pitch"][:hold])
+        assert np.rad2deg(np.abs(ticks["pitch"] - sound.columns["pitch"]).max()) > 0.1
+    assert (layout.inputs / "no_low_speed_rule.yaml").is_file()
+    assert not (made["full"].inputs / "no_low_speed_rule.yaml").exists()
+
+
+@pytest.mark.parametrize("setting", ["low_speed: literal", "vehicle_mode: coupled"])
+def test_a_rule_that_would_not_act_cannot_be_left_out(write_grid, setting):
+    path = write_grid("no-low-speed-rule", WET, grid=GRID + setting)
+    with pytest.raises(InputError, match="leaves out a rule of vehicle_mode: paper with low_speed: steady"):
+        freeze_grid(load_grid(path), "t", "cpu")
+
+
 @pytest.mark.parametrize("variant", CUTS)
 def test_a_cut_dataset_is_made_again_byte_for_byte_and_obeys_the_laws_of_what_it_drives(made, variant):
     root = str(made[variant].root)
@@ -206,7 +228,7 @@ def test_a_variant_changes_ids_and_is_named_as_the_difference(write_grid, made):
     for variant in ("full", *CUTS):
         settings = grid.settings.model_copy(update={"variant": variant})
         plans[variant] = freeze_grid(replace(grid, settings=settings), "t", "cpu")[0]
-    assert len({plan.clips[0].clip_id for plan in plans.values()}) == 4
+    assert len({plan.clips[0].clip_id for plan in plans.values()}) == 5
     assert len({plan.clips[0].seed for plan in plans.values()}) == 1  # the same drops
     rows = input_differences(read_manifest(made["fixed-mu"]), read_manifest(made["vertical-only"]), {}, {})
     assert ("fixed-mu", "vertical-only") in {
@@ -221,6 +243,7 @@ def test_a_frozen_run_keeps_its_variant_and_a_replay_drives_it(write_grid):
     bare = frozen_run(load_grid(write_grid("", SNOW, grid=GRID.replace("variant: {variant}\n", ""))))
     assert "variant" not in bare["grid"] and bare["clips"][0]["ticks"] != run["clips"][0]["ticks"]
     assert problems_of(run) == []
+    assert problems_of(frozen_run(load_grid(write_grid("no-low-speed-rule", WET)))) == []
     assert replay_audit(write_grid("fixed-mu", SNOW), seeds=2)["verified"]
 
 

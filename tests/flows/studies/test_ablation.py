@@ -9,7 +9,7 @@ import pytest
 
 from catalogs.scenario import Scenario
 from catalogs.studies.ablation import cut_coupling
-from catalogs.variants import VARIANTS
+from catalogs.variants import COUPLINGS
 from flows.studies.ablation import run_ablation
 from tasks.errors import InputError
 
@@ -78,7 +78,7 @@ def test_without_traces_the_oracle_is_said_not_to_have_run(made: tuple[dict[str,
     assert result["reference"]["note"] == "not run: no reference traces given"
     assert pq.read_table(out / "ablation.parquet").column_names == [
         "time",
-        *(f"pitch_deg_{name.replace('-', '_')}" for name in VARIANTS),
+        *(f"pitch_deg_{name.replace('-', '_')}" for name in COUPLINGS),
     ]
     assert (out / "ablation.svg").read_text().startswith("<svg")
 
@@ -89,7 +89,7 @@ def test_the_full_model_follows_the_reference_and_no_cut_one_does(outside_data: 
         pytest.skip(f"no reference traces at {traces}")
     figures = run_ablation(out=str(tmp_path), traces=str(traces))["reference"]
     assert figures["full_pitch_rmse_deg"] < 0.05
-    assert all(figures[f"{name}_pitch_rmse_deg"] > 0.4 for name in VARIANTS if name != "full")
+    assert all(figures[f"{name}_pitch_rmse_deg"] > 0.4 for name in COUPLINGS if name != "full")
 
 
 def test_traces_without_the_condition_are_refused(outside_data: Path, tmp_path: Path) -> None:

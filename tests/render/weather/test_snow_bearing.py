@@ -94,3 +94,23 @@ def test_the_top_of_a_wall_is_covered_whichever_way_its_discs_are_turned(anchors
     share = bearing_share(replace(wall, normals=turn.apply(wall.normals).astype(np.float32)), anchors)
     assert share[wall.means[:, 2] > 1.33].min() > 0.9
     assert np.mean(share[wall.means[:, 2] < 1.1] > 0.3) < 0.01
+
+
+def test_a_kerb_beside_the_road_keeps_a_bare_face_and_the_lawn_behind_it_stays_closed(anchors):
+    """Of a reconstruction, whose kerb is ground like the lawn: a mean wider than its face would lay it flat."""
+    scene = sheet((0.0, 6.0), (-2.0, 0.0), 0.0, (0, 0, 1), SemanticClass.ROAD)
+    for y, z, normal in ((0.0, (0.02, 0.16), (0, -1, 0)), ((0.0, 3.0), 0.16, (0, 0, 1))):
+        scene = append_gaussians(scene, sheet((0.0, 6.0), y, z, normal, SemanticClass.TERRAIN))
+    rng = np.random.default_rng(4)
+    turn = Rotation.from_rotvec(np.deg2rad(SCATTER_DEG) * rng.standard_normal((len(scene), 3)))
+    rough = replace(scene, normals=turn.apply(scene.normals).astype(np.float32))
+    assert not normals_agree(rough)
+    share = bearing_share(rough, anchors)
+    ground = scene.class_id == SemanticClass.TERRAIN
+    face = ground & (scene.means[:, 2] < 0.1)
+    lawn = ground & (scene.means[:, 1] > 0.8)
+    assert np.median(share[face]) < 0.3
+    assert np.mean(share[lawn] < 0.9) < 0.02
+    # the same ground with no road beside it has no kerb
+    alone = replace(rough, class_id=np.where(ground, rough.class_id, SemanticClass.TERRAIN).astype(np.uint8))
+    assert np.median(bearing_share(alone, anchors)[face]) > 0.3

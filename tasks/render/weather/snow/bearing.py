@@ -23,6 +23,11 @@ NO_SURFACE = (*ROAD_CLASSES, SemanticClass.VEGETATION, SemanticClass.POLE, Seman
 reconstruction is made even."""
 CELL_M = 0.15
 """Edge of the cells over which normals are averaged, three by three by three, and in which tops are sought."""
+KERB_CELL_M = 0.10
+"""Edge of the single cell over which normals are averaged beside the road: a kerb's face is no higher than 0.15 m, and
+the wider mean would lay it flat."""
+KERB_REACH_M = 0.6
+"""Distance from the road within which ground may step up by a kerb."""
 AGREEMENT_DEG = 5.0
 """Median angle between the normals of Gaussians of one cell up to which a scene's normals are taken as exact."""
 ASKED = 7
@@ -51,6 +56,9 @@ def bearing_share(gaussians: Gaussians, anchors: AnchorParameters) -> NDArray[np
         return share
     if len(ground := np.flatnonzero(np.isin(kind, SOFT_GROUND))):
         share[ground] = facing_share(_mean_up(gaussians, ground), anchors)
+        if len(beside := ground[_beside_road(gaussians, ground)]):
+            face = facing_share(_cell_up(gaussians, beside), anchors)
+            share[beside] = np.minimum(share[beside], face)
     if len(standing := np.flatnonzero(~np.isin(kind, (*GROUND_CLASSES, SemanticClass.SKY)))):
         mean = facing_share(_mean_up(gaussians, standing), anchors)
         share[standing] = np.maximum(mean, _top_share(gaussians, standing))
@@ -103,9 +111,11 @@ def _disc_areas(gaussians: Gaussians, index: NDArray[np.int64]) -> NDArray[np.fl
     return SOLID_SHARE * scales[:, 1] * scales[:, 2] * gaussians.opacities[index]
 
 
-def _cell_keys(means: NDArray[np.floating]) -> tuple[NDArray[np.int64], tuple[int, int]]:
+def _cell_keys(
+    means: NDArray[np.floating], edge: float = CELL_M
+) -> tuple[NDArray[np.int64], tuple[int, int]]:
     """A number for each point's cell, and by how much it grows from a cell to the next one along x and y."""
-    cell = np.floor(means / CELL_M).astype(np.int64)
+    cell = np.floor(means / edge).astype(np.int64)
     cell = cell - cell.min(axis=0) + 1
     _, across, high = cell.max(axis=0) + 2
     steps = int(across * high), int(high)
@@ -128,6 +138,32 @@ def _mean_up(gaussians: Gaussians, index: NDArray[np.int64]) -> NDArray[np.float
             high = np.searchsorted(filled, filled + x + y + 1, side="right")
             total += below[high] - below[low]
     return (total[:, 2] / np.maximum(np.sqrt((total**2).sum(axis=1)), 1e-12))[cell]
+
+
+def _cell_up(gaussians: Gaussians, index: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Upward part of the mean normal of the Gaussians in each one's own small cell, of these Gaussians alone."""
+    keys, _ = _cell_keys(gaussians.means[index], KERB_CELL_M)
+    _, cell = np.unique(keys, return_inverse=True)
+    area = _disc_areas(gaussians, index)
+    mean = np.column_stack([np.bincount(cell, area * part) for part in gaussians.normals[index].T])
+    up: NDArray[np.float64] = mean[:, 2] / np.maximum(np.sqrt((mean**2).sum(axis=1)), 1e-12)
+    return up[cell]
+
+
+def _beside_road(gaussians: Gaussians, index: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether road lies within reach of each Gaussian, in the map's plane."""
+    place = np.floor(gaussians.means[:, :2] / CELL_M).astype(np.int64)
+    road, asked = place[np.isin(gaussians.class_id, ROAD_CLASSES)], place[index]
+    if not len(road):
+        return np.zeros(len(index), bool)
+    reach = round(KERB_REACH_M / CELL_M)
+    low, high = road.min(axis=0) - reach, road.max(axis=0) + reach
+    paved = np.zeros(high - low + 1, np.uint8)
+    paved[tuple((road - low).T)] = 1
+    near = maximum_filter(paved, size=2 * reach + 1, mode="constant")
+    found: NDArray[np.bool_] = ((asked >= low) & (asked <= high)).all(axis=1)
+    found[found] = near[tuple((asked[found] - low).T)] > 0
+    return found
 
 
 def _top_share(gaussians: Gaussians, index: NDArray[np.int64]) -> NDArray[np.float64]:
