@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from catalogs.grids import load_grid
-from flows.making.clip import frame_rows, load_catalogue, render_frames, rig_of
+from flows.making.catalogue import load_catalogue
+from flows.making.clip import frame_rows, render_frames, rig_of
 from flows.making.driving import simulate_drive
 from flows.making.plan import freeze_grid
 from flows.store.layout import write_atomically

@@ -23,9 +23,9 @@ from tasks.render.weather.layers import (
     ClipWeather,
     apply_weather,
     particle_layer,
-    pixel_rays,
     weather_scene,
 )
+from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tasks.surface.state import SurfaceState
 

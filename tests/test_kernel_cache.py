@@ -55,8 +55,16 @@ def result(package: Path, cache: str = "cache") -> float:
     return float(done.stdout)
 
 
-def test_a_change_in_a_called_file_or_a_constant_reaches_the_caller(package):
+def test_a_change_in_a_called_file_or_a_constant_reaches_the_caller_and_the_oldest_state_is_forgotten(
+    package,
+):
+    kernels = package.parent / "cache" / "kernels"
+    old = {f"{number:016x}" for number in range(KEPT + 2)}
+    for name in old:
+        (kernels / name).mkdir(parents=True)
     assert result(package) == 8.0
+    left = {path.name for path in kernels.iterdir()}
+    assert len(left) == KEPT and len(left - old) == 1
     (package / "called.py").write_text(CALLED.format("2 * LEVEL"))
     assert result(package) == 10.0
     (package / "level.py").write_text("LEVEL = 5.0\n")
@@ -67,16 +75,6 @@ def test_a_file_without_kernels_changes_nothing(package):
     before = sources_hash(package)
     (package / "prose.py").write_text("TEXT = 'words'\n")
     assert sources_hash(package) == before
-
-
-def test_a_new_state_makes_the_old_forgotten(package):
-    kernels = package.parent / "cache" / "kernels"
-    old = {f"{number:016x}" for number in range(KEPT + 2)}
-    for name in old:
-        (kernels / name).mkdir(parents=True)
-    result(package)
-    left = {path.name for path in kernels.iterdir()}
-    assert len(left) == KEPT and len(left - old) == 1
 
 
 def test_only_states_are_forgotten_and_no_link_is_followed(tmp_path):

@@ -12,7 +12,8 @@ import numpy as np
 import flows.making.clip
 import flows.making.driving
 import flows.making.generate
-from flows.making.clip import Catalogue, nothing_to_judge
+from flows.making.catalogue import Catalogue
+from flows.making.clip import nothing_to_judge
 from flows.making.plan import Plan, make_plan
 
 GRID = """\

@@ -19,7 +19,7 @@ import numpy as np
 
 from catalogs.scenes.gaussian_files import write_gaussians
 from flows.exporting.dataset import ExportedClip, ExportedDataset
-from flows.making.clip import catalogue_of
+from flows.making.catalogue import catalogue_of
 from flows.making.driving import hazard_of
 from flows.making.edited_scene import edit_scene
 from flows.store.layout import write_json

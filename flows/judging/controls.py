@@ -13,7 +13,7 @@ from flows.judging.controls_figure import roc_figure
 from flows.judging.evaluation_rows import control_of
 from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
-from flows.making.clip import Catalogue, catalogue_of
+from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import simulate_drive
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
 from flows.making.traced import refuse_traced

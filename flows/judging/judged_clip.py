@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from flows.judging.physics import clip_columns
 from flows.judging.trajectories import read_trajectory
-from flows.making.clip import catalogue_of, prepare_for_checks
+from flows.making.catalogue import catalogue_of
+from flows.making.clip import prepare_for_checks
 from flows.making.plan import read_plan
 from flows.reading.film import through_film
 from flows.store.frames import read_clip

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from flows.judging.evaluation_rows import control_of, figure_row
 from flows.judging.judged_clip import JudgedClip, Row, View
-from flows.making.clip import Catalogue, catalogue_of
+from flows.making.catalogue import Catalogue, catalogue_of
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim

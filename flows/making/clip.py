@@ -7,28 +7,16 @@ where the receipt exists, the clip is complete. Making a clip twice writes the s
 import resource
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
-from functools import lru_cache
-from pathlib import Path
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.cameras import load_camera
-from catalogs.gates import load_gates
-from catalogs.hazard_markings import load_marking
-from catalogs.low_speed import load_kept_low_speed
-from catalogs.references import read_reference
 from catalogs.scenario import Scenario
-from catalogs.scenes import load_scene
-from catalogs.studies import load_sensitivity_study
-from catalogs.studies.ablation import FamilyWeather, cut_coupling, load_kept_families
-from catalogs.surfaces import load_surface
-from catalogs.variants import Variant
-from catalogs.vehicles import load_vehicle
-from catalogs.weather import load_weather
+from catalogs.studies.ablation import cut_coupling
+from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import (
     hazard_of,
     ranges_of,
@@ -38,10 +26,9 @@ from flows.making.driving import (
     weather_of,
 )
 from flows.making.edited_scene import edit_scene
-from flows.making.places import find_scene, remember_place
+from flows.making.places import remember_place
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
-from flows.making.traced import FOLDER as TRACES
-from flows.making.traced import Reference, replay_drive, unknown_ranges
+from flows.making.traced import replay_drive, unknown_ranges
 from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_json
@@ -49,73 +36,16 @@ from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
+from tasks.eval.motion_agreement import PoseVerdict, pose_verdict
 from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
 from tasks.eval.poses.undistort import undistort_frames
-from tasks.render.camera import PIXEL_CENTRE, Camera, RigAt, body_poses, continuous_rig
+from tasks.render.camera import PIXEL_CENTRE, RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
 from tasks.render.rasterise.backend import select_backend
-from tasks.render.road_paint import HazardMarking
 from tasks.render.weather.layers import ClipConditions
-from tasks.render.weather.parameters import WeatherParameters
-from tasks.scene.scene import Scene
-from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.anchors import adjacent_anchors
-from tasks.surface.state import SurfaceParameters, SurfaceState
-from tasks.vehicle.paper.low_speed import SteadyStop
-from tasks.vehicle.parameters import Vehicle
+from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import Rollout, compute_lift_times
-
-
-@dataclass(frozen=True, kw_only=True)
-class Catalogue:
-    """The entries that a dataset was planned with, read from the dataset's own frozen copies."""
-
-    vehicle: Vehicle
-    surface: SurfaceParameters
-    camera: Camera
-    scene: Scene
-    weather: Path
-    gates: PoseThresholds
-    study: StudyProtocol
-    marking: HazardMarking | None = None
-    traces: Reference | None = None
-    steady: SteadyStop | None = None
-    families: FamilyWeather | None = None
-
-    @property
-    def looks(self) -> WeatherParameters:
-        """How the weathers look, which who does not draw never reads."""
-        return _looks(self.weather)
-
-
-@lru_cache(maxsize=2)
-def _looks(folder: Path) -> WeatherParameters:
-    return load_weather(folder)
-
-
-@lru_cache(maxsize=2)
-def catalogue_of(root: Path) -> Catalogue:
-    """Load a dataset's frozen inputs and its scene."""
-    plan = read_plan(root)
-    return load_catalogue(Layout(root).inputs, find_scene(plan.scene), plan.settings.variant)
-
-
-def load_catalogue(inputs: Path, scene: str, variant: Variant = "full") -> Catalogue:
-    """Load frozen inputs from their folder, with those of a variant, and a scene."""
-    return Catalogue(
-        vehicle=load_vehicle(inputs / "vehicle.yaml", inputs / "weather"),
-        surface=load_surface(inputs / "surface.yaml", inputs / "weather"),
-        camera=load_camera(inputs / "camera.yaml"),
-        scene=load_scene(scene),
-        weather=inputs / "weather",
-        gates=load_gates(inputs / "gates.yaml"),
-        marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
-        study=load_sensitivity_study(inputs / "study.yaml")[0],
-        traces=read_reference(traces) if (traces := inputs / TRACES).is_dir() else None,
-        steady=load_kept_low_speed(inputs),
-        families=load_kept_families(inputs, variant),
-    )
 
 
 def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:

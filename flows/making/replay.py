@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from catalogs.grids import load_grid
 from catalogs.studies.ablation import cut_coupling
-from flows.making.clip import Catalogue, frame_rows, load_catalogue, render_frames, rig_of
+from flows.making.catalogue import Catalogue, load_catalogue
+from flows.making.clip import frame_rows, render_frames, rig_of
 from flows.making.driving import simulate_drive, surface_figures, surface_of
 from flows.making.plan import ClipPlan, Plan, freeze_grid
 from flows.running.progress import progress_bar

@@ -11,7 +11,8 @@ from tasks.render.readout import Field, read_out
 from tasks.render.weather.attribution import attribute_pixels, mark_changed_pixels
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import recompose_layers
-from tasks.render.weather.layers import ClipWeather, WeatherFrame, particle_layer, pixel_rays
+from tasks.render.weather.layers import ClipWeather, WeatherFrame, particle_layer
+from tasks.render.weather.rays import pixel_rays
 
 
 @dataclass(frozen=True, kw_only=True)

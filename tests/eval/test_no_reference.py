@@ -38,7 +38,7 @@ def test_a_blank_picture_has_nothing_that_is_looked_at() -> None:
 
 
 def test_temporal_error_sees_flicker_and_noise_and_forgives_motion(full_clip: Clip) -> None:
-    frames = full_clip.frames
+    frames = full_clip.frames[:9]
     flicker = frames.copy()
     flicker[1::2] = np.clip(flicker[1::2].astype(int) + 25, 0, 255)
     still = temporal_error(np.repeat(frames[:1], 9, axis=0))

@@ -14,6 +14,7 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, make_planned_run
+from tasks.identification.decision import experiment
 from tasks.identification.decision.attribution import refine_candidates
 from tasks.identification.decision.experiment import plan_next_experiment
 from tasks.identification.decision.rivals import find_detectable_sizes
@@ -99,7 +100,7 @@ def test_effects_of_one_shape_are_look_alikes_and_others_are_not() -> None:
     assert alike == [1]
 
 
-def test_the_next_experiment_excites_what_tells_the_two_apart() -> None:
+def test_the_next_experiment_excites_what_tells_the_two_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     evidence = evidence_of(build_parameter_vector({"fade": 0.06}), "brake_fade", "pressure_nonlinearity")
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     faded = fit_hypotheses(
@@ -109,6 +110,8 @@ def test_the_next_experiment_excites_what_tells_the_two_apart() -> None:
     assert plan is not None
     assert plan.plan in {words for words, _ in EXPERIMENTS} and "hot discs" in plan.plan
     assert plan.expected_d2 > 20.0
+    # of two that are alike, the run that told the others apart best is refused too
+    monkeypatch.setattr(experiment, "EXPERIMENTS", [drive for drive in EXPERIMENTS if drive[0] == plan.plan])
     assert plan_next_experiment(evidence, faded, faded, VEHICLE, SURFACE) is None
 
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.body import body_laws, frame_laws, outcome_laws, pose_laws, surface_laws
+from tasks.eval.physics.body import body_laws, outcome_laws, surface_laws
 from tasks.eval.physics.constants import Constants
+from tasks.eval.physics.frames import frame_laws, pose_laws
 from tasks.eval.physics.half_step import follow_half_step
 from tasks.eval.physics.laws import Law, command_laws, motion_laws, wheel_laws
 

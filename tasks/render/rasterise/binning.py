@@ -109,7 +109,8 @@ def touched_tiles(records, width, height):  # type: ignore[no-untyped-def]
         right = int(np.floor(min(x0 + half_width, np.float32(width - 1)))) // TILE_WIDTH
         if count + (bottom - top + 1) * (right - left + 1) > len(tiles):
             longer = np.empty(2 * len(tiles), dtype=np.int32)
-            longer[:count] = tiles[:count]
+            for entry in range(count):  # a slice would compile its error message too, for two seconds
+                longer[entry] = tiles[entry]
             tiles = longer
         is_box = top == bottom or left == right
         tip = slope * half_height * half_height / half_width

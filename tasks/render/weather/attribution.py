@@ -10,7 +10,8 @@ from tasks.render.composition import encode_8bit, to_display
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import Layer, recompose_layers
-from tasks.render.weather.layers import ClipWeather, WeatherFrame, pixel_rays
+from tasks.render.weather.layers import ClipWeather, WeatherFrame
+from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.snow.bearing import GROUND_CLASSES, steepest_bearing
 from tasks.render.weather.snow.field import coverage_rank, tracks_at
 

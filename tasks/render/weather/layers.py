@@ -13,7 +13,6 @@ weather the scene and the picture are returned unchanged.
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +29,7 @@ from tasks.render.weather.falling.streaks import draw_streaks
 from tasks.render.weather.layer import Layer, recompose_layers
 from tasks.render.weather.overcast import Overcast, make_overcast
 from tasks.render.weather.parameters import WeatherParameters
+from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.relief import clear_light, overcast_light, relight_gaussians
 from tasks.render.weather.scene_light import ground_light, without_sun
 from tasks.render.weather.sky import SkyLight, light_from
@@ -290,30 +290,3 @@ def particle_layer(
     light = kind.scattering * (kind.backlit_share * beyond + (1 - kind.backlit_share) * before)
     drawn = draw_streaks(streaks, light, depth, shutter.K, 1e-3 * p.air.near.aperture_mm)
     return Layer(name="particles", gain=(1 - drawn.alpha)[..., None], add=drawn.rgb)
-
-
-def pixel_rays(shutter: Shutter) -> NDArray[np.float32]:
-    """Return world directions through the pixels' centres, of camera z 1.
-
-    Parameters
-    ----------
-    shutter : pose and intrinsics
-
-    Returns
-    -------
-    float32 [H, W, 3] directions [1]
-    """
-    K = shutter.K
-    u = ((np.arange(shutter.width) + 0.5 - K[0, 2]) / K[0, 0]).astype(np.float32)
-    v = ((np.arange(shutter.height) + 0.5 - K[1, 2]) / K[1, 1]).astype(np.float32)
-    rays = np.empty((shutter.height, shutter.width, 3), dtype=np.float32)
-    _fill_rays(u, v, shutter.T_world_camera[:3, :3].astype(np.float32), rays)
-    return rays
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _fill_rays(u, v, R, rays):  # type: ignore[no-untyped-def]
-    for i in range(len(v)):
-        for j in range(len(u)):
-            for c in range(3):
-                rays[i, j, c] = u[j] * R[c, 0] + v[i] * R[c, 1] + R[c, 2]

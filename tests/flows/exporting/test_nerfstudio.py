@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from catalogs.scenes.gaussian_files import read_gaussians
-from flows.making.clip import catalogue_of
+from flows.making.catalogue import catalogue_of
 from flows.making.driving import hazard_of
 from flows.making.edited_scene import edit_scene
 from flows.making.plan import read_plan

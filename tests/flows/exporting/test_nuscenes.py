@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flows.making.clip import catalogue_of
+from flows.making.catalogue import catalogue_of
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
 SCENES = {BRAKING: "scene-2000", HUMP: "scene-2001"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flows.making.clip import catalogue_of
+from flows.making.catalogue import catalogue_of
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
 

@@ -25,7 +25,7 @@ from flows.judging.controls import (
 from flows.judging.controls_figure import roc_figure
 from flows.judging.judged_clip import METHODS, JudgedClip
 from flows.judging.physics import clip_columns, clip_facts
-from flows.making.clip import catalogue_of
+from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
 from tasks.errors import InputError

@@ -10,7 +10,7 @@ import pytest
 
 from flows.judging.evaluation import NOT_RUN, evaluate_dataset
 from flows.judging.physics import clip_columns, clip_facts
-from flows.making.clip import catalogue_of
+from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from tasks.errors import InputError
 from tasks.eval.state_agreement import WHEELS

@@ -18,7 +18,7 @@ from flows.auditing.explain import explain_frame
 from flows.auditing.kept_lines import list_lines
 from flows.exporting.export import export_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
-from flows.making.clip import catalogue_of
+from flows.making.catalogue import catalogue_of
 from flows.making.driving import simulate_drive
 from flows.making.freezing import frozen_run, problems_of
 from flows.making.generate import generate_dataset

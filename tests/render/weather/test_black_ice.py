@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.render.weather.layers import pixel_rays
+from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.sky import sky_light
 from tasks.render.weather.wet.puddles import water_surface
 from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, fresnel_reflectance, wet_layer

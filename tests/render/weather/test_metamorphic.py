@@ -15,7 +15,8 @@ from tasks.render.weather.atmosphere import air_layer, light_layer, precipitatin
 from tasks.render.weather.attribution import snow_on
 from tasks.render.weather.falling.precipitation import make_population
 from tasks.render.weather.layer import recompose_layers
-from tasks.render.weather.layers import apply_weather, pixel_rays
+from tasks.render.weather.layers import apply_weather
+from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.scene_light import append_gaussians
 from tasks.render.weather.sky import sky_light
 from tasks.surface.state import SurfaceState

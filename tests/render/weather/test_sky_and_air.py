@@ -14,7 +14,7 @@ from tasks.render.weather.atmosphere import (
 )
 from tasks.render.weather.falling.precipitation import make_population
 from tasks.render.weather.layer import recompose_layers
-from tasks.render.weather.layers import pixel_rays
+from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.sky import (
     LUMINANCE,
     cloud_transmittance,

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tasks.conventions import SemanticClass
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
-from tasks.render.weather.layers import pixel_rays
+from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.scene_light import append_gaussians, mean_colours, remove_gaussians
 from tasks.render.weather.snow.field import coverage_rank, local_depth_mm, snow_field, tracks_at
 from tasks.render.weather.snow.layer import hidden_share, snow_layer, snowed_over, whiten_gaussians

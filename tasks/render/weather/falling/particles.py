@@ -270,7 +270,8 @@ def _streaks_of_class(  # type: ignore[no-untyped-def]
                         continue
                     if found == len(streaks):
                         longer = np.empty(2 * found, dtype=STREAK)
-                        longer[:found] = streaks
+                        for i in range(found):  # see `touched_tiles`
+                            longer[i] = streaks[i]
                         streaks = longer
                     streak = streaks[found]
                     streak.share = min(1.0, (reach - distance) / fade)
