@@ -1,4 +1,4 @@
-"""``python -m benchmarks.road_edit_bound DATASET``: the road-edit scores of a true mask, the best that pictures allow.
+"""``python -m benchmarks.road_edit_bound DATASET``: the road-edit scores of a true mask.
 
 The mask is the feature's own outline, from the renderer's depth and class and the scene's route. It takes the place of
 the pixels above the metric's threshold; morphology, components and flow are the metric's. No judge calls this.
