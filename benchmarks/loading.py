@@ -21,7 +21,7 @@ import zarr
 from torch.utils.data import DataLoader, Dataset
 
 from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
-from benchmarks.store import Mp4, Mp4Lossless, Store, StoredFrames, TarOfPng
+from benchmarks.store import Mp4, Store, StoredFrames, TarOfPng
 from flows.making.generate import generate_dataset
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
@@ -121,7 +121,7 @@ class Mp4ByTorchcodec(Mp4ShortGroups):
 
 FORMS: tuple[type[StoredFrames], ...] = (
     Store, StoreLz4, StoreByZarr, TarOfPng, TarOfJxl, TarOfJxlLossy, TarOfJpeg, Mp4, Mp4ShortGroups,
-    Mp4ByTorchcodec, Mp4Lossless,
+    Mp4ByTorchcodec,
 )  # fmt: skip
 
 
