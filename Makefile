@@ -87,7 +87,8 @@ study-mutants: $(READY)
 EXPORTS := .venv-exports/bin/python -m
 study-exports:
 	$(PYTHON) -m venv .venv-exports
-	$(EXPORTS) pip install --quiet --editable '.[dev,export]' webdataset pykitti plyfile pycocotools evo mlcroissant prov
+	$(EXPORTS) pip install --quiet --editable '.[dev,export]' webdataset pykitti plyfile pycocotools evo mlcroissant prov \
+		libcosimpy ecospy
 	$(EXPORTS) pip install --quiet --no-deps nuscenes-devkit pyquaternion descartes shapely scikit-learn joblib \
 		threadpoolctl tqdm cachetools parameterized
 	$(EXPORTS) pytest -rs tests/flows/exporting

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from unittest.mock import patch
 
 import av
@@ -23,11 +23,11 @@ import cv2
 import h5py  # type: ignore[import-untyped]
 import numpy as np
 import yaml
-import zarr
 
 from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
 from flows.making.generate import generate_dataset
-from flows.store.frames import create_arrays, read_clip, write_clip
+from flows.store.frame_metadata import check_array, read_local_metadata
+from flows.store.frames import create_arrays, read_clip, read_frames, write_clip
 from flows.store.layout import Layout
 
 FRAMES, WINDOW, RATE, REPEATS = 41, 16, 10, 3
@@ -71,19 +71,17 @@ class Store(StoredFrames):
     """The dataset store: Zarr, a shard a clip, a chunk a frame, Zstandard and a checksum."""
 
     name = "store (Zarr shards)"
+    compression: Literal["zstd", "lz4"] = "zstd"
 
     def write(self, frames: np.ndarray) -> None:
         if not (self.place / "rgb").is_dir():
             _, height, width, _ = frames.shape
-            create_arrays(self.place, 1, len(frames), height, width, False, {})
+            create_arrays(self.place, (1, len(frames), height, width), False, {}, self.compression)
         write_clip(self.place, 0, {"rgb": frames})
 
     def read(self, first: int, count: int) -> np.ndarray:
-        if count == FRAMES:
-            return read_clip(self.place, 0, "rgb")
-        return np.asarray(
-            zarr.open_array(self.place / "rgb", mode="r", zarr_format=3)[0, first : first + count]
-        )
+        shape = check_array(read_local_metadata(self.place), "rgb", self.place)
+        return read_frames(self.place, "rgb", shape, 0, slice(first, first + count))
 
 
 class PngFiles(StoredFrames):
@@ -125,12 +123,23 @@ class TarOfPng(StoredFrames):
     """A tar file of PNG files, as WebDataset has them; an index beside it says where each begins."""
 
     name = "tar of PNG"
+    ending = ".png"
+
+    @staticmethod
+    def encode(frame: np.ndarray) -> bytes:
+        """Return the file of a picture."""
+        return _encode_png(frame)
+
+    @staticmethod
+    def decode(content: bytes) -> np.ndarray:
+        """Return the picture of a file."""
+        return _decode_png(content)
 
     def write(self, frames: np.ndarray) -> None:
         with tarfile.open(self.place / "clip.tar", "w") as tar:
             for index, frame in enumerate(frames):
-                content = _encode_png(frame)
-                member = tarfile.TarInfo(f"{index:05d}.png")
+                content = self.encode(frame)
+                member = tarfile.TarInfo(f"{index:05d}{self.ending}")
                 member.size = len(content)
                 tar.addfile(member, io.BytesIO(content))
         with tarfile.open(self.place / "clip.tar") as tar:
@@ -142,7 +151,7 @@ class TarOfPng(StoredFrames):
         with (self.place / "clip.tar").open("rb") as tar:
             for start, size in places:
                 tar.seek(int(start))
-                frames.append(_decode_png(tar.read(int(size))))
+                frames.append(self.decode(tar.read(int(size))))
         return np.stack(frames)
 
 

@@ -59,6 +59,11 @@ class GridFile(Blocks):
         description="linear adds up light; paper adds drops and flakes as 8-bit differences (Appendix A.4).",
     )
     labels: bool = False
+    compression: Literal["zstd", "lz4"] = Field(
+        default="zstd",
+        exclude_if=lambda compression: compression == "zstd",
+        description="Of stored frames, without loss; lz4 is written more slowly and read more quickly, for training.",
+    )
     pictures: bool = True
     base: PartialScenario = PartialScenario()
     exclude: list[Condition] = Field(

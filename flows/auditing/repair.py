@@ -136,6 +136,7 @@ def restore_files(
     with scratch_dataset(layout) as scratch:
         plan = _prepare_scratch(layout, scratch, manifest)
         move_in(scratch, [path for path in paths if (scratch.root / path).is_file()])
+        _compress_as_recorded(layout, scratch, paths)
         parts = {table: table_parts(plan, table) for table in STAGED_TABLES}
         broken = [(t, path, ids) for t in parts for path, ids in parts[t].items() if path in wanted]
         again = {clip_id for _, _, ids in broken for clip_id in ids}
@@ -173,6 +174,14 @@ def _prepare_scratch(layout: Layout, scratch: Layout, manifest: Manifest) -> Pla
         raise InputError(problems)
     create_frame_arrays(scratch, plan)
     return read_plan(scratch.root)
+
+
+def _compress_as_recorded(layout: Layout, scratch: Layout, damaged: list[str]) -> None:
+    """Give the scratch arrays the dataset's own metadata: an earlier version may have compressed otherwise."""
+    for made in sorted(scratch.frames.glob("*/zarr.json")):
+        kept = scratch.relative(made)
+        if kept not in damaged:
+            write_atomically(made, (layout.root / kept).read_bytes())
 
 
 def plan_of(manifest: Manifest) -> Plan:

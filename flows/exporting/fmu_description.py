@@ -52,17 +52,11 @@ def format_description(
     units = ElementTree.SubElement(root, "UnitDefinitions")
     for unit, base in UNITS.items():
         ElementTree.SubElement(ElementTree.SubElement(units, "Unit", name=write_unit(unit)), "BaseUnit", base)
-    kinds = ElementTree.SubElement(
-        ElementTree.SubElement(ElementTree.SubElement(root, "TypeDefinitions"), "SimpleType", name="Weather"),
-        "Enumeration",
-    )
-    for number, weather in enumerate(WEATHERS, 1):
-        if weather in weathers:
-            ElementTree.SubElement(kinds, "Item", name=weather, value=str(number))
     ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="5", stepSize=str(2 * STEP))
     variables = ElementTree.SubElement(root, "ModelVariables")
     for place, row in enumerate((*INPUTS, *OUTPUTS)):
-        _add_variable(variables, row, place, starts.get(row.name))
+        said = f"{row.description}: {_number_weathers(weathers)}" if row.kind == "choice" else row.description
+        _add_variable(variables, row, said, place, starts.get(row.name))
     structure = ElementTree.SubElement(root, "ModelStructure")
     for group in ("Outputs", "InitialUnknowns"):
         unknowns = ElementTree.SubElement(structure, group)
@@ -85,20 +79,27 @@ def write_unit(unit: str) -> str:
     return _SLASHED.get(unit, unit)
 
 
+def _number_weathers(weathers: Sequence[str]) -> str:
+    """The numbers of the kinds of weather in which a vehicle has a tyre, in words."""
+    return ", ".join(f"{number} {kind}" for number, kind in enumerate(WEATHERS, 1) if kind in weathers)
+
+
 def _add_variable(
-    parent: ElementTree.Element, row: EmbeddedVariable, place: int, start: float | None
+    parent: ElementTree.Element, row: EmbeddedVariable, description: str, place: int, start: float | None
 ) -> None:
     fixed = {"parameter": {"causality": "parameter", "variability": "fixed"}, "input": {"causality": "input"}}
     roles = fixed.get(row.role, {"causality": "output", "initial": "calculated"})
     if row.kind != "real":
         roles |= {"variability": "discrete"}
-    said = {"name": row.name, "valueReference": str(place), "description": row.description}
+    said = {"name": row.name, "valueReference": str(place), "description": description}
     variable = ElementTree.SubElement(parent, "ScalarVariable", said | roles)
     if row.kind == "boolean":
         ElementTree.SubElement(variable, "Boolean", start="true" if start else "false")
         return
     if row.kind == "choice":
-        ElementTree.SubElement(variable, "Enumeration", declaredType="Weather", start=str(int(start or 1)))
+        # not an Enumeration: some importers (libcosim, Ecos) do not know that type, and could not choose
+        given = {"min": "1", "max": str(len(WEATHERS)), "start": str(int(start or 1))}
+        ElementTree.SubElement(variable, "Integer", given)
         return
     bounds = {"min": row.minimum, "max": row.maximum, "start": start}
     given = {

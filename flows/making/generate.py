@@ -236,8 +236,8 @@ def create_frame_arrays(layout: Layout, plan: Plan) -> None:
             "motion_blur_s": camera.exposure_s if camera.motion_blur else 0.0,
             "frame_time": "of the middle of the picture, in the middle of its exposure; rows are read downwards",
         }
-    clips, frames = len(plan.clips), plan.settings.frames
-    create_arrays(layout.frames, clips, frames, camera.height, camera.width, plan.settings.labels, attributes)
+    shape = (len(plan.clips), plan.settings.frames, camera.height, camera.width)
+    create_arrays(layout.frames, shape, plan.settings.labels, attributes, plan.settings.compression)
 
 
 @contextmanager

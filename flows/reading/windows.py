@@ -10,13 +10,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import torch
-import zarr
 from torch.utils.data import Dataset, Sampler
 
 from catalogs.sentences import shorten, shorten_value
 from flows.reading.table_files import table_files
 from flows.store.arrays import arrays_of
 from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
+from flows.store.frames import read_frames
 from flows.store.layout import Layout
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
@@ -48,7 +48,7 @@ class ClipWindows(Dataset[dict[str, Any]]):
     window: int
     starts: tuple[int, ...]
     left_out: tuple[str, ...]
-    _opened: dict[str, zarr.Array] = field(default_factory=dict, init=False, repr=False)
+    _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.clips) * len(self.starts)
@@ -66,23 +66,22 @@ class ClipWindows(Dataset[dict[str, Any]]):
         return sample | {name: torch.from_numpy(self._pictures(name, clip, span)) for name in self.arrays}
 
     def __getstate__(self) -> dict[str, Any]:
-        # each worker opens the arrays itself: an open store belongs to its process
-        return self.__dict__ | {"_opened": {}}
+        # each worker looks at the arrays itself: it may be on another machine
+        return self.__dict__ | {"_shapes": {}}
 
     def _pictures(self, name: str, clip: int, span: slice) -> np.ndarray:
         try:
-            return np.asarray(self._array(name)[clip, span])
-        except (ValueError, RuntimeError, IndexError, OSError) as error:
+            return read_frames(self.frames, name, self._shape(name), clip, span)
+        except (ValueError, RuntimeError, OSError) as error:
             raise InputError(
                 f"{self.frames / name}: clip {clip}: cannot be read; {shorten(error)}: musync repair makes it again"
             ) from None
 
-    def _array(self, name: str) -> zarr.Array:
-        if name not in self._opened:
-            # its metadata again: the dataset may be another since the windows were made, or on another machine
-            check_array(read_local_metadata(self.frames), name, self.frames)
-            self._opened[name] = zarr.open_array(self.frames / name, mode="r", zarr_format=3)
-        return self._opened[name]
+    def _shape(self, name: str) -> tuple[int, ...]:
+        if name not in self._shapes:
+            # its metadata again: the dataset may be another since the windows were made
+            self._shapes[name] = check_array(read_local_metadata(self.frames), name, self.frames)
+        return self._shapes[name]
 
 
 class SeededOrder(Sampler[int]):

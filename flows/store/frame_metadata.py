@@ -28,6 +28,7 @@ _CODECS = {
     "crc32c": set[str](),
 }
 """Codecs inside a shard, and what may be set of each."""
+_COMPRESSORS = {"zstd", "lz4hc"}
 _INDEX_CODECS = ["bytes", "crc32c"]
 
 ReadMetadata = Callable[[str], bytes | None]
@@ -198,8 +199,8 @@ def _layout_problems(metadata: Mapping[str, Any], array: PixelArray, shape: list
     ]
     if not _is_shard(metadata.get("codecs"), [1, 1, *tail]):
         problems.append(
-            "codecs must be those that muSync writes: a shard of one chunk a frame, each as bytes, blosc (zstd),"
-            f" crc32c; they are {shorten_value(metadata.get('codecs'), most=120)}"
+            "codecs must be those that muSync writes: a shard of one chunk a frame, each as bytes, blosc (zstd or"
+            f" lz4hc), crc32c; they are {shorten_value(metadata.get('codecs'), most=120)}"
         )
     return problems
 
@@ -226,7 +227,7 @@ def _are_codecs(codecs: Any, names: list[str]) -> bool:
         settings = codec.get("configuration", {})
         if not isinstance(settings, dict) or codec.keys() - {"name", "configuration"}:
             return False
-        if settings.keys() - _CODECS[codec["name"]] or settings.get("cname", "zstd") != "zstd":
+        if settings.keys() - _CODECS[codec["name"]] or settings.get("cname", "zstd") not in _COMPRESSORS:
             return False
         if any(not isinstance(value, str | int) for value in settings.values()):
             return False

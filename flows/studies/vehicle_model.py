@@ -27,7 +27,7 @@ from tasks.vehicle.rollout import Mode, Rollout, simulate_scenario
 PAPER = ("paper-reference", "paper")
 """The paper's vehicle and mode, drawn beside any other."""
 BENCHMARKS = (
-    "rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries", "store", "rollouts",
+    "rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries", "store", "loading", "rollouts",
 )  # fmt: skip
 
 STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")

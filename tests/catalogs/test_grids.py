@@ -42,6 +42,16 @@ def test_axes_multiply_and_later_axes_override_earlier_ones(tmp_path):
     ]  # fmt: skip
 
 
+def test_how_frames_are_compressed_stands_in_the_record_only_where_it_was_asked_for(tmp_path):
+    body = "name: g\naxes: {weather: {dry: {weather: dry}}}\n"
+    plain = load_grid(str(grid_file(tmp_path, body))).settings
+    quick = load_grid(str(grid_file(tmp_path, body + "compression: lz4\n"))).settings
+    assert "compression" not in plain.model_dump(mode="json") and plain.compression == "zstd"
+    assert quick.model_dump(mode="json")["compression"] == "lz4"
+    with pytest.raises(InputError, match="compression"):
+        load_grid(str(grid_file(tmp_path, body + "compression: zip\n")))
+
+
 def test_all_faults_of_a_file_are_listed_at_once_each_with_its_place(tmp_path):
     path = grid_file(
         tmp_path,

@@ -8,11 +8,13 @@ import pytest
 
 from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import collect_garbage, verify_dataset
+from flows.store.frames import read_clip, write_clip
 from flows.store.layout import PARTIAL, Layout
 from flows.store.lock import sole_writer
 from manifests.canonical import canonical_bytes
 from manifests.manifest import recorded_files
 from tasks.errors import InputError
+from tests.flows.reseal import reseal
 
 FLIPS = 50
 
@@ -54,6 +56,26 @@ def test_every_one_of_50_flipped_bits_is_found_and_its_file_named(copy):
             (copy.root / path).write_bytes(original)
         named += not result["verified"] and [row["path"] for row in result["damaged"]] == [path]
     assert named == FLIPS
+
+
+def test_a_dataset_that_was_compressed_otherwise_is_repaired_in_its_own_compression(copy):
+    """As earlier versions did: Blosc's own blocks."""
+    pixels = read_clip(copy.frames, 0, "class")
+    path = copy.frames / "class" / "zarr.json"
+    metadata = json.loads(path.read_text())
+    metadata["codecs"][0]["configuration"]["codecs"][1]["configuration"] |= {"blocksize": 0, "clevel": 3}
+    path.write_text(json.dumps(metadata))
+    before = copy.frame_shard("class", 0).read_bytes()
+    write_clip(copy.frames, 0, {"class": pixels})
+    group = json.loads((copy.frames / "zarr.json").read_text())
+    group["consolidated_metadata"]["metadata"]["class"] = metadata
+    (copy.frames / "zarr.json").write_text(json.dumps(group))
+    reseal(copy)
+    kept = copy.frame_shard("class", 0).read_bytes()
+    assert kept != before
+    copy.frame_shard("class", 0).unlink()
+    assert repair_dataset(str(copy.root))["repaired"]
+    assert copy.frame_shard("class", 0).read_bytes() == kept
 
 
 def test_a_manifest_that_was_written_anew_with_other_figures_does_not_verify(copy):

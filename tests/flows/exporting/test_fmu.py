@@ -304,8 +304,10 @@ def test_the_page_names_every_input_and_weather(fmu):
     said = PAGE.replace("`_length`, `_height`", "`road_feature_length`, `road_feature_height`")
     said = said.replace("`ground_slope_f`, `_r`", "`ground_slope_f`, `ground_height_r`, `ground_slope_r`")
     assert not [row.name for row in INPUTS if f"`{row.name}`" not in said]
-    kinds = fmpy.read_model_description(str(fmu)).typeDefinitions[0].items
-    assert ", ".join(f"{kind.value} {kind.name}" for kind in kinds) in PAGE
+    (weather,) = [v for v in fmpy.read_model_description(str(fmu)).modelVariables if v.name == "weather"]
+    assert (weather.type, weather.min, weather.max) == ("Integer", "1", "4")
+    assert weather.description.partition(": ")[2] == "1 dry, 2 rain, 3 snow, 4 ice"
+    assert weather.description.partition(": ")[2] in PAGE
 
 
 def test_all_that_is_wrong_with_the_command_is_told_at_once(tmp_path, monkeypatch, capsys):

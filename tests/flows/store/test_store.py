@@ -20,7 +20,7 @@ SHAPE = (3, 16, 24)
 @pytest.fixture
 def layout(tmp_path):
     layout = Layout(tmp_path / "dataset")
-    create_arrays(layout.frames, 4, *SHAPE, False, {"camera": "test"})
+    create_arrays(layout.frames, (4, *SHAPE), False, {"camera": "test"})
     return layout
 
 
@@ -44,7 +44,7 @@ def test_a_clip_reads_back_bit_for_bit_from_one_file_an_array(layout):
 
 def test_the_same_pixels_give_the_same_bytes(layout, tmp_path):
     other = Layout(tmp_path / "other")
-    create_arrays(other.frames, 4, *SHAPE, False, {"camera": "test"})
+    create_arrays(other.frames, (4, *SHAPE), False, {"camera": "test"})
     for index in (0, 2):
         write_clip(layout.frames, index, buffers(1))
     for index in (2, 0):
@@ -73,7 +73,7 @@ def test_arrays_say_their_dimensions_and_camera(layout):
 
 
 def test_arrays_carry_unit_and_meaning_and_the_names_of_their_codes(tmp_path):
-    create_arrays(tmp_path / "frames", 1, *SHAPE, True, {})
+    create_arrays(tmp_path / "frames", (1, *SHAPE), True, {})
     group = zarr.open_group(tmp_path / "frames", mode="r")
     assert {name: array.attrs["units"] for name, array in group.arrays()} == {
         "rgb": "1", "depth": "m", "class": "1", "normal": "1", "road": "m", "flow": "px", "marks": "1",
