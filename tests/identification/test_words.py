@@ -7,6 +7,7 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.decision.attribution import Candidate
+from tasks.identification.decision.verdict import find_pair_to_confirm
 from tasks.identification.decision.words import say_rejection, tell_verdict
 
 RULES = load_decision_rules()
@@ -55,3 +56,11 @@ def test_only_a_candidate_that_held_out_runs_neither_confirm_nor_contradict_is_o
 ) -> None:
     assert refused("anti_dive", 45.6, held_out_gain=gain, at_bound=at_bound).is_open is is_open
     assert not refused("anti_dive", 20.0, held_out_gain=gain, at_bound=at_bound).is_open
+
+
+def test_the_next_run_is_planned_for_the_best_candidate_that_is_open() -> None:
+    contradicted = refused("bump_stop", 158.4, held_out_gain=-14.8)
+    best, other = refused("anti_dive", 45.6, held_out_gain=0.4), refused("brake_lag", 30.0)
+    null = SimpleNamespace()
+    assert find_pair_to_confirm([contradicted, other, best], null) == (best.fitted, null)
+    assert find_pair_to_confirm([contradicted], null) is None

@@ -149,7 +149,7 @@ def find_missing_effects(
     if present:
         reasons.append(f"{vehicle.name} already has {', '.join(present)}: what is named comes on top of that")
     experiment = None
-    pair = _to_tell_apart(compared, near_form, start) if compared else _to_confirm(tried, start)
+    pair = _to_tell_apart(compared, near_form, start) if compared else find_pair_to_confirm(tried, start.base)
     if pair is not None:
         experiment = plan_next_experiment(start.evidence, *pair, vehicle, surface)
     theta, slots = compose_parameters(found.base.parts, found.base.values, np.zeros(len(SESSION)))
@@ -182,6 +182,18 @@ def find_missing_effects(
         reasons=tuple(reasons),
     )
     return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
+
+
+def find_pair_to_confirm(tried: Sequence[Candidate], null: Fit) -> tuple[Fit, Fit] | None:
+    """Return the best candidate that further runs could confirm, and the plain model; None if there is none.
+
+    Parameters
+    ----------
+    tried : candidates of which none was accepted
+    null : fit without them
+    """
+    best = max((c for c in tried if c.is_open), key=lambda c: c.score, default=None)
+    return None if best is None else (best.fitted, null)
 
 
 def _object_to_last(found: SearchState, start: SearchState, error: Mapping[str, ChannelError]) -> str | None:
@@ -224,12 +236,6 @@ def _to_tell_apart(
         return first, start.base
     own, other = max(near or others, key=lambda pair: pair[1].score)
     return own.fitted, other.fitted
-
-
-def _to_confirm(tried: Sequence[Candidate], start: SearchState) -> tuple[Fit, Fit] | None:
-    """The best candidate that further runs could confirm, and the plain model; None if there is none."""
-    best = max((c for c in tried if c.is_open), key=lambda c: c.score, default=None)
-    return None if best is None else (best.fitted, start.base)
 
 
 def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
