@@ -101,7 +101,7 @@ study-editors: $(READY)
 # What a true mask scores in the road-edit metric, beside the judge: five minutes, most of them for the dataset.
 study-road-edit: $(READY)
 	$(BIN)/musync generate evaluation --out datasets/road-edit
-	$(BIN)/python -m benchmarks.road_edit_bound datasets/road-edit
+	$(BIN)/python -m benchmarks.road_edit_true_mask datasets/road-edit
 
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)

@@ -29,8 +29,7 @@ from tasks.conventions import (
 )
 from tasks.errors import InputError
 from tasks.eval.physics.audit import PhysicsVerdict, audit_clip
-from tasks.eval.physics.body import DT
-from tasks.eval.physics.constants import Constants, TyreTables
+from tasks.eval.physics.constants import DT, Constants, TyreTables
 from tasks.eval.physics.laws import finite_rows
 
 DEPTHS = ("film_depth_mm", "snow_depth_mm", "snow_coverage")

@@ -13,13 +13,12 @@ import pyarrow.parquet as pq
 from catalogs.sentences import shorten
 from flows.reading.clips import Clip, find_clip
 from flows.reading.connection import connect_sealed, quote_identifier
+from flows.reading.pictures import open_frames_store, open_labelled_frames
 from flows.reading.query import VIEWS, list_columns, refused_query
 from flows.reading.suggestions import suggest_names
 from flows.reading.table_files import table_files
-from flows.store.address import frames_store, open_for_reading, want_telemetry
-from flows.store.frame_metadata import check_frames, read_local_metadata
+from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
-from flows.store.objects import Objects
 from flows.store.sealed import read_manifest, read_manifest_head
 from tasks.conventions import CHANNELS_BY_NAME
 from tasks.errors import InputError
@@ -238,7 +237,7 @@ class Dataset:
         InputError
             If the dataset was made without frames, or their metadata are not those that muSync writes.
         """
-        store = self._checked_frames()
+        store = open_frames_store(self._layout, self.manifest)
         import zarr
 
         return zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
@@ -251,29 +250,7 @@ class Dataset:
         InputError
             If xarray is not installed, or as for `frames`.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise InputError("xarray is not installed: pip install 'musync-gs[analysts]'") from None
-        try:
-            pixels = xarray.open_zarr(
-                self._checked_frames(), consolidated=False, zarr_format=3, chunks=None, decode_cf=False
-            )
-        except (ValueError, TypeError, KeyError) as error:
-            raise InputError(
-                f"{self._layout}/frames.zarr: {shorten(error)}: musync verify says whether it is damaged"
-            ) from None
-        clips, time = self.manifest["clips"], CHANNELS_BY_NAME["t_ns"]
-        seconds = [frame / self.manifest["grid"]["frame_rate_hz"] for frame in range(pixels.sizes["frame"])]
-        return pixels.assign_coords(
-            clip=[clip["label"] for clip in clips],
-            clip_id=("clip", [clip["clip_id"] for clip in clips]),
-            t=(
-                "frame",
-                seconds,
-                {"standard_name": time.standard_name, "long_name": time.description, "units": "s"},
-            ),
-        )
+        return open_labelled_frames(self._layout, self.manifest)
 
     def torch(
         self,
@@ -304,23 +281,6 @@ class Dataset:
         return windows_of(
             self._layout, self.manifest, window, stride or window, columns, arrays, clips, quarantined
         )
-
-    def _checked_frames(self) -> Any:
-        """Return the Zarr store of the frames, after checking that muSync wrote its metadata."""
-        grid, layout = self.manifest["grid"], self._layout
-        if not grid.get("pictures", True):
-            raise InputError(f"{layout}: the dataset was made without frames")
-        if self.origin is None:
-            open_for_reading(self.root, lambda name: name.startswith("frames.zarr/"))
-            read = read_local_metadata(layout.frames)
-            members = [path.name for path in layout.frames.glob("*") if path.is_dir()]
-        else:
-            objects = Objects(f"{self.origin}/{layout.frames.name}")
-            read, members = objects.read, objects.folders()
-        check_frames(
-            read, members, f"{layout}/{layout.frames.name}", len(self.manifest["clips"]), grid["frames"]
-        )
-        return frames_store(layout)
 
     def schema(self) -> dict[str, Any]:
         """Columns of every view with unit, paper symbol, CF standard name and description."""

@@ -5,13 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from tasks.eval.physics.constants import SURFACE_FORMS, Constants, Floats, derive_surface
+from tasks.eval.physics.constants import DT, SURFACE_FORMS, Constants, Floats, derive_surface
 from tasks.eval.physics.half_step import INNER_STEP, find_brake_onset
 from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
 from tasks.eval.physics.superposition import sum_contact_changes
-
-DT = 0.001
-"""Tick interval [s]."""
 
 ROUND = 1e-9
 """Relative rounding of closed forms [1]."""

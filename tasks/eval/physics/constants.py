@@ -1,4 +1,4 @@
-""" "Constants of the car and the pavement that the auditor takes as given, and the closed forms of its laws.
+"""Constants of the car and the pavement that the auditor takes as given, and the closed forms of its laws.
 
 Written from the paper's appendices alone: nothing here is shared with the model that made the telemetry.
 """
@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+DT = 0.001
+"""Tick interval [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)

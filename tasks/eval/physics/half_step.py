@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tasks.eval.physics.constants import (
+    DT,
     Constants,
     Floats,
     compute_burckhardt_friction,
@@ -60,7 +61,7 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
     s, v, a = ticks["station"], ticks["speed"], ticks["longitudinal_acceleration"]
     speed = v[:-1] + INNER_STEP * a[:-1]
     station = s[:-1] + 0.5 * INNER_STEP * (v[:-1] + speed)
-    time = 0.001 * np.arange(len(s) - 1, dtype=np.float64) + INNER_STEP
+    time = DT * np.arange(len(s) - 1, dtype=np.float64) + INNER_STEP
     pressure = pressure_at(time - find_brake_onset(ticks, facts), *pressure_shape(facts))
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     analytic = constants.mode == "paper" and hump[2] == 0.0

@@ -1,14 +1,11 @@
-"""What the tyres push in the sum of road and brake response, once a wheel has left the road."""
+"""Tyre forces in the sum of road and brake response, once a wheel has left the road."""
 
 from collections.abc import Mapping
 
 import numpy as np
 from scipy.signal import lsim
 
-from tasks.eval.physics.constants import Constants, Floats
-
-TICK = 0.001
-"""Tick interval [s]."""
+from tasks.eval.physics.constants import DT, Constants, Floats
 
 
 def sum_contact_changes(
@@ -59,5 +56,5 @@ def follow_moment(moment: Floats, constants: Constants) -> dict[str, Floats]:
     B = np.zeros((8, 1))
     B[5] = 1.0 / inertia
     C = np.eye(8)[2:4]
-    _, heave, _ = lsim((A, B, C, np.zeros((2, 1))), moment, TICK * np.arange(len(moment)))
+    _, heave, _ = lsim((A, B, C, np.zeros((2, 1))), moment, DT * np.arange(len(moment)))
     return {"f": heave[:, 0], "r": heave[:, 1]}

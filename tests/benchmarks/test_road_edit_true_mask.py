@@ -1,8 +1,8 @@
-"""What a detector without error scores: the metric's own morphology and flow are all that is left to lose."""
+"""A true mask loses in the road-edit metric only by the metric's own morphology and flow."""
 
 import numpy as np
 
-from benchmarks.road_edit_bound import score_true_masks
+from benchmarks.road_edit_true_mask import score_true_masks
 from tasks.eval.road_edit import RoadEditSettings
 
 SETTINGS = RoadEditSettings()

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.road_edit_bound DATASET``: the road-edit scores of a true mask.
+"""``python -m benchmarks.road_edit_true_mask DATASET``: the road-edit scores of a true mask.
 
 The mask is the feature's own outline, from the renderer's depth and class and the scene's route. It takes the place of
 the pixels above the metric's threshold; morphology, components and flow are the metric's. No judge calls this.
@@ -14,7 +14,7 @@ from flows.judging.evaluation_rows import control_of
 from flows.judging.judged_clip import JudgedClip, Row, View
 from flows.judging.physics import clip_columns, clip_facts
 from flows.judging.road_edit_rows import prescribed_masks
-from flows.making.clip import catalogue_of
+from flows.making.catalogue import catalogue_of
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.road_edit import (
     RoadEditScore,
@@ -43,7 +43,7 @@ def score_true_masks(
 
 
 def main(root: Path) -> None:
-    """Print the scores of each clip with a road feature, by the judge where it has a flat twin, and the bound."""
+    """Print the scores of each clip with a road feature, by the judge if it has a flat twin, and by the true mask."""
     view, catalogue, settings = View(root=root), catalogue_of(root), RoadEditSettings()
     clips = [_read_clip(root, facts) for facts in clip_facts(root)]
     print(f"{'clip':28}{'':10} edit rate    T-IoU   anchor   frames")
