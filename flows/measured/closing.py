@@ -225,6 +225,7 @@ def effect_json(effect: NamedEffect, library: Sequence[Effect]) -> dict[str, Any
         "gain": effect.gain,
         "inflation": effect.inflation,
         "held_out_gain": effect.held_out_gain,
+        "cross_validated_gain": effect.cross_validated_gain,
         "win_share": effect.win_share,
     }
 

@@ -31,14 +31,16 @@ LIBRARY = tuple(e for e in load_effects() if e.name in WANTED)
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
 
 
-def evidence_of(theta: np.ndarray) -> Evidence:
-    runs = [
-        (30.0, 0.0, 1, 20.0),
-        (28.0, 1.5, -1, 20.0),
-        (25.0, 1.8, 1, 250.0),
-        (12.0, 1.0, -1, 150.0),
-        (15.0, 0.0, 1, 20.0),
-    ]
+RUNS = (
+    (30.0, 0.0, 1, 20.0),
+    (28.0, 1.5, -1, 20.0),
+    (25.0, 1.8, 1, 250.0),
+    (12.0, 1.0, -1, 150.0),
+    (15.0, 0.0, 1, 20.0),
+)
+
+
+def evidence_of(theta: np.ndarray, runs: tuple[tuple[float, float, int, float], ...] = RUNS) -> Evidence:
     derived = tuple(
         differentiate_run(
             measured(plain_run(v, p, name=str(i), direction=d, disc_rise=t), theta, i),
@@ -85,6 +87,20 @@ def test_nothing_passes_where_nothing_is_missing() -> None:
     evidence = evidence_of(np.zeros(len(EFFECT_TABLE)))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     assert not any(c.passes for c in refine_candidates(evidence, null, count=3))
+
+
+@pytest.mark.parametrize(("stops", "passes"), [(2, True), (1, False)])
+def test_an_effect_that_no_held_out_run_excites_needs_two_training_runs_that_predict_each_other(
+    stops: int, passes: bool
+) -> None:
+    coasting = (15.0, 0.0, 1, 20.0)
+    evidence = evidence_of(
+        build_parameter_vector({"anti_dive": 0.5}), (*RUNS[1 : 1 + stops], coasting, coasting)
+    )
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    best = refine_candidates(evidence, null, count=3)[0]
+    assert best.hypothesis.name == "anti_dive" and best.is_open
+    assert best.passes is passes and (best.cross_validated_gain > 100.0) is passes
 
 
 def test_the_marginal_misfit_is_that_of_the_dense_covariance() -> None:

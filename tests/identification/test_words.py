@@ -8,29 +8,34 @@ from catalogs.decision_rules import load_decision_rules
 from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.verdict import find_pair_to_confirm
-from tasks.identification.decision.words import say_rejection, tell_verdict
+from tasks.identification.decision.words import say_confirmation, say_rejection, tell_verdict
 
 RULES = load_decision_rules()
 
 
-def refused(name: str, score: float, *, held_out_gain: float = 0.0, at_bound: bool = False) -> Candidate:
+def judged(
+    name: str, score: float, *, held_out_gain: float = 0.0, crossed: float = 0.0, at_bound: bool = False
+) -> Candidate:
     return Candidate(
         hypothesis=SimpleNamespace(name=name), fitted=SimpleNamespace(at_bound=at_bound), gain=2.0 * score,
-        inflation=1.5, score=score, held_out_gain=held_out_gain, informed=5, rules=RULES,
+        inflation=1.5, score=score, held_out_gain=held_out_gain, cross_validated_gain=crossed, informed=5, rules=RULES,
     )  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("candidate", "says"),
     [
-        (refused("brake_lag", 20.14), "the best candidate, brake_lag, scores 20.1; a name needs 25"),
-        (refused("anti_dive", 45.6, held_out_gain=0.44), "do not confirm it: gain 0.4, a name needs 4"),
-        (refused("bump_stop", 158.4, held_out_gain=-14.8), "the held-out runs contradict it: gain -14.8"),
-        (refused("tyre_heating", 40.0, held_out_gain=9.0, at_bound=True), "a number at the end of its range"),
+        (judged("brake_lag", 20.14), "the best candidate, brake_lag, scores 20.1; a name needs 25"),
+        (
+            judged("anti_dive", 45.6, held_out_gain=0.44, crossed=-1.3),
+            "gain 0.4, a name needs 4, cross-validated -1.3",
+        ),
+        (judged("bump_stop", 158.4, held_out_gain=-14.8), "the held-out runs contradict it: gain -14.8"),
+        (judged("tyre_heating", 40.0, held_out_gain=9.0, at_bound=True), "a number at the end of its range"),
     ],
 )
 def test_a_refusal_names_the_rule_and_the_figure(candidate: Candidate, says: str) -> None:
-    assert says in say_rejection([refused("pad_drag", 1.0), candidate])
+    assert says in say_rejection([judged("pad_drag", 1.0), candidate])
 
 
 def test_without_any_candidate_the_refusal_says_that_nothing_acts_on_the_channels() -> None:
@@ -40,7 +45,7 @@ def test_without_any_candidate_the_refusal_says_that_nothing_acts_on_the_channel
 def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
     suggested = NamedEffect(
         name="anti_dive_form", effect_class="form", port="pitch_moment", variable="speed", parameters=(),
-        score=45.6, gain=89.0, inflation=1.6, held_out_gain=0.4, win_share=0.0,
+        score=45.6, gain=89.0, inflation=1.6, held_out_gain=0.4, cross_validated_gain=0.0, win_share=0.0,
     )  # fmt: skip
     told = tell_verdict((), (), (), {}, {}, suggested)
     assert told.startswith("These runs prove nothing")
@@ -54,13 +59,28 @@ def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
 def test_only_a_candidate_that_held_out_runs_neither_confirm_nor_contradict_is_open(
     gain: float, at_bound: bool, is_open: bool
 ) -> None:
-    assert refused("anti_dive", 45.6, held_out_gain=gain, at_bound=at_bound).is_open is is_open
-    assert not refused("anti_dive", 20.0, held_out_gain=gain, at_bound=at_bound).is_open
+    assert judged("anti_dive", 45.6, held_out_gain=gain, at_bound=at_bound).is_open is is_open
+    assert not judged("anti_dive", 20.0, held_out_gain=gain, at_bound=at_bound).is_open
 
 
 def test_the_next_run_is_planned_for_the_best_candidate_that_is_open() -> None:
-    contradicted = refused("bump_stop", 158.4, held_out_gain=-14.8)
-    best, other = refused("anti_dive", 45.6, held_out_gain=0.4), refused("brake_lag", 30.0)
+    contradicted = judged("bump_stop", 158.4, held_out_gain=-14.8)
+    best, other = judged("anti_dive", 45.6, held_out_gain=0.4), judged("brake_lag", 30.0)
     null = SimpleNamespace()
     assert find_pair_to_confirm([contradicted, other, best], null) == (best.fitted, null)
     assert find_pair_to_confirm([contradicted], null) is None
+
+
+@pytest.mark.parametrize(
+    ("held_out", "crossed", "passes"),
+    [(9.0, 0.0, True), (0.4, 134.0, True), (0.4, 3.9, False), (-14.8, 0.0, False)],
+)
+def test_runs_that_no_fit_has_seen_must_confirm_a_name(held_out: float, crossed: float, passes: bool) -> None:
+    assert judged("anti_dive", 45.6, held_out_gain=held_out, crossed=crossed).passes is passes
+    assert not judged("anti_dive", 20.0, held_out_gain=held_out, crossed=crossed).passes
+
+
+def test_the_verdict_says_when_cross_validation_confirmed_a_name() -> None:
+    said = say_confirmation(judged("anti_dive", 45.6, held_out_gain=0.4, crossed=134.0))
+    assert said is not None and "(gain 134.0, a name needs 4)" in said
+    assert say_confirmation(judged("anti_dive", 45.6, held_out_gain=9.0)) is None

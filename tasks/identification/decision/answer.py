@@ -38,7 +38,8 @@ class NamedEffect:
     name, effect_class, port, variable : as in the library, or of the form found
     parameters : estimates
     score : gain / inflation - parameters x log N, in addition to the other effects [1]
-    gain, inflation, held_out_gain, win_share : terms of the score and of the gates that it passed [1]
+    gain, inflation, held_out_gain, cross_validated_gain, win_share : terms of the score and of the gates that it
+        passed [1]
     """
 
     name: str
@@ -50,6 +51,7 @@ class NamedEffect:
     gain: float
     inflation: float
     held_out_gain: float
+    cross_validated_gain: float
     win_share: float
 
 
@@ -154,5 +156,6 @@ def make_named_effect(candidate: Candidate, share: float, interval: Bounds) -> N
         gain=candidate.gain,
         inflation=candidate.inflation,
         held_out_gain=candidate.held_out_gain,
+        cross_validated_gain=candidate.cross_validated_gain,
         win_share=share,
     )  # fmt: skip

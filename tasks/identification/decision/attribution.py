@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.cross_validation import compute_cross_validated_fall
 from tasks.identification.decision.screening import compute_inflation, find_look_alikes, screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import (
@@ -32,6 +33,7 @@ class Candidate:
     inflation : empirical-null factor by which the gain is divided [1]
     score : gain / inflation - parameters x log N [1]
     held_out_gain : fall of the held-out marginal misfit, divided by the inflation; 0 where the score fails [1]
+    cross_validated_gain : the same over training runs, each left out in turn; 0 where the held-out runs decide [1]
     informed : number of training runs that are sensitive to its first parameter [1]
     rules : decision rules
     """
@@ -42,6 +44,7 @@ class Candidate:
     inflation: float
     score: float
     held_out_gain: float
+    cross_validated_gain: float
     informed: int
     rules: DecisionRules
 
@@ -52,15 +55,19 @@ class Candidate:
 
     @property
     def passes(self) -> bool:
-        """Return whether score, held-out test and bounds all hold."""
-        enough = self.score > self.rules.accept_score and self.held_out_gain > self.rules.held_out_gain
-        return enough and not self.fitted.at_bound
+        """Return whether score, test on unseen runs and bounds all hold."""
+        unseen = max(self.held_out_gain, self.cross_validated_gain)
+        return self.shows and unseen > self.rules.held_out_gain
+
+    @property
+    def shows(self) -> bool:
+        """Return whether the training runs show it, with every parameter inside its bounds."""
+        return self.score > self.rules.accept_score and not self.fitted.at_bound
 
     @property
     def is_open(self) -> bool:
         """Return whether the training runs show it and the held-out runs neither confirm nor contradict it."""
-        undecided = abs(self.held_out_gain) <= self.rules.held_out_gain
-        return self.score > self.rules.accept_score and undecided and not self.fitted.at_bound
+        return self.shows and abs(self.held_out_gain) <= self.rules.held_out_gain
 
 
 def judge_hypothesis(
@@ -142,13 +149,20 @@ def assess_fit(
         # a fall of the misfit that the base reaches from here too is no gain of the hypothesis
         gain = min(gain, 0.5 * (_refit_base(evidence, base, hypothesis, fitted).objective - fitted.objective))
     score = gain / factor - penalty
-    held_out = 0.0
-    if score > evidence.rules.accept_score and base_held_out is not None:
-        held_out = sum_misfit_falls(base_held_out, compute_misfit_by_run(evidence.held_out, fitted)) / factor
-    return Candidate(
-        hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=held_out,
-        informed=len(own) or len(evidence.train), rules=evidence.rules,
+    candidate = Candidate(
+        hypothesis=hypothesis, fitted=fitted, gain=gain, inflation=factor, score=score, held_out_gain=0.0,
+        cross_validated_gain=0.0, informed=len(own) or len(evidence.train), rules=evidence.rules,
     )  # fmt: skip
+    if score <= evidence.rules.accept_score or base_held_out is None:
+        return candidate
+    fall = sum_misfit_falls(base_held_out, compute_misfit_by_run(evidence.held_out, fitted))
+    candidate = replace(candidate, held_out_gain=fall / factor)
+    # what no effect of the library says must be felt in the held-out runs themselves
+    if not candidate.is_open or hypothesis.effect_class == "form":
+        return candidate
+    return replace(
+        candidate, cross_validated_gain=compute_cross_validated_fall(evidence, base, fitted) / factor
+    )
 
 
 def compute_own_inflation(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> float:

@@ -27,7 +27,7 @@ from tasks.identification.decision.intervals import (
 from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals, find_detectable_sizes
 from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded
-from tasks.identification.decision.words import say_rejection
+from tasks.identification.decision.words import say_confirmation, say_rejection
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import prepare_evidence
@@ -143,6 +143,7 @@ def find_missing_effects(
             f"{len(near) - len(others)} other explanation(s) lie within {rules.rival_span:g} units, make good"
             f" {rules.rival_gain_share:.0%} of the gain or win too many resamples"
         )
+    reasons += filter(None, (say_confirmation(c.own) for c in compared))
     if not named and not reasons:
         reasons.append(say_rejection(tried))
     present = [name for name, value in vehicle.effects.items() if value] + [f.name for f in vehicle.forms]

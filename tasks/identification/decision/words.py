@@ -82,8 +82,24 @@ def say_rejection(tried: Sequence[Candidate]) -> str:
     if not best.is_open:
         return f"{shown} the held-out runs contradict it: {gain}"
     return (
-        f"{shown} the held-out runs do not confirm it: {gain}; if none of them excites it, record another run that"
-        " does, or give one of the training runs to the held-out runs"
+        f"{shown} neither the held-out runs nor the training runs, each predicted from the others, confirm it: {gain},"
+        f" cross-validated {best.cross_validated_gain:.1f}; record another run that excites it"
+    )
+
+
+def say_confirmation(named: Candidate) -> str | None:
+    """Return what confirms a name that the held-out runs neither confirm nor contradict; None if they confirm it.
+
+    Parameters
+    ----------
+    named : the accepted candidate
+    """
+    if named.cross_validated_gain <= named.rules.held_out_gain:
+        return None
+    return (
+        f"the held-out runs neither confirm nor contradict {named.hypothesis.name} (gain {named.held_out_gain:.1f});"
+        " the training runs, each predicted from the others, confirm it"
+        f" (gain {named.cross_validated_gain:.1f}, a name needs {named.rules.held_out_gain:g})"
     )
 
 

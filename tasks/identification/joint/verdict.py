@@ -229,6 +229,7 @@ def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> N
         gain=0.5 * sure**2,
         inflation=1.0,
         held_out_gain=0.0,
+        cross_validated_gain=0.0,
         win_share=1.0,
     )  # fmt: skip
 

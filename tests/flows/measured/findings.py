@@ -10,7 +10,14 @@ from tasks.vehicle.effects.forms import SHAPES, name_form
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import build_parameter_vector
 
-FOUND = {"score": 50.0, "gain": 60.0, "inflation": 1.0, "held_out_gain": 9.0, "win_share": 1.0}
+FOUND = {
+    "score": 50.0,
+    "gain": 60.0,
+    "inflation": 1.0,
+    "held_out_gain": 9.0,
+    "cross_validated_gain": 0.0,
+    "win_share": 1.0,
+}
 
 
 def _parameter(name: str, value: float, lower: float, upper: float, unit: str) -> Parameter:

@@ -201,7 +201,7 @@ def parameter(name: str, value: float, unit: str = "1") -> Parameter:
 def named(name: str, kind: str, *parameters: Parameter) -> NamedEffect:
     return NamedEffect(
         name=name, effect_class=kind, port="p", variable="v", parameters=parameters, score=50.0, gain=60.0,
-        inflation=1.0, held_out_gain=9.0, win_share=1.0,
+        inflation=1.0, held_out_gain=9.0, cross_validated_gain=0.0, win_share=1.0,
     )  # fmt: skip
 
 

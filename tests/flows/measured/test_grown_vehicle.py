@@ -28,7 +28,7 @@ def drag(value: float, name: str = "aerodynamic_drag") -> NamedEffect:
     )
     return NamedEffect(
         name=name, effect_class="effect", port="longitudinal_force", variable="speed", parameters=(parameter,),
-        score=50.0, gain=60.0, inflation=1.0, held_out_gain=9.0, win_share=1.0,
+        score=50.0, gain=60.0, inflation=1.0, held_out_gain=9.0, cross_validated_gain=0.0, win_share=1.0,
     )  # fmt: skip
 
 
