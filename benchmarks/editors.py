@@ -21,7 +21,7 @@ from benchmarks.synthetic_street import camera_matrix, make_mount, render_clip, 
 from catalogs.scenario import Scenario
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.judging.judge_set import format_cell, judge_video_set
+from flows.judging.video_sets.judge_set import format_cell, judge_video_set
 from flows.making.driving import simulate_drive
 from flows.store.layout import write_json
 from tasks.eval.motion_agreement import rms

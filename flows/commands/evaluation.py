@@ -22,7 +22,7 @@ def leave_out_roc(result: dict[str, Any]) -> dict[str, Any]:
 
 def show_table(result: dict[str, Any]) -> dict[str, Any]:
     """Return the table of a judged set with a text in each cell, and what is missing."""
-    from flows.judging.judge_set import format_cell
+    from flows.judging.video_sets.judge_set import format_cell
 
     rows = [{key: format_cell(cell) for key, cell in row.items()} for row in result["table"]]
     empty = {key for key in rows[0] if all(row[key] == "-" for row in rows)}
@@ -124,7 +124,7 @@ COMMANDS = (
         name="judge-set",
         group=GROUP,
         sentence="Judge the clips of video editors by a protocol: a table of models, the paper's figures beside them.",
-        function="flows.judging.judge_set:judge_video_set",
+        function="flows.judging.video_sets.judge_set:judge_video_set",
         options=(
             define_argument(
                 "folder", str, "Folder of models, sources, claims and targets (docs/evaluation.md)."

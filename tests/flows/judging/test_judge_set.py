@@ -15,10 +15,10 @@ from benchmarks.synthetic_street import drive_clip, hump_drive, make_mount, rig_
 from catalogs.learned_judges import LoadedJudge
 from catalogs.video_protocols import load_video_protocol
 from flows.judging.foreign_sources import read_camera
-from flows.judging.judge_set import format_cell, judge_video_set
 from flows.judging.learned_rows import score_pictures
-from flows.judging.set_files import SetClip, find_set
-from flows.judging.set_rows import look_at_clip
+from flows.judging.video_sets.files import SetClip, find_set
+from flows.judging.video_sets.judge_set import format_cell, judge_video_set
+from flows.judging.video_sets.motion import look_at_clip
 from tasks.errors import InputError
 from tests.flows.judging.test_foreign import encode
 from tests.flows.judging.test_trajectories import tum_lines

@@ -1,26 +1,19 @@
 """Figures of a set of edited videos, clip by clip, by the tasks of a protocol."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Iterator
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.gates import load_foreign_gates
-from catalogs.learned_judges import LoadedJudge
-from catalogs.video_protocols import VideoProtocol
 from flows.judging.evaluation_rows import figure_row
-from flows.judging.foreign_sources import ForeignCamera, read_footage, read_video
 from flows.judging.judged_clip import Row
-from flows.judging.learned_rows import rank_weathers, score_pictures
-from flows.judging.set_files import SOURCE, VIDEO_METHOD, SetClip, VideoSet
+from flows.judging.video_sets.files import SOURCE
+from flows.judging.video_sets.motion import JudgedSet, SetMotion, check_motion
+from flows.judging.video_sets.picture_rows import edit_rows, learned_rows_of
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
+from tasks.eval.foreign_video import judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.road_edit import score_road_edit
 from tasks.eval.video_motion import (
     WINDOWS,
     geometry_error,
@@ -30,84 +23,7 @@ from tasks.eval.video_motion import (
     weather_error,
 )
 
-PIXELS = "pixels"
-"""Method of figures that need no pose."""
-MASK_LEVEL = 127
-"""Grey level above which a pixel of a target's video is the target (paper, Appendix A.6)."""
-LEARNED = ("dover_overall", "dover_technical", "dover_aesthetic", "fast_vqa")
-ROAD_EDIT = ("localised_edit_rate", "temporal_iou", "anchor_error")
 JUDGED = ("pitch_rmse_deg", "pitch_relative_error", "normalised_progress_rmse")
-
-Key = tuple[str, str, str, str]
-
-
-@dataclass(frozen=True, kw_only=True)
-class SetMotion:
-    """A clip of a set after it was looked at once.
-
-    Parameters
-    ----------
-    clip : which
-    times : of its frames [s]
-    motion : recovered or read
-    scores : of learned judges
-    """
-
-    clip: SetClip
-    times: NDArray[np.float64]
-    motion: RecoveredMotion
-    scores: Mapping[str, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class JudgedSet:
-    """A set whose clips were looked at.
-
-    Parameters
-    ----------
-    protocol : by which it is judged
-    files : of the set
-    motions : by model, seed, clip and method
-    claims : by clip
-    judges : learned ones
-    """
-
-    protocol: VideoProtocol
-    files: VideoSet
-    motions: Mapping[Key, SetMotion]
-    claims: Mapping[str, VideoClaim]
-    judges: Mapping[str, LoadedJudge]
-
-    def find(self, model: str, seed: str, clip: str, method: str) -> SetMotion | None:
-        """Return a clip of a model, or of the source; None if it is not there."""
-        return self.motions.get((model, seed, clip, method))
-
-
-def look_at_clip(
-    clip: SetClip, camera: ForeignCamera, judges: Mapping[str, LoadedJudge], kinds: Sequence[str]
-) -> SetMotion:
-    """Recover the motion of one clip, and score its pictures.
-
-    Parameters
-    ----------
-    clip : of the set
-    camera : that it was taken with
-    judges : learned ones
-    kinds : of weather that the protocol has
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
-    footage = read_footage(clip.path)
-    scored = footage.frames is not None and clip.clip.startswith("weather/")
-    return SetMotion(
-        clip=clip,
-        times=footage.times,
-        motion=footage.motion(camera),
-        scores=score_pictures(footage.frames, judges, kinds) if scored and footage.frames is not None else {},
-    )
 
 
 def set_rows(judged: JudgedSet) -> Iterator[Row]:
@@ -139,7 +55,7 @@ def clip_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
         claim = judged.claims.get(seen.clip.clip)
 
         def compute(window: int | None) -> tuple[float, float]:
-            _need_motion(seen)
+            check_motion(seen)
             if claim is None:
                 raise InputError(f"not run: claims/{seen.clip.clip}.parquet is missing")
             meant = np.interp(seen.times, claim.time, claim.pitch, right=np.nan)
@@ -196,65 +112,6 @@ def retention_rows(judged: JudgedSet, model: str, seed: str, method: str) -> Ite
             yield figure_row("motion_retention", method, names[0], value, "1", note=note)
 
 
-def edit_rows(judged: JudgedSet, model: str, seed: str) -> Iterator[Row]:
-    """Edit rate, T-IoU and anchor error of each feature video against the model's flat control."""
-    protocol = judged.protocol
-    flat = judged.find(model, seed, f"geometry/{protocol.geometry_control}", VIDEO_METHOD)
-    for feature in protocol.geometry_features:
-        seen = judged.find(model, seed, f"geometry/{feature}", VIDEO_METHOD)
-        if seen is None:
-            continue
-        target, score, note = judged.files.targets.get(feature), None, ""
-        if flat is None or target is None:
-            note = f"not run: it needs geometry/{protocol.geometry_control} and targets/{feature}.mp4"
-        else:
-            try:
-                score = score_road_edit(*_read_edit(seen.clip.path, flat.clip.path, target))
-                note = "the target is never seen" if score is None else f"{score.active_frames} frames"
-            except InputError as fault:
-                note = str(fault)
-        for name in ROAD_EDIT:
-            value = None if score is None else getattr(score, name)
-            yield figure_row(name, PIXELS, f"geometry/{feature}", value, "1", note=note)
-
-
-def learned_rows_of(judged: JudgedSet, model: str, seed: str) -> Iterator[Row]:
-    """Scores of learned judges of each weather clip, and CLIP's order of each kind of weather."""
-    protocol = judged.protocol
-    names = (protocol.weather_control, *protocol.weather_levels)
-    clips = {name: judged.find(model, seed, f"weather/{name}", VIDEO_METHOD) for name in names}
-    scores = {name: seen.scores for name, seen in clips.items() if seen is not None}
-    if not scores:
-        return
-    missing = {name: judge.note for name, judge in judged.judges.items() if judge.network is None}
-    for metric in LEARNED:
-        note = missing.get("dover" if metric.startswith("dover") else metric, "")
-        for name, given in scores.items():
-            yield figure_row(metric, PIXELS, f"weather/{name}", given.get(metric), "1", note=note)
-    control = scores.get(protocol.weather_control, {})
-    for kind in dict.fromkeys(level.weather for level in protocol.weather_levels.values()):
-        levels = {n: x.precipitation_mm_h for n, x in protocol.weather_levels.items() if x.weather == kind}
-        for name in (name for name in levels if name in scores):
-            value = scores[name].get("temporal_lpips")
-            plain = control.get("temporal_lpips")
-            excess = None if value is None or plain is None else value - plain
-            note = missing.get("lpips", "")
-            yield figure_row(f"temporal_lpips_{kind}", PIXELS, f"weather/{name}", value, "1", note=note)
-            yield figure_row(
-                f"temporal_lpips_excess_{kind}", PIXELS, f"weather/{name}", excess, "1", note=note
-            )
-        rates = {protocol.weather_control: 0.0, **levels}
-        given = {
-            name: scores[name][f"clip_{kind}"] for name in rates if f"clip_{kind}" in scores.get(name, {})
-        }
-        note = missing.get("clip", "")
-        if not note and len(given) < len(rates):
-            note = f"not run: {', '.join(sorted(rates.keys() - given.keys()))} are missing"
-        rho, rising = (None, None) if note else rank_weathers(rates, given)
-        yield figure_row(f"clip_rho_{kind}", PIXELS, kind, rho, "1", note=note)
-        yield figure_row(f"clip_adjacent_{kind}", PIXELS, kind, rising, "1", note=note)
-
-
 def _weather_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
     protocol, clip = judged.protocol, seen.clip
     name = f"weather/{protocol.weather_control}"
@@ -266,10 +123,10 @@ def _weather_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
     from_source = "" if own else "against the source's control: the model made none"
 
     def need_control() -> SetMotion:
-        _need_motion(seen)
+        check_motion(seen)
         if control is None:
             raise InputError(f"not run: {name} is missing, of the model and of the source")
-        _need_motion(control)
+        check_motion(control)
         return control
 
     def compute(window: int | None) -> tuple[float, float]:
@@ -308,19 +165,6 @@ def _windowed_rows(
         )
 
 
-def _read_edit(feature: Path, flat: Path, target: Path) -> tuple[list[Any], list[Any], list[Any]]:
-    """Frames of a feature video and of its control, and the target's masks at their size."""
-    shown, control, mask = (read_video(path)[0] for path in (feature, flat, target))
-    if not len(shown) == len(control) == len(mask) or shown.shape != control.shape:
-        raise InputError(
-            f"not run: feature, control and target must have one size and number of frames; they have"
-            f" {shown.shape[:3]}, {control.shape[:3]} and {mask.shape[:3]}"
-        )
-    size = shown.shape[2], shown.shape[1]
-    masks = [cv2.resize(frame[..., 0], size, interpolation=cv2.INTER_NEAREST) > MASK_LEVEL for frame in mask]
-    return list(shown), list(control), masks
-
-
 def _cut_motion(motion: RecoveredMotion, rows: NDArray[np.int64]) -> RecoveredMotion:
     """Return the motion of the first frames, whose progress is normalised over them."""
     if len(rows) == len(motion.failed):
@@ -331,14 +175,6 @@ def _cut_motion(motion: RecoveredMotion, rows: NDArray[np.int64]) -> RecoveredMo
     }
     values["normalised_path"] = values["normalised_path"] / motion.normalised_path[last, 0]
     return RecoveredMotion(method=motion.method, failures=motion.failures, **values)
-
-
-def _need_motion(seen: SetMotion) -> None:
-    failed = int(seen.motion.failed.sum())
-    if failed:
-        raise InputError(f"{failed} of {len(seen.times)} frames without a pose; {seen.motion.failures[0]}")
-    if not np.isfinite(seen.motion.normalised_path).all():
-        raise InputError("the car does not move, and its progress cannot be normalised")
 
 
 def _name_owner(rows: Iterator[Row], model: str, seed: str) -> Iterator[Row]:

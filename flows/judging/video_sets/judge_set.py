@@ -13,8 +13,10 @@ from flows.judging.claims import read_claim
 from flows.judging.evaluation_means import average_within_seeds
 from flows.judging.foreign_sources import read_camera
 from flows.judging.judged_clip import Row
-from flows.judging.set_files import VideoSet, find_set
-from flows.judging.set_rows import PIXELS, JudgedSet, Key, SetMotion, look_at_clip, set_rows
+from flows.judging.video_sets.files import VideoSet, find_set
+from flows.judging.video_sets.motion import JudgedSet, Key, SetMotion, look_at_clip
+from flows.judging.video_sets.picture_rows import PIXELS
+from flows.judging.video_sets.rows import set_rows
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
@@ -41,7 +43,7 @@ def judge_video_set(
 
     Parameters
     ----------
-    folder : of the set, as `flows.judging.set_files.find_set` reads it
+    folder : of the set, as `flows.judging.video_sets.files.find_set` reads it
     protocol : name or file of a video protocol
     out : folder for judge-set.json and judge-set.md
     learned : YAML of local checkpoints of learned judges
