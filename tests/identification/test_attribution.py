@@ -78,7 +78,7 @@ def test_the_effect_in_the_data_tops_the_ladder_with_its_value(
     evidence = evidence_of(build_parameter_vector({parameter: value}))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     best = refine_candidates(evidence, null, count=3)[0]
-    assert best.hypothesis.name == effect and best.score > 25.0
+    assert best.hypothesis.name == effect and best.score > evidence.rules.accept_score
     sigma = np.sqrt(best.fitted.covariance[-1, -1] * best.inflation)
     assert abs(best.fitted.values[0] - value) < 4.0 * sigma + 0.02 * value
 
