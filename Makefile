@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-scale study-production study-mutants study-exports study-calibration study-editors study-road-edit study-learning freeze bench lock clean
+.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-scale study-production study-mutants study-exports study-calibration study-editors study-learning freeze bench lock clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -97,11 +97,6 @@ study-calibration: $(READY)
 
 study-editors: $(READY)
 	$(BIN)/python -m benchmarks.editors datasets/editors
-
-# What a true mask scores in the road-edit metric, beside the judge: five minutes, most of them for the dataset.
-study-road-edit: $(READY)
-	$(BIN)/musync generate evaluation --out datasets/road-edit
-	$(BIN)/python -m benchmarks.road_edit_true_mask datasets/road-edit
 
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)

@@ -10,7 +10,7 @@ from flows.making.catalogue import Catalogue, catalogue_of
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim
-from tasks.eval.road_edit import score_road_edit
+from tasks.eval.road_edit import score_road_edit, score_true_masks
 from tasks.render.camera import PIXEL_CENTRE
 
 LOOK_AHEAD = 40.0
@@ -23,6 +23,8 @@ AROUND = 18
 
 def road_edit_rows(view: View, clips: list[JudgedClip]) -> list[Row]:
     """Road-edit metrics of each feature clip that has a flat twin, and whether the edit left the rest alone.
+
+    Beside each stands, as its floor, what the true outline of the feature scores in the same pictures.
 
     Parameters
     ----------
@@ -39,12 +41,15 @@ def road_edit_rows(view: View, clips: list[JudgedClip]) -> list[Row]:
         targets = prescribed_masks(clip, depth, np.isin(kind, ROAD_CLASSES), catalogue)
         pictures = [view.arrays(c.facts["index"], "rgb")[0] for c in (clip, flat)]
         score = score_road_edit(list(pictures[0]), list(pictures[1]), list(targets))
+        true = score_true_masks(list(pictures[0]), list(targets))
         for name in ("localised_edit_rate", "anchor_error", "temporal_iou"):
             note = "the target is never seen" if score is None else ""
             if score is not None:
                 note = f"{score.active_frames} frames, {score.unregistered} not registered"
-            value = None if score is None else getattr(score, name)
-            rows.append(figure_row(name, "paired-lab", clip.facts["label"], value, "1", note=note))
+            value, floor = (None if found is None else getattr(found, name) for found in (score, true))
+            rows.append(
+                figure_row(name, "paired-lab", clip.facts["label"], value, "1", note=note, floor=floor)
+            )
         rows += twin_rows(clip, flat, pictures[0], pictures[1], targets)
     return rows
 

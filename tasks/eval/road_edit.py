@@ -207,6 +207,28 @@ def score_road_edit(
     return score_masks(masks, feature, targets, sum(not converged for _, converged in found.values()))
 
 
+def score_true_masks(
+    feature: Sequence[NDArray[np.uint8]], targets: Sequence[Mask], settings: RoadEditSettings | None = None
+) -> RoadEditScore | None:
+    """Return the score of a detector that finds every target without error; None if the target is never seen.
+
+    Morphology and flow stay the metric's, which is why it scores less than 1.
+
+    Parameters
+    ----------
+    feature : F pictures, uint8 [H, W, 3] sRGB, whose flow carries the masks [1]
+    targets : F masks, bool [H, W] [1]
+    settings : constants
+    """
+    chosen = settings or RoadEditSettings()
+    masks = {
+        k: keep_components(target, target, chosen)
+        for k, target in enumerate(targets)
+        if target.sum() >= chosen.active_px
+    }
+    return score_masks(masks, feature, targets) if masks else None
+
+
 def score_masks(
     masks: Mapping[int, Mask],
     feature: Sequence[NDArray[np.uint8]],

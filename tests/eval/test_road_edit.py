@@ -4,7 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
-from tasks.eval.road_edit import RoadEditSettings, register_background, score_road_edit, temporal_iou
+from tasks.eval.road_edit import (
+    RoadEditSettings,
+    register_background,
+    score_road_edit,
+    score_true_masks,
+    temporal_iou,
+)
 from tasks.eval.severity import image_statistics, severity_agreement
 
 DRAW = np.random.Generator(np.random.Philox(4))
@@ -42,6 +48,29 @@ def test_a_target_below_80_pixels_is_not_active() -> None:
     small = np.zeros_like(SPOT)
     small[90:98, 100:109] = True
     assert score_road_edit([GROUND], [GROUND], [small]) is None
+
+
+def draw_strips(heights: list[int]) -> list[np.ndarray]:
+    """Outlines of so many rows."""
+    targets = [np.zeros_like(SPOT) for _ in heights]
+    for target, rows in zip(targets, heights, strict=True):
+        target[70 : 70 + rows, 40:120] = True
+    return targets
+
+
+def test_a_true_mask_of_a_still_feature_loses_nothing() -> None:
+    score = score_true_masks([GROUND] * 3, draw_strips([6, 6, 6]))
+    assert score is not None
+    assert (score.localised_edit_rate, score.temporal_iou, score.active_frames) == (1.0, 1.0, 3)
+    assert score.anchor_error == 0.0
+
+
+def test_a_true_outline_of_fewer_rows_than_the_opening_is_lost() -> None:
+    """The opening is three rows high; a frame that shows two is active all the same."""
+    score = score_true_masks([GROUND] * 2, draw_strips([2, 6]))
+    assert score is not None
+    assert (score.localised_edit_rate, score.temporal_iou, score.active_frames) == (0.5, 0.0, 2)
+    assert score.anchor_error == 0.5
 
 
 def test_registration_undoes_a_shift() -> None:

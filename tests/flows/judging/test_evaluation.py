@@ -90,6 +90,8 @@ def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) 
             "anchor_error", "severity_rank_correlation", "piqe", "temporal_error", "twin_ssim", "twin_flip",
             *NOT_RUN} <= names  # fmt: skip
     assert all(row["note"] for row in rows if row["value"] is None)
+    edits = [row for row in rows if row["method"] == "paired-lab" and row["averaged"] is None]
+    assert edits and all(row["floor"] is not None for row in edits if row["value"] is not None)
     assert {row["method"] for row in rows if row["metric"] == "pitch_rmse"} == {
         "photometric",
         "pnp",
