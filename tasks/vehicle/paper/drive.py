@@ -4,6 +4,7 @@ from math import inf, isinf
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.vehicle.brake import PressureProfile, compute_brake_pressure, find_onset_by_position
@@ -107,7 +108,7 @@ def simulate_drive(
     return log, onset, stop, stop_time
 
 
-@njit(cache=True, nogil=True)
+@register_jitable(cache=True)
 def log_standing(
     log: NDArray[np.float64],
     stop: int,
@@ -132,7 +133,8 @@ def log_standing(
         pressure = compute_brake_pressure(n * step - onset, profile)
         if len(loads) > 0:
             load_f, load_r = loads[n, 0], loads[n, 1]
-        log[n] = log[stop]
+        for column in range(log.shape[1]):  # a row assigned whole makes Numba compile the text of an error
+            log[n, column] = log[stop, column]
         log[n, 9], log[n, 10], log[n, 15] = load_f, load_r, pressure
         log[n, 11] = log[stop, 13] * (wheels.front.brake_gain * pressure)
         log[n, 12] = log[stop, 14] * (wheels.rear.brake_gain * pressure)
