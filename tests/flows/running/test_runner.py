@@ -36,6 +36,8 @@ def process_id(_: int) -> int:
 @pytest.fixture(scope="module")
 def executors():
     """An executor of every runner, as each takes seconds to start; Dask's on a machine with two GPUs."""
+    import distributed  # noqa: F401  (brings its settings)
+
     settings = dask.config.get(SPAWNED)
     with pytest.MonkeyPatch.context() as patch, ExitStack() as running:
         patch.setenv("CUDA_VISIBLE_DEVICES", "0,1")
