@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import NamedTuple
 
-from numba import njit
+from numba.extending import register_jitable
 
 from tasks.errors import InputError
 
@@ -84,7 +84,7 @@ class BrakeCommand:
         )
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def compute_brake_pressure(since_onset: float, profile: PressureProfile) -> float:
     """Return the commanded brake pressure p_b [MPa].
 
@@ -105,7 +105,7 @@ def compute_brake_pressure(since_onset: float, profile: PressureProfile) -> floa
     return profile.peak * (1.0 - falling / profile.release)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def find_onset_by_position(time: float, station: float, speed: float, profile: PressureProfile) -> float:
     """Return the time of the brake onset once its position is passed, else infinity [s].
 
@@ -123,7 +123,7 @@ def find_onset_by_position(time: float, station: float, speed: float, profile: P
     return max(time - (station - profile.onset_station) / speed, 0.0)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def compute_abs_command(braking_slip: float, target_slip: float, release_width: float) -> float:
     """Return the share of the brake torque that the proportional ABS asks for, q_cmd [1] (paper, Eq. app_abs_command).
 
@@ -137,7 +137,7 @@ def compute_abs_command(braking_slip: float, target_slip: float, release_width: 
     return min(max(share, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def limit_abs_rate(command: float, scale: float, build_step: float, release_step: float) -> float:
     """Return the ABS torque scale q after one step: the command within the rate limits [1] (paper, Appendix B).
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.vehicle.parameters import Vehicle
@@ -65,7 +66,7 @@ def build_half_car(vehicle: Vehicle) -> HalfCar:
     )
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def compute_contact_load(
     road_height: float, unsprung_height: float, stiffness: float, static_load: float
 ) -> float:
@@ -80,7 +81,7 @@ def compute_contact_load(
     return static_load + max(stiffness * (road_height - unsprung_height), -static_load)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def compute_suspension_forces(x: HalfCarState, car: HalfCar) -> tuple[float, float]:
     """Return the spring and damper forces of the front and rear axle, F_s,f and F_s,r [N] (paper, Appendix B).
 
@@ -133,7 +134,7 @@ def compute_half_car_rates(
     )
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def advance_half_car(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCarState:
     """Return the half-car state after a step [s] at a constant rate."""
     return (
@@ -148,7 +149,7 @@ def advance_half_car(x: HalfCarState, rate: HalfCarState, step: float) -> HalfCa
     )
 
 
-@njit(cache=True, nogil=True)
+@register_jitable(cache=True)
 def compute_forced_rates(
     x: HalfCarState, road_f: float, road_r: float, moment: float, car: HalfCar
 ) -> HalfCarState:
@@ -167,7 +168,7 @@ def compute_forced_rates(
     return compute_half_car_rates(x, load_f, load_r, force_f, force_r, moment, 0.0, car)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def step_half_car(
     x: HalfCarState,
     road_f: tuple[float, float],

@@ -3,7 +3,7 @@
 from math import cos, pi, sin
 from typing import NamedTuple
 
-from numba import njit
+from numba.extending import register_jitable
 
 from tasks.surface.road_profile import RoadHazard
 
@@ -42,7 +42,7 @@ def make_road_feature(hazard: RoadHazard) -> RoadFeature:
     return RoadFeature(float(hazard.center_m), float(hazard.length_m), float(hazard.height_m))
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def find_line(station: float, road: RoadFeature) -> RoadLine:
     """Return the line of the axle that a station is nearer to.
 
@@ -54,7 +54,7 @@ def find_line(station: float, road: RoadFeature) -> RoadLine:
     return road.front if station > 0.5 * (road.front.station + road.rear.station) else road.rear
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def compute_road_height(station: float, road: RoadFeature) -> float:
     """Return the road height H_g [m] (paper, Eq. shared_road_profile).
 
@@ -73,7 +73,7 @@ def compute_road_height(station: float, road: RoadFeature) -> float:
     return height
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def compute_road_slope(station: float, road: RoadFeature) -> float:
     """Return the road slope dH_g/ds [m/m] (derivative of the paper's Eq. shared_road_profile).
 

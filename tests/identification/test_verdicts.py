@@ -11,7 +11,7 @@ from catalogs.effects.truths import load_truths
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run
+from tasks.campaign.planned_runs import EXPERIMENTS, RICH, RunPlan, make_planned_run
 from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.discovery import ForeignCarError
@@ -62,14 +62,18 @@ def judged(
     outside: str | None = None,
     design: tuple[RunPlan, ...] = LEAN,
     rules: DecisionRules = RULES,
+    experiments: tuple[tuple[str, RunPlan], ...] = EXPERIMENTS[-1:],
 ) -> Verdict:
+    """The verdict on a campaign; to weigh every planned run takes as long as all that comes before it."""
     slots = OUTSIDE[outside].slots if outside else ()
     campaign = make_synthetic_campaign(driven, SURFACE, values, seed, slots=slots, design=design)
     last = 3 * len(design) // 4
     runs = tuple(replace(run, held_out=number >= last) for number, run in enumerate(campaign.runs))
-    return find_missing_effects(
-        replace(campaign, runs=runs), vehicle, SURFACE, tuple(LIBRARY.values()), rules
-    ).verdict
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tasks.identification.decision.experiment.EXPERIMENTS", experiments)
+        return find_missing_effects(
+            replace(campaign, runs=runs), vehicle, SURFACE, tuple(LIBRARY.values()), rules
+        ).verdict
 
 
 def names(verdict: Verdict) -> list[str]:
@@ -115,7 +119,7 @@ def test_two_effects_at_once_are_both_named() -> None:
 
 @pytest.mark.minutes
 def test_what_stops_of_one_kind_cannot_tell_apart_is_a_set_with_the_run_that_can() -> None:
-    verdict = judged({"pad_drag": 40.0}, design=load_closing_study().drives())
+    verdict = judged({"pad_drag": 40.0}, design=load_closing_study().drives(), experiments=EXPERIMENTS)
     told = {*names(verdict), *(rival.name for _, rival in verdict.rivals)}
     assert verdict.verdict == "SET" and "pad_drag" in told
     assert verdict.experiment is not None and verdict.experiment.expected_d2 > 10.0

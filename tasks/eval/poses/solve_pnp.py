@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+from numba.extending import register_jitable
 
 from tasks.eval.poses.motion import FrameStep, failed_step
 from tasks.eval.poses.rigid import (
@@ -91,7 +92,7 @@ def solve_pnp(points: Floats, pixels: Floats, T_start: Floats, K: Floats, limits
     )
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def _linearise(point, pixel, T, K, depth_share, J, residual):  # type: ignore[no-untyped-def]
     """Fill residual and Jacobian of a point; return its depth error's shift a, or NaN behind the camera.
 

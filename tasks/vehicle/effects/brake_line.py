@@ -5,7 +5,7 @@ With every number 0 the acting pressure is the commanded one, bit for bit.
 
 from math import exp
 
-from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.effects.equations import compute_brake_factor
 from tasks.vehicle.effects.table import EffectValues
@@ -16,7 +16,7 @@ DISC_COOLING = 30.0
 """Convective loss of an axle's discs [W/K]."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_line_pressure(
     line: float, before: float, after: float, step: float, effects: EffectValues
 ) -> float:
@@ -37,7 +37,7 @@ def compute_line_pressure(
     return after - behind + (line - before + behind) * exp(-step / effects.lag)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_acting_pressure(line: float, speed: float, disc_rise: float, effects: EffectValues) -> float:
     """Return the pressure that would give the same torque under the linear law of the paper [MPa].
 
@@ -51,7 +51,7 @@ def compute_acting_pressure(line: float, speed: float, disc_rise: float, effects
     return max(line - effects.push_out, 0.0) * compute_brake_factor(effects, line, speed, disc_rise)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_disc_temperature_rate(disc_rise: float, power: float, capacity: float) -> float:
     """Return the rate of the temperature of an axle's discs [K/s].
 

@@ -5,7 +5,7 @@ With every value 0 they return the plain model.
 
 from math import sqrt
 
-from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.road import RoadFeature, compute_road_height, compute_road_slope
@@ -15,7 +15,7 @@ STICK_SLIP = 0.002
 """Slip over which a sticking tyre builds up its force; any value well below the curve's peak serves [1]."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_stick_share(speed: float, effects: EffectValues) -> float:
     """Return the share of the tyre that sticks and slides instead of rolling [1]: 1 at low speed, smoothly down to 0.
 
@@ -32,7 +32,7 @@ def compute_stick_share(speed: float, effects: EffectValues) -> float:
     return u * u * (3.0 - 2.0 * u)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_tread_curve(slip: float, stiffness: float, tyre: Tyre) -> tuple[float, float]:
     """Return friction [1] and slope [1] of a tyre whose tread has its own stiffness, below the slip of the peak.
 
@@ -53,7 +53,7 @@ def compute_tread_curve(slip: float, stiffness: float, tyre: Tyre) -> tuple[floa
     return friction, tyre.peak / tyre.target_slip * steepness * (1.0 - u * u) / (below * below)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_rolling_friction(slip: float, load: float, tyre: Tyre, effects: EffectValues) -> float:
     """Return the friction of a rolling tyre at a braking slip [1].
 
@@ -69,7 +69,7 @@ def compute_rolling_friction(slip: float, load: float, tyre: Tyre, effects: Effe
     return compute_tyre_friction(slip, load, tyre)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_rolling_slope(slip: float, load: float, tyre: Tyre, effects: EffectValues) -> float:
     """Return the derivative of ``compute_rolling_friction`` by slip [1].
 
@@ -85,7 +85,7 @@ def compute_rolling_slope(slip: float, load: float, tyre: Tyre, effects: EffectV
     return compute_tyre_slope(slip, load, tyre)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_stick_friction(tyre: Tyre, effects: EffectValues) -> float:
     """Return the friction of a tyre that sticks [1].
 
@@ -97,7 +97,7 @@ def compute_stick_friction(tyre: Tyre, effects: EffectValues) -> float:
     return max(effects.stick_ratio * tyre.peak - effects.stick_loss, 0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_effective_friction(
     slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
@@ -118,7 +118,7 @@ def compute_effective_friction(
     return (1.0 - share) * rolling + share * compute_stick_friction(tyre, effects) * u / sqrt(1.0 + u * u)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_effective_slope(
     slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
@@ -141,7 +141,7 @@ def compute_effective_slope(
     ) ** 1.5
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def average_over_footprint(station: float, road: RoadFeature, effects: EffectValues) -> tuple[float, float]:
     """Return road height [m] and slope [m/m] averaged over the tyre's footprint.
 
@@ -164,7 +164,7 @@ def average_over_footprint(station: float, road: RoadFeature, effects: EffectVal
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def find_contact(station: float, road: RoadFeature, effects: EffectValues) -> tuple[float, float]:
     """Return road height [m] and slope [m/m] that a wheel at a station feels.
 
@@ -185,7 +185,7 @@ def find_contact(station: float, road: RoadFeature, effects: EffectValues) -> tu
     return height - 0.5 * radius * slope * slope, slope
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_lateral_reserve(friction: float, peak: float) -> float:
     """Return the lateral friction that a braking tyre has left, by the friction circle [1].
 
@@ -198,7 +198,7 @@ def compute_lateral_reserve(friction: float, peak: float) -> float:
     return sqrt(max(1.0 - used * used, 0.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_link_force(
     tyre_force: float, transfer: float, anti: float, stick_anti: float, share: float
 ) -> float:

@@ -2,7 +2,7 @@
 
 from math import exp
 
-from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.effects.table import EffectValues
 
@@ -12,7 +12,7 @@ COULOMB_SPEED = 0.01
 """Suspension speed over which dry friction changes sign [m/s]."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_resistance(effects: EffectValues, speed: float, direction: float, snow_depth_mm: float) -> float:
     """Return the force on the body against the motion [N]: air and snow ploughing, less the idle creep.
 
@@ -34,7 +34,7 @@ def compute_resistance(effects: EffectValues, speed: float, direction: float, sn
     return force
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_brake_factor(effects: EffectValues, pressure: float, speed: float, disc_rise: float) -> float:
     """Return the factor of pad friction and hydraulics on the linear law from pressure to torque [1].
 
@@ -51,7 +51,7 @@ def compute_brake_factor(effects: EffectValues, pressure: float, speed: float, d
     return max(factor, 0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_friction_factor(
     effects: EffectValues, speed: float, load_ratio: float, slip_energy: float, wet: float
 ) -> float:
@@ -73,7 +73,7 @@ def compute_friction_factor(
     return max(factor, 0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_strut_force(
     effects: EffectValues, stiffness: float, damping: float, travel: float, rate: float
 ) -> float:

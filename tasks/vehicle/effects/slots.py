@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
@@ -61,7 +61,7 @@ def pack_slots(slots: Sequence[Slot]) -> SlotTables:
     return SlotTables(keys.reshape(-1, 2), grids.reshape(-1, 2), tables)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def interpolate_table(table: NDArray[np.float64], origin: float, spacing: float, x: float) -> float:
     """Return the value of a piecewise-linear table on a uniform grid, constant beyond its ends [unit of the port].
 
@@ -81,7 +81,7 @@ def interpolate_table(table: NDArray[np.float64], origin: float, spacing: float,
     return float(table[i] + (u - i) * (table[i + 1] - table[i]))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def sum_slots(port: int, variables: tuple[float, ...], slots: SlotTables) -> float:
     """Return the sum of all slots at a port [unit of the port].
 

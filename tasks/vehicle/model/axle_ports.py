@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.brake import compute_abs_command, limit_abs_rate
 from tasks.vehicle.effects.brake_line import compute_acting_pressure
@@ -70,7 +71,7 @@ def compute_signed_slip(speed: float, rim_speed: float, speed_floor: float) -> f
     return min(max((speed - rim_speed) / max(speed, speed_floor), -1.0), 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_signed_friction(
     slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
@@ -88,7 +89,7 @@ def compute_signed_friction(
     return friction if slip >= 0.0 else -friction
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_lock_share(omega: float, lock_speed: float) -> float:
     """Return the share of the brake torque that pad friction gives at a wheel speed: 1, but near standstill [1].
 
@@ -100,7 +101,7 @@ def compute_lock_share(omega: float, lock_speed: float) -> float:
     return min(max(omega / lock_speed, -1.0), 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def collect_form_variables(
     speed: float, load_ratio: float, strut: Strut, memory: AxleMemory, instant: Instant
 ) -> FormVariables:
@@ -118,7 +119,7 @@ def collect_form_variables(
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_relaxation_rate(speed: float, speed_floor: float, length: float) -> float:
     """Return the rate at which the slip that builds up force follows the slip, v / length; 0 without relaxation [1/s].
 
@@ -131,7 +132,7 @@ def compute_relaxation_rate(speed: float, speed_floor: float, length: float) -> 
     return max(speed, speed_floor) / length if length > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_rolling_axle(
     ground: Ground,
     strut: Strut,
@@ -199,7 +200,7 @@ def compute_rolling_axle(
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
     """Return the ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 
@@ -224,7 +225,7 @@ def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxleP
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
     """Return the ports with a force of the links in parallel to spring and damper.
 
@@ -239,7 +240,7 @@ def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_vertical_force(ports: AxlePorts, effects: EffectValues) -> float:
     """Return the force that the road passes to the axle upwards [N].
 
@@ -253,7 +254,7 @@ def compute_vertical_force(ports: AxlePorts, effects: EffectValues) -> float:
     return ports.ground.load - effects.force_tilt * ports.tyre_force * ports.ground.slope
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_axle_lateral_reserve(ports: AxlePorts, tyre: Tyre) -> float:
     """Return the lateral friction that an axle has left; 0 off the road [1].
 

@@ -4,7 +4,7 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.vehicle.brake import PressureProfile, compute_brake_pressure
@@ -59,7 +59,7 @@ def make_trace_input(
     return BrakeInput(NO_COMMAND, pressure, interval, False, NO_TRACE if engine is None else engine)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_input_pressure(time: float, onset: float, delay: float, drive: BrakeInput) -> float:
     """Return the pressure that the driver gives, after a delay [MPa].
 
@@ -75,7 +75,7 @@ def compute_input_pressure(time: float, onset: float, delay: float, drive: Brake
     return interpolate_trace(time - delay - drive.begin, drive.trace, drive.interval)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def interpolate_trace(time: float, trace: NDArray[np.float64], interval: float) -> float:
     """Return the value of a trace, linear between its samples and held beyond both ends [unit of the trace].
 

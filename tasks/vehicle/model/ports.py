@@ -7,7 +7,7 @@ model lacks acts on exactly one of them.
 
 from typing import NamedTuple
 
-from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.effects.chassis import compute_link_force, compute_stick_share
 from tasks.vehicle.effects.equations import compute_resistance
@@ -55,7 +55,7 @@ class Ports(NamedTuple):
     lift: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float]:
     """Return the brake torque per pressure of the front and the rear axle, never negative [N m/MPa].
 
@@ -69,7 +69,7 @@ def compute_brake_gains(pressure: float, chassis: Chassis) -> tuple[float, float
     return front + moved, rear - moved
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_ports(
     motion: Motion,
     memory: Memory,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tasks.vehicle.brake import find_onset_by_position
 from tasks.vehicle.effects.brake_line import compute_line_pressure
 from tasks.vehicle.effects.slots import Slot, SlotTables, pack_slots
+from tasks.vehicle.history import write_row
 from tasks.vehicle.model.axle_ports import compute_vertical_force
 from tasks.vehicle.model.brake_input import BrakeInput, compute_input_pressure, interpolate_trace
 from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
@@ -202,7 +203,7 @@ def integrate_motion(
                 onset_station,
                 stop,
             )
-            states[n // substeps] = pack_state(kept)
+            write_row(states, n // substeps, pack_state(kept))
         if isinf(onset):
             onset = find_onset_by_position(time, motion.station, motion.speed, drive.profile)
         if isinf(onset_station) and time >= onset:
@@ -223,7 +224,7 @@ def integrate_motion(
         ports = compute_ports(motion, memory, x, instant, scale_f, scale_r, step, slots, chassis, tyre, road)
         if n % substeps == 0:
             f, r = ports.front, ports.rear
-            history[n // substeps] = (
+            sample = (
                 motion.station, motion.speed, ports.acceleration, f.slip, r.slip, motion.omega_f, motion.omega_r,
                 f.tyre_force, r.tyre_force, f.ground.load, r.ground.load, f.brake_torque, r.brake_torque, f.abs_scale,
                 r.abs_scale, compute_input_pressure(time, onset, 0.0, drive), ports.road_force,
@@ -233,6 +234,7 @@ def integrate_motion(
                 x[4] - x[6] - body.to_front * x[5], x[4] - x[7] + body.to_rear * x[5], line,
                 compute_vertical_force(f, chassis.effects), compute_vertical_force(r, chassis.effects),
             )  # fmt: skip
+            write_row(history, n // substeps, sample)
         if n == last:
             break
         deceleration = -ports.acceleration

@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import NamedTuple
 
-from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.effects.chassis import compute_effective_slope, compute_stick_share
 from tasks.vehicle.model.axle_ports import AxlePorts, compute_lock_share, compute_relaxation_rate
@@ -42,7 +42,7 @@ class AxleSlope(NamedTuple):
     slip_share: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_axle_slope(
     ports: AxlePorts,
     motion: Motion,
@@ -101,7 +101,7 @@ def compute_axle_slope(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def drop_speed_coupling(slope: AxleSlope) -> AxleSlope:
     """Return the same derivatives for a speed that the driver holds constant."""
     return AxleSlope(
@@ -110,7 +110,7 @@ def drop_speed_coupling(slope: AxleSlope) -> AxleSlope:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def solve_slip(
     rates: Motion, memory: Memory, front: AxleSlope, rear: AxleSlope, g: float
 ) -> tuple[Motion, Memory]:
@@ -138,7 +138,7 @@ def solve_slip(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def _restore_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: float) -> AxleMemory:
     """Return the memory with its eliminated slip restored from the solved speed and wheel speed."""
     if slope.slip_share == 0.0:

@@ -4,7 +4,6 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
@@ -98,7 +97,7 @@ class VehicleState(NamedTuple):
     stop: float
 
 
-@njit(cache=True, nogil=True)
+@register_jitable(cache=True)
 def pack_state(state: VehicleState) -> tuple[float, ...]:
     """Return a state as a row of numbers; `unpack_state` is the inverse."""
     motion, front, rear, x = state.motion, state.memory.front, state.memory.rear, state.body
@@ -144,7 +143,7 @@ def make_rolling_state(speed: float, wheel_radius: float, disc_rise: float, onse
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def advance_motion(motion: Motion, rate: Motion, step: float) -> Motion:
     """Return the longitudinal state after a step [s] at a constant rate."""
     return Motion(
@@ -155,7 +154,7 @@ def advance_motion(motion: Motion, rate: Motion, step: float) -> Motion:
     )
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def advance_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemory:
     """Return the memory of an axle after a step [s] at constant rates."""
     return AxleMemory(
@@ -165,7 +164,7 @@ def advance_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemor
     )
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@register_jitable(cache=True, forceinline=True)
 def clear_slip(memory: Memory) -> Memory:
     """Return the memory with slip 0, as at rest; tyres and discs stay warm."""
     front, rear = memory.front, memory.rear

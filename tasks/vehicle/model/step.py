@@ -6,6 +6,7 @@ that wheel speeds do not oscillate near standstill. For all other states (body, 
 """
 
 from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, compute_disc_temperature_rate
 from tasks.vehicle.effects.slots import SlotTables
@@ -33,7 +34,7 @@ def compute_wheel_rate(ports: AxlePorts, axle: Axle) -> float:
     return torque / axle.inertia
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_axle_memory_rate(
     memory: AxleMemory, ports: AxlePorts, speed: float, omega: float, disc_capacity: float, chassis: Chassis
 ) -> AxleMemory:
@@ -55,7 +56,7 @@ def compute_axle_memory_rate(
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: Chassis) -> Motion:
     """Return the rates of station, speed and wheel speeds (paper, Eq. app_longitudinal_complete).
 
@@ -77,7 +78,7 @@ def compute_motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: 
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: Chassis) -> Memory:
     """Return the rates of both axles' slip states, sliding energies and disc temperatures.
 
@@ -94,7 +95,7 @@ def compute_memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: 
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_body_rates(x: HalfCarState, ports: Ports, chassis: Chassis) -> HalfCarState:
     """Return the rate of the half-car state under the forces of the ports (paper, Eq. app_half_car_complete).
 
@@ -116,7 +117,7 @@ def compute_body_rates(x: HalfCarState, ports: Ports, chassis: Chassis) -> HalfC
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def take_step(
     motion: Motion,
     memory: Memory,
@@ -184,7 +185,7 @@ def take_step(
     return after, remembered, advance_half_car(advance_half_car(x, h1, 0.5 * step), h2, 0.5 * step)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def _advance_axle_twice(memory: AxleMemory, k1: AxleMemory, k2: AxleMemory, step: float) -> AxleMemory:
     """Return the memory after both stages of ROS2, with their weights 3/2 and 1/2."""
     return advance_axle(advance_axle(memory, k1, 1.5 * step), k2, 0.5 * step)

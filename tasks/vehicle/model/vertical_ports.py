@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.effects.chassis import find_contact
 from tasks.vehicle.effects.equations import compute_strut_force
@@ -28,7 +28,7 @@ class Strut(NamedTuple):
     force: float
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_ground(
     station: float,
     speed: float,
@@ -58,7 +58,7 @@ def compute_ground(
     return Ground(height, slope, load)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_struts(x: HalfCarState, chassis: Chassis) -> tuple[Strut, Strut]:
     """Return travel, rate and force of the struts of the front and the rear axle.
 

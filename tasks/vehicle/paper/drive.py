@@ -4,9 +4,11 @@ from math import inf, isinf
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.vehicle.brake import PressureProfile, compute_brake_pressure, find_onset_by_position
+from tasks.vehicle.history import write_row
 from tasks.vehicle.paper.wheel_step import solve_wheel_speed
 from tasks.vehicle.paper.wheels import Wheels, compute_axle_step, compute_transferred_loads
 from tasks.vehicle.road import RoadFeature, compute_road_slope
@@ -77,10 +79,11 @@ def simulate_drive(
             road_force, acceleration = 0.0, 0.0
         elif hold_speed and n * step < onset:
             acceleration = 0.0
-        log[n] = (
+        sample = (
             station, speed, acceleration, f.slip, r.slip, omega_f, omega_r, f.force, r.force, load_f, load_r,
             f.torque, r.torque, f.scale, r.scale, pressure, road_force,
         )  # fmt: skip
+        write_row(log, n, sample)
         if stop >= 0 or n == steps:
             break
         before, after = speed, speed + step * acceleration
@@ -107,7 +110,7 @@ def simulate_drive(
     return log, onset, stop, stop_time
 
 
-@njit(cache=True, nogil=True)
+@register_jitable(cache=True)
 def log_standing(
     log: NDArray[np.float64],
     stop: int,
@@ -132,7 +135,7 @@ def log_standing(
         pressure = compute_brake_pressure(n * step - onset, profile)
         if len(loads) > 0:
             load_f, load_r = loads[n, 0], loads[n, 1]
-        log[n] = log[stop]
+        write_row(log, n, log[stop])
         log[n, 9], log[n, 10], log[n, 15] = load_f, load_r, pressure
         log[n, 11] = log[stop, 13] * (wheels.front.brake_gain * pressure)
         log[n, 12] = log[stop, 14] * (wheels.rear.brake_gain * pressure)

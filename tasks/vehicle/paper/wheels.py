@@ -12,6 +12,7 @@ from math import nan
 from typing import NamedTuple
 
 from numba import njit
+from numba.extending import register_jitable
 
 from tasks.vehicle.brake import PressureProfile, compute_abs_command, compute_brake_pressure, limit_abs_rate
 from tasks.vehicle.parameters import Vehicle
@@ -101,7 +102,7 @@ class AxleStep(NamedTuple):
     rate: float
 
 
-@njit(cache=True, nogil=True)
+@register_jitable(cache=True)
 def compute_axle_step(
     speed: float,
     omega: float,

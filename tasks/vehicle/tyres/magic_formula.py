@@ -10,6 +10,7 @@ from math import atan, copysign, cos, exp, sin, tan
 from typing import NamedTuple
 
 from numba import njit
+from numba.extending import register_jitable
 
 
 class Longitudinal(NamedTuple):
@@ -107,7 +108,7 @@ class MagicFormula(NamedTuple):
     combined: Combined
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def bend_slip(scaled_slip: float, curvature: float) -> float:
     """Return the slip that the arctangent of the Magic Formula takes, B x - E (B x - atan B x) [1].
 
@@ -119,7 +120,7 @@ def bend_slip(scaled_slip: float, curvature: float) -> float:
     return scaled_slip - min(curvature, 1.0) * (scaled_slip - atan(scaled_slip))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def compute_load_change(load: float, nominal_load: float) -> float:
     """Return df_z, how far a load exceeds the nominal one, relative to it [1] (4.E2).
 
@@ -143,7 +144,7 @@ def compute_longitudinal_peak(load_change: float, camber: float, c: Longitudinal
     return (c.pdx1 + c.pdx2 * load_change) * (1.0 - c.pdx3 * camber * camber)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def compute_longitudinal_curvature(load_change: float, slip: float, c: Longitudinal) -> float:
     """Return E_x, which can differ between driving and braking [1] (4.E14).
 
@@ -169,7 +170,7 @@ def compute_longitudinal_stiffness(load_change: float, c: Longitudinal) -> float
     return (c.pkx1 + c.pkx2 * load_change) * exp(c.pkx3 * load_change)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def compute_longitudinal_friction(slip: float, load_change: float, camber: float, c: Longitudinal) -> float:
     """Return force over load in pure longitudinal slip, F_x0 / F_z [1] (4.E9 to 4.E18).
 
@@ -187,7 +188,7 @@ def compute_longitudinal_friction(slip: float, load_change: float, camber: float
     return peak * sin(c.pcx1 * atan(bent)) + c.pvx1 + c.pvx2 * load_change
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def compute_lateral_peak(load_change: float, camber: float, c: Lateral) -> float:
     """Return the peak friction mu_y; negative in the book's signs [1] (4.E23).
 
@@ -200,7 +201,7 @@ def compute_lateral_peak(load_change: float, camber: float, c: Lateral) -> float
     return (c.pdy1 + c.pdy2 * load_change) * (1.0 - c.pdy3 * camber * camber)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def compute_lateral_stiffness(load_change: float, camber: float, c: Lateral) -> float:
     """Return cornering stiffness over load, K_y / F_z; negative in the book's signs [1] (4.E25).
 
@@ -215,7 +216,7 @@ def compute_lateral_stiffness(load_change: float, camber: float, c: Lateral) -> 
     return c.pky1 * (1.0 - c.pky3 * abs(camber)) * turn / load_ratio
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def compute_lateral_friction(slip: float, load_change: float, camber: float, c: Lateral) -> float:
     """Return force over load in pure lateral slip, F_y0 / F_z [1] (4.E19 to 4.E30).
 
@@ -238,7 +239,7 @@ def compute_lateral_friction(slip: float, load_change: float, camber: float, c: 
     return peak * sin(c.pcy1 * atan(bent)) + c.pvy1 + c.pvy2 * load_change + from_camber
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(cache=True, error_model="numpy")
 def weigh_slip(slip: float, shift: float, narrowness: float, shape: float, curvature: float) -> float:
     """Return the weight G that a force keeps under the other slip, 1 without that slip [1] (4.E51, 4.E59).
 

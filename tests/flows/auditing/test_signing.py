@@ -5,24 +5,19 @@ import json
 import shutil
 
 import pytest
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from typer.testing import CliRunner
 
 from flows.auditing.repair import repair_dataset
 from flows.auditing.signing import sign_dataset, signature_findings
 from flows.auditing.verify import verify_dataset
 from flows.cli import app
-from flows.making.generate import generate_dataset
-from flows.store.address import open_for_writing, want_everything
 from flows.store.layout import Layout
 from flows.store.lock import sole_writer
-from flows.store.objects import Objects
 from manifests.canonical import canonical_bytes
 from manifests.manifest import seal_of
 from manifests.signing import ENVELOPE
 from tasks.errors import InputError
-from tests.flows.objects_server import environment, s3_server
-from tests.manifests.test_signing import private_pem, public_pem
+from tests.flows.keys import write_keys
 
 
 @pytest.fixture
@@ -33,14 +28,7 @@ def copy(toy_dataset, tmp_path) -> Layout:
 
 @pytest.fixture
 def keys(tmp_path) -> dict[str, str]:
-    """Files of two key pairs: owner, owner.pub, other, other.pub."""
-    paths = {}
-    for name in ("owner", "other"):
-        key = Ed25519PrivateKey.generate()
-        for suffix, content in (("", private_pem(key)), (".pub", public_pem(key))):
-            (tmp_path / (name + suffix)).write_bytes(content)
-            paths[name + suffix] = str(tmp_path / (name + suffix))
-    return paths
+    return write_keys(tmp_path)
 
 
 def names(layout: Layout) -> set[str]:
@@ -155,24 +143,3 @@ def test_a_link_in_the_envelopes_place_is_not_written_through(copy, keys, tmp_pa
 def test_a_dataset_that_is_being_written_is_not_signed(copy, keys):
     with sole_writer(copy), pytest.raises(InputError, match="another run is writing"):
         sign_dataset(str(copy.root), key=keys["owner"])
-
-
-def test_a_dataset_in_an_object_store_is_signed_there(keys, toy_dataset, tmp_path, monkeypatch):
-    with s3_server(tmp_path) as server:
-        for name, value in environment(server, tmp_path / "cache").items():
-            monkeypatch.setenv(name, value)
-        objects = Objects("s3://data/signed")
-        objects.send(
-            {
-                name: toy_dataset.root / name
-                for name in names(toy_dataset)
-                if (toy_dataset.root / name).is_file()
-            }
-        )
-        assert sign_dataset("s3://data/signed", key=keys["owner"])["written"]
-        assert sign_dataset("s3://data/signed", key=keys["other"])["signatures"] == 2
-        assert objects.sizes().keys() - names(toy_dataset) == {ENVELOPE}
-        with open_for_writing("s3://data/signed", want_everything) as layout:
-            assert signature_findings(layout, keys["owner.pub"])["signed"] is True
-        grid = str(toy_dataset.root.parent / "grid.yaml")
-        assert generate_dataset(grid, "s3://data/signed").made == 0 and ENVELOPE in objects.sizes()

@@ -74,7 +74,7 @@ def test_a_dataset_that_was_compressed_otherwise_is_repaired_in_its_own_compress
     kept = copy.frame_shard("class", 0).read_bytes()
     assert kept != before
     copy.frame_shard("class", 0).unlink()
-    assert repair_dataset(str(copy.root))["repaired"]
+    assert repair_dataset(str(copy.root), runner="threads", workers=1)["repaired"]
     assert copy.frame_shard("class", 0).read_bytes() == kept
 
 

@@ -176,7 +176,7 @@ def piped(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-def test_what_is_wrong_with_a_video_is_told_by_us_alone(tmp_path):
+def test_in_a_process_of_its_own_what_is_wrong_is_told_by_us_alone_a_sentence_each(tmp_path):
     (tmp_path / "no.mp4").write_bytes(b"\0\0\0\x18ftypmp42")
     words = ["judge", "no.mp4", "--claim", "no.parquet", "--camera", "no.yaml"]
     done = subprocess.run(
@@ -189,12 +189,3 @@ def test_what_is_wrong_with_a_video_is_told_by_us_alone(tmp_path):
 
 def test_a_reader_that_leaves_is_no_failure(tmp_path):
     assert piped("schema", cwd=tmp_path).stderr == "0\n"
-
-
-def test_a_folder_that_is_no_dataset_is_one_sentence_in_a_process_of_its_own(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "flows.cli", "describe", "nowhere"], capture_output=True, text=True, cwd=tmp_path,
-        env=dict(os.environ) | {"PYTHONPATH": str(SOURCE_ROOT)}, timeout=60,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert done.stderr.startswith("musync: ") and done.stderr.count("\n") == 1

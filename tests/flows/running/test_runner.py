@@ -3,6 +3,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -32,21 +33,30 @@ def process_id(_: int) -> int:
     return os.getpid()
 
 
+@pytest.fixture(scope="module")
+def executors():
+    """An executor of every runner, as each takes seconds to start; Dask's on a machine with two GPUs."""
+    import distributed  # noqa: F401  (brings its settings)
+
+    settings = dask.config.get(SPAWNED)
+    with pytest.MonkeyPatch.context() as patch, ExitStack() as running:
+        patch.setenv("CUDA_VISIBLE_DEVICES", "0,1")
+        opened = {
+            runner: running.enter_context(open_executor(runner, workers))
+            for runner, workers in (("threads", 2), ("processes", 1), ("dask", 2))
+        }
+        yield opened
+    assert dask.config.get(SPAWNED) == settings, "what workers find is changed for the run alone"
+
+
 @pytest.mark.parametrize("runner", ["threads", "processes", "dask"])
-def test_every_runner_returns_each_result_and_keeps_going_past_a_failure(runner):
-    with open_executor(runner, workers=2) as executor:
-        ended = {
-            call[0]: future
-            for call, future in run_unordered(executor, square_or_fail, [(i,) for i in range(6)])
-        }
-        assert {number: ended[number].result() for number in (0, 1, 2, 4, 5)} == {
-            0: 0,
-            1: 1,
-            2: 4,
-            4: 16,
-            5: 25,
-        }
-        assert isinstance(ended[3].exception(), ValueError)
+def test_every_runner_returns_each_result_and_keeps_going_past_a_failure(executors, runner):
+    ended = {
+        call[0]: future
+        for call, future in run_unordered(executors[runner], square_or_fail, [(i,) for i in range(6)])
+    }
+    assert {number: ended[number].result() for number in (0, 1, 2, 4, 5)} == {0: 0, 1: 1, 2: 4, 4: 16, 5: 25}
+    assert isinstance(ended[3].exception(), ValueError)
 
 
 def test_only_so_many_calls_are_submitted_at_once(monkeypatch):
@@ -93,38 +103,32 @@ def test_without_frames_the_run_is_on_threads_unless_a_runner_is_named():
     assert choose_runner("processes", pictures=False) == "processes"
 
 
-def test_processes_are_other_processes():
-    with open_executor("processes", workers=1) as executor:
-        assert executor.submit(process_id, 0).result() != os.getpid()
+def test_processes_are_other_processes(executors):
+    assert executors["processes"].submit(process_id, 0).result() != os.getpid()
 
 
-def test_a_running_dask_cluster_is_used_by_its_address():
-    from distributed import LocalCluster
-
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
-    ) as cluster:
-        address = cluster.scheduler_address
-        with (
-            pytest.raises(InputError, match="belongs to --runner dask"),
-            open_executor("threads", 1, address),
-        ):
-            pass
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", protocol="tcp"
-    ) as cluster, open_executor("dask", None, cluster.scheduler_address) as executor:  # fmt: skip
-        assert executor.submit(square_or_fail, 7).result() == 49
+def test_a_running_dask_cluster_is_used_by_its_address(executors):
+    address = executors["dask"]._client.scheduler.address
+    with (
+        pytest.raises(InputError, match="belongs to --runner dask"),
+        open_executor("threads", 1, address),
+    ):
+        pass
+    with open_executor("dask", None, address) as executor:
+        assert executor.submit(process_id, 0).result() in executors["dask"]._client.run(os.getpid).values()
 
 
 def memory_settings() -> dict[str, str | None]:
     return {name: os.environ.get(name) for name in ALLOCATOR}
 
 
-def test_local_workers_keep_the_memory_that_the_next_frame_needs():
-    before = dask.config.get(SPAWNED)
-    with open_executor("dask", 1) as executor:
-        assert executor.submit(memory_settings).result() == {k: str(v) for k, v in ALLOCATOR.items()}
-    assert dask.config.get(SPAWNED) == before
+def test_local_workers_keep_the_memory_that_the_next_frame_needs(executors):
+    assert executors["dask"].submit(memory_settings).result() == {k: str(v) for k, v in ALLOCATOR.items()}
+
+
+def test_each_worker_process_sees_one_gpu_of_those_visible(executors):
+    seen = executors["dask"]._client.run(os.getenv, "CUDA_VISIBLE_DEVICES")
+    assert sorted(seen.values()) == ["0", "1"]
 
 
 def test_the_dashboard_is_told_where_its_pages_can_be_drawn(monkeypatch, capsys):
@@ -135,8 +139,8 @@ def test_the_dashboard_is_told_where_its_pages_can_be_drawn(monkeypatch, capsys)
         assert capsys.readouterr().err == said
 
 
-def test_two_runs_on_one_machine_do_not_quarrel_about_a_port(recwarn):
-    with open_executor("dask", 1, None), open_executor("dask", 1, None) as second:
+def test_two_runs_on_one_machine_do_not_quarrel_about_a_port(executors, recwarn):
+    with open_executor("dask", 1, None) as second:
         assert second.submit(square_or_fail, 7).result() == 49
     assert not [str(w.message) for w in recwarn if "in use" in str(w.message)]
 

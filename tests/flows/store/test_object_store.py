@@ -13,6 +13,7 @@ import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
 from flows.auditing.repair import repair_dataset
+from flows.auditing.signing import sign_dataset, signature_findings
 from flows.auditing.verify import collect_garbage, verify_dataset
 from flows.cli import main
 from flows.making.clip import make_clip
@@ -22,12 +23,14 @@ from flows.reading.describe import describe_dataset
 from flows.reading.query import query_dataset
 from flows.scheduled.failure_report import report_failure
 from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
-from flows.store.address import open_for_reading, open_for_writing, want_progress
+from flows.store.address import open_for_reading, open_for_writing, want_everything, want_progress
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.lease import LOCK, hold_lease
 from flows.store.objects import Objects
+from manifests.signing import ENVELOPE
 from tasks.errors import InputError
+from tests.flows.keys import write_keys
 from tests.flows.objects_server import ask, environment, kill, s3_server, start
 
 
@@ -253,3 +256,15 @@ def test_a_command_whose_output_must_be_a_folder_says_so(stored, machine, monkey
     assert (
         end.value.code == 2 and "--out s3://data/reports: must be a folder or file of this machine" in errors
     )
+
+
+def test_a_dataset_is_signed_where_it_lies(machine, grid, toy_dataset, tmp_path):
+    keys, address, written = write_keys(tmp_path), "s3://data/signed", set(files_of(toy_dataset))
+    objects = Objects(address)
+    objects.send({name: toy_dataset.root / name for name in written})
+    assert sign_dataset(address, key=keys["owner"])["written"]
+    assert sign_dataset(address, key=keys["other"])["signatures"] == 2
+    assert objects.sizes().keys() - written == {ENVELOPE}
+    with open_for_writing(address, want_everything) as layout:
+        assert signature_findings(layout, keys["owner.pub"])["signed"] is True
+    assert generate_dataset(grid, address).made == 0 and ENVELOPE in objects.sizes()
