@@ -23,7 +23,13 @@ from tasks.eval.poses.rigid import (
     skew_matrix,
     viewing_rays,
 )
-from tasks.eval.poses.solve_pnp import PnpLimits, _measure_residuals, _sum_normal_equations, solve_pnp
+from tasks.eval.poses.solve_pnp import (
+    PnpLimits,
+    _measure_residuals,
+    _solve_symmetric,
+    _sum_normal_equations,
+    solve_pnp,
+)
 from tasks.eval.poses.warp import bilinear_taps, view_from, warp_map
 
 K = camera_matrix()
@@ -133,6 +139,19 @@ def test_points_that_do_not_agree_are_a_failure() -> None:
     _, exact = seen_by_both(points)
     exact[:10] += 30.0
     assert "40 of 50 tracked points agree" in solve_pnp(points, exact, np.eye(4), K, limits).failure
+
+
+def test_points_that_do_not_fix_the_pose_are_a_failure() -> None:
+    points = np.tile([0.5, 0.2, 8.0], (50, 1))
+    limits = PnpLimits(min_inliers=30, noise_floor=0.01, noise_ceiling=2.0)
+    assert "do not fix the pose" in solve_pnp(points, project_points(points, K), np.eye(4), K, limits).failure
+
+
+def test_the_solver_s_six_equations_are_solved_as_by_a_library() -> None:
+    spread = np.random.default_rng(5).normal(size=(6, 9))
+    H, right, x = spread @ spread.T, np.arange(6.0), np.empty(6)
+    assert _solve_symmetric(H, right, x)
+    np.testing.assert_allclose(x, np.linalg.solve(H, right), rtol=1e-9)
 
 
 def test_an_error_of_depth_does_less_harm_where_it_is_expected() -> None:
