@@ -191,9 +191,7 @@ def _make_clip_files(
 ) -> dict[str, str | bytes | memoryview]:
     """Return the content of a clip's files by name: its telemetry, and its film where it has a frame rate."""
     clip_id, names = row["clip_id"], [channel.name for channel in TICK_CHANNELS]
-    ticks = read_columns(
-        layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id, names
-    )
+    ticks = read_columns(layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id, names)
     packed = _format_script(pack_columns(ticks, names))
     files: dict[str, str | bytes | memoryview] = {
         _traces_name(row): f"clipArrived({_format_script(clip_id)}, {packed});\n"
