@@ -1,4 +1,4 @@
-"""Rigid motions: twists, poses and their effect on pixels."""
+"""Rigid motions: poses and their effect on pixels."""
 
 from typing import Any
 
@@ -6,33 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-
-
-def pose_from_twist(twist: Floats) -> Floats:
-    """Return the pose of a twist: the exponential map of SE(3).
-
-    Parameters
-    ----------
-    twist : float64 [6] translation part [m], then rotation vector [rad]
-
-    Returns
-    -------
-    float64 [4, 4] pose
-
-    Source: Barfoot, State Estimation for Robotics, 2017, DOI 10.1017/9781316671528, section 7.1.
-    """
-    rho, phi = twist[:3], twist[3:]
-    angle = float(np.sqrt(phi @ phi))
-    W = skew_matrix(phi)
-    # below 1e-4 rad the next term of each series is under double precision
-    if angle < 1e-4:
-        a, b, c = 1.0 - angle**2 / 6, 0.5 - angle**2 / 24, 1 / 6 - angle**2 / 120
-    else:
-        a, b, c = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
-    pose = np.eye(4)
-    pose[:3, :3] += a * W + b * (W @ W)
-    pose[:3, 3] = rho + b * (W @ rho) + c * (W @ (W @ rho))
-    return pose
 
 
 def skew_matrix(vector: Floats) -> Floats:

@@ -11,8 +11,8 @@ from tasks.eval.poses.rigid import (
     Floats,
     adjoint_matrix,
     invert_pose,
-    pose_from_twist,
 )
+from tasks.eval.poses.twists import pose_from_twist
 
 TUKEY = 4.685
 """Tukey's constant: 95 % efficiency under Gaussian errors [1] (Beaton and Tukey 1974,
@@ -57,25 +57,13 @@ def solve_pnp(points: Floats, pixels: Floats, T_start: Floats, K: Floats, limits
     -------
     The step ``T_earlier_later`` with its covariance, or the reason of the failure.
     """
-    T, scale = T_start, limits.noise_ceiling
-    size, weight = np.empty(len(points)), np.empty(len(points))
-    for _ in range(40):
-        # pixel errors are white but for the shift of a pixel by the error of the depth, in pixel errors
-        depth_share = limits.depth_error / scale
-        ahead = int(_measure_residuals(points, pixels, T, K, depth_share, size))
-        if ahead < limits.min_inliers:
-            return failed_step(f"{ahead} points lie ahead of the camera", ahead)
-        # the median length of a 2-D Gaussian error is 1.1774 of its standard deviation
-        scale = max(float(np.median(size[size < np.inf])) / 1.1774, limits.noise_floor)
-        weight = np.maximum(1 - (np.minimum(size, 1e9) / (TUKEY * scale)) ** 2, 0.0) ** 2
-        H, gradient = _sum_normal_equations(points, pixels, T, K, depth_share, weight)
-        try:
-            twist = np.linalg.solve(H, gradient)
-        except np.linalg.LinAlgError:
-            return failed_step("the points do not fix the pose", 0)
-        T = pose_from_twist(twist) @ T
-        if np.abs(twist).max() < 1e-7:  # a thousandth of the error of the sharpest tracks
-            break
+    T, size, weight = T_start.copy(), np.empty(len(points)), np.empty(len(points))
+    rules = limits.min_inliers, limits.noise_floor, limits.noise_ceiling, limits.depth_error
+    ahead, scale, H = _settle_pose(points, pixels, T, K, rules, size, weight)
+    if ahead < limits.min_inliers:
+        return failed_step(f"{ahead} points lie ahead of the camera", ahead)
+    if not scale > 0:
+        return failed_step("the points do not fix the pose", 0)
     inliers = int((weight > 0).sum())
     if inliers < limits.min_inliers:
         return failed_step(f"{inliers} of {len(points)} tracked points agree on a pose", inliers)
@@ -90,6 +78,74 @@ def solve_pnp(points: Floats, pixels: Floats, T_start: Floats, K: Floats, limits
     return FrameStep(
         T_earlier_later=pose, covariance=carry @ (variance * np.linalg.inv(H)) @ carry.T, inliers=inliers
     )
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _settle_pose(points, pixels, T, K, rules, size, weight):  # type: ignore[no-untyped-def]
+    """Move T [4, 4] to the pose of least error, and fill size and weight of each residual at its last step.
+
+    Returns
+    -------
+    how many points lie ahead of the camera; the scale of the errors, 0 where the points do not fix the pose [px];
+    and the normal equations H [6, 6]
+    """
+    min_inliers, noise_floor, noise_ceiling, depth_error = rules
+    scale, H, twist = noise_ceiling, np.zeros((6, 6)), np.empty(6)
+    ahead = 0
+    for _ in range(40):
+        # pixel errors are white but for the shift of a pixel by the error of the depth, in pixel errors
+        depth_share = depth_error / scale
+        ahead = _measure_residuals(points, pixels, T, K, depth_share, size)
+        if ahead < min_inliers:
+            break
+        # the median length of a 2-D Gaussian error is 1.1774 of its standard deviation
+        scale = max(np.median(size[size < np.inf]) / 1.1774, noise_floor)
+        for k in range(len(size)):
+            share = min(size[k], 1e9) / (TUKEY * scale)
+            weight[k] = max(1 - share * share, 0.0) ** 2
+        H, gradient = _sum_normal_equations(points, pixels, T, K, depth_share, weight)
+        if not _solve_symmetric(H, gradient, twist):
+            return ahead, 0.0, H
+        _move_pose(pose_from_twist(twist), T)
+        if np.abs(twist).max() < 1e-7:  # a thousandth of the error of the sharpest tracks
+            break
+    return ahead, scale, H
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _move_pose(by, T):  # type: ignore[no-untyped-def]
+    """Put the pose ``by`` [4, 4] before T."""
+    for column in range(4):
+        x, y, z = T[0, column], T[1, column], T[2, column]
+        for i in range(3):
+            T[i, column] = by[i, 0] * x + by[i, 1] * y + by[i, 2] * z + by[i, 3] * T[3, column]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _solve_symmetric(H, right, x):  # type: ignore[no-untyped-def]
+    """Fill x of H x = right by H = L D L'; return False where H is not positive definite.
+
+    Its own few lines, and not a library's, so that its rounding does not depend on the processor.
+    """
+    n = len(right)
+    L, D = np.eye(n), np.empty(n)
+    for i in range(n):
+        for j in range(i):
+            rest = H[i, j]
+            for k in range(j):
+                rest -= L[i, k] * D[k] * L[j, k]
+            L[i, j] = rest / D[j]
+        D[i], x[i] = H[i, i], right[i]
+        for k in range(i):
+            D[i] -= L[i, k] ** 2 * D[k]
+            x[i] -= L[i, k] * x[k]
+        if not D[i] > 0:
+            return False
+    for i in range(n - 1, -1, -1):
+        x[i] /= D[i]
+        for k in range(i + 1, n):
+            x[i] -= L[k, i] * x[k]
+    return True
 
 
 @register_jitable(cache=True, error_model="numpy")
