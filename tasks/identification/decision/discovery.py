@@ -153,6 +153,7 @@ def find_best_form(
     least: float = 0.0,
     splines: tuple[NDArray[np.float64], ...] | None = None,
     accept: float | None = None,
+    gated: bool = True,
 ) -> Candidate | None:
     """Return the form that explains most of the residual of a fit, refined and judged; None if no form passes.
 
@@ -165,21 +166,24 @@ def find_best_form(
     least : gain in log likelihood from which a spline leads to forms [1]
     splines : `differentiate_by_splines` at the fit; None if not computed yet
     accept : score that a spline must promise [1]; None takes that of an effect
+    gated : judge it on held-out runs too, and beside forms of the second spline; else see what the best one explains
     """
     promised = evidence.rules.accept_score if accept is None else accept
     level = compute_inflation(evidence, base, None)
     enough = max(promised + float(np.log(evidence.samples)), least / level)
-    leftovers = [x for x in fit_residual_splines(evidence, base, splines)[:2] if x.gain > enough]
+    leftovers = [x for x in fit_residual_splines(evidence, base, splines)[: 1 + gated] if x.gain > enough]
     if not leftovers:
         return None
-    held_out = compute_misfit_by_run(evidence.held_out, base)
+    held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None
     judged = [
         judge_hypothesis(evidence, base, held_out, h)
         for x in leftovers
         for h in make_form_hypotheses(x, evidence.samples)
     ]
     best = max(judged, key=lambda c: c.score)
-    return None if is_session_number(best.hypothesis) else relinearise_candidate(evidence, base, best)[1]
+    if is_session_number(best.hypothesis):
+        return None
+    return relinearise_candidate(evidence, base, best)[1] if gated else best
 
 
 def search_library_and_forms(
@@ -247,7 +251,7 @@ def _explain_disagreement(explored: SearchState) -> Fit:
     evidence, limit = explored.evidence, explored.evidence.rules.foreign_inflation
     if compute_inflation(evidence, explored.base, None) <= limit:
         return explored.base
-    form = find_best_form(evidence, explored.base)
+    form = find_best_form(evidence, explored.base, gated=False)
     if form is None or compute_inflation(evidence, form.fitted, None) > limit:
         raise ForeignCarError
     return form.fitted
