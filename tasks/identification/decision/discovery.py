@@ -28,7 +28,6 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
 from tasks.identification.inference.linearisation import differentiate_at, hold_session, rescale_disturbances
-from tasks.identification.rules import DecisionRules
 
 
 def search_forms(
@@ -128,22 +127,17 @@ def _find_credible_form(
     """
     if splines is None:
         splines = differentiate_by_splines(evidence, base)
-    form = find_best_form(evidence, base, splines=splines)
-    if form is None or not form.passes:
-        return evidence, form
-    pulled = _find_pulled(form.fitted, base, evidence.rules)
-    if not pulled:
-        return evidence, form
-    held = hold_session(evidence, pulled)
-    form = find_best_form(held, base, splines=splines)
-    if form is None or _find_pulled(form.fitted, base, evidence.rules):
-        return evidence, None
-    return held, form
+    here, form = evidence, find_best_form(evidence, base, splines=splines)
+    while form is not None and form.passes and (pulled := _find_pulled(form, base)):
+        here = hold_session(here, pulled)
+        form = find_best_form(here, base, splines=splines)
+    return here, form
 
 
-def _find_pulled(fitted: Fit, base: Fit, rules: DecisionRules) -> list[str]:
-    """Return the numbers of the session that a fit pulls beyond belief and that were not pulled so before."""
-    pulled = (fitted.pulls > rules.retune_pull) & (base.pulls <= rules.retune_pull)
+def _find_pulled(form: Candidate, base: Fit) -> list[str]:
+    """Return the numbers of the session that a form pulls beyond belief and that were not pulled so before."""
+    limit = form.rules.retune_pull
+    pulled = (np.abs(form.fitted.session) > limit * base.session_sigma) & (base.pulls <= limit)
     return [SESSION[place] for place in np.flatnonzero(pulled)]
 
 
