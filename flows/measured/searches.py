@@ -5,7 +5,7 @@ from contextlib import suppress
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import Campaign
-from tasks.identification.decision.discovery import ForeignCarError
+from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import Trace, find_missing_effects
 from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
 from tasks.surface.state import SurfaceParameters

@@ -59,8 +59,9 @@ class DecisionRules:
     rival_span : difference of scores within which two explanations cannot be told apart [1]
     rival_gain_share : share of the named effect's gain from which another effect counts as a rival [1]
     discrepancy_limit : mean square of a channel's whitened leftover in a run from which its noise is widened [1]
-    foreign_inflation : inflation beside the best effects from which the vehicle's equations are not the model's [1]
-    disputed_inflation : inflation of a named effect from which the runs disagree about it, which tells the same [1]
+    foreign_inflation : inflation beside the best effects, and form, from which the car's equations are not the model's
+        [1]
+    disputed_inflation : inflation of a name from which the runs disagree about it, which tells the same [1]
     win_share : share of bootstrap resamples that the named effect must win [1]
     bootstrap_resamples : bootstrap resamples of the runs [1]
     refined_candidates : candidates of a screening that are refined through the simulation [1]

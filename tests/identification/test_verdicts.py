@@ -13,8 +13,9 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, RunPlan, make_planned_run
 from tasks.identification.benchmark import make_synthetic_campaign
+from tasks.identification.decision import discovery
 from tasks.identification.decision.answer import Verdict
-from tasks.identification.decision.discovery import ForeignCarError
+from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import find_missing_effects
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.identification.rules import DecisionRules
@@ -94,6 +95,36 @@ def test_a_number_off_beyond_its_tolerance_is_a_retune() -> None:
 def test_a_named_effect_about_which_the_runs_disagree_is_left_to_the_joint_fit() -> None:
     with pytest.raises(ForeignCarError):
         judged({"lag": 0.08}, design=BUMPS, rules=replace(RULES, disputed_inflation=0.5))
+
+
+class TestRunsThatDisagreeUntilAFormIsInTheModel:
+    """Pitch that depends on deceleration: no effect of the library, and pitch along the road is none to a joint fit."""
+
+    DISAGREEING = replace(RULES, foreign_inflation=1.5)
+
+    def test_the_form_is_named(self) -> None:
+        verdict = judged({}, outside="pitch_by_deceleration", rules=self.DISAGREEING)
+        (form,) = verdict.effects
+        assert (verdict.verdict, form.port, form.variable) == ("UNKNOWN_FORM", "pitch_moment", "deceleration")
+        # the best of all forms would pull the pitch gain by more than four tolerances
+        assert any("vehicle's own pitch_gain" in reason for reason in verdict.reasons)
+        assert abs(verdict.session_pulls["pitch_gain"][1]) < 0.1
+
+    def test_a_form_that_passes_no_gate_explains_nothing(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(discovery, "search_forms", lambda found, *_: (found, None))
+        with pytest.raises(ForeignCarError):
+            judged({}, outside="pitch_by_deceleration", rules=self.DISAGREEING)
+
+    def test_runs_that_disagree_beside_every_form_are_left_to_the_joint_fit(self) -> None:
+        with pytest.raises(ForeignCarError):
+            judged({}, outside="pitch_by_deceleration", rules=replace(RULES, foreign_inflation=0.9))
+
+    def test_what_moves_the_body_alone_is_taken_back_where_they_disagree_about_it(self) -> None:
+        verdict = judged({}, outside="strut_step", design=BUMPS, rules=replace(RULES, disputed_inflation=0.5))
+        assert verdict.verdict == "NOTHING"
+        assert any(
+            reason.startswith("suspension_force") and "disagree" in reason for reason in verdict.reasons
+        )
 
 
 def test_an_instrument_that_feels_gravity_is_a_sensor_and_no_missing_physics() -> None:

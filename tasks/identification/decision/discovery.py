@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.identification.decision.attribution import Candidate, compute_own_inflation, judge_hypothesis
+from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.attribution import Candidate, judge_hypothesis
+from tasks.identification.decision.disputes import PORT_OF_NUMBER, ForeignCarError, settle_disputes
 from tasks.identification.decision.forms import (
     differentiate_by_splines,
     fit_residual_splines,
@@ -25,36 +27,7 @@ from tasks.identification.decision.search import (
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
-from tasks.identification.inference.linearisation import differentiate_at, rescale_disturbances
-from tasks.identification.rules import DecisionRules
-
-PORT_OF_NUMBER = {
-    "pressure_gain": "brake_torque", "mass": "longitudinal_force", "slope": "longitudinal_force",
-    "pitch_gain": "pitch_moment", "damping": "suspension_force", "stiffness": "suspension_force",
-}  # fmt: skip
-"""Where a wrong number of the session acts: a form there may stand behind it."""
-
-
-class ForeignCarError(Exception):
-    """The runs disagree about every direction even with the best effects: the model's equations do not fit the car."""
-
-
-def check_agreement(evidence: Evidence, fitted: Fit) -> None:
-    """Check that the runs agree about everything that a fit holds.
-
-    Parameters
-    ----------
-    evidence : the runs
-    fitted : fit of all that is named
-
-    Raises
-    ------
-    ForeignCarError
-        If the runs disagree about a part of it so much that the model's equations do not fit the car.
-    """
-    inflation = max((compute_own_inflation(evidence, fitted, part) for part in fitted.parts), default=1.0)
-    if inflation > evidence.rules.disputed_inflation:
-        raise ForeignCarError
+from tasks.identification.inference.linearisation import differentiate_at, hold_session, rescale_disturbances
 
 
 def search_forms(
@@ -77,8 +50,8 @@ def search_forms(
     The state, and a single form that cannot be told from the first effect.
     """
     state, near, rules = start, None, start.evidence.rules
-    left = find_best_form(state.evidence, state.base, splines=splines)
-    over = left is not None and left.passes and not _pulls_session(left.fitted, state.base, rules)
+    here, left = _find_credible_form(state.evidence, state.base, splines)
+    over = left is not None and left.passes
     disagreeing = any(r.accepted.inflation > rules.disagreement for r in state.rounds)
     # a number is held to be wrong by its pull, so a form need not reach the score of an effect beside it
     retuned = all(r.accepted.hypothesis.effect_class == "retune" for r in state.rounds)
@@ -123,10 +96,17 @@ def search_forms(
             near = alone if (ahead > rules.rival_span if same_effect else elsewhere or disagreeing) else None
     if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
         reasons.append(f"a form explains a part of the residual: {left.hypothesis.name}")
+        moved = here.session_sigma < state.evidence.session_sigma
+        if moved.any():
+            held = ", ".join(np.array(SESSION)[moved])
+            reasons.append(
+                f"it is fitted with the vehicle's own {held}, which a form alone would pull beyond belief"
+            )
         state = replace(
             state,
+            evidence=here,
             base=left.fitted,
-            rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left, evidence=state.evidence)),
+            rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left, evidence=here)),
         )
     return state, near
 
@@ -137,12 +117,28 @@ def _acts_where(form: Candidate, rounds: tuple[Round, ...]) -> bool:
     return ports == {form.hypothesis.port}
 
 
-def _pulls_session(fitted: Fit, base: Fit, rules: DecisionRules) -> bool:
-    """Whether a fit pulls a number of the session beyond belief that was not pulled so before.
+def _find_credible_form(
+    evidence: Evidence, base: Fit, splines: tuple[NDArray[np.float64], ...] | None
+) -> tuple[Evidence, Candidate | None]:
+    """Return the best form that pulls no number of the session beyond belief, and the runs that it was fitted to.
 
-    A damping force that is undone by a wrong damping is no discovery.
+    A damping force that is undone by a wrong damping is no discovery. What explains the runs with the number held at
+    the vehicle's value is one: that number only bent the form's shape.
     """
-    return bool(np.any((fitted.pulls > rules.retune_pull) & (base.pulls <= rules.retune_pull)))
+    if splines is None:
+        splines = differentiate_by_splines(evidence, base)
+    here, form = evidence, find_best_form(evidence, base, splines=splines)
+    while form is not None and form.passes and (pulled := _find_pulled(form, base)):
+        here = hold_session(here, pulled)
+        form = find_best_form(here, base, splines=splines)
+    return here, form
+
+
+def _find_pulled(form: Candidate, base: Fit) -> list[str]:
+    """Return the numbers of the session that a form pulls beyond belief and that were not pulled so before."""
+    limit = form.rules.retune_pull
+    pulled = (np.abs(form.fitted.session) > limit * base.session_sigma) & (base.pulls <= limit)
+    return [SESSION[place] for place in np.flatnonzero(pulled)]
 
 
 def find_best_form(
@@ -151,6 +147,7 @@ def find_best_form(
     least: float = 0.0,
     splines: tuple[NDArray[np.float64], ...] | None = None,
     accept: float | None = None,
+    gated: bool = True,
 ) -> Candidate | None:
     """Return the form that explains most of the residual of a fit, refined and judged; None if no form passes.
 
@@ -163,21 +160,24 @@ def find_best_form(
     least : gain in log likelihood from which a spline leads to forms [1]
     splines : `differentiate_by_splines` at the fit; None if not computed yet
     accept : score that a spline must promise [1]; None takes that of an effect
+    gated : judge it on held-out runs too, and beside forms of the second spline; else see what the best one explains
     """
     promised = evidence.rules.accept_score if accept is None else accept
     level = compute_inflation(evidence, base, None)
     enough = max(promised + float(np.log(evidence.samples)), least / level)
-    leftovers = [x for x in fit_residual_splines(evidence, base, splines)[:2] if x.gain > enough]
+    leftovers = [x for x in fit_residual_splines(evidence, base, splines)[: 1 + gated] if x.gain > enough]
     if not leftovers:
         return None
-    held_out = compute_misfit_by_run(evidence.held_out, base)
+    held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None
     judged = [
         judge_hypothesis(evidence, base, held_out, h)
         for x in leftovers
         for h in make_form_hypotheses(x, evidence.samples)
     ]
     best = max(judged, key=lambda c: c.score)
-    return None if is_session_number(best.hypothesis) else relinearise_candidate(evidence, base, best)[1]
+    if is_session_number(best.hypothesis):
+        return None
+    return relinearise_candidate(evidence, base, best)[1] if gated else best
 
 
 def search_library_and_forms(
@@ -206,10 +206,9 @@ def search_library_and_forms(
     evidence = set_run_noise(evidence, estimate_run_noise(evidence, null))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search_library(SearchState(evidence=evidence, base=null), gated=False)
-    if compute_inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
-        raise ForeignCarError
-    # what the best effects follow again is no noise
-    noise = estimate_run_noise(explored.evidence, explored.base)
+    best = _explain_disagreement(explored)
+    # what the best explanation follows again is no noise
+    noise = estimate_run_noise(explored.evidence, best)
     evidence = set_run_noise(evidence, noise)
     explored = replace(
         explored,
@@ -229,5 +228,24 @@ def search_library_and_forms(
     if not found.rounds:
         found = replace(find_retune(start, reasons), tried=found.tried)
     found, near = search_forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
-    check_agreement(found.evidence, found.base)
-    return start, found, near
+    if best is not explored.base and all(r.accepted.hypothesis.effect_class != "form" for r in found.rounds):
+        raise ForeignCarError
+    settled = settle_disputes(found, reasons)
+    return start, settled, near if settled is found else None
+
+
+def _explain_disagreement(explored: SearchState) -> Fit:
+    """Return the fit of what explains the runs best: of the library, or with a form where the runs disagree about that.
+
+    Raises
+    ------
+    ForeignCarError
+        If the runs disagree beside the best form too.
+    """
+    evidence, limit = explored.evidence, explored.evidence.rules.foreign_inflation
+    if compute_inflation(evidence, explored.base, None) <= limit:
+        return explored.base
+    form = find_best_form(evidence, explored.base, gated=False)
+    if form is None or compute_inflation(evidence, form.fitted, None) > limit:
+        raise ForeignCarError
+    return form.fitted

@@ -1,4 +1,4 @@
-"""Effects that were named early and no longer earn their place beside those named later."""
+"""Names that are taken back: an early one that no longer earns its place beside those named later."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,13 +27,24 @@ def drop_superseded(found: SearchState, compared: Sequence[RivalComparison]) -> 
     ]
     if not weak:
         return None
-    gone = min(weak)[1]
-    after = refit_without_part(found.base, gone, evidence)
-    kept = [r for i, r in enumerate(found.rounds) if i != gone]
-    rounds = [_judge_again(found, after, kept[-1])]
-    for known in reversed(kept[:-1]):
-        rounds.insert(0, _judge_again(found, rounds[0].base, known))
-    return replace(found, base=after, rounds=tuple(rounds))
+    return leave_out(found, min(weak)[1])
+
+
+def leave_out(found: SearchState, index: int) -> SearchState:
+    """Return the search without one of its names; the others are fitted and judged again.
+
+    Parameters
+    ----------
+    found : what is named
+    index : position of the name
+    """
+    after = refit_without_part(found.base, index, found.evidence)
+    rounds: tuple[Round, ...] = ()
+    fitted = after
+    for known in reversed([r for i, r in enumerate(found.rounds) if i != index]):
+        rounds = (_judge_again(found, fitted, known), *rounds)
+        fitted = rounds[0].base
+    return replace(found, base=after, rounds=rounds)
 
 
 def _judge_again(found: SearchState, fitted: Fit, known: Round) -> Round:

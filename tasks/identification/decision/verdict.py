@@ -16,7 +16,8 @@ from tasks.identification.decision.answer import (
 )
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.correlation import correlate_residual_with_pressure
-from tasks.identification.decision.discovery import check_agreement, search_library_and_forms
+from tasks.identification.decision.discovery import search_library_and_forms
+from tasks.identification.decision.disputes import settle_disputes
 from tasks.identification.decision.experiment import plan_next_experiment
 from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels, is_noticed
 from tasks.identification.decision.intervals import (
@@ -96,7 +97,9 @@ def find_missing_effects(
     while again := drop_superseded(found, compared):
         found = again
         compared = compare_with_rivals(found.evidence, found.base, found.rounds)
-    check_agreement(found.evidence, found.base)
+    if (agreed := settle_disputes(found, reasons)) is not found:
+        found, near_form = agreed, None
+        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
     progress("held-out error")
     error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     tried = list(found.tried)

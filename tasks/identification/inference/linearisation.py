@@ -1,5 +1,6 @@
 """Linearisation of all runs about a fit, and the scales of their disturbances."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -129,6 +130,18 @@ def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
         train=tuple(differentiate_again(run, evidence.effects if library else ()) for run in evidence.train),
         held_out=tuple(differentiate_again(run, ()) for run in evidence.held_out),
     )
+
+
+def hold_session(evidence: Evidence, names: Sequence[str]) -> Evidence:
+    """Return the same runs with some of the session's numbers held at the vehicle's values.
+
+    Parameters
+    ----------
+    evidence : the runs
+    names : of `SESSION`
+    """
+    held = {name: UNSEEN * evidence.tolerances.session[SESSION.index(name)] for name in names}
+    return replace(evidence, tolerances=evidence.tolerances.with_session(held))
 
 
 def differentiate_about_fit(evidence: Evidence, at: Fit) -> Evidence:

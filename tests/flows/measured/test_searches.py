@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from flows.measured import searches
-from tasks.identification.decision.discovery import ForeignCarError
+from tasks.identification.decision.disputes import ForeignCarError
 
 
 @pytest.mark.parametrize(
