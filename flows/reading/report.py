@@ -19,6 +19,7 @@ from flows.making.seal import pick_evenly
 from flows.reading.film import write_film
 from flows.reading.previews import named_clips
 from flows.running.progress import progress_bar
+from flows.running.runner import open_executor, run_unordered
 from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
@@ -171,30 +172,35 @@ def _write_clips(
     page: Outputs,
     pictures: bool,
 ) -> int:
-    """Write the telemetry and make the missing films of some clips; how many films were made."""
-    names = [channel.name for channel in TICK_CHANNELS]
-    made = 0
-    with progress_bar("report", len(brought)) as advance:
-        for row in brought:
-            clip_id = row["clip_id"]
-            ticks = read_columns(
-                layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id, names
-            )
-            page.write(
-                _traces_name(row),
-                f"clipArrived({_format_script(clip_id)}, {_format_script(pack_columns(ticks, names))});\n",
-            )
-            if pictures and not page.path(_film_name(row)).is_file():
-                film = BytesIO()
-                write_film(
-                    film,
-                    list(read_clip(layout.frames, row["index"], "rgb")),
-                    manifest["grid"]["frame_rate_hz"],
-                )
-                page.write(_film_name(row), film.getvalue())
-                made += 1
+    """Write the telemetry and make the missing films of some clips, on all processors; how many films were made."""
+    filmed = {row["clip_id"] for row in brought if pictures and not page.path(_film_name(row)).is_file()}
+    jobs = (
+        (layout, row, manifest["grid"]["frame_rate_hz"] if row["clip_id"] in filmed else None)
+        for row in brought
+    )
+    with progress_bar("report", len(brought)) as advance, open_executor("threads") as executor:
+        for (_, row, _), future in run_unordered(executor, _make_clip_files, jobs):
+            for name, content in future.result().items():
+                page.write(name, content)
             advance(row["label"])
-    return made
+    return len(filmed)
+
+
+def _make_clip_files(
+    layout: Layout, row: Mapping[str, Any], frame_rate_hz: float | None
+) -> dict[str, str | bytes | memoryview]:
+    """Return the content of a clip's files by name: its telemetry, and its film where it has a frame rate."""
+    clip_id, names = row["clip_id"], [channel.name for channel in TICK_CHANNELS]
+    ticks = read_columns(layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id, names)
+    packed = _format_script(pack_columns(ticks, names))
+    files: dict[str, str | bytes | memoryview] = {
+        _traces_name(row): f"clipArrived({_format_script(clip_id)}, {packed});\n"
+    }
+    if frame_rate_hz is not None:
+        film = BytesIO()
+        write_film(film, list(read_clip(layout.frames, row["index"], "rgb")), frame_rate_hz)
+        files[_film_name(row)] = film.getvalue()
+    return files
 
 
 def _traces_name(row: Mapping[str, Any]) -> str:
