@@ -17,7 +17,6 @@ from tasks.eval.poses.rigid import (
     adjoint_matrix,
     advance_pose,
     invert_pose,
-    pose_from_twist,
     project_points,
     projection_jacobian,
     skew_matrix,
@@ -30,6 +29,7 @@ from tasks.eval.poses.solve_pnp import (
     _sum_normal_equations,
     solve_pnp,
 )
+from tasks.eval.poses.twists import pose_from_twist
 from tasks.eval.poses.warp import bilinear_taps, view_from, warp_map
 
 K = camera_matrix()

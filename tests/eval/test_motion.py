@@ -103,7 +103,7 @@ def test_uncertainty_grows_with_the_root_of_the_number_of_equal_steps() -> None:
 
 
 def test_propagated_uncertainty_matches_a_thousand_perturbed_chains() -> None:
-    from tasks.eval.poses.rigid import pose_from_twist
+    from tasks.eval.poses.twists import pose_from_twist
 
     station, heave, pitch = hump_drive(8, 10.0, hump_at=0.1)
     exact = exact_steps(rig_poses(station, heave, pitch, 1 / 40), list(range(7)), 1e-6)

@@ -9,7 +9,8 @@ from benchmarks.synthetic_street import Clip, drive_clip
 from tasks.eval.poses.essential import EssentialSettings, recover_motion_essential
 from tasks.eval.poses.links import Link, chained_poses, link_placements
 from tasks.eval.poses.motion import FrameStep, Placement, failed_step
-from tasks.eval.poses.rigid import invert_pose, pose_from_twist
+from tasks.eval.poses.rigid import invert_pose
+from tasks.eval.poses.twists import pose_from_twist
 from tests.eval.scoring import pitch_rmse_deg
 
 AHEAD = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])

@@ -8,11 +8,11 @@ from tasks.eval.poses.rigid import (
     Floats,
     adjoint_matrix,
     invert_pose,
-    pose_from_twist,
     projection_jacobian,
     skew_matrix,
 )
 from tasks.eval.poses.solve_pnp import TUKEY
+from tasks.eval.poses.twists import pose_from_twist
 
 
 def fit_rotation(rays: Floats, later_rays: Floats, focal: float) -> tuple[Floats, float]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tasks.eval.poses.motion import FrameStep, Placement
-from tasks.eval.poses.rigid import Floats, adjoint_matrix, invert_pose, pose_from_twist
+from tasks.eval.poses.rigid import Floats, adjoint_matrix, invert_pose
+from tasks.eval.poses.twists import pose_from_twist
 
 LEAST_STD = 1e-7
 """Least standard error of a step [m, rad]: with an error of 0 a step could not be adjusted at all."""

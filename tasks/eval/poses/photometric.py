@@ -15,7 +15,8 @@ from tasks.eval.poses.motion import (
     failed_step,
     integrate_motion,
 )
-from tasks.eval.poses.rigid import Floats, adjoint_matrix, advance_pose, invert_pose, pose_from_twist
+from tasks.eval.poses.rigid import Floats, adjoint_matrix, advance_pose, invert_pose
+from tasks.eval.poses.twists import pose_from_twist
 
 
 @dataclass(frozen=True, kw_only=True)

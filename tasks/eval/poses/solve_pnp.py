@@ -10,8 +10,8 @@ from tasks.eval.poses.rigid import (
     Floats,
     adjoint_matrix,
     invert_pose,
-    pose_from_twist,
 )
+from tasks.eval.poses.twists import pose_from_twist
 
 TUKEY = 4.685
 """Tukey's constant: 95 % efficiency under Gaussian errors [1] (Beaton and Tukey 1974,
