@@ -1,7 +1,7 @@
 """Telemetry as Arrow tables and Parquet files, labelled from the one table of conventions."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import chain
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +63,6 @@ def write_tables(tables: Iterable[pa.Table], path: Path) -> None:
     path : of the file, which is there whole or not at all
     """
     write_pieces(path, _parquet_pieces(_cut_row_groups(tables)))
-    pa.default_memory_pool().release_unused()  # what encoding took, which it would keep for the next time
 
 
 def _cut_row_groups(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
@@ -73,10 +72,14 @@ def _cut_row_groups(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
     for table in tables:
         held.append(table)
         rows += len(table)
+        del table
         while rows >= ROW_GROUP_ROWS:
             whole, is_cut = pa.concat_tables(held), True
-            yield whole.slice(0, ROW_GROUP_ROWS).combine_chunks()
+            group = whole.slice(0, ROW_GROUP_ROWS).combine_chunks()
             held, rows = [whole.slice(ROW_GROUP_ROWS)], rows - ROW_GROUP_ROWS
+            del whole  # what the group was copied from goes before the group is encoded
+            yield group
+            del group
     if rows or not is_cut:  # a table without rows has a row group too
         yield pa.concat_tables(held).combine_chunks()
 
@@ -104,8 +107,8 @@ class _Pieces:
 def _parquet_pieces(tables: Iterable[pa.Table]) -> Iterator[bytes]:
     """The bytes of a Parquet file, each table's as soon as it is encoded."""
     left = iter(tables)
-    first = next(left)
-    pieces, schema = _Pieces(), first.schema
+    waiting = [next(left)]
+    pieces, schema = _Pieces(), waiting[0].schema
     floats = [field.name for field in schema if pa.types.is_floating(field.type)]
     with pq.ParquetWriter(
         pa.PythonFile(pieces, "w"),
@@ -116,10 +119,12 @@ def _parquet_pieces(tables: Iterable[pa.Table]) -> Iterator[bytes]:
         column_encoding=dict.fromkeys(floats, "BYTE_STREAM_SPLIT"),
         write_page_checksum=True,
     ) as writer:
-        for table in chain([first], left):
-            writer.write_table(table, row_group_size=ROW_GROUP_ROWS)
+        while waiting:
+            writer.write_table(waiting.pop(), row_group_size=ROW_GROUP_ROWS)
             yield from pieces.take()
+            waiting += islice(left, 1)
     yield from pieces.take()
+    pa.default_memory_pool().release_unused()  # what encoding took, which it would keep for the next time
 
 
 def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
