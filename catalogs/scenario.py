@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass, fields
 from math import isfinite
+from operator import attrgetter
 from typing import Any
 
 from catalogs.names import WeatherName
@@ -11,7 +12,7 @@ from catalogs.quantities import Scalar
 from tasks.surface.weather import DRY, WEATHERS, find_weather
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Scenario:
     """The controls of one clip (paper, Eq. overall_pipeline: q, u, g), flat as they stand in a Parquet row.
 
@@ -48,10 +49,11 @@ class Scenario:
 
     def as_row(self) -> dict[str, Any]:
         """The fields in order, for a manifest, a table row or a content id."""
-        return dict(vars(self))
+        return dict(zip(SCENARIO_FIELDS, _read_fields(self), strict=True))
 
 
 SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario))
+_read_fields = attrgetter(*SCENARIO_FIELDS)
 NUMBERS = tuple(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"})
 NOT_NEGATIVE = (
     "precipitation_mm_h", "snow_accumulation_h", "peak_pressure_mpa", "hazard_length_m", "ramp_s", "release_s",

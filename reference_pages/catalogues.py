@@ -110,7 +110,7 @@ def write_grids_page() -> str:
             f"\n## {name}\n\n{format_cell(_read_comment(find_entry('grid', name)))}\n\n{len(grid.scenarios)} clips of"
             f" {(settings.frames - 1) / settings.frame_rate_hz:g} s, {drawn}, vehicle `{settings.vehicle}`.\n\n"
         )
-        scenarios = [{k: v for k, v in vars(s).items() if v is not None} for _, s in grid.scenarios]
+        scenarios = [{k: v for k, v in s.as_row().items() if v is not None} for _, s in grid.scenarios]
         fields = [
             f for f in CHANNELS_BY_NAME if any(f in s for s in scenarios) and f not in {"label", "clip_id"}
         ]

@@ -196,7 +196,7 @@ class Outcomes(Sequence[Mapping[str, Any]]):
         return {
             "clip_id": clip.clip_id,
             "label": clip.label,
-            "scenario": vars(clip.scenario),
+            "scenario": clip.scenario.as_row(),
             "figures": figures,
         }
 

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 import flows.making.generate
+from catalogs.scenario import SCENARIO_FIELDS, Scenario
 from flows.making.clip import make_clip
 from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
@@ -94,3 +95,8 @@ def test_the_peak_of_a_run_hardly_grows_with_its_clips(tmp_path, monkeypatch):
     for less, more in ((few, many), (planned_few, planned_many)):
         growth = (more - less) / (MANY - FEW)
         assert growth < LARGEST_GROWTH, f"{growth:.0f} B a clip"
+
+
+def test_a_scenario_keeps_no_dictionary_of_its_own() -> None:
+    scenario = Scenario()
+    assert list(scenario.as_row()) == list(SCENARIO_FIELDS) and not hasattr(scenario, "__dict__")
