@@ -6,6 +6,7 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks.synthetic_street import camera_matrix, make_mount
+from tasks.eval.poses.corners import corner_strength, grid_corners, merge_tracks, track_corners
 from tasks.eval.poses.epipolar import (
     fit_rotation,
     refine_essential,
@@ -150,6 +151,7 @@ def test_points_that_do_not_fix_the_pose_are_a_failure() -> None:
 def test_the_solver_s_six_equations_are_solved_as_by_a_library() -> None:
     spread = np.random.default_rng(5).normal(size=(6, 9))
     H, right, x = spread @ spread.T, np.arange(6.0), np.empty(6)
+    assert not _solve_symmetric(-H, right, x)
     assert _solve_symmetric(H, right, x)
     np.testing.assert_allclose(x, np.linalg.solve(H, right), rtol=1e-9)
 
@@ -227,3 +229,19 @@ def test_bilinear_taps_are_exact_on_a_plane_and_know_the_edge() -> None:
     np.testing.assert_allclose(
         (weights * plane[taps]).sum(axis=0)[:2], [3 * 4.25 - 15 + 1, 87 - 38 + 1], atol=0.01
     )
+
+
+def test_corners_that_are_tracked_in_two_lots_go_where_they_go_together() -> None:
+    rng = np.random.default_rng(8)
+    earlier = cv2.GaussianBlur(rng.integers(0, 256, (96, 128)).astype(np.uint8), (0, 0), 1.5)
+    later = np.roll(earlier, (1, 2), axis=(0, 1))
+    corners = grid_corners(corner_strength(earlier), 16, 6, 0.0).astype(np.float32)
+    lot = np.arange(len(corners)) % 3 > 0
+    together, first, second = (
+        track_corners(earlier, later, some, 11, 1, 0.3) for some in (corners, corners[lot], corners[~lot])
+    )
+    merged = merge_tracks(lot, first, second)
+    assert together.came_back.mean() > 0.5
+    for ours, theirs in zip(merged, together, strict=True):
+        assert np.array_equal(ours, theirs)
+    assert len(track_corners(earlier, later, corners[:0], 11, 1, 0.3).came_back) == 0

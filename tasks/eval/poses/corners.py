@@ -1,10 +1,17 @@
 """Corners spread over a picture, and their tracks from one picture to another."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+
+class Tracks(NamedTuple):
+    """Where corners were found in another picture: places float32 [N, 2] [px], and bool [N] whether they came back."""
+
+    places: NDArray[np.float32]
+    came_back: NDArray[np.bool_]
 
 
 def corner_strength(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -65,7 +72,7 @@ def track_corners(
     window: int,
     levels: int,
     forward_backward: float,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+) -> Tracks:
     """Track corners to another picture and back (Lucas and Kanade, in pyramids; Kalal et al. 2010,
     DOI 10.1109/ICPR.2010.675, for the track back).
 
@@ -79,8 +86,10 @@ def track_corners(
 
     Returns
     -------
-    float32 [N, 2] places in the later picture [px], and bool [N] whether the track came back
+    Places in the later picture; none depends on the other corners.
     """
+    if not len(corners):
+        return Tracks(np.empty((0, 2), np.float32), np.empty(0, bool))
     options: dict[str, Any] = {
         "winSize": (window, window),
         "maxLevel": levels,
@@ -89,4 +98,18 @@ def track_corners(
     there, found, _ = cv2.calcOpticalFlowPyrLK(earlier, later, corners, None, **options)
     back, found_back, _ = cv2.calcOpticalFlowPyrLK(later, earlier, there, None, **options)
     returned = np.linalg.norm(back - corners, axis=-1) < forward_backward
-    return there, (found.ravel() == 1) & (found_back.ravel() == 1) & returned
+    return Tracks(there, (found.ravel() == 1) & (found_back.ravel() == 1) & returned)
+
+
+def merge_tracks(in_first: NDArray[np.bool_], first: Tracks, second: Tracks) -> Tracks:
+    """Return the tracks of corners that were tracked in two lots, in the order of the corners.
+
+    Parameters
+    ----------
+    in_first : bool [N] corners of the first lot; the others are those of the second [1]
+    first, second : tracks of either lot
+    """
+    merged = Tracks(np.empty((len(in_first), 2), np.float32), np.empty(len(in_first), bool))
+    for lot, tracks in ((in_first, first), (~in_first, second)):
+        merged.places[lot], merged.came_back[lot] = tracks
+    return merged

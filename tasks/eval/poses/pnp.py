@@ -11,7 +11,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners, least_strength, track_corners
+from tasks.eval.poses.corners import (
+    Tracks,
+    cell_size,
+    corner_strength,
+    grid_corners,
+    least_strength,
+    merge_tracks,
+    track_corners,
+)
 from tasks.eval.poses.depth_chain import Attempt, invert_depth, place_frames_by_depth, prepare_on_demand
 from tasks.eval.poses.links import Link, chained_poses, link_placements
 from tasks.eval.poses.motion import (
@@ -183,8 +191,9 @@ def _place_frame(
 ) -> FrameStep:
     """Find the way to the frame by every second corner, then place it by all of them, less what things fly before."""
     corners = frame.corners
-    for some in (corners[:: settings.coarse_stride], corners):
-        view, step = _follow_prediction(anchor, frame, some, predicted, K, levels, settings)
+    for stride in (settings.coarse_stride, 1):
+        some = corners[::stride]
+        view, tracks, step = _follow_prediction(anchor, frame, some, predicted, K, levels, settings)
         if not step.failure:
             break
     else:
@@ -193,10 +202,14 @@ def _place_frame(
         strange = (cv2.absdiff(view.grey, frame.grey) > settings.crowded_contrast).astype(np.uint8)
         hidden = cv2.dilate(strange, np.ones((settings.window, settings.window), np.uint8)) > 0
         unhidden = _find_smooth_corners(frame.grey, frame.inverse_depth, settings, hidden)
-        placed = _track_and_solve(anchor, frame, unhidden, view, K, 0, settings)
+        seen = _track_into_frame(view, frame, unhidden, 0, settings)
+        placed = _solve_tracks(anchor, frame, unhidden, seen, view, K, settings)
         if placed.inliers > settings.coarse_stride * step.inliers and not placed.failure:
             return placed
-    placed = _track_and_solve(anchor, frame, corners, view, K, levels, settings)
+    others = np.arange(len(corners)) % stride > 0  # a corner's track does not depend on those of others
+    rest = _track_into_frame(view, frame, corners[others], levels, settings)
+    tracks = merge_tracks(others, rest, tracks)
+    placed = _solve_tracks(anchor, frame, corners, tracks, view, K, settings)
     return step if placed.failure else placed
 
 
@@ -208,18 +221,23 @@ def _follow_prediction(
     K: Floats,
     levels: int,
     settings: PnpSettings,
-) -> tuple[_WarpedAnchor, FrameStep]:
-    """Track and solve; again from the step found where the prediction was far off. Returns the view it ended with."""
+) -> tuple[_WarpedAnchor, Tracks, FrameStep]:
+    """Track and solve; again from the step found where the prediction was far off.
+
+    Returns the view it ended with, the tracks of the corners in it, and the step.
+    """
     for _ in range(levels + 1):
         view = _warp_anchor(anchor, frame, predicted, K)
-        step = _track_and_solve(anchor, frame, corners, view, K, levels, settings)
+        tracks = _track_into_frame(view, frame, corners, levels, settings)
+        step = _solve_tracks(anchor, frame, corners, tracks, view, K, settings)
         if (
             step.failure
             or _mean_shift(frame, corners, predicted, step.T_earlier_later, K) <= settings.near_prediction
         ):
-            return view, step
+            return view, tracks, step
         predicted = step.T_earlier_later
-    return _warp_anchor(anchor, frame, predicted, K), step
+    view = _warp_anchor(anchor, frame, predicted, K)
+    return view, _track_into_frame(view, frame, corners, levels, settings), step
 
 
 def _warp_anchor(anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats) -> _WarpedAnchor:
@@ -236,23 +254,28 @@ def _mean_shift(
     return float(np.mean(np.linalg.norm(seen - expected, axis=-1)))
 
 
-def _track_and_solve(
+def _track_into_frame(
+    view: _WarpedAnchor, frame: _Frame, corners: NDArray[np.int64], levels: int, settings: PnpSettings
+) -> Tracks:
+    return track_corners(
+        view.grey, frame.grey, corners.astype(np.float32), settings.window, levels, settings.forward_backward
+    )
+
+
+def _solve_tracks(
     anchor: _Frame,
     frame: _Frame,
     corners: NDArray[np.int64],
+    tracks: Tracks,
     view: _WarpedAnchor,
     K: Floats,
-    levels: int,
     settings: PnpSettings,
 ) -> FrameStep:
     if len(corners) < settings.min_points:
         return failed_step(f"{len(corners)} points to track, at least {settings.min_points} are needed", 0)
-    found, tracked = track_corners(
-        view.grey, frame.grey, corners.astype(np.float32), settings.window, levels, settings.forward_backward
-    )
     origin = view.source[corners[:, 1], corners[:, 0]]
     q, smooth = _sample_inverse_depth(anchor.inverse_depth, origin, settings)
-    tracked &= smooth
+    tracked = tracks.came_back & smooth
     count = int(tracked.sum())
     if count < settings.min_points:
         return failed_step(f"{count} points tracked, at least {settings.min_points} are needed", count)
@@ -264,7 +287,9 @@ def _track_and_solve(
         overlap=max(settings.window / cell_size(frame.grey.shape[1], settings.cells_across), 1.0) ** 2,
         depth_error=settings.depth_error,
     )
-    return solve_pnp(points, found[tracked].astype(np.float64), invert_pose(view.T_anchor_frame), K, limits)
+    return solve_pnp(
+        points, tracks.places[tracked].astype(np.float64), invert_pose(view.T_anchor_frame), K, limits
+    )
 
 
 def _sample_inverse_depth(
