@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 
 from tasks.eval.poses.motion import FrameStep, failed_step
 from tasks.eval.poses.rigid import (
@@ -92,7 +91,7 @@ def solve_pnp(points: Floats, pixels: Floats, T_start: Floats, K: Floats, limits
     )
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _linearise(point, pixel, T, K, depth_share, J, residual):  # type: ignore[no-untyped-def]
     """Fill residual and Jacobian of a point; return its depth error's shift a, or NaN behind the camera.
 
