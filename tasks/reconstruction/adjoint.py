@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH, tile_lists
@@ -87,7 +86,7 @@ def blend_and_derive(
     return _blend_and_derive(records, starts, splats, planes)
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _opacity_of_logarithm(p):  # type: ignore[no-untyped-def]
     """Return the opacity of logarithm p, 0 where the rasteriser draws nothing: the 64th power of four Taylor terms.
 
@@ -140,14 +139,14 @@ def _blend_and_derive(records, starts, splats, planes):  # type: ignore[no-untyp
     return picture, sums
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _row_range(records, splat, y_tile):  # type: ignore[no-untyped-def]
     y0 = records[splat, Y] - np.float32(y_tile) - _HALF
     half_height = records[splat, HALF_HEIGHT]
     return int(np.ceil(max(y0 - half_height, _ZERO))), int(np.floor(min(y0 + half_height, _BOTTOM)))
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _blend_tile(s, records, splats, tile):  # type: ignore[no-untyped-def]
     """Blend colours front to back; return the end of the splats that still received light."""
     start, end, x_tile, y_tile = tile
@@ -182,7 +181,7 @@ def _blend_tile(s, records, splats, tile):  # type: ignore[no-untyped-def]
     return end
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _derive_tile(s, lanes, records, splats, tile, sums):  # type: ignore[no-untyped-def]
     start, end, x_tile, y_tile = tile
     for i in range(start, end):

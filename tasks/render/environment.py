@@ -4,7 +4,6 @@ from math import floor, pi, sqrt
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
@@ -42,7 +41,7 @@ def direction_angle(y, x):  # type: ignore[no-untyped-def]
     return -angle if y < _ZERO else angle
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def find_on_panorama(x, y, z, rows, columns):  # type: ignore[no-untyped-def]
     """Return row and column of an equirectangular picture in the direction (x, y, z), float32 of any length [px]."""
     row = (_HALF - direction_angle(z, np.float32(sqrt(x * x + y * y))) * _PER_HALF_TURN) * np.float32(
@@ -52,7 +51,7 @@ def find_on_panorama(x, y, z, rows, columns):  # type: ignore[no-untyped-def]
     return row, column
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def blend_panorama(panorama, row, column, out):  # type: ignore[no-untyped-def]
     """Write the picture [H, W, 3] at a place of `find_on_panorama` into ``out`` [3]: bilinear, wrapped in azimuth."""
     height, width = panorama.shape[:2]

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.render.camera import Camera, world_to_camera
@@ -147,7 +146,7 @@ def read_out(
     return Readout(**seen._asdict())
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _cubic_weights(t, weights):  # type: ignore[no-untyped-def]
     """Compute the weights of four neighbours, t between the middle two (Keys 1981, DOI 10.1109/TASSP.1981.1163711)."""
     weights[0] = np.float32(t * (-0.5 + t * (1 - 0.5 * t)))
@@ -156,7 +155,7 @@ def _cubic_weights(t, weights):  # type: ignore[no-untyped-def]
     weights[3] = np.float32(t * t * (-0.5 + 0.5 * t))
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _add_light(picture, u, v, across, down, light):  # type: ignore[no-untyped-def]
     """Add the picture's light at a place by cubic convolution; linear interpolation would blur between pixels."""
     height, width = picture.shape[:2]
@@ -226,7 +225,7 @@ def _project_rows(points, views, K, coefficients, places):  # type: ignore[no-un
         places[k, 2] = camera[2] if v == v else np.nan
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _interpolate_ray(pose, span, share, direction, ray, shift):  # type: ignore[no-untyped-def]
     """Interpolate ray and shift of a pixel at a share of its exposure, linearly, since the rotation is small."""
     for i in range(3):

@@ -5,8 +5,8 @@ the point of inverse depth w on it, times w. The search runs along its image fro
 that neighbourhood, so that near surfaces hide far ones.
 """
 
+import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 TILE = 16
@@ -33,7 +33,7 @@ def depth_bounds(near: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArra
     return bounds[0], bounds[1]
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _inverse_depth(near, u, v):  # type: ignore[no-untyped-def]
     """Return inverse depth at a place: bilinear, exact on planes; at an edge that of the nearest pixel [m-1]."""
     height, width = near.shape
@@ -48,20 +48,20 @@ def _inverse_depth(near, u, v):  # type: ignore[no-untyped-def]
     return (1 - ty) * ((1 - tx) * a + tx * b) + ty * ((1 - tx) * d + tx * e)
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def project_onto_picture(K, ray, shift, w):  # type: ignore[no-untyped-def]
     """Return the place in the wide picture of the point of inverse depth w on a row's ray [px]."""
     z = ray[2] + w * shift[2]
     return K[0] * (ray[0] + w * shift[0]) / z + K[2], K[1] * (ray[1] + w * shift[1]) / z + K[3]
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _row_inverse_depth(q, ray, shift):  # type: ignore[no-untyped-def]
     """Return inverse depth in the row's camera of the ray's point of inverse depth q in the wide camera [m-1]."""
     return ray[2] * q / max(1 - shift[2] * q, 0.1)
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _inverse_depth_range(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
     """Return inverse depths in the row's camera of the ray's points at the nearest and farthest depth nearby [m-1]."""
     u, v = project_onto_picture(K, ray, shift, 0.0)
@@ -73,7 +73,7 @@ def _inverse_depth_range(near, nearest, farthest, K, ray, shift):  # type: ignor
     )
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def parallax_range(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
     """Return the distance of those two points in the wide picture [px]."""
     w, last = _inverse_depth_range(near, nearest, farthest, K, ray, shift)
@@ -82,7 +82,7 @@ def parallax_range(near, nearest, farthest, K, ray, shift):  # type: ignore[no-u
     return max(abs(far_u - u), abs(far_v - v))
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def nearest_surface(near, nearest, farthest, K, ray, shift):  # type: ignore[no-untyped-def]
     """Return the nearest surface on a ray: place in the wide picture [px], inverse depth in the row's camera [m-1]."""
     w, last = _inverse_depth_range(near, nearest, farthest, K, ray, shift)

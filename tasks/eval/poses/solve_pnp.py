@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 
 from tasks.eval.poses.motion import FrameStep, failed_step
 from tasks.eval.poses.rigid import (

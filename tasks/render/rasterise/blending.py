@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH
@@ -89,7 +88,7 @@ def _compile_blend_strips(normals):  # type: ignore[no-untyped-def]
 _blend_strips, _blend_strips_flat = _compile_blend_strips(True), _compile_blend_strips(False)
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _plane_depth(record, rays, u, v):  # type: ignore[no-untyped-def]
     """Return camera z of a splat's plane at picture point (u, v); of its centre if the plane is nearly edge-on."""
     slant = (

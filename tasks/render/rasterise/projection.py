@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.render.rasterise.painters_bias import LARGEST_SHIFT, interpolate_shift
@@ -164,7 +163,7 @@ def _project_blocks(cloud, wanted, in_camera, from_eye, camera, records, slots):
     return written
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _project_lanes(s, antialiased, origin, rotation, lens, drawable):  # type: ignore[no-untyped-def]
     """Fill the records but for planes and colours; mark the Gaussians in front whose splats single precision holds."""
     r00, r01, r02 = rotation[0]
@@ -219,7 +218,7 @@ def _project_lanes(s, antialiased, origin, rotation, lens, drawable):  # type: i
         drawable[l] = (z >= _NEAR) & (reach > _ZERO) & (det < _LARGEST_DET)
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def]
     """Undo the painter's bias: move every splat along its surface by its shift."""
     r00, r01, r02 = rotation[0]
@@ -254,7 +253,7 @@ def _move_nearer(s, antialiased, rotation, lens):  # type: ignore[no-untyped-def
         s[_RECORD + Y * BLOCK + l] = v + way * along_y
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _find_visible(s, width, height, visible):  # type: ignore[no-untyped-def]
     """Keep the drawable splats whose box holds a pixel centre of the picture; return whether any is left."""
     for l in range(BLOCK):
@@ -274,7 +273,7 @@ def _find_visible(s, width, height, visible):  # type: ignore[no-untyped-def]
     return count > 0
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _face_camera(s, from_eye, directions):  # type: ignore[no-untyped-def]
     """Compute unit viewing directions, and turn the planes of the splats against them."""
     ox, oy, oz = from_eye

@@ -2,7 +2,6 @@
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 
 from tasks.render.rasterise.preparation import BLOCK, SH
 from tasks.scene.spherical_harmonics import C0, C1, C2, C3
@@ -14,17 +13,17 @@ _C30, _C31, _C32, _C33, _C34 = (np.float32(c) for c in C3)
 _HALF, _ZERO, _TWO, _THREE, _FOUR = (np.float32(c) for c in (0.5, 0, 2, 3, 4))
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _load_vector(planes, l):  # type: ignore[no-untyped-def]
     return planes[l], planes[BLOCK + l], planes[2 * BLOCK + l]
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _store_vector(planes, l, values):  # type: ignore[no-untyped-def]
     planes[l], planes[BLOCK + l], planes[2 * BLOCK + l] = values
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _add_basis_share(rgb, block, k, l, value):  # type: ignore[no-untyped-def]
     """Add the contribution of basis function k in lane l."""
     plane = SH + 3 * k

@@ -12,8 +12,8 @@ IEEE 754 says, whatever the processor.
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH
@@ -70,7 +70,7 @@ class Strips(NamedTuple):
     is_open: NDArray[np.bool_]
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def absorb_light(p, before):  # type: ignore[no-untyped-def]
     """Return the blend weight of a splat with logarithmic opacity p, and the transmittance behind it.
 
@@ -88,7 +88,7 @@ def absorb_light(p, before):  # type: ignore[no-untyped-def]
     return weight if after > _STOP else _ZERO, after
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def open_tile(s, rows, columns):  # type: ignore[no-untyped-def]
     """Reset the state: transmittance 1 inside the picture, 0 in the part of the tile beyond it."""
     s[:] = _ZERO
@@ -97,7 +97,7 @@ def open_tile(s, rows, columns):  # type: ignore[no-untyped-def]
             s[y * TILE_WIDTH + x] = _ONE
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def find_open_rows(s, is_open):  # type: ignore[no-untyped-def]
     """Mark the rows where light still passes; return the number of pixels where it does."""
     total = 0
@@ -110,7 +110,7 @@ def find_open_rows(s, is_open):  # type: ignore[no-untyped-def]
     return total
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def new_strips():  # type: ignore[no-untyped-def]
     """Return room for the strips of a batch."""
     size = BATCH * TILE_HEIGHT + 1
@@ -124,7 +124,7 @@ def new_strips():  # type: ignore[no-untyped-def]
     )
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def list_strips(records, splats, start, end, x_tile, y_tile, strips):  # type: ignore[no-untyped-def]
     """List the open strips that the splats ``splats[start:end]`` reach, nearest splat first."""
     x_first, y_first = np.float32(x_tile) + _HALF, np.float32(y_tile) + _HALF

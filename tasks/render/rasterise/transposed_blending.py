@@ -2,7 +2,6 @@
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 
 from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH
 from tasks.render.rasterise.projection import COLUMN_FALLOFF
@@ -51,7 +50,7 @@ def blend_transposed(records, starts, splats, residual, sums):  # type: ignore[n
             start = end
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _gather_strips(s, records, listed, strips, weights, sums):  # type: ignore[no-untyped-def]
     for i in range(listed):
         splat, first = np.uint64(strips.splat[i]), np.uint64(strips.pixel[i])

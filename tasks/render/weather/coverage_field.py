@@ -9,7 +9,6 @@ from math import floor, sqrt
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.render.weather.random_streams import lattice_unit, stream_key
@@ -85,7 +84,7 @@ def rank_uniform(
     return ranks
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def lattice_noise(x, y, key):  # type: ignore[no-untyped-def]
     """Smooth noise of unit wavelength: mean 0, variance 1 over all places and seeds.
 

@@ -11,7 +11,6 @@ from math import cos, exp, log, pi, sin, sqrt
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.render.lens import Lens, distort_rays, undistort_points
@@ -136,7 +135,7 @@ def _frustum_planes(rays: NDArray[np.float64]) -> NDArray[np.float64]:
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _outside(point, planes, radius, reach):  # type: ignore[no-untyped-def]
     """Return whether a sphere lies completely outside the view or beyond the reach."""
     outside = point[0] ** 2 + point[1] ** 2 + point[2] ** 2 > (reach + radius) ** 2
@@ -145,7 +144,7 @@ def _outside(point, planes, radius, reach):  # type: ignore[no-untyped-def]
     return outside
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _poisson(chance, mean):  # type: ignore[no-untyped-def]
     """Return a Poisson number by inversion; it never falls when the mean rises: populations are nested in the rate."""
     number, share = 0, exp(-mean)
@@ -156,13 +155,13 @@ def _poisson(chance, mean):  # type: ignore[no-untyped-def]
     return number
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _turn(R, vector, out):  # type: ignore[no-untyped-def]
     for i in range(3):
         out[i] = R[i, 0] * vector[0] + R[i, 1] * vector[1] + R[i, 2] * vector[2]
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _sway(offset, moving, amplitude, rate, time, turn_x, turn_y, quickness, size):  # type: ignore[no-untyped-def]
     """Add a flake's own slow elliptic motion to its position and velocity."""
     amplitude *= 0.3 + 0.7 * size
@@ -174,7 +173,7 @@ def _sway(offset, moving, amplitude, rate, time, turn_x, turn_y, quickness, size
         moving[i] += amplitude * own * cos(phase)
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _expose(streak, place, motion, exposure, K):  # type: ignore[no-untyped-def]
     """Write the pixels of a particle when the shutter opens and when it closes."""
     z = place[2]
@@ -186,7 +185,7 @@ def _expose(streak, place, motion, exposure, K):  # type: ignore[no-untyped-def]
         streak.end[i] = K[i, i] * (place[i] + step) / last + K[i, 2]
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _seen_at(place, motion, time, K, coefficients):  # type: ignore[no-untyped-def]
     """Return the distorted pixel of a particle at a time from the middle of the frame [px]."""
     z = max(place[2] + time * motion[2], NEAREST_Z_SHARE * place[2])
@@ -195,7 +194,7 @@ def _seen_at(place, motion, time, K, coefficients):  # type: ignore[no-untyped-d
     return K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _expose_by_rows(streak, place, motion, exposure, K, coefficients, line_delay, height):  # type: ignore[no-untyped-def]
     """`_expose` behind a lens, by a shutter that opens for one row after the other.
 

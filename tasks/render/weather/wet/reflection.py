@@ -10,7 +10,6 @@ from math import exp, sqrt
 
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.render.environment import sample_panorama
@@ -61,14 +60,14 @@ def mirrored_scene(
     return out
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _gap(u, v, z, depth):  # type: ignore[no-untyped-def]
     """Return the distance of a point of the ray behind the surface seen at its pixel [m]; negative in front of it."""
     surface = depth[int(v), int(u)]
     return z - surface if surface == surface else np.float32(-1e9)
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _blend_pixel(picture, u, v, out):  # type: ignore[no-untyped-def]
     height, width = picture.shape[:2]
     x = min(max(u - np.float32(0.5), np.float32(0)), np.float32(width - 1.001))
@@ -91,7 +90,7 @@ def _place(origin, direction, t, camera):  # type: ignore[no-untyped-def]
     return u, v, z
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-untyped-def]
     """Return u, v, t and weight where a ray that left the picture meets the extended surface at the edge (u, v)."""
     height, width = depth.shape
@@ -106,7 +105,7 @@ def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-
     return edge_u, edge_v, t, np.float32(exp(-beyond / (EDGE_FADE * height)))
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _march(origin, direction, climb, depth, camera):  # type: ignore[no-untyped-def]
     """Follow a ray through the depth picture; return pixel (u, v) and length t where it meets a surface, and a weight.
 

@@ -12,7 +12,6 @@ from math import sqrt
 import cv2
 import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
@@ -84,7 +83,7 @@ class LightOnRoad:
     extinction: float
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def fresnel_reflectance(cosine, refractive_index):  # type: ignore[no-untyped-def]
     """Unpolarised reflectance of a smooth surface (Fresnel; Born & Wolf 1999, section 1.5).
 
@@ -104,7 +103,7 @@ def fresnel_reflectance(cosine, refractive_index):  # type: ignore[no-untyped-de
     return (across * across + along * along) / 2
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def wet_albedo_ratio(albedo, refractive_index, diffuse_reflectance):  # type: ignore[no-untyped-def]
     """Diffuse reflectance of a surface under a water film by its dry one.
 
