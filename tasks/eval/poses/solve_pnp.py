@@ -147,7 +147,7 @@ def _solve_symmetric(H, right, x):  # type: ignore[no-untyped-def]
     return True
 
 
-@register_jitable(cache=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _linearise(point, pixel, T, K, depth_share, J, residual):  # type: ignore[no-untyped-def]
     """Fill residual and Jacobian of a point; return its depth error's shift a, or NaN behind the camera.
 
