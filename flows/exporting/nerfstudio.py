@@ -52,7 +52,10 @@ def write_nerfstudio(dataset: ExportedDataset, folder: Path) -> None:
         if road not in roads:
             roads[road] = f"scenes/road-{len(roads):03d}.ply"
             drawn, _ = edit_scene(
-                catalogue.scene, hazard_of(scenario), catalogue.marking, catalogue.looks.sky.asphalt_albedo
+                catalogue.scene,
+                hazard_of(scenario),
+                catalogue.marking,
+                catalogue.weather_parameters.sky.asphalt_albedo,
             )
             write_gaussians(drawn, folder / roads[road])
         _write_clip(clip, dataset, folder / clip.name, roads[road])

@@ -49,13 +49,13 @@ class Catalogue:
     families: FamilyWeather | None = None
 
     @property
-    def looks(self) -> WeatherParameters:
-        """How the weathers look, which who does not draw never reads."""
-        return _looks(self.weather)
+    def weather_parameters(self) -> WeatherParameters:
+        """Return how the weathers look; the entries are read when a picture first asks for them."""
+        return _read_weather_parameters(self.weather)
 
 
 @lru_cache(maxsize=2)
-def _looks(folder: Path) -> WeatherParameters:
+def _read_weather_parameters(folder: Path) -> WeatherParameters:
     return load_weather(folder)
 
 

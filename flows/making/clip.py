@@ -173,7 +173,10 @@ def render_frames(
 ) -> dict[str, NDArray[Any]]:
     """Render the clip's finished frames, depth and class."""
     gaussians, relief = edit_scene(
-        catalogue.scene, hazard_of(scenario), catalogue.marking, catalogue.looks.sky.asphalt_albedo
+        catalogue.scene,
+        hazard_of(scenario),
+        catalogue.marking,
+        catalogue.weather_parameters.sky.asphalt_albedo,
     )
     return render_clip(
         replace(catalogue.scene, gaussians=gaussians),
@@ -184,7 +187,10 @@ def render_frames(
             rig_at=rig_at,
         ),
         ClipConditions(
-            state=state, parameters=catalogue.looks, seed=seed, anchors=_anchors_of(scenario, plan, catalogue)
+            state=state,
+            parameters=catalogue.weather_parameters,
+            seed=seed,
+            anchors=_anchors_of(scenario, plan, catalogue),
         ),
         select_backend(plan.backend),
         relief=relief,
@@ -195,7 +201,7 @@ def render_frames(
 
 def _anchors_of(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, ...]:
     """Return the anchors about the clip's rate that the paper's composition blends."""
-    look = catalogue.looks.find_look(scenario.weather)
+    look = catalogue.weather_parameters.find_look(scenario.weather)
     if plan.settings.composition != "paper" or look is None or look.anchors_mm_h is None:
         return ()
     return adjacent_anchors(weather_of(scenario), look.anchors_mm_h, catalogue.surface)

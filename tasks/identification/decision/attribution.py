@@ -57,17 +57,17 @@ class Candidate:
     def passes(self) -> bool:
         """Return whether score, test on unseen runs and bounds all hold."""
         unseen = max(self.held_out_gain, self.cross_validated_gain)
-        return self.shows and unseen > self.rules.held_out_gain
+        return self.is_shown and unseen > self.rules.held_out_gain
 
     @property
-    def shows(self) -> bool:
+    def is_shown(self) -> bool:
         """Return whether the training runs show it, with every parameter inside its bounds."""
         return self.score > self.rules.accept_score and not self.fitted.at_bound
 
     @property
     def is_open(self) -> bool:
         """Return whether the training runs show it and the held-out runs neither confirm nor contradict it."""
-        return self.shows and abs(self.held_out_gain) <= self.rules.held_out_gain
+        return self.is_shown and abs(self.held_out_gain) <= self.rules.held_out_gain
 
 
 def judge_hypothesis(

@@ -58,7 +58,7 @@ def test_the_ply_of_a_clip_is_the_scene_that_it_was_drawn_from(export, toy_datas
     folder = export("nerfstudio") / FOLDERS[label]
     file = folder / json.loads((folder / "transforms.json").read_text())["gaussians_file"]
     scenario = next(clip.scenario for clip in plan.clips if clip.label == label)
-    albedo = catalogue.looks.sky.asphalt_albedo
+    albedo = catalogue.weather_parameters.sky.asphalt_albedo
     drawn, _ = edit_scene(catalogue.scene, hazard_of(scenario), catalogue.marking, albedo)
     assert np.array_equal(drawn.means, catalogue.scene.gaussians.means) == (label == BRAKING)
     read = read_gaussians(file)
