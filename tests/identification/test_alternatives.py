@@ -15,13 +15,17 @@ from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
 from tasks.identification.decision.forms import ResidualSpline, is_session_number, make_form_hypotheses
 from tasks.identification.decision.held_out import find_worse_channels, is_noticed
-from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals
+from tasks.identification.decision.rivals import (
+    RivalComparison,
+    compare_with_rivals,
+    is_close_on_unseen_runs,
+)
 from tasks.identification.decision.search import Round, SearchState
 from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import differentiate_run
-from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, TOLERANCES, measured, plain_run
@@ -71,6 +75,21 @@ def test_two_effects_that_together_explain_as_much_stand_beside_the_one_that_is_
 def test_two_effects_do_not_stand_beside_the_truth() -> None:
     evidence, null = evidence_of({"rolling_speed": 0.0009})
     assert find_pairs(*name_effect(evidence, null, "rolling_resistance_speed")) == []
+
+
+@pytest.mark.parametrize(("unseen", "close"), [((3,), True), ((0,), False)], ids=["slow", "fast"])
+def test_unseen_runs_may_tell_a_rival_from_the_named_effect(unseen: tuple[int, ...], close: bool) -> None:
+    evidence, _ = evidence_of({"rolling_speed": 0.0005})
+    # one slow coast-down trains: there, speed says nothing
+    evidence = replace(evidence, train=evidence.train[3:4], held_out=tuple(evidence.train[i] for i in unseen))
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    own, other = (
+        judge_hypothesis(evidence, null, None, make_library_hypothesis(LIBRARY[name]))
+        for name in ("rolling_resistance_speed", "pad_drag")
+    )
+    before = compute_misfit_by_run(evidence.held_out, null)
+    assert is_close_on_unseen_runs(evidence, before, own, own)
+    assert is_close_on_unseen_runs(evidence, before, own, other) is close
 
 
 def test_a_number_that_stays_pulled_beyond_belief_stands_beside_what_is_named() -> None:

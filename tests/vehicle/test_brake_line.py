@@ -90,6 +90,20 @@ def test_wind_creep_rubbing_pads_and_rolling_by_speed_change_coasting_by_their_f
     assert compute_resistance(theta(drag_area=1.0, wind_speed=-10.0), 10.0, 1.0, 0.0) == 0.0
 
 
+def test_idle_creep_drives_a_wheel_and_not_a_body_whose_tyres_slide(coupled, vehicle):
+    creep = {"creep_force": 800.0, "creep_speed": 8.0}
+
+    def compare_with_a_force_on_the_body(pressure, **surface):
+        stop = {**surface, "brake": command(pressure), "duration": 1.6, "speed_km_h": 25}
+        plain, pushed = (coupled(effects, **stop) for effects in ({}, creep))
+        window = slice(1300, 1500)
+        less = np.mean((pushed["longitudinal_acceleration"] - plain["longitudinal_acceleration"])[window])
+        return less * vehicle.mass / (800.0 * (1.0 - np.mean(pushed["speed"][window]) / 8.0))
+
+    assert compare_with_a_force_on_the_body(0.8) == pytest.approx(1.0, abs=0.1)
+    assert abs(compare_with_a_force_on_the_body(3.0, family="snow", friction=0.2)) < 0.1
+
+
 def test_struts_meet_friction_and_a_stop():
     dry = theta(coulomb_friction=80.0)
     assert compute_strut_force(dry, 0.0, 0.0, 0.0, 0.5) == pytest.approx(80.0)

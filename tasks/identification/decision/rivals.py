@@ -7,6 +7,7 @@ import numpy as np
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (  # fmt: skip
     Candidate,
+    Misfits,
     compute_win_share,
     is_nested,
     judge_hypothesis,
@@ -16,7 +17,7 @@ from tasks.identification.decision.attribution import (  # fmt: skip
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.search import Round
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, compute_misfit_by_run
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, sum_misfit_falls
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +58,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             own = judge_hypothesis(evidence, rest, compute_misfit_by_run(evidence.held_out, rest), part)
             tried = tuple(refine_candidates(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
+        unseen = compute_misfit_by_run(evidence.held_out, rest)
         share = compute_win_share([own, *others], rest)
         shares = [compute_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
         near = tuple(
@@ -67,6 +69,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             and not is_nested(own.hypothesis, c.hypothesis)
             # an explanation that bends the session beyond belief is none beside one that does not
             and (own.pulls_session or not c.pulls_session)
+            and is_close_on_unseen_runs(evidence, unseen, own, c)
         )
         compared.append(
             RivalComparison(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
@@ -86,6 +89,27 @@ def is_close(own: Candidate, share: float, other: Candidate, wins: float) -> boo
     if other.gain > own.rules.rival_gain_share * own.gain:
         return True
     return other.score > own.score - own.rules.rival_span or (share < needed and wins > 0.5 * (1.0 - needed))
+
+
+def is_close_on_unseen_runs(evidence: Evidence, before: Misfits, own: Candidate, other: Candidate) -> bool:
+    """Return whether held-out runs leave another explanation as close to the named one as the training runs do.
+
+    Parameters
+    ----------
+    evidence : the runs
+    before : `compute_misfit_by_run` of the held-out runs without either
+    own, other : the named effect and the other
+    """
+    rules = evidence.rules
+    mine, its = (
+        sum_misfit_falls(before, compute_misfit_by_run(evidence.held_out, c.fitted)) for c in (own, other)
+    )
+    if its < -rules.held_out_gain * other.inflation:
+        return False
+    return (
+        its > rules.rival_gain_share * mine
+        or 0.5 * its / other.inflation > 0.5 * mine / own.inflation - rules.rival_span
+    )
 
 
 def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:

@@ -14,7 +14,7 @@ COULOMB_SPEED = 0.01
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_resistance(effects: EffectValues, speed: float, direction: float, snow_depth_mm: float) -> float:
-    """Return the force on the body against the motion [N]: air and snow ploughing, less the idle creep.
+    """Return the force on the body against the motion [N]: air and snow ploughing.
 
     Parameters
     ----------
@@ -29,9 +29,24 @@ def compute_resistance(effects: EffectValues, speed: float, direction: float, sn
             air = speed + direction * effects.wind_speed
             force += 0.5 * AIR_DENSITY * effects.drag_area * air * abs(air)
         force += effects.ploughing * snow_depth_mm
-        if effects.creep_force != 0.0 and speed < effects.creep_speed:
-            force -= effects.creep_force * (1.0 - speed / effects.creep_speed)
     return force
+
+
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
+def compute_engine_torque(effects: EffectValues, omega: float, radius: float) -> float:
+    """Return the torque of the engine on the driven wheels, against their rotation [N m]: drag, less the idle creep.
+
+    Parameters
+    ----------
+    effects : numbers of the vehicle's effects
+    omega : speed of the driven wheels [rad/s]
+    radius : radius of the wheels [m]
+    """
+    torque = effects.engine_torque + effects.engine_viscous * omega
+    rim_speed = radius * omega
+    if effects.creep_force != 0.0 and rim_speed < effects.creep_speed:
+        torque -= effects.creep_force * radius * (1.0 - rim_speed / effects.creep_speed)
+    return torque
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)

@@ -124,11 +124,11 @@ EFFECT_TABLE = (
     _add_number("rolling_speed", "rolling resistance by speed", "s m-1", "longitudinal_force", (0.0, 0.003), 0.0002,
                 GILLESPIE),
     _add_number("ploughing", "snow ploughing", "N mm-1", "longitudinal_force", (0.0, 100.0), 5.0, SHOOP),
-    _add_number("creep_force", "idle creep", "N", "longitudinal_force", (0.0, 2500.0), 100.0, MITSCHKE),
-    _add_number("creep_speed", "idle creep", "m s-1", "longitudinal_force", (1.5, 12.0), 0.5, MITSCHKE, 4.0),
     # torques on the wheels
     _add_number("engine_torque", "engine braking", "N m", "brake_torque", (0.0, 400.0), 20.0, MITSCHKE),
     _add_number("engine_viscous", "engine braking", "N m s rad-1", "brake_torque", (0.0, 6.0), 0.4, MITSCHKE),
+    _add_number("creep_force", "idle creep", "N", "brake_torque", (0.0, 2500.0), 100.0, MITSCHKE),
+    _add_number("creep_speed", "idle creep", "m s-1", "brake_torque", (1.5, 12.0), 0.5, MITSCHKE, 4.0),
     _add_number("pad_drag", "pad drag", "N m", "brake_torque", (0.0, 250.0), 15.0, LIMPERT),
     _add_number("lag", "brake lag", "s", "brake_torque", (0.0, 0.5), 0.03, LIMPERT),
     _add_number("dead_time", "brake dead time", "s", "brake_torque", (0.0, 0.4), 0.02, LIMPERT),

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from numba.extending import register_jitable
 
 from tasks.vehicle.effects.chassis import compute_link_force, compute_stick_share
-from tasks.vehicle.effects.equations import compute_resistance
+from tasks.vehicle.effects.equations import compute_engine_torque, compute_resistance
 from tasks.vehicle.effects.ports import PORTS
 from tasks.vehicle.effects.slots import SlotTables, sum_slots
 from tasks.vehicle.half_car import HalfCarState
@@ -113,7 +113,7 @@ def compute_ports(
     else:
         gain_f, gain_r = compute_brake_gains(instant.pressure, chassis)
         share = gain_f / (gain_f + gain_r)
-        engine = effects.engine_torque + effects.engine_viscous * motion.omega_f - share * instant.engine
+        engine = compute_engine_torque(effects, motion.omega_f, wheels.radius) - share * instant.engine
         engine_r = -(1.0 - share) * instant.engine
         front = compute_rolling_axle(
             ground_f, strut_f, speed, motion.omega_f, memory.front, scale_f, gain_f, engine, body.static_f,
