@@ -77,7 +77,9 @@ def test_two_effects_do_not_stand_beside_the_truth() -> None:
     assert find_pairs(*name_effect(evidence, null, "rolling_resistance_speed")) == []
 
 
-@pytest.mark.parametrize(("unseen", "close"), [((3,), True), ((0,), False)], ids=["slow", "fast"])
+@pytest.mark.parametrize(
+    ("unseen", "close"), [((3, 3), True), ((0, 1), False), ((0, 3), True)], ids=["slow", "fast", "one fast"]
+)
 def test_unseen_runs_may_tell_a_rival_from_the_named_effect(unseen: tuple[int, ...], close: bool) -> None:
     evidence, _ = evidence_of({"rolling_speed": 0.0005})
     # one slow coast-down trains: there, speed says nothing

@@ -17,7 +17,7 @@ from tasks.identification.decision.attribution import (  # fmt: skip
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.search import Round
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, compute_misfit_by_run, sum_misfit_falls
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, compute_misfit_falls
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,16 +100,17 @@ def is_close_on_unseen_runs(evidence: Evidence, before: Misfits, own: Candidate,
     before : `compute_misfit_by_run` of the held-out runs without either
     own, other : the named effect and the other
     """
-    rules = evidence.rules
     mine, its = (
-        sum_misfit_falls(before, compute_misfit_by_run(evidence.held_out, c.fitted)) for c in (own, other)
+        compute_misfit_falls(before, compute_misfit_by_run(evidence.held_out, c.fitted)) for c in (own, other)
     )
-    if its < -rules.held_out_gain * other.inflation:
-        return False
-    return (
-        its > rules.rival_gain_share * mine
-        or 0.5 * its / other.inflation > 0.5 * mine / own.inflation - rules.rival_span
+    # what a single run says tells no two explanations apart
+    kept = 1.0 - np.eye(len(mine))
+    own_fall, fall = 0.5 * kept @ mine, 0.5 * kept @ its
+    rules = evidence.rules
+    as_good = (fall > rules.rival_gain_share * own_fall) | (
+        fall / other.inflation > own_fall / own.inflation - rules.rival_span
     )
+    return bool(np.any(as_good & (2.0 * fall / other.inflation >= -rules.held_out_gain)))
 
 
 def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:

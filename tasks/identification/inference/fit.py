@@ -244,14 +244,22 @@ def sum_misfit_falls(
     before: tuple[NDArray[np.float64], NDArray[np.float64]],
     after: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> float:
-    """Return the fall of the misfit summed over runs; a run's change counts only beyond its numerical error.
+    """Return the fall of the misfit summed over runs, of which `compute_misfit_falls` says more."""
+    return float(np.sum(compute_misfit_falls(before, after)))
+
+
+def compute_misfit_falls(
+    before: tuple[NDArray[np.float64], NDArray[np.float64]],
+    after: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    """Return the fall of the misfit of each run, float64 [R]; a change counts only beyond its numerical error.
 
     Parameters
     ----------
     before, after : results of `compute_misfit_by_run`
     """
     change = before[0] - after[0]
-    return float(np.sum(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0)))
+    return np.asarray(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0))
 
 
 def _compute_total_misfit(
