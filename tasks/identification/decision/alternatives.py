@@ -10,7 +10,8 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
 from tasks.identification.decision.rivals import RivalComparison, is_close_on_unseen_runs
 from tasks.identification.decision.search import SearchState
-from tasks.identification.inference.fit import compute_misfit_by_run
+from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.fit import Fit, compute_misfit_by_run, sum_misfit_falls
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 
 
@@ -61,7 +62,7 @@ def find_pairs(found: SearchState, compared: Sequence[RivalComparison]) -> list[
     """Return the members of two effects that together explain as much as the one that is named alone.
 
     Drag of the air and of the pads together look like a resistance that grows with speed. Runs that no fit has seen
-    must not tell the two from the one.
+    must not tell the two from the one, nor contradict one of the two.
 
     Parameters
     ----------
@@ -94,6 +95,7 @@ def find_pairs(found: SearchState, compared: Sequence[RivalComparison]) -> list[
             and each_counts
             and not both.fitted.at_bound
             and is_close_on_unseen_runs(evidence, unseen, own, both)
+            and not any(_is_contradicted(evidence, one.fitted, both) for one in (a, b))
         ):
             first = judge_hypothesis(evidence, b.fitted, None, a.hypothesis)
             reason = f"{a.hypothesis.name} and {b.hypothesis.name} together explain as much as {own.hypothesis.name}"
@@ -104,3 +106,9 @@ def find_pairs(found: SearchState, compared: Sequence[RivalComparison]) -> list[
             ]
             known |= {a.hypothesis.name, b.hypothesis.name}
     return alternatives
+
+
+def _is_contradicted(evidence: Evidence, alone: Fit, both: Candidate) -> bool:
+    """Return whether held-out runs are predicted worse with a further effect than without it."""
+    fall = sum_misfit_falls(*(compute_misfit_by_run(evidence.held_out, f) for f in (alone, both.fitted)))
+    return fall < -evidence.rules.held_out_gain * both.inflation
