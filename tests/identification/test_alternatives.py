@@ -19,8 +19,8 @@ from tasks.identification.decision.rivals import RivalComparison, compare_with_r
 from tasks.identification.decision.search import Round, SearchState
 from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import differentiate_run
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector

@@ -128,8 +128,9 @@ def fit_hypotheses(
             # a threshold has no derivative while its effect is 0: take derivatives again after the effect has moved
             blind = bool(np.any(np.diag(normal)[:k] == 0.0))
         right = np.concatenate((np.zeros(k), -prior * s))
-        for point, (columns, q) in zip(points, slopes, strict=True):
-            right += columns.T @ point.residual - q.T @ point.projected
+        for run, point, (columns, q) in zip(evidence, points, slopes, strict=True):
+            # the offsets' linear part N d of the residual: columns' N = q' factor'
+            right += columns.T @ point.residual + q.T @ (run.factor.T @ point.offsets - point.projected)
         move = _compute_gauss_newton_step(normal, right, x, lower, upper)
         foreseen = float(move @ right)
         if foreseen < 0.1 and abs(fell) < 3.0:
@@ -165,7 +166,10 @@ def fit_hypotheses(
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
         by_run=collect_misfits(points), covariance=covariance,
-        residuals=tuple(point.residual for point in points), offsets=tuple(point.offsets for point in points),
+        residuals=tuple(
+            run.add_offsets(point.residual, point.offsets) for run, point in zip(evidence, points, strict=True)
+        ),
+        offsets=tuple(point.offsets for point in points),
     )  # fmt: skip
 
 
