@@ -216,7 +216,9 @@ def search_library_and_forms(
     found = search_library(start, gated=True, explored=explored)
     if not found.rounds:
         found = replace(find_retune(start, reasons), tried=found.tried)
-    found, near = search_forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
+    # about the same parts again, in other words, the residual has the same splines
+    same = [p.name for p in found.base.parts] == [p.name for p in explored.base.parts]
+    found, near = search_forms(found, start, reasons, splines if same else None)
     if best is not explored.base and all(r.accepted.hypothesis.effect_class != "form" for r in found.rounds):
         raise ForeignCarError
     settled = settle_disputes(found, reasons)
