@@ -21,6 +21,8 @@ HELD = 1e18
 MISSED = 0.3
 """Relative error of the predicted fall of the misfit from which derivatives are taken anew."""
 
+SETTLED = 1.0
+"""Fall of the misfit that a fit no longer seeks: half a unit of log likelihood [1]."""
 TRIALS = ((1.0, True), (0.4, True), (1.0, False), (0.4, False), (0.16, False), (0.064, False))
 """Shares of a step that are tried, and whether the runs' own offsets move with it."""
 
@@ -141,7 +143,10 @@ def fit_hypotheses(
             run.estimate_offsets(point.projected - q @ move)
             for run, point, (_, q) in zip(evidence, points, slopes, strict=True)
         )
+        better = False
         for share, together in TRIALS:
+            if share * (2.0 - share) * foreseen < SETTLED and share < 1.0:
+                continue
             x_try, s_try = np.clip(x + share * move[:k], lower, upper), s + share * move[k:]
             own = tuple(
                 point.offsets + share * together * (d - point.offsets)
@@ -157,7 +162,7 @@ def fit_hypotheses(
         points = trial if together else move_linearisation_points(evidence, parts, x, s, trial)
         objective = _compute_total_misfit(points, prior, s)
         fell = before - objective
-        if abs(fell) < 0.3 and foreseen < 0.5:
+        if abs(fell) < SETTLED and foreseen < SETTLED:
             break
     # scaled first: in their own units the information matrix is too ill-conditioned for double precision
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
