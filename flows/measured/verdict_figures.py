@@ -96,7 +96,8 @@ def make_spline_figures(trace: Trace) -> dict[str, Any]:
     trace : the verdict and what it stands on
     """
     frozen = fit_residual_splines(trace.start.evidence, trace.start.base)
-    after = {(s.port, s.variable): s for s in fit_residual_splines(trace.end.evidence, trace.end.base)}
+    left = frozen if trace.end is trace.start else fit_residual_splines(trace.end.evidence, trace.end.base)
+    after = {(s.port, s.variable): s for s in left}
     ports = [effect.port for effect in trace.verdict.effects]
     shown = next((spline for spline in frozen if spline.port in ports), frozen[0])
     return {

@@ -23,8 +23,8 @@ from tasks.identification.decision.rivals import (
 from tasks.identification.decision.search import Round, SearchState
 from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import differentiate_run
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
@@ -68,7 +68,11 @@ def name_effect(evidence: Evidence, null: Fit, name: str) -> tuple[SearchState, 
 def test_two_effects_that_together_explain_as_much_stand_beside_the_one_that_is_named() -> None:
     evidence, null = evidence_of({"drag_area": 0.8, "pad_drag": 60.0})
     pairs = find_pairs(*name_effect(evidence, null, "rolling_resistance_speed"))
-    assert {other.candidate.hypothesis.name for other in pairs} == {"aerodynamic_drag", "pad_drag"}
+    values = {other.candidate.hypothesis.name: other.candidate.fitted.values[-1] for other in pairs}
+    assert values == {
+        "aerodynamic_drag": pytest.approx(0.8, rel=0.3),
+        "pad_drag": pytest.approx(60.0, rel=0.3),
+    }
     assert "together" in pairs[0].reason
 
 

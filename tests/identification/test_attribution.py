@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +12,17 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.attribution import refine_candidates
+from tasks.identification.decision.attribution import cross_validate_candidate, refine_candidates
+from tasks.identification.inference import derivatives
 from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance, compute_prior_precision
-from tasks.identification.inference.evidence import differentiate_run
 from tasks.identification.inference.fit import fit_hypotheses
-from tasks.identification.inference.forward import predict_channels, prepare_run
+from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
+from tasks.identification.inference.linearisation_points import linearise_at
+from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
+from tasks.vehicle.model.simulation import Simulation
 
 WANTED = (
     "aerodynamic_drag",
@@ -98,7 +103,7 @@ def test_an_effect_that_no_held_out_run_excites_needs_two_training_runs_that_pre
         build_parameter_vector({"anti_dive": 0.5}), (*RUNS[1 : 1 + stops], coasting, coasting)
     )
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
-    best = refine_candidates(evidence, null, count=3)[0]
+    best = cross_validate_candidate(evidence, null, refine_candidates(evidence, null, count=3)[0])
     assert best.hypothesis.name == "anti_dive" and best.is_open
     assert best.passes is passes and (best.cross_validated_gain > 100.0) is passes
 
@@ -113,6 +118,49 @@ def test_the_marginal_misfit_is_that_of_the_dense_covariance() -> None:
     dense = r @ np.linalg.solve(np.eye(600) + j @ np.linalg.inv(precision) @ j.T, r)
     q = np.linalg.solve(np.linalg.cholesky(j.T @ j + precision), j.T @ r)
     assert dense == pytest.approx(float(r @ r - q @ q), rel=1e-8)
+
+
+def test_offsets_that_a_run_is_simulated_with_are_added_to_its_misfit_in_products() -> None:
+    evidence = evidence_of(build_parameter_vector({"fade": 0.03}))
+    theta, offsets = np.zeros(len(EFFECT_TABLE)), []
+    for run in evidence.train:
+        residual = run.compute_residual(theta)
+        offsets.append(run.estimate_offsets(run.project_on_nuisances(residual)))
+    for run, d, point in zip(
+        evidence.train,
+        offsets,
+        linearise_at(evidence.train, (), np.empty(0), np.zeros(7), tuple(offsets)),
+        strict=True,
+    ):
+        residual = run.add_offsets(run.compute_residual(theta, (), d), d)
+        q = run.project_on_nuisances(residual)
+        assert point.misfit == pytest.approx(residual @ residual - q @ q, rel=1e-9)
+        np.testing.assert_allclose(point.projected, q, rtol=1e-9, atol=1e-9 * np.abs(q).max())
+
+
+def test_an_error_of_an_instrument_is_differentiated_without_a_simulation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = measured(plain_run(25.0, 1.5), np.zeros(len(EFFECT_TABLE)), 0)
+    base = build_parameter_vector({"fade": 0.03, "pitch_lag": 0.02})
+    effects = tuple(e for e in load_effects() if e.name in ("sensor_pitch_lag", "sensor_speed_scale"))
+    run = differentiate_run(model, np.zeros(7), NOISE, base, (), TOLERANCES, QUIET)
+    started: list[np.ndarray] = []
+    simulate = derivatives.simulate_run
+
+    def count(model: RunModel, theta: np.ndarray, **options: Any) -> Simulation:
+        started.append(theta)
+        return simulate(model, theta, **options)
+
+    monkeypatch.setattr(derivatives, "simulate_run", count)
+    run = derivatives.differentiate_by_library(run, base, effects)
+    # the base and the scale of the speed, which changes where the run starts
+    assert len(effects) == 2 == len(started)
+    for column, effect in zip(run.library.T, effects, strict=True):
+        first = effect.parameters[0]
+        moved = base + first.step * (np.arange(len(base)) == first.index)
+        change = predict_channels(model, moved) - predict_channels(model, base)
+        np.testing.assert_array_equal(column, whiten_channels(change / first.step, np.zeros(7), NOISE))
 
 
 def test_every_library_effect_moves_some_instrument_and_zero_moves_none() -> None:

@@ -20,8 +20,8 @@ from tasks.identification.decision.forms import (
 )
 from tasks.identification.decision.screening import screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.derivatives import differentiate_run, list_second_values
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import differentiate_run, list_second_values
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import (
     RunModel,

@@ -21,8 +21,8 @@ from tasks.identification.decision.intervals import (
     refit_named,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import differentiate_run
 from tasks.identification.inference.fit import compute_misfit_by_run, fit_hypotheses
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.identification.inference.hypothesis import make_library_hypothesis
@@ -120,7 +120,7 @@ def test_intervals_stay_within_the_bounds_of_their_parameters(
 def test_with_derivatives_taken_at_it_an_estimate_forgets_where_it_started() -> None:
     rolling = next(e for e in LIBRARY if e.name == "rolling_resistance")
     campaign = make_synthetic_campaign(VEHICLE, SURFACE, {"rolling_coefficient": 0.012}, 56)
-    evidence = prepare_evidence(campaign, VEHICLE, SURFACE, (rolling,), load_decision_rules())
+    evidence, _ = prepare_evidence(campaign, VEHICLE, SURFACE, (rolling,), load_decision_rules())
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, iterations=6)
     part = make_library_hypothesis(rolling)
     far = fit_hypotheses(evidence.train, (part,), evidence.session_sigma, session=null.session, iterations=8)

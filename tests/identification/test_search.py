@@ -3,6 +3,7 @@
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,15 +15,15 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, make_planned_run
-from tasks.identification.decision import experiment
-from tasks.identification.decision.attribution import refine_candidates
+from tasks.identification.decision import experiment, search
+from tasks.identification.decision.attribution import Candidate, refine_candidates
 from tasks.identification.decision.experiment import plan_next_experiment
 from tasks.identification.decision.rivals import find_detectable_sizes
 from tasks.identification.decision.screening import compute_inflation, find_look_alikes
 from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.evidence import differentiate_run
-from tasks.identification.inference.fit import fit_hypotheses, sum_misfit_falls
+from tasks.identification.inference.fit import Fit, fit_hypotheses, sum_misfit_falls
 from tasks.identification.inference.forward import prepare_run
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.inference.linearisation import compute_step_misfit
@@ -111,6 +112,9 @@ def test_the_next_experiment_excites_what_tells_the_two_apart(monkeypatch: pytes
     assert plan.plan in {words for words, _ in EXPERIMENTS} and "hot discs" in plan.plan
     assert plan.expected_d2 > 20.0
     # of two that are alike, the run that told the others apart best is refused too
+    # runs that cannot be better are not differentiated, and any order gives the same one
+    monkeypatch.setattr(experiment, "EXPERIMENTS", EXPERIMENTS[::-1])
+    assert plan_next_experiment(evidence, faded, null, VEHICLE, SURFACE) == plan
     monkeypatch.setattr(experiment, "EXPERIMENTS", [drive for drive in EXPERIMENTS if drive[0] == plan.plan])
     assert plan_next_experiment(evidence, faded, faded, VEHICLE, SURFACE) is None
 
@@ -123,6 +127,35 @@ def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> 
         for also in (frozenset[str](), frozenset({"rolling_resistance"}))
     )
     assert plain == {"brake_fade"} and asked == {"brake_fade", "rolling_resistance"}
+
+
+@pytest.mark.parametrize(
+    ("pulls", "asked"), [(False, ["open", "nested"]), (True, ["open", "alike", "nested"])]
+)
+def test_only_what_may_be_named_is_cross_validated(
+    monkeypatch: pytest.MonkeyPatch, pulls: bool, asked: list[str]
+) -> None:
+    def judged(name: str, *names: str, unseen: float = 0.0) -> SimpleNamespace:
+        return SimpleNamespace(
+            hypothesis=SimpleNamespace(name=name, names=names), passes=unseen > 4.0, pulls_session=pulls
+        )
+
+    # best first; the second passes, and is credible unless it pulls the session
+    tried = [
+        judged("open", "a"),
+        judged("best", "b", "c", unseen=9.0),
+        judged("alike", "d"),
+        judged("nested", "b"),
+    ]
+    seen: list[str] = []
+
+    def cross_validate(evidence: Evidence, base: Fit, candidate: Candidate) -> Candidate:
+        seen.append(candidate.hypothesis.name)
+        return candidate
+
+    monkeypatch.setattr(search, "cross_validate_candidate", cross_validate)
+    search._confirm_open(SimpleNamespace(evidence=None, base=None), tried, {})  # type: ignore[arg-type]
+    assert [name for name in seen if name != "best"] == asked
 
 
 def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bounds() -> None:

@@ -1,13 +1,13 @@
 """Explanations beside those tried one by one: wrong numbers of the vehicle, and two effects that act together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from tasks.campaign.campaign import SESSION
-from tasks.identification.decision.attribution import Candidate, judge_hypothesis
+from tasks.identification.decision.attribution import Candidate, assess_fit, judge_hypothesis
 from tasks.identification.decision.rivals import RivalComparison, is_close_on_unseen_runs
 from tasks.identification.decision.search import SearchState
 from tasks.identification.inference.campaign_evidence import Evidence
@@ -97,7 +97,12 @@ def find_pairs(found: SearchState, compared: Sequence[RivalComparison]) -> list[
             and is_close_on_unseen_runs(evidence, unseen, own, both)
             and not any(_is_contradicted(evidence, one.fitted, both) for one in (a, b))
         ):
-            first = judge_hypothesis(evidence, b.fitted, None, a.hypothesis)
+            # the same fit of both, with the other one last
+            swapped = replace(
+                both.fitted, parts=both.fitted.parts[::-1], values=both.fitted.values[::-1],
+                covariance=both.fitted.covariance[::-1, ::-1],
+            )  # fmt: skip
+            first = assess_fit(evidence, b.fitted, None, a.hypothesis, swapped)
             reason = f"{a.hypothesis.name} and {b.hypothesis.name} together explain as much as {own.hypothesis.name}"
             alternatives += [
                 Alternative(candidate=c, reason=reason)

@@ -33,7 +33,7 @@ class Candidate:
     inflation : empirical-null factor by which the gain is divided [1]
     score : gain / inflation - parameters x log N [1]
     held_out_gain : fall of the held-out marginal misfit, divided by the inflation; 0 where the score fails [1]
-    cross_validated_gain : the same over training runs, each left out in turn; 0 where the held-out runs decide [1]
+    cross_validated_gain : the same over training runs, each left out in turn; 0 where it decides nothing [1]
     informed : number of training runs that are sensitive to its first parameter [1]
     rules : decision rules
     """
@@ -156,13 +156,23 @@ def assess_fit(
     if score <= evidence.rules.accept_score or base_held_out is None:
         return candidate
     fall = sum_misfit_falls(base_held_out, compute_misfit_by_run(evidence.held_out, fitted))
-    candidate = replace(candidate, held_out_gain=fall / factor)
+    return replace(candidate, held_out_gain=fall / factor)
+
+
+def cross_validate_candidate(evidence: Evidence, base: Fit, candidate: Candidate) -> Candidate:
+    """Return the candidate with its gain by cross-validation, where the held-out runs do not decide.
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at the candidate
+    base : fit of the hypotheses accepted so far
+    candidate : judged on held-out runs
+    """
     # what no effect of the library says must be felt in the held-out runs themselves
-    if not candidate.is_open or hypothesis.effect_class == "form":
+    if not candidate.is_open or candidate.hypothesis.effect_class == "form":
         return candidate
-    return replace(
-        candidate, cross_validated_gain=compute_cross_validated_fall(evidence, base, fitted) / factor
-    )
+    fall = compute_cross_validated_fall(evidence, base, candidate.fitted)
+    return replace(candidate, cross_validated_gain=fall / candidate.inflation)
 
 
 def compute_own_inflation(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> float:

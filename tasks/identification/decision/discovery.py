@@ -1,5 +1,6 @@
 """The search in its order: effects of the library, wrong numbers of the vehicle, then forms outside the library."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +28,7 @@ from tasks.identification.decision.search import (
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
-from tasks.identification.inference.linearisation import differentiate_at, hold_session, rescale_disturbances
+from tasks.identification.inference.linearisation import hold_session, rescale_disturbances
 
 
 def search_forms(
@@ -200,38 +201,38 @@ def search_library_and_forms(
     ForeignCarError
         If the model's own misfit exceeds any effect that could be found, or the runs disagree about one that was found.
     """
-    if np.max(null.pulls) > evidence.rules.relinearisation_pull:
-        evidence = differentiate_at(evidence, null, library=True)
-        null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     evidence = set_run_noise(evidence, estimate_run_noise(evidence, null))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     explored = search_library(SearchState(evidence=evidence, base=null), gated=False)
     best = _explain_disagreement(explored)
     # what the best explanation follows again is no noise
     noise = estimate_run_noise(explored.evidence, best)
-    evidence = set_run_noise(evidence, noise)
-    explored = replace(
-        explored,
-        evidence=set_run_noise(explored.evidence, noise),
-        rounds=tuple(replace(r, evidence=set_run_noise(r.evidence, noise)) for r in explored.rounds),
-    )
+    evidence, explored = _change_runs(evidence, explored, lambda runs: set_run_noise(runs, noise))
     splines = differentiate_by_splines(explored.evidence, explored.base)
     scales = scale_disturbances(explored, splines)
-    evidence = rescale_disturbances(evidence, scales)
-    explored = replace(
-        explored,
-        rounds=tuple(replace(r, evidence=rescale_disturbances(r.evidence, scales)) for r in explored.rounds),
-    )
+    evidence, explored = _change_runs(evidence, explored, lambda runs: rescale_disturbances(runs, scales))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     start = SearchState(evidence=evidence, base=null)
     found = search_library(start, gated=True, explored=explored)
     if not found.rounds:
         found = replace(find_retune(start, reasons), tried=found.tried)
-    found, near = search_forms(found, start, reasons, None if explored.rounds or found.rounds else splines)
+    # about the same parts again, in other words, the residual has the same splines
+    same = [p.name for p in found.base.parts] == [p.name for p in explored.base.parts]
+    found, near = search_forms(found, start, reasons, splines if same else None)
     if best is not explored.base and all(r.accepted.hypothesis.effect_class != "form" for r in found.rounds):
         raise ForeignCarError
     settled = settle_disputes(found, reasons)
     return start, settled, near if settled is found else None
+
+
+def _change_runs(
+    evidence: Evidence, explored: SearchState, change: Callable[[Evidence], Evidence]
+) -> tuple[Evidence, SearchState]:
+    """Return the runs and a search of them, changed alike; what both share is changed once."""
+    states = (evidence, explored.evidence, *(r.evidence for r in explored.rounds))
+    changed = {key: change(runs) for key, runs in {id(runs): runs for runs in states}.items()}
+    rounds = tuple(replace(r, evidence=changed[id(r.evidence)]) for r in explored.rounds)
+    return changed[id(evidence)], replace(explored, evidence=changed[id(explored.evidence)], rounds=rounds)
 
 
 def _explain_disagreement(explored: SearchState) -> Fit:

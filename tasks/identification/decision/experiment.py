@@ -6,7 +6,7 @@ import numpy as np
 
 from tasks.campaign.planned_runs import EXPERIMENTS, make_planned_run
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.evidence import differentiate_run
+from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.identification.inference.hypothesis import compose_parameters
@@ -44,21 +44,25 @@ def plan_next_experiment(
     vehicle, surface : the judged model
     """
     rho, sigma = evidence.train[0].rho, evidence.train[0].sigma
-    best = ("", -1.0)
+    theta, slots = compose_parameters(first.parts, first.values, first.session)
+    other, other_slots = compose_parameters(second.parts, second.values, second.session)
+    planned = []
     for plan, drive in EXPERIMENTS:
-        theta, slots = compose_parameters(first.parts, first.values, first.session)
-        other, other_slots = compose_parameters(second.parts, second.values, second.session)
         model = prepare_run(make_planned_run(drive, plan), vehicle, surface)
         predicted = predict_channels(model, theta, slots=slots)
         # prepared again with the predicted speed, so that the run ends where the vehicle is slow
         model = prepare_run(replace(model.run, response=predicted), vehicle, surface)
+        change = predict_channels(model, other, slots=other_slots) - predict_channels(
+            model, theta, slots=slots
+        )
+        planned.append((plan, model, whiten_channels(change, rho, sigma)))
+    best = ("", -1.0)
+    # what the nuisances take away makes a distance smaller only: the largest come first, and the rest are not taken
+    for plan, model, change in sorted(planned, key=lambda run: -float(run[2] @ run[2])):
+        if float(change @ change) <= best[1]:
+            break
         expected = differentiate_run(
             model, rho, sigma, theta, (), evidence.tolerances, evidence.disturbance, slots
-        )
-        change = whiten_channels(
-            predict_channels(model, other, slots=other_slots) - predict_channels(model, theta, slots=slots),
-            rho,
-            sigma,
         )
         q = expected.project_on_nuisances(change)
         session = expected.session.T @ expected.session - expected.session_q.T @ expected.session_q

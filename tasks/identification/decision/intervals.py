@@ -49,7 +49,10 @@ def refit_named(
             iterations=8,
         )
 
-    return here, refit_here(base), [replace(c, fitted=refit_here(c.fitted)) for c in candidates]
+    settled = refit_here(base)
+    # the only one that is named is the base itself
+    refitted = [replace(c, fitted=settled if c.fitted is base else refit_here(c.fitted)) for c in candidates]
+    return here, settled, refitted
 
 
 def compute_student_quantile(candidate: Candidate) -> float:

@@ -9,6 +9,7 @@ from tasks.identification.decision.attribution import (  # fmt: skip
     Candidate,
     Misfits,
     compute_win_share,
+    cross_validate_candidate,
     is_nested,
     judge_hypothesis,
     refine_candidates,
@@ -56,6 +57,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             at = sum(len(p.names) for p in base.parts[:i])
             part = replace(base.parts[i], start=base.values[at : at + len(base.parts[i].names)])
             own = judge_hypothesis(evidence, rest, compute_misfit_by_run(evidence.held_out, rest), part)
+            own = cross_validate_candidate(evidence, rest, own)
             tried = tuple(refine_candidates(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
         unseen = compute_misfit_by_run(evidence.held_out, rest)

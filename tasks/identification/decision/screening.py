@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.evidence import list_second_values
+from tasks.identification.inference.derivatives import list_second_values
 from tasks.identification.inference.fit import Fit
 
 

@@ -1,5 +1,6 @@
 """The search: effects are added to the model round by round, and the runs are linearised anew where needed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (
     Candidate,
     assess_fit,
+    cross_validate_candidate,
     is_nested,
     judge_hypothesis,
     refine_candidates,
@@ -111,7 +113,8 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
         tried = refine_candidates(state.evidence, state.base, count, gated=gated, also=met)
         places: dict[str, Evidence] = {}
         for i, candidate in enumerate(tried[: rules.relinearised_candidates] if gated else tried[:1]):
-            if candidate.score > max(rules.accept_score, 0.3 * tried[0].score):
+            # a large gain may score low only because the fit has not arrived
+            if candidate.score > 0.3 * max(rules.accept_score, tried[0].score):
                 near, known = candidate, None
                 if explored and candidate.gain >= rules.relinearisation_gain:
                     near, known = _recall_candidate(explored, candidate)
@@ -119,6 +122,8 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
                     state.evidence, state.base, near, gated=gated, known=known
                 )
         tried.sort(key=lambda c: -c.score)
+        if gated:
+            tried = _confirm_open(state, tried, places)
         passing = [c for c in tried if (c.passes if gated else c.score > rules.accept_score)]
         if not passing:
             return replace(state, tried=tuple(tried))
@@ -147,6 +152,25 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
             rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best, evidence=here)),
         )
     return state
+
+
+def _confirm_open(
+    state: SearchState, tried: list[Candidate], places: Mapping[str, Evidence]
+) -> list[Candidate]:
+    """Return candidates, best first, with those cross-validated that are open and may be accepted.
+
+    Behind the first that passes and is credible, only one that is nested in it may.
+    """
+    confirmed: list[Candidate] = []
+    best: Candidate | None = None
+    for candidate in tried:
+        here = places.get(candidate.hypothesis.name, state.evidence)
+        if best is None or is_nested(candidate.hypothesis, best.hypothesis):
+            candidate = cross_validate_candidate(here, state.base, candidate)
+        if best is None and candidate.passes and not candidate.pulls_session:
+            best = candidate
+        confirmed.append(candidate)
+    return confirmed
 
 
 def _recall_candidate(explored: SearchState, candidate: Candidate) -> tuple[Candidate, Evidence | None]:

@@ -3,7 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from tasks.identification.decision.attribution import assess_fit, refine_candidates, refit_without_part
+from tasks.identification.decision.attribution import (
+    assess_fit,
+    cross_validate_candidate,
+    refine_candidates,
+    refit_without_part,
+)
 from tasks.identification.decision.rivals import RivalComparison
 from tasks.identification.decision.search import Round, SearchState
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run
@@ -53,5 +58,7 @@ def _judge_again(found: SearchState, fitted: Fit, known: Round) -> Round:
     before = refit_without_part(fitted, len(fitted.parts) - 1, evidence)
     held_out = compute_misfit_by_run(evidence.held_out, before)
     tried = tuple(refine_candidates(evidence, before)) if part.effect_class != "form" else ()
-    accepted = assess_fit(evidence, before, held_out, part, fitted)
+    accepted = cross_validate_candidate(
+        evidence, before, assess_fit(evidence, before, held_out, part, fitted)
+    )
     return replace(known, base=before, tried=tried, accepted=accepted, evidence=evidence)

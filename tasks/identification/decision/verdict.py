@@ -29,7 +29,7 @@ from tasks.identification.decision.rivals import RivalComparison, compare_with_r
 from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.decision.words import say_confirmation, say_rejection
-from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.identification.rules import DecisionRules
@@ -85,12 +85,11 @@ def find_missing_effects(
         If the car's equations are not the model's, so that single effects cannot be told; `judge_jointly` can.
     """
     progress("derivatives")
-    evidence = prepare_evidence(
+    evidence, null = prepare_evidence(
         campaign, vehicle, surface, tuple(e for e in effects if not _is_fixed(e, vehicle)), rules
     )
     reasons: list[str] = []
     progress("search")
-    null = fit_hypotheses(evidence.train, (), evidence.session_sigma, iterations=6)
     start, found, near_form = search_library_and_forms(evidence, null, reasons)
     progress("rivals")
     compared = compare_with_rivals(found.evidence, found.base, found.rounds)

@@ -63,6 +63,8 @@ def set_run_noise(evidence: Evidence, noise: Mapping[str, RunNoise]) -> Evidence
 
     def rewhiten(run: RunEvidence) -> RunEvidence:
         own = noise[run.model.run.name]
+        if np.array_equal(own.rho, run.rho) and np.array_equal(own.sigma, run.sigma):
+            return run
         nuisance, session, library, others = (
             whiten_channels(unwhiten_channels(columns, run.rho, run.sigma), own.rho, own.sigma)
             for columns in (run.nuisance, run.session, run.library, run.others)
@@ -82,7 +84,7 @@ def set_run_noise(evidence: Evidence, noise: Mapping[str, RunNoise]) -> Evidence
 
 def _estimate_noise(run: RunEvidence, point: LinearisedRun, evidence: Evidence) -> RunNoise:
     """Return the noise that a run's leftover asks for, which is nowhere below its sensors'."""
-    left = point.residual - run.nuisance @ run.estimate_offsets(point.projected)
+    left = run.add_offsets(point.residual, point.offsets - run.estimate_offsets(point.projected))
     error = unwhiten_channels(left, run.rho, run.sigma)
     white = whiten_channels(error, *evidence.sensors).reshape(error.shape)
     rho, sigma = evidence.sensors[0].copy(), evidence.sensors[1].copy()

@@ -6,7 +6,6 @@ Gram matrix per run. Screening, bootstrap and leave-one-run-out are therefore su
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,16 +27,12 @@ from tasks.identification.inference.forward import (
     simulate_run,
 )
 from tasks.identification.inference.noise import whiten_channels
-from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
 BROKEN = 1e4
 """Whitened residual of a trial whose simulation diverges, so large that no fit accepts the trial."""
-SECOND_SHARES = (0.3, 0.6)
-"""Shares of the range of an effect's second parameter at which the screen tries it, besides its first value."""
-KNOT_STEP = (30.0, 0.01, 30.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,9 +78,9 @@ class RunEvidence:
     ) -> NDArray[np.float64]:
         """Return the whitened residual, measured less model, at ``theta`` (full vector), float64 [M].
 
-        With ``offsets`` the model is simulated with this run's own offsets and disturbances, and their linear part is
-        added again. To first order this is the same residual, but it is also correct where the run is not linear in
-        them, as on a road feature that the vehicle reaches a moment later.
+        With ``offsets`` the model is simulated with this run's own offsets and disturbances. Less their linear part,
+        which `add_offsets` adds again, this is to first order the same residual, but it is also correct where the run
+        is not linear in them, as on a road feature that the vehicle reaches a moment later.
 
         Parameters
         ----------
@@ -98,7 +93,7 @@ class RunEvidence:
             if not np.isfinite(y).all():
                 return np.full(len(self.nuisance), BROKEN)
             return whiten_channels(self.model.measured - y, self.rho, self.sigma)
-        moved, slots = _add_offsets(theta, slots, offsets, self.knots)
+        moved, slots = move_by_offsets(theta, slots, offsets, self.knots)
         speed = compute_starting_speed(self.model, theta) + offsets[0]
         simulated = simulate_run(self.model, moved, slots=slots, initial_speed=speed)
         y = compute_instrument_readings(self.model, moved, simulated)
@@ -106,7 +101,17 @@ class RunEvidence:
             return np.full(len(self.nuisance), BROKEN)
         y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
         y[:, CHANNELS.index("pitch")] += offsets[3]
-        return whiten_channels(self.model.measured - y, self.rho, self.sigma) + self.nuisance @ offsets
+        return whiten_channels(self.model.measured - y, self.rho, self.sigma)
+
+    def add_offsets(self, residual: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a residual with the linear part of the run's own offsets and disturbances, float64 [M].
+
+        Parameters
+        ----------
+        residual : float64 [M] of a simulation with these offsets
+        offsets : float64 [D]
+        """
+        return residual + self.nuisance @ offsets
 
     def estimate_offsets(self, projected: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the posterior mean of the run's offsets and disturbance knots, float64 [D].
@@ -124,137 +129,30 @@ class RunEvidence:
         ----------
         x : float64 [M] or [M, P] whitened residuals or derivatives
         """
-        return solve_triangular(self.factor, self.nuisance.T @ x, lower=True, check_finite=False)
+        return self.project_product(self.nuisance.T @ x)
+
+    def project_product(self, product: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return factor^-1 nuisance' x from nuisance' x, float64 [D] or [D, P].
+
+        Parameters
+        ----------
+        product : float64 [D] or [D, P] nuisance' x
+        """
+        return solve_triangular(self.factor, product, lower=True, check_finite=False)
 
 
-def differentiate_run(
-    model: RunModel,
-    rho: NDArray[np.float64],
-    sigma: NDArray[np.float64],
-    base: NDArray[np.float64],
-    effects: tuple[Effect, ...],
-    tolerances: Tolerances,
-    disturbance: Disturbance,
-    slots: tuple[Slot, ...] = (),
-) -> RunEvidence:
-    """Simulate a run and its derivatives about a linearisation point.
-
-    Parameters
-    ----------
-    model : the run
-    rho, sigma : channel noise
-    base : float64 [len(EFFECT_TABLE)] parameters at which derivatives are taken
-    effects : library of effects; empty for held-out runs
-    tolerances : priors of the run's offsets
-    disturbance : prior of the disturbances
-    slots : forms that belong to that point
-    """
-    simulated = simulate_run(model, base, slots=slots, keep_states=True)
-    y = compute_instrument_readings(model, base, simulated)
-
-    def differentiate(
-        theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
-    ) -> NDArray[np.float64]:
-        """Return the difference quotient of the readings."""
-        moved = simulate_run(model, theta, slots=(*slots, *extra), **options)
-        return (compute_instrument_readings(model, theta, moved) - y) / step
-
-    columns = [
-        differentiate(base, 0.02, initial_speed=compute_starting_speed(model, base) + 0.02),
-        differentiate(_shift_parameter(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
-    ]
-    for name in ("longitudinal_acceleration", "pitch"):
-        offset = np.zeros_like(y)
-        offset[:, CHANNELS.index(name)] = 1.0
-        columns.append(offset)
-    knots = []
-    dt = model.run.interval
-    for port, spacing, step in zip(DISTURBED, KNOT_SPACING, KNOT_STEP, strict=True):
-        count = int(np.ceil(model.samples * dt / spacing)) + 1
-        knots.append(count)
-        for k in range(count):
-            first = min(max(int((k - 1) * spacing / dt), 0), model.samples - 1)
-            slot = Slot(
-                port=port,
-                variable="time",
-                origin=(k - 1) * spacing,
-                spacing=spacing,
-                values=np.array([0.0, step, 0.0]),
-            )
-            columns.append(differentiate(base, step, (slot,), branch=(first, simulated)))
-    session = [
-        differentiate(_shift_parameter(base, i, 0.5 * s), 0.5 * s)
-        for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
-    ]
-    library, others = [], []
-    for effect in effects:
-        theta = base.copy()
-        leading = effect.parameters[0]
-        if base[leading.index] == 0.0:
-            for parameter in effect.parameters[1:]:
-                theta[parameter.index] = parameter.start
-        library.append(differentiate(_shift_parameter(theta, leading.index, leading.step), leading.step))
-    for place, value in list_second_values(effects):
-        leading, second = effects[place].parameters
-        theta = base.copy()
-        theta[second.index] = value
-        # an effect that the model has already is not screened
-        there = base[leading.index] != 0.0
-        others.append(
-            np.zeros_like(y)
-            if there
-            else differentiate(_shift_parameter(theta, leading.index, leading.step), leading.step)
-        )
-    library, others = library or [np.zeros_like(y)], others or [np.zeros_like(y)]
-    nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma)
-    evidence = RunEvidence(
-        model=model,
-        rho=rho,
-        sigma=sigma,
-        nuisance=nuisance,
-        knots=tuple(knots),
-        information=nuisance.T @ nuisance,
-        session=whiten_channels(np.stack(session, axis=-1), rho, sigma),
-        library=whiten_channels(np.stack(library, axis=-1), rho, sigma),
-        others=whiten_channels(np.stack(others, axis=-1), rho, sigma),
-        factor=np.empty(0),
-        session_q=np.empty(0),
-        library_q=np.empty(0),
-        others_q=np.empty(0),
-    )
-    return set_disturbance_prior(evidence, tolerances, disturbance)
-
-
-def differentiate_about_offsets(
-    run: RunEvidence,
-    base: NDArray[np.float64],
-    slots: tuple[Slot, ...],
-    offsets: NDArray[np.float64],
-    tolerances: Tolerances,
-    disturbance: Disturbance,
-) -> RunEvidence:
-    """Differentiate a run again about a point that its own offsets and disturbances belong to.
-
-    Parameters
-    ----------
-    run : the run; the derivatives by the library are kept
-    base : float64 [len(EFFECT_TABLE)] parameters at which derivatives are taken
-    slots : forms that belong to that point
-    offsets : float64 [D] the run's offsets and disturbance knots
-    tolerances, disturbance : prior of its offsets and disturbances
-    """
-    moved, forms = _add_offsets(base, slots, offsets, run.knots)
-    faster = offsets[0] * (1.0 + float(base[PARAMETER_INDEX["speed_scale"]]))
-    model = replace(run.model, initial_speed=run.model.initial_speed + faster)
-    fresh = differentiate_run(model, run.rho, run.sigma, moved, (), tolerances, disturbance, forms)
-    kept = replace(fresh, model=run.model, library=run.library, others=run.others, origin=offsets)
-    return set_disturbance_prior(kept, tolerances, disturbance)
-
-
-def _add_offsets(
+def move_by_offsets(
     theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64], knots: tuple[int, ...]
 ) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
-    """Return parameters and forms of a run with its own friction and disturbances."""
+    """Return parameters and forms of a run with its own friction and disturbances.
+
+    Parameters
+    ----------
+    theta : float64 [len(EFFECT_TABLE)] parameters without them [units of the table]
+    slots : forms without them
+    offsets : float64 [D] the run's offsets and disturbance knots
+    knots : number of knots at each disturbed port
+    """
     moved = theta.copy()
     moved[PARAMETER_INDEX["friction"]] += offsets[1]
     at = N_OFFSETS
@@ -284,25 +182,3 @@ def set_disturbance_prior(
         library_q=changed.project_on_nuisances(changed.library),
         others_q=changed.project_on_nuisances(changed.others),
     )
-
-
-def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
-    """Return positions of the effects with a second parameter, and the values at which the screen tries it.
-
-    Parameters
-    ----------
-    effects : library of effects
-    """
-    return [
-        (place, second.lower + share * (second.upper - second.lower))
-        for place, effect in enumerate(effects)
-        for second in effect.parameters[1:]
-        for share in SECOND_SHARES
-    ]
-
-
-def _shift_parameter(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
-    """Return a copy of the vector with one parameter moved by a step."""
-    moved = theta.copy()
-    moved[index] += step
-    return moved

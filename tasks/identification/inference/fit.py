@@ -21,6 +21,8 @@ HELD = 1e18
 MISSED = 0.3
 """Relative error of the predicted fall of the misfit from which derivatives are taken anew."""
 
+SETTLED = 1.0
+"""Fall of the misfit that a fit no longer seeks: half a unit of log likelihood [1]."""
 TRIALS = ((1.0, True), (0.4, True), (1.0, False), (0.4, False), (0.16, False), (0.064, False))
 """Shares of a step that are tried, and whether the runs' own offsets move with it."""
 
@@ -128,8 +130,9 @@ def fit_hypotheses(
             # a threshold has no derivative while its effect is 0: take derivatives again after the effect has moved
             blind = bool(np.any(np.diag(normal)[:k] == 0.0))
         right = np.concatenate((np.zeros(k), -prior * s))
-        for point, (columns, q) in zip(points, slopes, strict=True):
-            right += columns.T @ point.residual - q.T @ point.projected
+        for run, point, (columns, q) in zip(evidence, points, slopes, strict=True):
+            # the offsets' linear part N d of the residual: columns' N = q' factor'
+            right += columns.T @ point.residual + q.T @ (run.factor.T @ point.offsets - point.projected)
         move = _compute_gauss_newton_step(normal, right, x, lower, upper)
         foreseen = float(move @ right)
         if foreseen < 0.1 and abs(fell) < 3.0:
@@ -140,7 +143,10 @@ def fit_hypotheses(
             run.estimate_offsets(point.projected - q @ move)
             for run, point, (_, q) in zip(evidence, points, slopes, strict=True)
         )
+        better = False
         for share, together in TRIALS:
+            if share * (2.0 - share) * foreseen < SETTLED and share < 1.0:
+                continue
             x_try, s_try = np.clip(x + share * move[:k], lower, upper), s + share * move[k:]
             own = tuple(
                 point.offsets + share * together * (d - point.offsets)
@@ -156,7 +162,7 @@ def fit_hypotheses(
         points = trial if together else move_linearisation_points(evidence, parts, x, s, trial)
         objective = _compute_total_misfit(points, prior, s)
         fell = before - objective
-        if abs(fell) < 0.3 and foreseen < 0.5:
+        if abs(fell) < SETTLED and foreseen < SETTLED:
             break
     # scaled first: in their own units the information matrix is too ill-conditioned for double precision
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
@@ -165,7 +171,10 @@ def fit_hypotheses(
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
         by_run=collect_misfits(points), covariance=covariance,
-        residuals=tuple(point.residual for point in points), offsets=tuple(point.offsets for point in points),
+        residuals=tuple(
+            run.add_offsets(point.residual, point.offsets) for run, point in zip(evidence, points, strict=True)
+        ),
+        offsets=tuple(point.offsets for point in points),
     )  # fmt: skip
 
 

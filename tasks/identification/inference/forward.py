@@ -28,6 +28,9 @@ STEP = 0.002
 SENSOR_INDEX = {name: row.index for name, row in PARAMETERS.items() if row.port == "sensor"}
 """Position of every error of an instrument in a parameter vector."""
 
+READ_ALONE = [row.index for name, row in PARAMETERS.items() if row.port == "sensor" and name != "speed_scale"]
+"""Positions of the errors of instruments that leave the motion as it is; that of the speed changes where it starts."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RunModel:
@@ -117,6 +120,16 @@ def compute_starting_speed(model: RunModel, theta: NDArray[np.float64]) -> float
     theta : float64 [len(EFFECT_TABLE)] effects and sensor errors [units of the table]
     """
     return model.initial_speed / (1.0 + float(theta[PARAMETER_INDEX["speed_scale"]]))
+
+
+def moves_alike(theta: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Return whether a run moves alike under two vectors of parameters, which only its instruments tell apart.
+
+    Parameters
+    ----------
+    theta, other : float64 [len(EFFECT_TABLE)] [units of the table]
+    """
+    return not np.any(np.delete(theta != other, READ_ALONE))
 
 
 def simulate_run(

@@ -10,14 +10,14 @@ from scipy.linalg import cholesky, solve_triangular
 from tasks.campaign.campaign import SESSION, Campaign, Tolerances
 from tasks.campaign.gauge import denoise_pressure
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.disturbance import Disturbance, compute_prior_precision
-from tasks.identification.inference.evidence import (
-    RunEvidence,
+from tasks.identification.inference.derivatives import (
     differentiate_about_offsets,
+    differentiate_by_library,
     differentiate_run,
-    set_disturbance_prior,
 )
-from tasks.identification.inference.fit import Fit
+from tasks.identification.inference.disturbance import Disturbance, compute_prior_precision
+from tasks.identification.inference.evidence import RunEvidence, set_disturbance_prior
+from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.noise import estimate_channel_noise, whiten_channels
@@ -42,8 +42,11 @@ def prepare_evidence(
     surface: SurfaceParameters,
     effects: tuple[Effect, ...],
     rules: DecisionRules,
-) -> Evidence:
-    """Return noise and derivatives about the model as it stands, under the first guess of the disturbances.
+) -> tuple[Evidence, Fit]:
+    """Return noise and derivatives under the first guess of the disturbances, and the fit without effects.
+
+    The derivatives are those about the model as it stands or, where the runs pull a number of the session far from it,
+    about that fit.
 
     Parameters
     ----------
@@ -54,29 +57,38 @@ def prepare_evidence(
     """
     rho, sigma = estimate_channel_noise(campaign)
     tolerances = _without_unseen(campaign)
-    plain = np.zeros(len(EFFECT_TABLE))
     guess = Disturbance()
-    runs = [replace(run, pressure=denoise_pressure(run.pressure)) for run in campaign.runs]
-    models = [prepare_run(run, vehicle, surface) for run in runs]
-    used: list[str] = []
+    models = [
+        prepare_run(replace(run, pressure=denoise_pressure(run.pressure)), vehicle, surface)
+        for run in campaign.runs
+    ]
 
-    def differentiate_runs(held_out: bool, library: tuple[Effect, ...]) -> tuple[RunEvidence, ...]:
-        """Return the training or the held-out runs with their derivatives."""
+    def select_models(held_out: bool) -> list[RunModel]:
+        """Return the training or the held-out runs that are insensitive to the step; all if these are too few."""
         own = [m for m in models if m.run.held_out == held_out]
         insensitive = [m for m in own if compute_step_misfit(m, rho, sigma) <= rules.forked_misfit]
-        # with too few runs that are insensitive to the step, the others are used too
-        kept = insensitive if len(insensitive) >= rules.fewest_runs else own
-        used.extend(m.run.name for m in kept)
-        return tuple(
-            differentiate_run(model, rho, sigma, plain, library, tolerances, guess) for model in kept
-        )
+        return insensitive if len(insensitive) >= rules.fewest_runs else own
 
-    train, held_out = differentiate_runs(False, effects), differentiate_runs(True, ())
-    forked = tuple(run.name for run in campaign.runs if run.name not in used)
-    return Evidence(
-        train=train, held_out=held_out, effects=effects,
-        tolerances=tolerances, disturbance=guess, sensors=(rho, sigma), rules=rules, forked=forked,
+    def differentiate_runs(own: list[RunModel], base: NDArray[np.float64]) -> tuple[RunEvidence, ...]:
+        """Return the derivatives of runs by everything but the library."""
+        return tuple(differentiate_run(m, rho, sigma, base, (), tolerances, guess) for m in own)
+
+    train, held_out = select_models(False), select_models(True)
+    used = [m.run.name for m in (*train, *held_out)]
+    base, session_sigma = np.zeros(len(EFFECT_TABLE)), np.array(tolerances.session)
+    runs = differentiate_runs(train, base)
+    null = fit_hypotheses(runs, (), session_sigma, iterations=6)
+    if np.max(null.pulls) > rules.relinearisation_pull:
+        base = compose_parameters((), np.empty(0), null.session)[0]
+        runs = differentiate_runs(train, base)
+        null = fit_hypotheses(runs, (), session_sigma, session=null.session, iterations=6)
+    evidence = Evidence(
+        train=tuple(differentiate_by_library(run, base, effects) for run in runs),
+        held_out=differentiate_runs(held_out, base), effects=effects,
+        tolerances=tolerances, disturbance=guess, sensors=(rho, sigma), rules=rules,
+        forked=tuple(run.name for run in campaign.runs if run.name not in used),
     )  # fmt: skip
+    return evidence, null
 
 
 def _without_unseen(campaign: Campaign) -> Tolerances:
@@ -145,17 +157,17 @@ def hold_session(evidence: Evidence, names: Sequence[str]) -> Evidence:
 
 
 def differentiate_about_fit(evidence: Evidence, at: Fit) -> Evidence:
-    """Return the same runs with derivatives about a fit and, of the training runs, about their own offsets there.
+    """Return the runs with the derivatives of the training runs about a fit and about their own offsets there.
 
     Parameters
     ----------
-    evidence : the runs; the derivatives by the library are kept
+    evidence : the runs; the derivatives by the library and those of the held-out runs are kept
     at : fit, the new linearisation point
     """
     theta, slots = compose_parameters(at.parts, at.values, at.session)
     here = evidence.tolerances, evidence.disturbance
     return replace(
-        differentiate_at(replace(evidence, train=()), at, library=False),
+        evidence,
         train=tuple(
             differentiate_about_offsets(run, theta, slots, offsets, *here)
             for run, offsets in zip(evidence.train, at.offsets, strict=True)

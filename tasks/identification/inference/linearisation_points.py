@@ -24,8 +24,8 @@ class LinearisedRun:
     Parameters
     ----------
     offsets : float64 [D] offsets about which it is linearised
-    residual : float64 [M] whitened residual
-    projected : float64 [D] projection of the residual on the nuisances
+    residual : float64 [M] whitened residual of the simulation with these offsets
+    projected : float64 [D] projection of the residual, with the offsets added, on the nuisances
     misfit : marginalised misfit [1]
     linearisation_error : change of the misfit by the last full move of the offsets; 0 where the linearisation holds [1]
     """
@@ -117,13 +117,23 @@ def linearise_at(
 def _linearise_run(
     run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64] | None
 ) -> LinearisedRun:
-    """Return one run linearised about given offsets."""
+    """Return one run linearised about given offsets.
+
+    Their linear part N d is not added to the residual r: |r + N d|^2 = |r|^2 + (2 N'r + N'N d)'d needs N once.
+    """
     residual = run.compute_residual(theta, slots, offsets)
-    projected = run.project_on_nuisances(residual)
+    along = run.nuisance.T @ residual
+    misfit = float(residual @ residual)
+    if offsets is None:
+        offsets = np.zeros(len(along))
+    else:
+        added = run.information @ offsets
+        misfit += float((2.0 * along + added) @ offsets)
+        along += added
+    projected = run.project_product(along)
     return LinearisedRun(
-        offsets=np.zeros(run.nuisance.shape[1]) if offsets is None else offsets, residual=residual,
-        projected=projected, misfit=float(residual @ residual - projected @ projected),
-    )  # fmt: skip
+        offsets=offsets, residual=residual, projected=projected, misfit=misfit - float(projected @ projected)
+    )
 
 
 def collect_misfits(points: tuple[LinearisedRun, ...]) -> NDArray[np.float64]:

@@ -81,20 +81,44 @@ def interpolate_table(table: NDArray[np.float64], origin: float, spacing: float,
     return float(table[i] + (u - i) * (table[i + 1] - table[i]))
 
 
-@register_jitable(cache=True, error_model="numpy")
-def sum_slots(port: int, variables: tuple[float, ...], slots: SlotTables) -> float:
-    """Return the sum of all slots at a port [unit of the port].
+class PortSums(NamedTuple):
+    """Sum of the slots at each of `PORTS` [its unit]."""
+
+    longitudinal_force: float
+    brake_torque: float
+    friction: float
+    pitch_moment: float
+    suspension_force: float
+
+
+_FORCE, _TORQUE, _FRICTION, _MOMENT = (PORTS.index(port) for port in PortSums._fields[:4])
+NO_SUMS = PortSums(0.0, 0.0, 0.0, 0.0, 0.0)
+"""Sums of no slots."""
+
+
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
+def sum_slots(variables: tuple[float, ...], slots: SlotTables) -> PortSums:
+    """Return the sums of all slots at all ports, in one pass.
 
     Parameters
     ----------
-    port : position in `PORTS`
     variables : values of the variables, in the order of `VARIABLES` [their units]
     slots : the tables
     """
-    total = 0.0
+    force, torque, friction, moment, strut = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(slots.keys.shape[0]):
-        if slots.keys[k, 0] == port:
-            total += interpolate_table(
-                slots.tables[k], slots.grids[k, 0], slots.grids[k, 1], variables[slots.keys[k, 1]]
-            )
-    return total
+        port = slots.keys[k, 0]
+        value = interpolate_table(
+            slots.tables[k], slots.grids[k, 0], slots.grids[k, 1], variables[slots.keys[k, 1]]
+        )
+        if port == _FORCE:
+            force += value
+        elif port == _TORQUE:
+            torque += value
+        elif port == _FRICTION:
+            friction += value
+        elif port == _MOMENT:
+            moment += value
+        else:
+            strut += value
+    return PortSums(force, torque, friction, moment, strut)

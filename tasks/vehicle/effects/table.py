@@ -207,7 +207,7 @@ if TYPE_CHECKING:
     class EffectValues(tuple[float, ...]):
         """Numbers of a vehicle's effects by name, as the kernels take them; all 0 in the paper's model."""
 
-        def __new__(cls, *values: float) -> "EffectValues": ...
+        def __new__(cls, *values: float, **named: float) -> "EffectValues": ...
         def __getattr__(self, name: str) -> float: ...
 
 else:
@@ -235,7 +235,7 @@ def pack_effect_values(values: Mapping[str, float]) -> EffectValues:
         raise InputError(
             [f"effect {name}: a vehicle has no such number; there are: {known}" for name in unknown]
         )
-    return EffectValues(*(float(values.get(name, 0.0)) for name in EFFECT_UNITS))
+    return EffectValues(**{name: float(value) for name, value in values.items()})
 
 
 def build_parameter_vector(values: Mapping[str, float]) -> NDArray[np.float64]:

@@ -13,8 +13,7 @@ from tasks.vehicle.effects.chassis import (
     compute_stick_share,
 )
 from tasks.vehicle.effects.equations import compute_friction_factor
-from tasks.vehicle.effects.ports import PORTS
-from tasks.vehicle.effects.slots import SlotTables, sum_slots
+from tasks.vehicle.effects.slots import PortSums
 from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.model.chassis import Chassis
 from tasks.vehicle.model.states import AxleMemory, Instant
@@ -22,7 +21,6 @@ from tasks.vehicle.model.vertical_ports import Ground, Strut
 from tasks.vehicle.paper.wheels import Wheels
 from tasks.vehicle.tyres.contract import Tyre
 
-_BRAKE_FORM, _FRICTION_FORM = PORTS.index("brake_torque"), PORTS.index("friction")
 FormVariables = tuple[float, float, float, float, float, float, float, float, float]
 """Variables that a form can depend on, in the order of `VARIABLES`."""
 
@@ -146,7 +144,7 @@ def compute_rolling_axle(
     stiffness: float,
     step: float,
     instant: Instant,
-    forms: SlotTables | None,
+    forms: PortSums,
     chassis: Chassis,
     tyre: Tyre,
 ) -> AxlePorts:
@@ -164,7 +162,7 @@ def compute_rolling_axle(
     static_load, stiffness : load at rest and vertical stiffness of the tyre [N, N/m]
     step : length of the step [s]
     instant : inputs at this instant
-    forms : forms outside the library of effects, or None
+    forms : what forms outside the library of effects add at the axle
     chassis, tyre : the vehicle on its surface
     """
     wheels, effects = chassis.wheels, chassis.effects
@@ -172,11 +170,9 @@ def compute_rolling_axle(
     force_slip = memory.slip if effects.relaxation_length > 0.0 else slip
     load_ratio = ground.load / static_load
     grip = compute_friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet)
+    grip *= max(1.0 + forms.friction, 0.0)
     pressure = compute_acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
-    if forms is not None:
-        variables = collect_form_variables(speed, load_ratio, strut, memory, instant)
-        grip *= max(1.0 + sum_slots(_FRICTION_FORM, variables, forms), 0.0)
-        pressure *= max(1.0 + sum_slots(_BRAKE_FORM, variables, forms), 0.0)
+    pressure *= max(1.0 + forms.brake_torque, 0.0)
     sticking = compute_stick_share(speed, effects)
     tyre_force = (
         compute_signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load

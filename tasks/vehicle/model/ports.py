@@ -11,8 +11,7 @@ from numba.extending import register_jitable
 
 from tasks.vehicle.effects.chassis import compute_link_force, compute_stick_share
 from tasks.vehicle.effects.equations import compute_engine_torque, compute_resistance
-from tasks.vehicle.effects.ports import PORTS
-from tasks.vehicle.effects.slots import SlotTables, sum_slots
+from tasks.vehicle.effects.slots import NO_SUMS, SlotTables, sum_slots
 from tasks.vehicle.half_car import HalfCarState
 from tasks.vehicle.model.axle_ports import (
     AxlePorts,
@@ -27,10 +26,6 @@ from tasks.vehicle.model.states import Instant, Memory, Motion
 from tasks.vehicle.model.vertical_ports import compute_ground, compute_struts
 from tasks.vehicle.road import RoadFeature
 from tasks.vehicle.tyres.contract import Tyre
-
-_FORCE_FORM, _PITCH_FORM, _STRUT_FORM = (
-    PORTS.index(port) for port in ("longitudinal_force", "pitch_moment", "suspension_force")
-)
 
 
 class Ports(NamedTuple):
@@ -105,6 +100,16 @@ def compute_ports(
     behind = motion.station - wheels.wheelbase
     ground_r = compute_ground(behind, speed, x[3], x[7], body.tyre_r, body.static_r, road, effects)
     strut_f, strut_r = compute_struts(x, chassis)
+    forms_f = forms_r = NO_SUMS
+    if forms is not None:
+        forms_f = sum_slots(
+            collect_form_variables(speed, ground_f.load / body.static_f, strut_f, memory.front, instant),
+            forms,
+        )
+        forms_r = sum_slots(
+            collect_form_variables(speed, ground_r.load / body.static_r, strut_r, memory.rear, instant),
+            forms,
+        )
     if standing:
         front, rear = (
             compute_standing_axle(ground_f, strut_f, wheels),
@@ -117,11 +122,11 @@ def compute_ports(
         engine_r = -(1.0 - share) * instant.engine
         front = compute_rolling_axle(
             ground_f, strut_f, speed, motion.omega_f, memory.front, scale_f, gain_f, engine, body.static_f,
-            body.tyre_f, step, instant, forms, chassis, tyre,
+            body.tyre_f, step, instant, forms_f, chassis, tyre,
         )  # fmt: skip
         rear = compute_rolling_axle(
             ground_r, strut_r, speed, motion.omega_r, memory.rear, scale_r, gain_r, engine_r, body.static_r,
-            body.tyre_r, step, instant, forms, chassis, tyre,
+            body.tyre_r, step, instant, forms_r, chassis, tyre,
         )  # fmt: skip
     share = 0.0 if standing else compute_stick_share(speed, effects)
     lift_f = compute_link_force(
@@ -140,17 +145,10 @@ def compute_ports(
     )
     drag += wheels.mass * chassis.climb
     moment = effects.aero_pitch * speed * speed
-    if forms is not None:
-        variables_f = collect_form_variables(
-            speed, ground_f.load / body.static_f, strut_f, memory.front, instant
-        )
-        variables_r = collect_form_variables(
-            speed, ground_r.load / body.static_r, strut_r, memory.rear, instant
-        )
-        lift_f -= sum_slots(_STRUT_FORM, variables_f, forms)
-        lift_r += sum_slots(_STRUT_FORM, variables_r, forms)
-        drag += sum_slots(_FORCE_FORM, variables_f, forms)
-        moment += sum_slots(_PITCH_FORM, variables_f, forms)
+    lift_f -= forms_f.suspension_force
+    lift_r += forms_r.suspension_force
+    drag += forms_f.longitudinal_force
+    moment += forms_f.pitch_moment
     front, rear = add_link_force(front, -lift_f), add_link_force(rear, lift_r)
     acceleration = 0.0
     if not (standing or instant.held):

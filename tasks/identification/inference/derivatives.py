@@ -1,0 +1,213 @@
+"""Derivatives of one run's readings: by its own offsets and disturbances, by the session, and by the library."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNELS, Tolerances
+from tasks.identification.inference.disturbance import DISTURBED, KNOT_SPACING, Disturbance
+from tasks.identification.inference.evidence import (
+    SESSION_INDEX,
+    RunEvidence,
+    move_by_offsets,
+    set_disturbance_prior,
+)
+from tasks.identification.inference.forward import (
+    RunModel,
+    compute_instrument_readings,
+    compute_starting_speed,
+    moves_alike,
+    simulate_run,
+)
+from tasks.identification.inference.noise import whiten_channels
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import PARAMETER_INDEX
+from tasks.vehicle.model.simulation import Simulation
+
+SECOND_SHARES = (0.3, 0.6)
+"""Shares of the range of an effect's second parameter at which the screen tries it, besides its first value."""
+KNOT_STEP = (30.0, 0.01, 30.0)
+Quotient = Callable[..., NDArray[np.float64]]
+
+
+def differentiate_run(
+    model: RunModel,
+    rho: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    base: NDArray[np.float64],
+    effects: tuple[Effect, ...],
+    tolerances: Tolerances,
+    disturbance: Disturbance,
+    slots: tuple[Slot, ...] = (),
+) -> RunEvidence:
+    """Simulate a run and its derivatives about a linearisation point.
+
+    Parameters
+    ----------
+    model : the run
+    rho, sigma : channel noise
+    base : float64 [len(EFFECT_TABLE)] parameters at which derivatives are taken
+    effects : library of effects; empty for held-out runs
+    tolerances : priors of the run's offsets
+    disturbance : prior of the disturbances
+    slots : forms that belong to that point
+    """
+    simulated, differentiate = _prepare_quotients(model, base, slots)
+    columns = [
+        differentiate(base, 0.02, initial_speed=compute_starting_speed(model, base) + 0.02),
+        differentiate(_shift_parameter(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
+    ]
+    for name in ("longitudinal_acceleration", "pitch"):
+        offset = np.zeros_like(columns[0])
+        offset[:, CHANNELS.index(name)] = 1.0
+        columns.append(offset)
+    knots = []
+    dt = model.run.interval
+    for port, spacing, step in zip(DISTURBED, KNOT_SPACING, KNOT_STEP, strict=True):
+        count = int(np.ceil(model.samples * dt / spacing)) + 1
+        knots.append(count)
+        for k in range(count):
+            first = min(max(int((k - 1) * spacing / dt), 0), model.samples - 1)
+            slot = Slot(
+                port=port,
+                variable="time",
+                origin=(k - 1) * spacing,
+                spacing=spacing,
+                values=np.array([0.0, step, 0.0]),
+            )
+            columns.append(differentiate(base, step, (slot,), branch=(first, simulated)))
+    session = [
+        differentiate(_shift_parameter(base, i, 0.5 * s), 0.5 * s)
+        for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
+    ]
+    nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma)
+    evidence = RunEvidence(
+        model=model,
+        rho=rho,
+        sigma=sigma,
+        nuisance=nuisance,
+        knots=tuple(knots),
+        information=nuisance.T @ nuisance,
+        session=whiten_channels(np.stack(session, axis=-1), rho, sigma),
+        library=np.zeros((len(nuisance), 1)),
+        others=np.zeros((len(nuisance), 1)),
+        factor=np.empty(0),
+        session_q=np.empty(0),
+        library_q=np.empty(0),
+        others_q=np.empty(0),
+    )
+    evidence = set_disturbance_prior(evidence, tolerances, disturbance)
+    return differentiate_by_library(evidence, base, effects, slots) if effects else evidence
+
+
+def differentiate_by_library(
+    run: RunEvidence, base: NDArray[np.float64], effects: tuple[Effect, ...], slots: tuple[Slot, ...] = ()
+) -> RunEvidence:
+    """Return a run with its derivatives by every effect of the library.
+
+    Parameters
+    ----------
+    run : the run, differentiated about the same point
+    base : float64 [len(EFFECT_TABLE)] parameters at which derivatives are taken
+    effects : library of effects
+    slots : forms that belong to that point
+    """
+    _, differentiate = _prepare_quotients(run.model, base, slots)
+    library, others = [], []
+    for effect in effects:
+        theta = base.copy()
+        leading = effect.parameters[0]
+        if base[leading.index] == 0.0:
+            for parameter in effect.parameters[1:]:
+                theta[parameter.index] = parameter.start
+        library.append(differentiate(_shift_parameter(theta, leading.index, leading.step), leading.step))
+    for place, value in list_second_values(effects):
+        leading, second = effects[place].parameters
+        theta = base.copy()
+        theta[second.index] = value
+        # an effect that the model has already is not screened
+        there = base[leading.index] != 0.0
+        others.append(
+            np.zeros_like(library[0])
+            if there
+            else differentiate(_shift_parameter(theta, leading.index, leading.step), leading.step)
+        )
+    columns, more = (
+        whiten_channels(np.stack(part, axis=-1), run.rho, run.sigma)
+        for part in (library, others or [np.zeros_like(library[0])])
+    )
+    return replace(
+        run, library=columns, others=more,
+        library_q=run.project_on_nuisances(columns), others_q=run.project_on_nuisances(more),
+    )  # fmt: skip
+
+
+def _prepare_quotients(
+    model: RunModel, base: NDArray[np.float64], slots: tuple[Slot, ...]
+) -> tuple[Simulation, Quotient]:
+    """Return the simulation of a run at a point with its states, and the function that differentiates about it."""
+    simulated = simulate_run(model, base, slots=slots, keep_states=True)
+    y = compute_instrument_readings(model, base, simulated)
+
+    def differentiate(
+        theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
+    ) -> NDArray[np.float64]:
+        """Return the difference quotient of the readings."""
+        moved = simulated
+        if extra or options or not moves_alike(theta, base):
+            moved = simulate_run(model, theta, slots=(*slots, *extra), **options)
+        return (compute_instrument_readings(model, theta, moved) - y) / step
+
+    return simulated, differentiate
+
+
+def differentiate_about_offsets(
+    run: RunEvidence,
+    base: NDArray[np.float64],
+    slots: tuple[Slot, ...],
+    offsets: NDArray[np.float64],
+    tolerances: Tolerances,
+    disturbance: Disturbance,
+) -> RunEvidence:
+    """Differentiate a run again about a point that its own offsets and disturbances belong to.
+
+    Parameters
+    ----------
+    run : the run; the derivatives by the library are kept
+    base : float64 [len(EFFECT_TABLE)] parameters at which derivatives are taken
+    slots : forms that belong to that point
+    offsets : float64 [D] the run's offsets and disturbance knots
+    tolerances, disturbance : prior of its offsets and disturbances
+    """
+    moved, forms = move_by_offsets(base, slots, offsets, run.knots)
+    faster = offsets[0] * (1.0 + float(base[PARAMETER_INDEX["speed_scale"]]))
+    model = replace(run.model, initial_speed=run.model.initial_speed + faster)
+    fresh = differentiate_run(model, run.rho, run.sigma, moved, (), tolerances, disturbance, forms)
+    kept = replace(fresh, model=run.model, library=run.library, others=run.others, origin=offsets)
+    return set_disturbance_prior(kept, tolerances, disturbance)
+
+
+def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
+    """Return positions of the effects with a second parameter, and the values at which the screen tries it.
+
+    Parameters
+    ----------
+    effects : library of effects
+    """
+    return [
+        (place, second.lower + share * (second.upper - second.lower))
+        for place, effect in enumerate(effects)
+        for second in effect.parameters[1:]
+        for share in SECOND_SHARES
+    ]
+
+
+def _shift_parameter(theta: NDArray[np.float64], index: int, step: float) -> NDArray[np.float64]:
+    """Return a copy of the vector with one parameter moved by a step."""
+    moved = theta.copy()
+    moved[index] += step
+    return moved
