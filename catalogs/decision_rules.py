@@ -50,6 +50,7 @@ class DecisionRulesEntry(CatalogueEntry):
     refined_candidates: Count
     refined_look_alikes: Count
     look_alike_cosine: Share
+    hopeful_share: Share
     trusted_screen_share: Share
     relinearisation_gain: Level
     reached_share: Share

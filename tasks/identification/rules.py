@@ -68,6 +68,7 @@ class DecisionRules:
     refined_look_alikes : nearly collinear effects of the best candidate that are refined too [1]
     look_alike_cosine : cosine between two library directions, nuisances projected out, from which they are nearly
         collinear [1]
+    hopeful_share : share of what a name needs, or of the best, that a first and linear estimate must reach [1]
     trusted_screen_share : share of the best gain below which a linear gain counts without refinement [1]
     relinearisation_gain : gain from which derivatives taken without an effect no longer hold with it [1]
     reached_share : share of the linear gain that a first fit must reach to need no other start [1]
@@ -106,6 +107,7 @@ class DecisionRules:
     refined_candidates: int
     refined_look_alikes: int
     look_alike_cosine: float
+    hopeful_share: float
     trusted_screen_share: float
     relinearisation_gain: float
     reached_share: float

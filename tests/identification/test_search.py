@@ -20,6 +20,7 @@ from tasks.identification.decision.attribution import Candidate, refine_candidat
 from tasks.identification.decision.experiment import plan_next_experiment
 from tasks.identification.decision.rivals import find_detectable_sizes
 from tasks.identification.decision.screening import compute_inflation, find_look_alikes
+from tasks.identification.decision.search import relinearise_candidate
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
@@ -67,6 +68,29 @@ def test_a_fall_counts_only_beyond_the_doubt() -> None:
     before = (np.array([100.0, 100.0, 50.0]), np.array([0.0, 30.0, 0.0]))
     after = (np.array([90.0, 60.0, 55.0]), np.array([2.0, 20.0, 1.0]))
     assert sum_misfit_falls(before, after) == pytest.approx(8.0 + 0.0 - 4.0)
+
+
+def test_a_held_out_misfit_that_moves_with_the_derivatives_is_in_doubt_by_that_much(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A stop on snow at the threshold of the ABS: 2644 or 3134, by where the derivatives are taken."""
+    rules = load_decision_rules()
+    before, after = (
+        SimpleNamespace(held_out=name, train=(), session_sigma=None, rules=rules) for name in "ba"
+    )
+    misfits = {
+        "b": (np.array([2644.0, 3128.0]), np.array([4.0, 0.0])),
+        "a": (np.array([3134.0, 3128.5]), np.array([30.0, 0.0])),
+    }
+    fitted = SimpleNamespace(parts=(), values=np.ones(1), session=None)
+    monkeypatch.setattr(search, "differentiate_at", lambda *_, library: after)
+    monkeypatch.setattr(search, "fit_hypotheses", lambda *_, **__: fitted)
+    monkeypatch.setattr(search, "compute_misfit_by_run", lambda runs, _: misfits[runs])
+    monkeypatch.setattr(search, "assess_fit", lambda _, base, held_out, *__: held_out)
+    candidate = SimpleNamespace(gain=1000.0, fitted=fitted, hypothesis=None)
+    _, (misfit, doubt) = relinearise_candidate(before, None, candidate)
+    assert misfit.tolist() == [3134.0, 3128.5]
+    assert doubt == pytest.approx([520.0, 0.5])
 
 
 def test_a_free_parameter_takes_its_session_nuisance_over() -> None:

@@ -117,7 +117,7 @@ def judge_hypothesis(
         gain = 0.5 * (base.objective - trials[-1].objective)
         # a large gain is only ranked here: the runs are linearised anew at its estimate later
         enough = rules.reached_share * foreseen if len(hypothesis.names) == 1 else np.inf
-        hopeless = max(gain, foreseen) < 0.3 * rules.accept_score
+        hopeless = max(gain, foreseen) < rules.hopeful_share * rules.accept_score
         if gain > min(enough, rules.relinearisation_gain) or hopeless:
             break
     fitted = min(trials, key=lambda trial: trial.objective)
@@ -236,7 +236,11 @@ def refine_candidates(
     rules = evidence.rules
     gains, estimates, seconds = screen_library(evidence, base)
     held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None
-    hopeful = [int(j) for j in np.argsort(-gains, kind="stable") if gains[j] > 0.3 * rules.accept_score]
+    hopeful = [
+        int(j)
+        for j in np.argsort(-gains, kind="stable")
+        if gains[j] > rules.hopeful_share * rules.accept_score
+    ]
     order = hopeful[: rules.refined_candidates if count is None else count]
 
     def judge_library_effect(j: int) -> Candidate:

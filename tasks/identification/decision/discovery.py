@@ -15,6 +15,7 @@ from tasks.identification.decision.forms import (
     is_constant,
     is_session_number,
     make_form_hypotheses,
+    rewhiten_splines,
 )
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.search import (
@@ -58,7 +59,7 @@ def search_forms(
     retuned = all(r.accepted.hypothesis.effect_class == "retune" for r in state.rounds)
     if state.rounds and (over or disagreeing):
         least = rules.lone_form_share * sum(r.accepted.gain for r in state.rounds)
-        alone = find_best_form(null.evidence, null.base, least, accept=0.0 if retuned else None)
+        alone = find_best_form(null.evidence, null.base, least)
         ahead = -np.inf
         if alone is not None and (alone.passes or retuned):
             # a form has no library direction, hence no inflation of its own: both sides take the larger one
@@ -95,7 +96,13 @@ def search_forms(
         ):
             elsewhere = alone.hypothesis.port != first.port
             near = alone if (ahead > rules.rival_span if same_effect else elsewhere or disagreeing) else None
-    if left is not None and over and state is start and len(state.rounds) < rules.most_effects:
+    named = sum(r.accepted.gain for r in state.rounds)
+    if left is not None and over and state is start and named >= rules.rival_gain_share * (named + left.gain):
+        reasons.append(
+            f"{left.hypothesis.name} would fit beside what is named, which makes good"
+            f" {named / (named + left.gain):.0%} of the gain without it: not named"
+        )
+    elif left is not None and over and state is start and len(state.rounds) < rules.most_effects:
         reasons.append(f"a form explains a part of the residual: {left.hypothesis.name}")
         moved = here.session_sigma < state.evidence.session_sigma
         if moved.any():
@@ -147,7 +154,6 @@ def find_best_form(
     base: Fit,
     least: float = 0.0,
     splines: tuple[NDArray[np.float64], ...] | None = None,
-    accept: float | None = None,
     gated: bool = True,
 ) -> Candidate | None:
     """Return the form that explains most of the residual of a fit, refined and judged; None if no form passes.
@@ -160,12 +166,11 @@ def find_best_form(
     base : the fit
     least : gain in log likelihood from which a spline leads to forms [1]
     splines : `differentiate_by_splines` at the fit; None if not computed yet
-    accept : score that a spline must promise [1]; None takes that of an effect
     gated : judge it on held-out runs too, and beside forms of the second spline; else see what the best one explains
     """
-    promised = evidence.rules.accept_score if accept is None else accept
-    level = compute_inflation(evidence, base, None)
-    enough = max(promised + float(np.log(evidence.samples)), least / level)
+    # the linear gain of a spline is a hint: friction that no wheel reaches yet has no derivative
+    needed = evidence.rules.accept_score + float(np.log(evidence.samples))
+    enough = max(evidence.rules.hopeful_share * needed, least / compute_inflation(evidence, base, None))
     leftovers = [x for x in fit_residual_splines(evidence, base, splines)[: 1 + gated] if x.gain > enough]
     if not leftovers:
         return None
@@ -203,12 +208,20 @@ def search_library_and_forms(
     """
     evidence = set_run_noise(evidence, estimate_run_noise(evidence, null))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
-    explored = search_library(SearchState(evidence=evidence, base=null), gated=False)
-    best = _explain_disagreement(explored)
+    library = search_library(SearchState(evidence=evidence, base=null), gated=False)
+    foreign = compute_inflation(library.evidence, library.base, None) > evidence.rules.foreign_inflation
+    splines = differentiate_by_splines(library.evidence, library.base)
+    explored = _add_best_form(library, splines)
+    if compute_inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
+        raise ForeignCarError
     # what the best explanation follows again is no noise
-    noise = estimate_run_noise(explored.evidence, best)
+    noise = estimate_run_noise(explored.evidence, explored.base)
     evidence, explored = _change_runs(evidence, explored, lambda runs: set_run_noise(runs, noise))
-    splines = differentiate_by_splines(explored.evidence, explored.base)
+    splines = (
+        rewhiten_splines(splines, library.evidence, explored.evidence)
+        if explored.base is library.base
+        else differentiate_by_splines(explored.evidence, explored.base)
+    )
     scales = scale_disturbances(explored, splines)
     evidence, explored = _change_runs(evidence, explored, lambda runs: rescale_disturbances(runs, scales))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
@@ -219,7 +232,7 @@ def search_library_and_forms(
     # about the same parts again, in other words, the residual has the same splines
     same = [p.name for p in found.base.parts] == [p.name for p in explored.base.parts]
     found, near = search_forms(found, start, reasons, splines if same else None)
-    if best is not explored.base and all(r.accepted.hypothesis.effect_class != "form" for r in found.rounds):
+    if foreign and all(r.accepted.hypothesis.effect_class != "form" for r in found.rounds):
         raise ForeignCarError
     settled = settle_disputes(found, reasons)
     return start, settled, near if settled is found else None
@@ -235,18 +248,15 @@ def _change_runs(
     return changed[id(evidence)], replace(explored, evidence=changed[id(explored.evidence)], rounds=rounds)
 
 
-def _explain_disagreement(explored: SearchState) -> Fit:
-    """Return the fit of what explains the runs best: of the library, or with a form where the runs disagree about that.
+def _add_best_form(explored: SearchState, splines: tuple[NDArray[np.float64], ...]) -> SearchState:
+    """Return the search without gates with the form that explains most beside its effects, if the runs show one.
 
-    Raises
-    ------
-    ForeignCarError
-        If the runs disagree beside the best form too.
+    Otherwise a form outside the library would be taken for a disturbance, as an effect would be, which then hides it.
     """
-    evidence, limit = explored.evidence, explored.evidence.rules.foreign_inflation
-    if compute_inflation(evidence, explored.base, None) <= limit:
-        return explored.base
-    form = find_best_form(evidence, explored.base, gated=False)
-    if form is None or compute_inflation(evidence, form.fitted, None) > limit:
-        raise ForeignCarError
-    return form.fitted
+    evidence, base = explored.evidence, explored.base
+    form = find_best_form(evidence, base, splines=splines, gated=False)
+    if form is None or form.score <= evidence.rules.accept_score:
+        return explored
+    here, form = relinearise_candidate(evidence, base, form, gated=False)
+    last = Round(base=base, tried=(), accepted=form, evidence=here)
+    return replace(explored, evidence=here, base=form.fitted, rounds=(*explored.rounds, last))

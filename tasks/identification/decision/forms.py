@@ -12,7 +12,7 @@ from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
-from tasks.identification.inference.noise import whiten_channels
+from tasks.identification.inference.noise import unwhiten_channels, whiten_channels
 from tasks.vehicle.effects.forms import SHAPES, Form, name_form
 from tasks.vehicle.effects.ports import PORT_UNITS
 from tasks.vehicle.effects.slots import Slot
@@ -127,6 +127,22 @@ def differentiate_by_splines(evidence: Evidence, at: Fit) -> tuple[NDArray[np.fl
     """
     theta, slots = compose_parameters(at.parts, at.values, at.session)
     return tuple(_differentiate_run(run, theta, slots) for run in evidence.train)
+
+
+def rewhiten_splines(
+    splines: tuple[NDArray[np.float64], ...], before: Evidence, after: Evidence
+) -> tuple[NDArray[np.float64], ...]:
+    """Return the same derivatives under other noise of the runs.
+
+    Parameters
+    ----------
+    splines : `differentiate_by_splines` under the noise before
+    before, after : the runs under either noise
+    """
+    return tuple(
+        whiten_channels(unwhiten_channels(columns, old.rho, old.sigma), new.rho, new.sigma)
+        for columns, old, new in zip(splines, before.train, after.train, strict=True)
+    )
 
 
 def _differentiate_run(

@@ -93,7 +93,11 @@ def relinearise_candidate(
         fitted = again
         if np.all(shift < evidence.rules.relinearisation_change):
             break
-    base_held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None
+    base_held_out = None
+    if gated:
+        before, after = (compute_misfit_by_run(runs.held_out, base) for runs in (evidence, here))
+        # by what the misfit of the same fit moves with the derivatives, no fit can be told from another
+        base_held_out = (after[0], after[1] + np.abs(after[0] - before[0]))
     return here, assess_fit(here, base, base_held_out, candidate.hypothesis, fitted)
 
 
@@ -114,7 +118,7 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
         places: dict[str, Evidence] = {}
         for i, candidate in enumerate(tried[: rules.relinearised_candidates] if gated else tried[:1]):
             # a large gain may score low only because the fit has not arrived
-            if candidate.score > 0.3 * max(rules.accept_score, tried[0].score):
+            if candidate.score > rules.hopeful_share * max(rules.accept_score, tried[0].score):
                 near, known = candidate, None
                 if explored and candidate.gain >= rules.relinearisation_gain:
                     near, known = _recall_candidate(explored, candidate)
@@ -142,7 +146,7 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
         if gated and here is not state.evidence:
             held_out = compute_misfit_by_run(state.evidence.held_out, state.base)
             tried = [
-                c if c.score < 0.3 * best.score or c.hypothesis.name in places
+                c if c.score < rules.hopeful_share * best.score or c.hypothesis.name in places
                 else judge_hypothesis(here, state.base, held_out, c.hypothesis)
                 for c in tried
             ]  # fmt: skip
