@@ -18,8 +18,11 @@ from tasks.campaign.planned_runs import EXPERIMENTS, RICH, make_planned_run
 from tasks.identification.decision import experiment, search
 from tasks.identification.decision.attribution import Candidate, refine_candidates
 from tasks.identification.decision.experiment import plan_next_experiment
-from tasks.identification.decision.rivals import find_detectable_sizes
-from tasks.identification.decision.screening import compute_inflation, find_look_alikes
+from tasks.identification.decision.screening import (
+    compute_inflation,
+    find_detectable_sizes,
+    find_look_alikes,
+)
 from tasks.identification.decision.search import relinearise_candidate
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run

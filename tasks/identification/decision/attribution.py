@@ -269,28 +269,6 @@ def refine_candidates(
     return sorted(candidates, key=lambda c: -c.score)
 
 
-def compute_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
-    """Return the share of bootstrap resamples of the runs in which the first candidate keeps the best score [1].
-
-    Parameters
-    ----------
-    candidates : refined candidates, best first
-    base : fit to which they were added
-    seed : seed of the resampling
-    """
-    runs = len(base.by_run)
-    draws = np.random.Generator(np.random.Philox(seed)).integers(
-        0, runs, (candidates[0].rules.bootstrap_resamples, runs)
-    )
-    scores = []
-    for c in candidates:
-        per_run = 0.5 * (base.by_run - c.fitted.by_run) / c.inflation
-        penalty = c.gain / c.inflation - c.score
-        scores.append(per_run[draws].sum(axis=1) - penalty)
-    winner = np.argmax(np.array(scores), axis=0)
-    return float(np.mean((winner == 0) & (scores[0] > 0.0)))
-
-
 def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
     """Return whether every parameter of ``small`` is also one of ``large``."""
     return set(small.names) < set(large.names)

@@ -1,21 +1,18 @@
-"""Rivals of the named effects, and the smallest effects that could be named."""
+"""Rivals of the named effects: explanations that training, resampled and unseen runs cannot tell from them."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (  # fmt: skip
     Candidate,
     Misfits,
-    compute_win_share,
     cross_validate_candidate,
     is_nested,
     judge_hypothesis,
     refine_candidates,
     refit_without_part,
 )
-from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.search import Round
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, compute_misfit_falls
@@ -79,6 +76,28 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
     return compared
 
 
+def compute_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:
+    """Return the share of bootstrap resamples of the runs in which the first candidate keeps the best score [1].
+
+    Parameters
+    ----------
+    candidates : refined candidates, best first
+    base : fit to which they were added
+    seed : seed of the resampling
+    """
+    runs = len(base.by_run)
+    draws = np.random.Generator(np.random.Philox(seed)).integers(
+        0, runs, (candidates[0].rules.bootstrap_resamples, runs)
+    )
+    scores = []
+    for c in candidates:
+        per_run = 0.5 * (base.by_run - c.fitted.by_run) / c.inflation
+        penalty = c.gain / c.inflation - c.score
+        scores.append(per_run[draws].sum(axis=1) - penalty)
+    winner = np.argmax(np.array(scores), axis=0)
+    return float(np.mean((winner == 0) & (scores[0] > 0.0)))
+
+
 def is_close(own: Candidate, share: float, other: Candidate, wins: float) -> bool:
     """Return whether another explanation cannot be told from the named one: by score, by gain, or by resamples.
 
@@ -113,34 +132,3 @@ def is_close_on_unseen_runs(evidence: Evidence, before: Misfits, own: Candidate,
         fall / other.inflation > own_fall / own.inflation - rules.rival_span
     )
     return bool(np.any(as_good & (2.0 * fall / other.inflation >= -rules.held_out_gain)))
-
-
-def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:
-    """Return the smallest first parameter of each effect whose linear gain would pass the score gate.
-
-    The gate is taken at the null's inflation [unit of the parameter]; infinite where the bounds exclude that size.
-
-    Parameters
-    ----------
-    evidence : the runs
-    base : fit without effects
-    """
-    level = compute_inflation(evidence, base, None)
-    library = np.zeros((len(evidence.effects),) * 2)
-    cross = np.zeros((len(evidence.effects), len(SESSION)))
-    session = np.diag(1.0 / np.square(evidence.session_sigma))
-    for run in evidence.train:
-        q = run.library_q
-        library += run.library.T @ run.library - q.T @ q
-        cross += run.library.T @ run.session - q.T @ run.session_q
-        session += run.session.T @ run.session - run.session_q.T @ run.session_q
-    information = np.diag(library) - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(session), cross)
-    sizes = {}
-    for effect, known in zip(evidence.effects, information, strict=True):
-        needed = (
-            2.0 * level * (evidence.rules.accept_score + len(effect.parameters) * np.log(evidence.samples))
-        )
-        first = effect.parameters[0]
-        size = float(np.sqrt(needed / known)) if known > 0 else np.inf
-        sizes[effect.name] = size if size <= max(first.upper, -first.lower) else np.inf
-    return sizes

@@ -1,4 +1,4 @@
-"""Linear screening of the library: gain and estimate of every effect, and the inflation of the runs."""
+"""Linear screening of the library: gain, estimate and detectable size of its effects, and the inflation of the runs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +93,38 @@ def find_look_alikes(evidence: Evidence, index: int) -> list[int]:
     evidence : the runs
     index : position of the effect in the library
     """
+    gram = _compute_information(evidence)
+    length = np.sqrt(np.maximum(np.diag(gram), 1e-30))
+    cosine = np.abs(gram[index]) / (length * length[index])
+    least = evidence.rules.look_alike_cosine
+    return [int(j) for j in np.argsort(-cosine, kind="stable") if j != index and cosine[j] > least]
+
+
+def find_detectable_sizes(evidence: Evidence, base: Fit) -> dict[str, float]:
+    """Return the smallest first parameter of each effect whose linear gain would pass the score gate.
+
+    The gate is taken at the null's inflation [unit of the parameter]; infinite where the bounds exclude that size.
+
+    Parameters
+    ----------
+    evidence : the runs
+    base : fit without effects
+    """
+    level = compute_inflation(evidence, base, None)
+    information = np.diag(_compute_information(evidence))
+    sizes = {}
+    for effect, known in zip(evidence.effects, information, strict=True):
+        needed = (
+            2.0 * level * (evidence.rules.accept_score + len(effect.parameters) * np.log(evidence.samples))
+        )
+        first = effect.parameters[0]
+        size = float(np.sqrt(needed / known)) if known > 0 else np.inf
+        sizes[effect.name] = size if size <= max(first.upper, -first.lower) else np.inf
+    return sizes
+
+
+def _compute_information(evidence: Evidence) -> NDArray[np.float64]:
+    """Return what the runs say about the library's first parameters, nuisances and session projected out, [E, E]."""
     size, n_session = len(evidence.effects), len(evidence.session_sigma)
     gram, cross = np.zeros((size, size)), np.zeros((size, n_session))
     session = np.diag(1.0 / np.square(evidence.session_sigma))
@@ -100,8 +132,4 @@ def find_look_alikes(evidence: Evidence, index: int) -> list[int]:
         gram += run.library.T @ run.library - run.library_q.T @ run.library_q
         cross += run.library.T @ run.session - run.library_q.T @ run.session_q
         session += run.session.T @ run.session - run.session_q.T @ run.session_q
-    gram = gram - cross @ np.linalg.solve(session, cross.T)
-    length = np.sqrt(np.maximum(np.diag(gram), 1e-30))
-    cosine = np.abs(gram[index]) / (length * length[index])
-    least = evidence.rules.look_alike_cosine
-    return [int(j) for j in np.argsort(-cosine, kind="stable") if j != index and cosine[j] > least]
+    return np.asarray(gram - cross @ np.linalg.solve(session, cross.T))

@@ -25,7 +25,8 @@ from tasks.identification.decision.intervals import (
     compute_profile_interval,
     refit_named,
 )
-from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals, find_detectable_sizes
+from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals
+from tasks.identification.decision.screening import find_detectable_sizes
 from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.decision.words import say_confirmation, say_rejection
