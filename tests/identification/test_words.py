@@ -28,7 +28,7 @@ def judged(
         (judged("brake_lag", 19.14), "the best candidate, brake_lag, scores 19.1; a name needs 20"),
         (
             judged("anti_dive", 45.6, held_out_gain=0.44, crossed=-1.3),
-            "gain 0.4, a name needs 4, cross-validated -1.3",
+            "gain 0.4, a name needs 4, cross-validated -1.3 of 40",
         ),
         (judged("bump_stop", 158.4, held_out_gain=-14.8), "the held-out runs contradict it: gain -14.8"),
         (judged("tyre_heating", 40.0, held_out_gain=9.0, at_bound=True), "a number at the end of its range"),
@@ -73,7 +73,7 @@ def test_the_next_run_is_planned_for_the_best_candidate_that_is_open() -> None:
 
 @pytest.mark.parametrize(
     ("held_out", "crossed", "passes"),
-    [(9.0, 0.0, True), (0.4, 134.0, True), (0.4, 3.9, False), (-14.8, 0.0, False)],
+    [(9.0, 0.0, True), (0.4, 134.0, True), (0.4, 39.0, False), (-14.8, 0.0, False)],
 )
 def test_runs_that_no_fit_has_seen_must_confirm_a_name(held_out: float, crossed: float, passes: bool) -> None:
     assert judged("anti_dive", 45.6, held_out_gain=held_out, crossed=crossed).passes is passes
@@ -82,5 +82,5 @@ def test_runs_that_no_fit_has_seen_must_confirm_a_name(held_out: float, crossed:
 
 def test_the_verdict_says_when_cross_validation_confirmed_a_name() -> None:
     said = say_confirmation(judged("anti_dive", 45.6, held_out_gain=0.4, crossed=134.0))
-    assert said is not None and "(gain 134.0, a name needs 4)" in said
+    assert said is not None and "(gain 134.0, a name needs 40)" in said
     assert say_confirmation(judged("anti_dive", 45.6, held_out_gain=9.0)) is None

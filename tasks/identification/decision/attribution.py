@@ -56,8 +56,11 @@ class Candidate:
     @property
     def passes(self) -> bool:
         """Return whether score, test on unseen runs and bounds all hold."""
-        unseen = max(self.held_out_gain, self.cross_validated_gain)
-        return self.is_shown and unseen > self.rules.held_out_gain
+        unseen = (
+            self.held_out_gain > self.rules.held_out_gain
+            or self.cross_validated_gain > self.rules.cross_validated_gain
+        )
+        return self.is_shown and unseen
 
     @property
     def is_shown(self) -> bool:

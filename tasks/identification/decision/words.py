@@ -83,7 +83,8 @@ def say_rejection(tried: Sequence[Candidate]) -> str:
         return f"{shown} the held-out runs contradict it: {gain}"
     return (
         f"{shown} neither the held-out runs nor the training runs, each predicted from the others, confirm it: {gain},"
-        f" cross-validated {best.cross_validated_gain:.1f}; record another run that excites it"
+        f" cross-validated {best.cross_validated_gain:.1f} of {rules.cross_validated_gain:g}; record another run that"
+        " excites it"
     )
 
 
@@ -94,12 +95,12 @@ def say_confirmation(named: Candidate) -> str | None:
     ----------
     named : the accepted candidate
     """
-    if named.cross_validated_gain <= named.rules.held_out_gain:
+    if named.cross_validated_gain <= named.rules.cross_validated_gain:
         return None
     return (
         f"the held-out runs neither confirm nor contradict {named.hypothesis.name} (gain {named.held_out_gain:.1f});"
         " the training runs, each predicted from the others, confirm it"
-        f" (gain {named.cross_validated_gain:.1f}, a name needs {named.rules.held_out_gain:g})"
+        f" (gain {named.cross_validated_gain:.1f}, a name needs {named.rules.cross_validated_gain:g})"
     )
 
 
