@@ -4,6 +4,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -106,6 +108,12 @@ def test_an_effect_that_no_held_out_run_excites_needs_two_training_runs_that_pre
     best = cross_validate_candidate(evidence, null, refine_candidates(evidence, null, count=3)[0])
     assert best.hypothesis.name == "anti_dive" and best.is_open
     assert best.passes is passes and (best.cross_validated_gain > 100.0) is passes
+    # nor do training runs confirm what needs a number of the session beyond belief
+    bent = replace(best, fitted=replace(best.fitted, session=5.0 * best.fitted.session_sigma))
+    assert (
+        cross_validate_candidate(evidence, null, replace(bent, cross_validated_gain=0.0)).cross_validated_gain
+        == 0.0
+    )
 
 
 def test_the_marginal_misfit_is_that_of_the_dense_covariance() -> None:

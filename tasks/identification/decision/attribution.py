@@ -171,8 +171,8 @@ def cross_validate_candidate(evidence: Evidence, base: Fit, candidate: Candidate
     base : fit of the hypotheses accepted so far
     candidate : judged on held-out runs
     """
-    # what no effect of the library says must be felt in the held-out runs themselves
-    if not candidate.is_open or candidate.hypothesis.effect_class == "form":
+    # what no effect of the library says, or what needs a number pulled beyond belief, must be felt in the held-out runs
+    if not candidate.is_open or candidate.pulls_session or candidate.hypothesis.effect_class == "form":
         return candidate
     fall = compute_cross_validated_fall(evidence, base, candidate.fitted)
     return replace(candidate, cross_validated_gain=fall / candidate.inflation)
