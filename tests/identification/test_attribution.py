@@ -1,10 +1,9 @@
 """Effects are recovered where they are, and nothing is found where nothing is."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-from dataclasses import replace
 
 import numpy as np
 import pytest

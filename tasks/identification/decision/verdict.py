@@ -132,7 +132,7 @@ def find_missing_effects(
     for other in others:
         interval = compute_curvature_interval(other.candidate)
         near.append((named[0].name, make_named_effect(other.candidate, 0.0, interval)))
-        reasons.append(other.reason)
+    reasons += dict.fromkeys(other.reason for other in others)
     if near_form is not None:
         near.append(
             (
