@@ -40,7 +40,6 @@ class DecisionRulesEntry(CatalogueEntry):
 
     accept_score: Level
     held_out_gain: Level
-    cross_validated_gain: Level
     rival_span: Level
     rival_gain_share: Share
     discrepancy_limit: Level

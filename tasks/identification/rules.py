@@ -56,7 +56,6 @@ class DecisionRules:
     ----------
     accept_score : score from which an effect may be named: gain / inflation - parameters x log N [1]
     held_out_gain : fall of the held-out misfit from which an effect may be named [1]
-    cross_validated_gain : the same over training runs, each left out in turn [1]
     rival_span : difference of scores within which two explanations cannot be told apart [1]
     rival_gain_share : share of the named effect's gain from which another effect counts as a rival [1]
     discrepancy_limit : mean square of a channel's whitened leftover in a run from which its noise is widened [1]
@@ -98,7 +97,6 @@ class DecisionRules:
 
     accept_score: float
     held_out_gain: float
-    cross_validated_gain: float
     rival_span: float
     rival_gain_share: float
     discrepancy_limit: float
@@ -133,3 +131,11 @@ class DecisionRules:
     forked_misfit: float
     fewest_runs: int
     joint: JointRules
+
+    @property
+    def cross_validated_gain(self) -> float:
+        """Return the fall of the misfit by which training runs, each left out in turn, must confirm a name [1].
+
+        They chose the candidate, so they must confirm it by as much as a score asks, which is twice that in misfit.
+        """
+        return 2.0 * self.accept_score

@@ -155,11 +155,11 @@ def test_an_error_of_an_instrument_is_differentiated_without_a_simulation(
     started: list[np.ndarray] = []
     simulate = derivatives.simulate_run
 
-    def count(model: RunModel, theta: np.ndarray, **options: Any) -> Simulation:
+    def count_simulation(model: RunModel, theta: np.ndarray, **options: Any) -> Simulation:
         started.append(theta)
         return simulate(model, theta, **options)
 
-    monkeypatch.setattr(derivatives, "simulate_run", count)
+    monkeypatch.setattr(derivatives, "simulate_run", count_simulation)
     run = derivatives.differentiate_by_library(run, base, effects)
     # the base and the scale of the speed, which changes where the run starts
     assert len(effects) == 2 == len(started)

@@ -14,7 +14,7 @@ RULES = load_decision_rules()
 RUNS = SimpleNamespace(rules=RULES, session_sigma=np.ones(7))
 
 
-def judged(name: str, kind: str, gain: float, score: float = 30.0) -> Candidate:
+def make_candidate(name: str, kind: str, gain: float, score: float = 30.0) -> Candidate:
     return Candidate(
         hypothesis=SimpleNamespace(name=name, effect_class=kind, names=("a",), port="suspension_force"),
         fitted=SimpleNamespace(at_bound=False), gain=gain, inflation=1.3, score=score, held_out_gain=11.0,
@@ -22,7 +22,7 @@ def judged(name: str, kind: str, gain: float, score: float = 30.0) -> Candidate:
     )  # fmt: skip
 
 
-def named(effect: Candidate) -> SearchState:
+def make_state(effect: Candidate) -> SearchState:
     return SearchState(
         evidence=RUNS, base=None, rounds=(Round(base=None, tried=(), accepted=effect, evidence=RUNS),)
     )
@@ -32,11 +32,13 @@ def named(effect: Candidate) -> SearchState:
 def test_a_form_beside_an_effect_that_makes_good_nearly_all_alone_is_not_named(
     gain: float, kept: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    form = judged("suspension_force ~ a tanh(4x)", "form", gain)
+    form = make_candidate("suspension_force ~ a tanh(4x)", "form", gain)
     monkeypatch.setattr(discovery, "_find_credible_form", lambda *_: (RUNS, form))
     monkeypatch.setattr(discovery, "find_best_form", lambda *_, **__: None)
     reasons: list[str] = []
-    found, _ = discovery.search_forms(named(judged("anti_dive", "effect", 900.0)), named(form), reasons)
+    found, _ = discovery.search_forms(
+        make_state(make_candidate("anti_dive", "effect", 900.0)), make_state(form), reasons
+    )
     assert (len(found.rounds) == 2) is kept
     assert any("makes good 95% of the gain" in reason for reason in reasons) is not kept
 
@@ -45,8 +47,23 @@ def test_a_form_beside_an_effect_that_makes_good_nearly_all_alone_is_not_named(
 def test_disturbances_are_scaled_beside_a_form_that_the_training_runs_show(
     score: float, added: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    form = judged("friction ~ a exp(-(4x - 1)^2)", "form", 150.0, score)
+    form = make_candidate("friction ~ a exp(-(4x - 1)^2)", "form", 150.0, score)
     monkeypatch.setattr(discovery, "find_best_form", lambda *_, **__: form)
-    explored = discovery._add_best_form(named(judged("brake_lag", "effect", 900.0)), ())
+    explored = discovery._add_best_form(make_state(make_candidate("brake_lag", "effect", 900.0)), ())
     assert ([r.accepted for r in explored.rounds[1:]] == [form]) is added
     assert (explored.base is form.fitted) is added
+
+
+@pytest.mark.parametrize(("share", "followed"), [(0.9, False), (1.1, True)])
+def test_a_weak_linear_hint_leads_to_forms(
+    share: float, followed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    needed = RULES.hopeful_share * (RULES.accept_score + np.log(1000.0))
+    runs = SimpleNamespace(rules=RULES, samples=1000)
+    form = make_candidate("friction ~ a exp(-(4x - 1)^2)", "form", 150.0)
+    monkeypatch.setattr(discovery, "compute_inflation", lambda *_: 1.0)
+    monkeypatch.setattr(discovery, "fit_residual_splines", lambda *_: [SimpleNamespace(gain=share * needed)])
+    monkeypatch.setattr(discovery, "make_form_hypotheses", lambda *_: [form.hypothesis])
+    monkeypatch.setattr(discovery, "judge_hypothesis", lambda *_: form)
+    monkeypatch.setattr(discovery, "is_session_number", lambda _: False)
+    assert discovery.find_best_form(runs, None, gated=False) is (form if followed else None)

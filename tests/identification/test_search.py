@@ -162,17 +162,17 @@ def test_what_the_screen_thinks_little_of_is_refined_where_it_is_asked_for() -> 
 def test_only_what_may_be_named_is_cross_validated(
     monkeypatch: pytest.MonkeyPatch, pulls: bool, asked: list[str]
 ) -> None:
-    def judged(name: str, *names: str, unseen: float = 0.0) -> SimpleNamespace:
+    def make_candidate(name: str, *names: str, unseen: float = 0.0) -> SimpleNamespace:
         return SimpleNamespace(
             hypothesis=SimpleNamespace(name=name, names=names), passes=unseen > 4.0, pulls_session=pulls
         )
 
     # best first; the second passes, and is credible unless it pulls the session
     tried = [
-        judged("open", "a"),
-        judged("best", "b", "c", unseen=9.0),
-        judged("alike", "d"),
-        judged("nested", "b"),
+        make_candidate("open", "a"),
+        make_candidate("best", "b", "c", unseen=9.0),
+        make_candidate("alike", "d"),
+        make_candidate("nested", "b"),
     ]
     seen: list[str] = []
 
@@ -200,3 +200,26 @@ def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bo
     assert find_detectable_sizes(bounded, null)["rolling_resistance"] == np.inf
     # stops on a dry road say nothing of wet friction
     assert sizes["wet_friction_speed"] == np.inf
+
+
+@pytest.mark.parametrize(("score", "arrives"), [(16.0, True), (5.0, False)])
+def test_a_large_gain_is_linearised_anew_though_it_scores_below_a_name(
+    monkeypatch: pytest.MonkeyPatch, score: float, arrives: bool
+) -> None:
+    """A pressure curve whose first fit stops at half its size: score 16, and 122 at the truth."""
+
+    def make_candidate(score: float) -> SimpleNamespace:
+        return SimpleNamespace(
+            hypothesis=SimpleNamespace(name="curve", names=("b",)), fitted=None, gain=520.0, score=score,
+            passes=score > 20.0, pulls_session=False,
+        )  # fmt: skip
+
+    rules = load_decision_rules()
+    start = search.SearchState(evidence=SimpleNamespace(rules=replace(rules, most_effects=1)), base=None)  # type: ignore[arg-type]
+    monkeypatch.setattr(search, "refine_candidates", lambda *_, **__: [make_candidate(score)])
+    monkeypatch.setattr(
+        search, "relinearise_candidate", lambda evidence, *_, **__: (evidence, make_candidate(122.0))
+    )
+    monkeypatch.setattr(search, "cross_validate_candidate", lambda _, __, candidate: candidate)
+    found = search.search_library(start, gated=True)
+    assert bool(found.rounds) is arrives

@@ -31,7 +31,9 @@ from tasks.vehicle.model.simulation import Simulation
 SECOND_SHARES = (0.3, 0.6)
 """Shares of the range of an effect's second parameter at which the screen tries it, besides its first value."""
 KNOT_STEP = (30.0, 0.01, 30.0)
+"""Step of a knot at each disturbed port [N, 1, N m]."""
 Quotient = Callable[..., NDArray[np.float64]]
+"""Function that returns the difference quotient of the readings for a moved parameter vector and its step."""
 
 
 def differentiate_run(
@@ -56,10 +58,10 @@ def differentiate_run(
     disturbance : prior of the disturbances
     slots : forms that belong to that point
     """
-    simulated, differentiate = _prepare_quotients(model, base, slots)
+    simulated, compute_quotient = _prepare_quotients(model, base, slots)
     columns = [
-        differentiate(base, 0.02, initial_speed=compute_starting_speed(model, base) + 0.02),
-        differentiate(_shift_parameter(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
+        compute_quotient(base, 0.02, initial_speed=compute_starting_speed(model, base) + 0.02),
+        compute_quotient(_shift_parameter(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
     ]
     for name in ("longitudinal_acceleration", "pitch"):
         offset = np.zeros_like(columns[0])
@@ -79,9 +81,9 @@ def differentiate_run(
                 spacing=spacing,
                 values=np.array([0.0, step, 0.0]),
             )
-            columns.append(differentiate(base, step, (slot,), branch=(first, simulated)))
+            columns.append(compute_quotient(base, step, (slot,), branch=(first, simulated)))
     session = [
-        differentiate(_shift_parameter(base, i, 0.5 * s), 0.5 * s)
+        compute_quotient(_shift_parameter(base, i, 0.5 * s), 0.5 * s)
         for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
     ]
     nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma)
@@ -116,7 +118,7 @@ def differentiate_by_library(
     effects : library of effects
     slots : forms that belong to that point
     """
-    _, differentiate = _prepare_quotients(run.model, base, slots)
+    _, compute_quotient = _prepare_quotients(run.model, base, slots)
     library, others = [], []
     for effect in effects:
         theta = base.copy()
@@ -124,7 +126,7 @@ def differentiate_by_library(
         if base[leading.index] == 0.0:
             for parameter in effect.parameters[1:]:
                 theta[parameter.index] = parameter.start
-        library.append(differentiate(_shift_parameter(theta, leading.index, leading.step), leading.step))
+        library.append(compute_quotient(_shift_parameter(theta, leading.index, leading.step), leading.step))
     for place, value in list_second_values(effects):
         leading, second = effects[place].parameters
         theta = base.copy()
@@ -134,7 +136,7 @@ def differentiate_by_library(
         others.append(
             np.zeros_like(library[0])
             if there
-            else differentiate(_shift_parameter(theta, leading.index, leading.step), leading.step)
+            else compute_quotient(_shift_parameter(theta, leading.index, leading.step), leading.step)
         )
     columns, more = (
         whiten_channels(np.stack(part, axis=-1), run.rho, run.sigma)
@@ -153,7 +155,7 @@ def _prepare_quotients(
     simulated = simulate_run(model, base, slots=slots, keep_states=True)
     y = compute_instrument_readings(model, base, simulated)
 
-    def differentiate(
+    def compute_quotient(
         theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
     ) -> NDArray[np.float64]:
         """Return the difference quotient of the readings."""
@@ -162,7 +164,7 @@ def _prepare_quotients(
             moved = simulate_run(model, theta, slots=(*slots, *extra), **options)
         return (compute_instrument_readings(model, theta, moved) - y) / step
 
-    return simulated, differentiate
+    return simulated, compute_quotient
 
 
 def differentiate_about_offsets(
