@@ -1,8 +1,8 @@
 """A Dask scheduler's share of each clip: it and the driver in this process, hundreds of workers in another.
 
 The workers are Dask's own, each with a thread that sleeps for as long as a clip would take. They answer, transfer and
-send heartbeats as ever; what samples a process (profiler, monitors of the system and of memory) is off, because hundreds
-of them share one here.
+send heartbeats as ever; what samples a process (profiler, monitors of the system and of memory) is off, because
+hundreds of them share one here.
 """
 
 import asyncio
