@@ -17,7 +17,9 @@ STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #1b1b1b; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; border-bottom: 1px solid #ddd; }
 table { border-collapse: collapse; font-size: 12.5px; } th, td { padding: .15rem .6rem; border-bottom: 1px solid #eee; }
-td.n { text-align: right; font-variant-numeric: tabular-nums; } th { text-align: left; }
+td.n { text-align: right; font-variant-numeric: tabular-nums; } th { text-align: left; } .wide { overflow-x: auto; }
+.metric th { padding-top: .8rem; border-bottom-color: #bbb; }
+small { margin-left: .8rem; font-weight: 400; color: #555; }
 svg { max-width: 100%; height: auto; } .clips { display: grid; grid-template-columns: 1fr 1fr; gap: .2rem 1rem; }
 .clips p { margin: .3rem 0; font-size: 13px; } .clips img { width: 32.5%; margin-right: .5%; }
 .none { color: #999; text-align: right; } figure { margin: .5rem 0; } figcaption { font-size: 13px; color: #444; }
@@ -103,22 +105,25 @@ def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, c
 
 
 def _render_summary(rows: Sequence[Row], names: Sequence[str]) -> str:
-    lines = []
+    head = ("method", "clips", "mean", "floor", "SD over seeds", "largest", "unit", "paper", "note")
+    groups = []
     for name in names:
         mine = [row for row in rows if row["metric"] == name and row["window"] == 0]
-        meaning = describe_metric(name)
         means = [r for r in mine if r["condition"] == "all" or r["condition"].startswith("paper/")]
+        lines = []
         for row in means or mine[:1]:
             single = [r["value"] for r in mine if r["method"] == row["method"] and _is_single(r)]
             scored = [value for value in single if value is not None]
             lines.append(
-                (name, row["method"], row["condition"], row["value"], row["seed_std"],
+                (row["method"], row["condition"], row["value"], row["floor"], row["seed_std"],
                  max(scored) if scored and row["condition"] == "all" else None,
-                 row["unit"], row["paper"], row["note"], meaning)
+                 row["unit"], row["paper"], row["note"])
             )  # fmt: skip
-            name = meaning = ""
-    head = ("metric", "method", "clips", "mean", "SD over seeds", "largest", "unit", "paper", "note", "")
-    return _html_table(head, lines)
+        title = f"{escape(name)}<small>{escape(describe_metric(name))}</small>"
+        groups.append(
+            f'<tbody><tr class="metric"><th colspan="{len(head)}">{title}</th></tr>{_html_rows(lines)}</tbody>'
+        )
+    return _html_table(head, "".join(groups))
 
 
 def _is_single(row: Row) -> bool:
@@ -140,19 +145,24 @@ def _render_table(rows: Sequence[Row]) -> str:
         "note",
     )
     means_first = sorted(rows, key=_is_single)
-    return _html_table(head, [tuple(row[key] for key in head) for row in means_first])
+    return _html_table(head, _html_rows([tuple(row[key] for key in head) for row in means_first]))
 
 
-def _html_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    def cell(value: Any) -> str:
-        if value is None:
-            return '<td class="none">-</td>'
-        if isinstance(value, float):
-            return f'<td class="n">{value:.4g}</td>'
-        return f"<td>{escape(str(value))}</td>"
+def _html_table(head: Sequence[str], body: str) -> str:
+    titles = "".join(f"<th>{escape(title)}</th>" for title in head)
+    return f'<div class="wide"><table><thead><tr>{titles}</tr></thead>{body}</table></div>'
 
-    body = "".join(f"<tr>{''.join(cell(v) for v in row)}</tr>" for row in rows)
-    return f"<table><tr>{''.join(f'<th>{escape(h)}</th>' for h in head)}</tr>{body}</table>"
+
+def _html_rows(rows: Sequence[Sequence[Any]]) -> str:
+    return "".join(f"<tr>{''.join(map(_html_cell, row))}</tr>" for row in rows)
+
+
+def _html_cell(value: Any) -> str:
+    if value is None:
+        return '<td class="none">-</td>'
+    if isinstance(value, float):
+        return f'<td class="n">{value:.4g}</td>'
+    return f"<td>{escape(str(value))}</td>"
 
 
 def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
