@@ -8,16 +8,10 @@ import time
 from collections import Counter, defaultdict
 from pathlib import Path
 
-from benchmarks.fuzzing.parsers import BY_NAME, PARSERS, Parser
-from benchmarks.fuzzing.watched import (
-    FINDINGS,
-    Desk,
-    Reading,
-    count_outcomes,
-    lay_out,
-    read_watched,
-    write_documents,
-)
+from benchmarks.fuzzing.desk import FINDINGS, Desk, lay_out, write_documents
+from benchmarks.fuzzing.parser import Parser
+from benchmarks.fuzzing.parsers import BY_NAME, PARSERS
+from benchmarks.fuzzing.watched import Reading, count_outcomes, read_watched
 
 SEED = 2025
 

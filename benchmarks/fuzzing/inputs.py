@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from benchmarks.fuzzing import payloads, trees
-from benchmarks.fuzzing.parsers import Parser
+from benchmarks.fuzzing.parser import Parser
 from benchmarks.fuzzing.rules import Rule, format_place
 from benchmarks.fuzzing.seals import Files
 

@@ -1,18 +1,21 @@
-"""Every parser of what a stranger may have written: sound documents, the loader, and the rules that it keeps."""
-
-import re
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+"""Every parser of what a stranger may have written."""
 
 from benchmarks.fuzzing import recorded, seals, sound
+from benchmarks.fuzzing.parser import Parser, parse_entries
+from benchmarks.fuzzing.readers import (
+    import_scene,
+    read_dataset,
+    read_recording,
+    read_signature,
+    read_tables,
+    read_weather,
+    remove_cache,
+)
 from benchmarks.fuzzing.rules import (
     CELLS_FINITE,
     FINITE,
     INF,
     NAN,
-    UNITS,
     Rule,
     files_inside,
     hashes_keep_their_form,
@@ -33,7 +36,6 @@ from catalogs.grids import load_grid
 from catalogs.hazard_markings import load_marking
 from catalogs.learned_judges import load_judges
 from catalogs.protocols import load_protocol
-from catalogs.recordings import read_signals, summarise_signals
 from catalogs.references import read_reference
 from catalogs.scenes.folder import read_scene
 from catalogs.scenes.gaussian_files import read_gaussians
@@ -45,128 +47,17 @@ from catalogs.studies import load_sensitivity_study
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from catalogs.weather import load_weather
-from catalogs.weather.grip import shared_families
-from flows.auditing.signing import signature_findings
-from flows.auditing.verify import verify_dataset
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
-from flows.judging.physics import clip_columns, clip_facts, read_constants
+from flows.judging.physics import read_constants
 from flows.judging.trajectories import read_trajectory
 from flows.making.plan import read_plan
-from flows.making.scenes import scene_import
 from flows.making.seal import seal_dataset
-from flows.reading.describe import describe_dataset, validate_grid
-from flows.reading.query import VIEWS, query_dataset
+from flows.reading.describe import validate_grid
 from flows.store.layout import Layout
 from flows.store.outputs import read_marker
 from flows.store.sealed import read_manifest
 from manifests.frozen_run import read_frozen
-from tasks.errors import InputError
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parser:
-    """One parser.
-
-    Parameters
-    ----------
-    name : of the parser
-    write : writes its sound documents
-    read : calls the real loader on a folder with one document
-    targets : names of the files that are mutated, as regular expressions
-    share : of all inputs, by weight [1]
-    rules : that mutations break knowingly
-    known_keys : places of mappings, as a regular expression, that take no unknown key; None where all are taken
-    reseal : makes seals fit again; None without seals
-    sealed : names, as a regular expression, of files that must be refused when they changed and the seals did not
-    writes : the loader changes the document's folder
-    """
-
-    name: str
-    write: sound.Writer
-    read: Callable[[Path], object]
-    targets: tuple[str, ...] = (r".*",)
-    share: float = 1.0
-    rules: tuple[Rule, ...] = ()
-    known_keys: str | None = None
-    reseal: seals.Resealing | None = None
-    sealed: str | None = None
-    writes: bool = False
-
-    def mutates(self, file: str) -> bool:
-        """Whether a file of the document is mutated."""
-        return any(re.fullmatch(target, file) for target in self.targets)
-
-
-def parse_entries(
-    name: str,
-    pattern: str,
-    load: Callable[[Path], object],
-    *,
-    share: float = 1.0,
-    reseal: seals.Resealing | None = None,
-    rules: tuple[Rule, ...] = (),
-) -> Parser:
-    """A parser of catalogue files: everything has a unit and nothing is unknown or infinite."""
-    return Parser(
-        name=name, write=sound.copy_entries(pattern), read=lambda folder: load(folder / "entry.yaml"), share=share,
-        rules=(FINITE, UNITS, *rules), known_keys=".*", reseal=reseal,
-    )  # fmt: skip
-
-
-def read_dataset(folder: Path) -> None:
-    """Verify, describe and query a dataset, as a reader does first."""
-    result = verify_dataset(str(folder))
-    describe_dataset(str(folder))
-    for view in VIEWS:
-        query_dataset(
-            str(folder),
-            f"SELECT * FROM {view} ORDER BY clip_id LIMIT 5" if view != "pairs" else "SELECT * FROM pairs",
-        )
-    if not result["verified"]:
-        raise InputError([f"{fault['path']} is {fault['damage']}" for fault in result["damaged"]])
-
-
-def read_tables(folder: Path) -> None:
-    """The tables of every clip as the auditors of its physics read them."""
-    for facts in clip_facts(folder):
-        clip_columns(folder, "ticks", facts)
-        clip_columns(folder, "frames", facts)
-
-
-def read_signature(folder: Path) -> None:
-    """A signed dataset's signature, held against the signer's key."""
-    found = signature_findings(Layout(folder), str(folder / "public.pem"))
-    if not found["signed"]:
-        raise InputError(found["signature"])
-
-
-def read_recording(folder: Path) -> None:
-    """A recording as an import reads it, and as a list of its signals."""
-    channel_map, _ = load_channel_map(folder / "map.yaml")
-    path = next(folder.glob("log.*"))
-    summarise_signals(path, channel_map)
-    read_signals(path, channel_map)
-
-
-def read_weather(folder: Path) -> None:
-    """How the weathers look, and how they grip: what rolls on a road reads its own parts of the same files."""
-    load_weather(folder)
-    load_surface("dense-asphalt", folder)
-    shared_families(folder)
-
-
-def import_scene(folder: Path) -> None:
-    """A file of Gaussians along a route, to the folder that is not written."""
-    files = {path.name.partition(".")[0]: path for path in folder.iterdir()}
-    scene_import(str(files["cloud"]), str(files["route"]), str(folder / "scene"), camera_height=1.65)
-
-
-def remove_cache(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function without its cache, in which another document of the same place would be found."""
-    return getattr(function, "__wrapped__", function)
-
 
 NUMBERS_OF_A_GRID = (
     limit_values("precipitation_mm_h", -1, 50_000, 1e308),

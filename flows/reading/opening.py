@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import duckdb
 import pyarrow as pa
-import pyarrow.parquet as pq
 
-from catalogs.sentences import shorten
 from flows.reading.clips import Clip, find_clip
 from flows.reading.connection import connect_sealed, quote_identifier
 from flows.reading.pictures import open_frames_store, open_labelled_frames
 from flows.reading.query import VIEWS, list_columns, refused_query
 from flows.reading.suggestions import suggest_names
-from flows.reading.table_files import table_files
+from flows.reading.table_files import STORED, explain_unreadable, open_stored_table
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest, read_manifest_head
@@ -30,7 +28,6 @@ if TYPE_CHECKING:  # each takes its time to import, and few people need all of t
 
     from flows.reading.windows import ClipWindows
 
-STORED = ("clips", "ticks", "frames", "pairs")
 _Answer = TypeVar("_Answer")
 
 
@@ -107,20 +104,7 @@ class Dataset:
             If there is no such table.
         """
         _check_names(table, STORED)
-        from pyarrow import dataset  # it imports pandas, which takes a third of a second
-
-        paths = list(table_files(self._layout, self.head)[table].values())
-        try:
-            # without the metadata of the whole: libraries read settings for other libraries there
-            schema = pq.read_schema(paths[0]).remove_metadata()
-            if table in {"clips", "pairs"}:
-                return dataset.dataset(paths, schema=schema)
-            partitioning = dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
-            return dataset.dataset(
-                paths, schema=schema.append(pa.field("family", pa.string())), partitioning=partitioning
-            )
-        except (pa.ArrowException, OSError) as error:
-            raise self._unreadable(error) from None
+        return open_stored_table(self._layout, self.head, table)
 
     @cached_property
     def connection(self) -> duckdb.DuckDBPyConnection:
@@ -195,7 +179,7 @@ class Dataset:
         try:
             return evaluate(relation)
         except (duckdb.Error, pa.ArrowException, ValueError, OverflowError) as error:
-            raise self._unreadable(error) from None
+            raise explain_unreadable(self._layout, error) from None
 
     def _quote_columns(self, table: str, columns: str | Sequence[str]) -> list[str]:
         """Columns of a view as SQL takes them; DuckDB does not mind the case of a name."""
@@ -221,12 +205,6 @@ class Dataset:
     @property
     def _layout(self) -> Layout:
         return Layout(self.root, self.origin)
-
-    def _unreadable(self, error: Exception) -> InputError:
-        return InputError(
-            f"{self._layout}: its tables must be as muSync writes them; {shorten(error)}:"
-            " musync verify says whether they are damaged"
-        )
 
     @cached_property
     def frames(self) -> "zarr.Group":

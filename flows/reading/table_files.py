@@ -1,4 +1,4 @@
-"""The recorded Parquet files of a dataset as a file system for DuckDB that reads them, and does nothing else.
+"""The recorded Parquet files of a dataset: as pyarrow tables, and as a file system for DuckDB that only reads them.
 
 DuckDB's own list of allowed paths lets a query write to them (``COPY ... TO``, also inside ``WITH``). Here writing is
 refused where files are opened, whatever the query looks like; and a name is not a path: glob characters or quotes in a
@@ -12,15 +12,21 @@ import threading
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
 
-from catalogs.sentences import shorten_value
+from catalogs.sentences import shorten, shorten_value
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
+if TYPE_CHECKING:
+    import pyarrow.dataset
+
 SCHEME = "musync"
+STORED = ("clips", "ticks", "frames", "pairs")
 _WHOLE = re.compile(r"telemetry/(?P<table>clips|pairs)\.parquet")
 _PART = re.compile(r"telemetry/(?P<table>ticks|frames)/family=[a-z0-9_-]{1,64}/part-[0-9]{4,9}\.parquet")
 
@@ -33,7 +39,7 @@ def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[s
     InputError
         Listing the tables of which files are missing, and recorded files that lie where no table's do.
     """
-    tables: dict[str, dict[str, Path]] = {"clips": {}, "pairs": {}, "ticks": {}, "frames": {}}
+    tables: dict[str, dict[str, Path]] = {table: {} for table in STORED}
     problems = []
     for recorded in sorted(manifest["artifacts"]):
         if not recorded.startswith("telemetry/"):
@@ -51,6 +57,38 @@ def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[s
     if problems:
         raise InputError(problems)
     return tables
+
+
+def open_stored_table(layout: Layout, manifest: Mapping[str, Any], table: str) -> "pyarrow.dataset.Dataset":
+    """Return a stored table, clips, ticks, frames or pairs, as a lazy pyarrow dataset; its schema has the units.
+
+    Raises
+    ------
+    InputError
+        If its files are missing, or are not as muSync writes them.
+    """
+    from pyarrow import dataset  # it imports pandas, which takes a third of a second
+
+    paths = list(table_files(layout, manifest)[table].values())
+    try:
+        # without the metadata of the whole: libraries read settings for other libraries there
+        schema = pq.read_schema(paths[0]).remove_metadata()
+        if table in {"clips", "pairs"}:
+            return dataset.dataset(paths, schema=schema)
+        partitioning = dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
+        return dataset.dataset(
+            paths, schema=schema.append(pa.field("family", pa.string())), partitioning=partitioning
+        )
+    except (pa.ArrowException, OSError) as error:
+        raise explain_unreadable(layout, error) from None
+
+
+def explain_unreadable(layout: Layout, error: Exception) -> InputError:
+    """Return the refusal of tables that a library cannot read."""
+    return InputError(
+        f"{layout}: its tables must be as muSync writes them; {shorten(error)}:"
+        " musync verify says whether they are damaged"
+    )
 
 
 class TableFiles(AbstractFileSystem):

@@ -10,9 +10,9 @@ import pytest
 
 from benchmarks.fuzzing import trees
 from benchmarks.fuzzing.__main__ import plan_inputs
+from benchmarks.fuzzing.desk import FINDINGS, Desk, lay_out, read_input, write_documents
 from benchmarks.fuzzing.inputs import Documents, Input, make_input
 from benchmarks.fuzzing.parsers import BY_NAME, PARSERS
-from benchmarks.fuzzing.watched import FINDINGS, Desk, lay_out, read_input, write_documents
 from tests.hostile.cases import COLUMNS, PLACES, TEXTS, WORDS
 
 OF_TEXT = [parser.name for parser in PARSERS if parser.name not in {"manifest", "telemetry", "planned grid"}]

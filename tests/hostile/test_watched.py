@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.fuzzing import watched
-from benchmarks.fuzzing.parsers import Parser
+from benchmarks.fuzzing import desk, watched
+from benchmarks.fuzzing.desk import write_documents
+from benchmarks.fuzzing.parser import Parser
 from benchmarks.fuzzing.rules import FINITE
 from benchmarks.fuzzing.sound import write_texts
-from benchmarks.fuzzing.watched import read_watched, write_documents
+from benchmarks.fuzzing.watched import read_watched
 from tasks.errors import InputError
 
 kept = []
@@ -70,7 +71,7 @@ def test_what_becomes_of_an_input_is_counted(tmp_path, monkeypatch, read, outcom
             read(folder)
 
     parser = Parser(name="p", write=write_texts({"a.yaml": "a: 1"}), read=read_changed, rules=(FINITE,))
-    monkeypatch.setattr(watched, "BY_NAME", {"p": parser})
+    monkeypatch.setattr(desk, "BY_NAME", {"p": parser})
     monkeypatch.setattr(watched, "START", "fork")
     monkeypatch.setattr(watched, "LONGEST_S", 0.5)
     monkeypatch.setattr(watched, "LONGEST_WAIT_S", 2.0)
