@@ -34,6 +34,8 @@ REACHES = {
     "low_speed": (VEHICLE, RENDER),
     "variant": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
+    "labels": (RENDER,),
+    "pictures": (RENDER, JUDGING),
     "seed": (RENDER,),
     "code": (VEHICLE, RENDER, JUDGING),
     "libraries": (VEHICLE, RENDER, JUDGING),
@@ -75,7 +77,8 @@ def input_differences(
     rows += _list_rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
     rows += _list_rows("backend", "backend", a["backend"], b["backend"])
     for name in (
-        "vehicle_mode", "low_speed", "variant", "composition", "frames", "frame_rate_hz", "duration_s", "seed"
+        "vehicle_mode", "low_speed", "variant", "composition", "labels", "pictures", "frames", "frame_rate_hz",
+        "duration_s", "seed",
     ):  # fmt: skip
         before = BEFORE.get(name)
         rows += _list_rows(name, name, a["grid"].get(name, before), b["grid"].get(name, before))

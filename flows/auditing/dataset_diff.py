@@ -96,7 +96,8 @@ def format_text(result: Mapping[str, Any]) -> str:
 def _clip_row(
     old: Layout, new: Layout, a: Mapping[str, Any], b: Mapping[str, Any], why: list[dict[str, Any]]
 ) -> dict[str, Any] | None:
-    changed = [name for name in a["content"] if a["content"][name] != b["content"].get(name)]
+    names = dict.fromkeys([*a["content"], *b["content"]])
+    changed = [name for name in names if a["content"].get(name) != b["content"].get(name)]
     if not changed:
         return None
     row: dict[str, Any] = {
@@ -116,7 +117,7 @@ def _clip_row(
         row["first"] = first and {
             "channel": first["channel"], "tick": first["tick"], "a": first["recorded"], "b": first["remade"]
         }  # fmt: skip
-    if "rgb" in changed:
+    if "rgb" in changed and "rgb" in a["content"].keys() & b["content"].keys():
         row["picture"] = _compare_pictures(old, new, a["index"], b["index"])
     return row | {"labels": {name: None if isnan(value) else value for name, value in moves.items()}}
 
@@ -127,7 +128,7 @@ def _read_ticks(layout: Layout, clip: Mapping[str, Any]) -> dict[str, np.ndarray
 
 
 def _compare_pictures(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | None:
-    """Share of changed pixels and mean change of their 8-bit values; None for pictures of two sizes."""
+    """Return the share of changed pixels and the mean change of their 8-bit values; None for pictures of two sizes."""
     ours, theirs = read_clip(old.frames, a, "rgb"), read_clip(new.frames, b, "rgb")
     if ours.shape[1:] != theirs.shape[1:]:
         return None

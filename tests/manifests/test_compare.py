@@ -27,9 +27,22 @@ def test_nan_that_became_a_number_is_a_difference():
     assert found is not None and found["tick"] == 7
 
 
+def test_what_the_hashes_tell_apart_is_a_difference_though_numbers_compare_equal():
+    recorded, remade = np.zeros((2, 3, 4)), np.zeros((2, 3, 4))
+    remade[1, 2, 3] = -0.0
+    found = first_row_difference({"pitch": recorded[1, 2]}, {"pitch": remade[1, 2]}, ["pitch"])
+    assert found is not None and (found["tick"], np.signbit(found["remade"])) == (3, True)
+    pixel = first_pixel_difference("depth", recorded, remade)
+    assert pixel is not None and (pixel["tick"], pixel["pixel"]) == (1, [3, 2])
+    single = first_row_difference(
+        {"pitch": recorded[0]}, {"pitch": recorded[0].astype(np.float32)}, ["pitch"]
+    )
+    assert single is not None and single["remade"] == "shape (3, 4) of float32"
+
+
 def test_a_missing_channel_and_a_shorter_table_are_differences():
     short = {name: values[:50] for name, values in table().items()}
-    assert first_row_difference(table(), short, ["t_ns"])["recorded"] == "shape (100,)"  # type: ignore[index]
+    assert first_row_difference(table(), short, ["t_ns"])["recorded"] == "shape (100,) of int64"  # type: ignore[index]
     assert first_row_difference(table(), {}, ["t_ns"])["remade"] == "absent"  # type: ignore[index]
 
 
