@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def first_row_difference(
+def find_row_difference(
     recorded: Mapping[str, NDArray[Any]], remade: Mapping[str, NDArray[Any]], channels: Sequence[str]
 ) -> dict[str, Any] | None:
     """Return the earliest row in which a channel differs; None when the tables are equal.
@@ -46,7 +46,7 @@ def first_row_difference(
     return first
 
 
-def first_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[Any]) -> dict[str, Any] | None:
+def find_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[Any]) -> dict[str, Any] | None:
     """Return the earliest frame in which two clips' pictures differ and its first such pixel; None when they are equal.
 
     Parameters
