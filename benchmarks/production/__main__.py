@@ -1,6 +1,6 @@
 """``python -m benchmarks.production [--clips N] [--workers N] [--measure]``: what a large production takes.
 
-With ``--measure`` the scheduler's share is measured (a minute or more), and the requests are counted on a server here;
+With ``--measure`` the scheduler's share is measured (three minutes), and the requests are counted on a server here;
 else the constants of docs/how-to/plan-a-million-clips.md stand.
 """
 

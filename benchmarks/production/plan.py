@@ -28,7 +28,7 @@ class ClipCosts:
     cpu_s: float = 20.0
     gather_cpu_s: float = 0.012
     driver_cpu_s: float = 0.0015
-    scheduler_cpu_s: float = 0.015
+    scheduler_cpu_s: float = 0.0062
     frames_bytes: float = 29.9e6
     tables_bytes: float = 0.22e6
     manifest_bytes: float = 2000

@@ -280,9 +280,8 @@ COMMANDS = (
                 "Folder for closing-benchmark.json and campaigns.jsonl; a later call continues there.",
             ),
             define_option("seeds", int, "Number of campaigns for each known truth.", 10, minimum=0),
-            define_option(
-                "nulls", int, "Number of campaigns in which the model lacks nothing.", 100, minimum=0
-            ),
+            define_option("first_seed", int, "Of each truth; rules rest on some of 0 to 4.", 0, minimum=0),
+            define_option("nulls", int, "Number of campaigns without any effect.", 100, minimum=0),
             define_option(
                 "harder",
                 int,

@@ -4,11 +4,15 @@ import asyncio
 import os
 import re
 import socket
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
+from distributed import WorkerPlugin
 from distributed.comm import CommClosedError
+from distributed.core import Status
 
+from flows.running.terminal import print_lines
 from manifests.provenance import code_version, library_versions
 from tasks.errors import InputError
 
@@ -16,6 +20,8 @@ NOT_ON_WORKERS = ("prefect",)
 """Recorded libraries that no worker imports."""
 SHOWN_WORKERS = 3
 VISIBLE = "CUDA_VISIBLE_DEVICES"
+TURNED_AWAY = "musync-turned-away"
+"""Dask's topic of events about workers that joined a run and may not work for it."""
 
 
 def facts_here() -> dict[str, str]:
@@ -70,6 +76,54 @@ def check_cluster(client: Any, address: str) -> None:
     problems = version_problems(facts_here(), client.run(facts_here, on_error="return"))
     if problems:
         raise InputError([f"--scheduler {address}: {problem}" for problem in problems])
+
+
+@contextmanager
+def check_joining(client: Any, address: str) -> Iterator[None]:
+    """Turn away workers that join while a run goes on and are not set up like this machine, and print why.
+
+    Clusters replace workers and grow (`SLURMCluster.adapt`, a pod that starts again); what came later computes as well.
+
+    Parameters
+    ----------
+    client : `distributed.Client` of the cluster
+    address : of its scheduler
+    """
+    check = JoiningCheck(facts_here())
+    client.subscribe_topic(
+        TURNED_AWAY, lambda event: print_lines(f"--scheduler {address}: {event[1]}", error=True)
+    )
+    client.register_plugin(check)
+    try:
+        yield
+    finally:
+        client.unregister_worker_plugin(check.name)
+        client.unsubscribe_topic(TURNED_AWAY)
+
+
+class JoiningCheck(WorkerPlugin):
+    """Makes a worker leave its cluster, before it is given work, where it is not set up like the driver.
+
+    Parameters
+    ----------
+    here : `facts_here` of the driver's machine
+    """
+
+    name = "musync-joining-check"
+
+    def __init__(self, here: Mapping[str, str]):
+        self.here = here
+
+    async def setup(self, worker: Any) -> None:
+        """Hold the worker's facts against the driver's; Dask reads the worker's messages when this has returned."""
+        problems = version_problems(self.here, {worker.address: facts_here()})
+        for problem in problems:
+            worker.log_event(TURNED_AWAY, f"{problem}; it was turned away")
+        if problems:
+            worker.status = Status.closing_gracefully  # begins nothing from here on
+            await worker.scheduler.retire_workers(workers=[worker.address], close_workers=False, remove=True)
+            # not from here: a worker that closes while it registers stays half open
+            worker.loop.add_callback(worker.close, reason="it is not set up like the driver")
 
 
 def share_gpus(client: Any) -> None:

@@ -90,7 +90,7 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
     import dask
     from distributed import Client, LocalCluster
 
-    from flows.running.cluster import check_cluster, share_gpus, warm_cluster
+    from flows.running.cluster import check_cluster, check_joining, share_gpus, warm_cluster
 
     # a closing cluster says so in a dozen lines, and Prefect lets every library log
     logging.getLogger("distributed").setLevel(logging.ERROR)
@@ -123,11 +123,12 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
         raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
     with client:
         check_cluster(client, scheduler)
-        share_gpus(client)
-        if warm is not None:
-            warm_cluster(client, warm, scheduler)
-        tell_dashboard(client)
-        yield client
+        with check_joining(client, scheduler):
+            share_gpus(client)
+            if warm is not None:
+                warm_cluster(client, warm, scheduler)
+            tell_dashboard(client)
+            yield client
 
 
 def tell_dashboard(client: Any) -> None:

@@ -155,3 +155,11 @@ def test_the_summary_counts_each_kind_once() -> None:
     # sizes and poor designs have shares of their own
     assert result["confusion"]["brake_lag"] == {"right": 1, "wrong": 1}
     assert result["named_instead"] == {"brake_lag": {"brake_dead_time": 1}, "nothing": {"brake_dead_time": 1}}
+
+
+def test_a_later_first_seed_makes_other_campaigns_of_the_same_truths_and_the_same_nulls() -> None:
+    first, later = (list(closing_benchmark._plan(2, seed, 4, 1)) for seed in (0, 5))
+    assert [(p.kind, p.name) for p in first] == [(p.kind, p.name) for p in later]
+    moved = {p.kind for p, q in zip(first, later, strict=True) if p.seed != q.seed}
+    assert moved == {"library", "outside", "size"}
+    assert {q.seed - p.seed for p, q in zip(first, later, strict=True) if p.kind in moved} == {5}

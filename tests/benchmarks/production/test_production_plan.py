@@ -1,8 +1,12 @@
 """What a large production takes follows from what a clip takes."""
 
+from pathlib import Path
+
 import pytest
 
 from benchmarks.production.plan import ClipCosts, Prices, plan_production
+from benchmarks.production.scheduling import measure_scheduling
+from flows.store.layout import Layout
 
 COSTS = ClipCosts(
     cpu_s=9.0, gather_cpu_s=1.0, driver_cpu_s=0.1, scheduler_cpu_s=0.02, frames_bytes=1e6, tables_bytes=1e6,
@@ -36,3 +40,10 @@ def test_a_production_is_counted_from_its_clips():
     assert {name: value for name, (value, _) in rows.items()} == pytest.approx(
         {name: value for name, (value, _) in expected.items()}
     )
+
+
+@pytest.mark.minutes
+def test_workers_of_another_process_are_kept_busy_and_only_scheduler_and_driver_are_counted():
+    found = measure_scheduling(Layout(Path("/shared/sets/x")), workers=4, calls=12, clip_s=1.0)
+    assert found["calls"] == 12 and 0.5 < found["busy"] <= 1.0
+    assert 0.0 < found["cpu_ms_per_call"] < 200.0

@@ -18,7 +18,14 @@ from distributed import Client, LocalCluster
 
 from flows.making.clip import warm_up
 from flows.making.generate import generate_dataset
-from flows.running.cluster import check_cluster, facts_here, gpu_for, version_problems, warm_cluster
+from flows.running.cluster import (
+    check_cluster,
+    check_joining,
+    facts_here,
+    gpu_for,
+    version_problems,
+    warm_cluster,
+)
 from flows.running.runner import open_executor
 from flows.store.layout import Layout
 from tasks.errors import InputError
@@ -186,3 +193,33 @@ def test_a_worker_that_does_not_see_the_folder_is_told(local):
 def test_a_cluster_without_workers_is_refused(local):
     with Client(local) as client, pytest.raises(InputError, match="has no workers"):
         check_cluster(client, local.scheduler_address)
+
+
+def test_a_worker_that_joins_a_run_with_another_version_is_turned_away_before_it_works(
+    local, monkeypatch, capsys
+):
+    local.scale(1)
+    address, own = local.scheduler_address, facts_here()
+    with Client(local) as client:
+        client.wait_for_workers(1, timeout=30)
+        with check_joining(client, address):
+            (first,) = client.run(os.getpid)
+            monkeypatch.setattr("flows.running.cluster.facts_here", lambda: own | {"numpy": "1.0"})
+            calls = client.map(time.sleep, [0.05] * 60, pure=False)
+            local.scale(2)
+            wait_for_event(client, "all", "remove-worker")
+            assert not all(call.done() for call in calls)
+            client.gather(calls)
+            assert {tuple(workers) for workers in client.who_has(calls).values()} == {(first,)}
+    told = capsys.readouterr().err
+    assert f"numpy is 1.0 there and {own['numpy']} here: install the same; it was turned away" in told
+    assert told.startswith(f"--scheduler {address}: worker ")
+
+
+def wait_for_event(client: Client, topic: str, action: str) -> None:
+    """Return when the scheduler has told of an action."""
+    for _ in range(200):
+        if any(event.get("action") == action for _, event in client.get_events(topic)):
+            return
+        time.sleep(0.05)
+    raise TimeoutError(f"no event {action} in 10 s")
