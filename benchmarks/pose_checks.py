@@ -19,7 +19,7 @@ from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.photometric import recover_motion_photometric
 from tasks.eval.poses.pnp import recover_motion_pnp
 from tasks.eval.road_edit import score_road_edit
-from tasks.eval.severity import image_statistics, sampled_frames
+from tasks.eval.severity import measure_image, sampled_frames
 
 PITCH_LIMITS_DEG = {"pnp": 0.04, "photometric": 0.02, "essential": 0.06}
 """Pitch RMSE allowed in clear weather [deg]."""
@@ -64,7 +64,7 @@ def measure_rows() -> list[dict[str, Any]]:
     others: dict[str, Callable[[], object]] = {
         "piqe": lambda: [piqe(picture) for picture in clip.frames[sampled_frames(len(clip.frames))]],
         "temporal error": lambda: temporal_error(clip.frames),
-        "image statistics": lambda: image_statistics(clip.frames, clip.class_id == SemanticClass.ROAD),
+        "image statistics": lambda: measure_image(clip.frames, clip.class_id == SemanticClass.ROAD),
     }
     totals = {}
     for kind, measures in {"a clip": others, "a feature clip": _feature_checks(clip)}.items():

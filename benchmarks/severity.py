@@ -16,7 +16,7 @@ from flows.making.driving import simulate_drive
 from flows.making.plan import freeze_grid
 from flows.store.layout import write_atomically
 from tasks.conventions import ROAD_CLASSES
-from tasks.eval.severity import image_statistics, severity_agreement
+from tasks.eval.severity import measure_image, severity_agreement
 
 SEEDS = (1, 2, 3)
 FRAMES, FRAME_RATE_HZ = 5, 2.0
@@ -73,7 +73,7 @@ def _measure_clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, d
             rig_at = rig_of(ride, frames, catalogue)
             shown = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)
             rates[clip.label] = clip.scenario.precipitation_mm_h
-            values[clip.label] = image_statistics(shown["rgb"], np.isin(shown["class"], ROAD_CLASSES))
+            values[clip.label] = measure_image(shown["rgb"], np.isin(shown["class"], ROAD_CLASSES))
     return rates, values
 
 

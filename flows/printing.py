@@ -22,15 +22,25 @@ def print_result(value: dict[str, Any]) -> None:
 
 
 def _print_table(title: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Print a table; one of few rows that is too wide for the terminal lies on its side, a line a column."""
     # its import takes longer than many a command
+    from rich.measure import Measurement
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left")
-    for column in rows[0]:
-        table.add_column(escape_controls(column), overflow="fold")
-    for row in rows:
-        table.add_row(*(_format_value(row.get(column)) for column in rows[0]))
-    open_console().print(table)
+    console = open_console()
+    names = [escape_controls(name) for name in rows[0]]
+    lines = [[_format_value(row.get(name)) for name in rows[0]] for row in rows]
+    table = Table(*names, title=title, title_justify="left")
+    for line in lines:
+        table.add_row(*line)
+    unfolded = console.options.update(width=10_000)
+    if len(rows) < len(names) and Measurement.get(console, unfolded, table).maximum > console.width:
+        table = Table(title=title, title_justify="left", show_header=False)
+        for cells in zip(names, *lines, strict=True):
+            table.add_row(*cells)
+    for column in table.columns:
+        column.overflow = "fold"
+    console.print(table)
 
 
 def _format_value(value: Any) -> str:

@@ -1,16 +1,22 @@
-"""Where two versions of the same clip first differ: which stage, which channel, which tick."""
+"""Where two versions of the same clip first differ, byte for byte as their hashes do: channel, tick, pixel."""
 
 from collections.abc import Mapping, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 
-def first_row_difference(
+def find_row_difference(
     recorded: Mapping[str, NDArray[Any]], remade: Mapping[str, NDArray[Any]], channels: Sequence[str]
 ) -> dict[str, Any] | None:
-    """The earliest row in which a channel differs, bit for bit; None when the tables are equal.
+    """Return the earliest row in which a channel differs; None when the tables are equal.
+
+    Parameters
+    ----------
+    recorded, remade : columns by their name, [N, ...] each
+    channels : names to compare
 
     Returns
     -------
@@ -20,7 +26,7 @@ def first_row_difference(
     first: dict[str, Any] | None = None
     for channel in channels:
         a, b = recorded.get(channel), remade.get(channel)
-        if a is None or b is None or a.shape != b.shape:
+        if a is None or b is None or (a.shape, a.dtype) != (b.shape, b.dtype):
             return {
                 "channel": channel,
                 "tick": 0,
@@ -40,8 +46,18 @@ def first_row_difference(
     return first
 
 
-def first_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[Any]) -> dict[str, Any] | None:
-    """The earliest frame in which two pictures differ and the first such pixel; None when they are equal."""
+def find_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[Any]) -> dict[str, Any] | None:
+    """Return the earliest frame in which two clips' pictures differ and its first such pixel; None when they are equal.
+
+    Parameters
+    ----------
+    array : name of both
+    recorded, remade : [F, H, W, ...] of one type
+
+    Returns
+    -------
+    ``channel``, ``tick`` (frame number), ``pixel`` (column and row), ``recorded`` and ``remade`` values there.
+    """
     if recorded.shape != remade.shape:
         return {
             "channel": array,
@@ -50,10 +66,9 @@ def first_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[A
             "remade": _describe_shape(remade),
         }
     for frame, (a, b) in enumerate(zip(recorded, remade, strict=True)):
-        if (a.view(np.uint8) != b.view(np.uint8)).any():
-            unequal = _mark_differences(
-                a.reshape(a.shape[0] * a.shape[1], -1), b.reshape(a.shape[0] * a.shape[1], -1)
-            )
+        pixels = a.shape[0] * a.shape[1]
+        unequal = _mark_differences(*(picture.reshape(pixels, -1) for picture in (a, b)))
+        if unequal.any():
             row, column = divmod(int(np.argmax(unequal)), a.shape[1])
             return {
                 "channel": array,
@@ -66,11 +81,11 @@ def first_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[A
 
 
 def _mark_differences(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
-    unequal = a != b
-    if np.issubdtype(a.dtype, np.floating):
-        unequal &= ~(np.isnan(a) & np.isnan(b))
-    return unequal.reshape(len(a), -1).any(axis=1)
+    """Return which rows of two arrays [N, ...] hold other bytes, bool [N]: 0 is not -0, and a NaN is itself."""
+    ours, theirs = (np.ascontiguousarray(x).reshape(len(x), prod(x.shape[1:])).view(np.uint8) for x in (a, b))
+    unequal: NDArray[np.bool_] = (ours != theirs).any(axis=1)
+    return unequal
 
 
 def _describe_shape(values: NDArray[Any] | None) -> str:
-    return "absent" if values is None else f"shape {values.shape}"
+    return "absent" if values is None else f"shape {values.shape} of {values.dtype}"

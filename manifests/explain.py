@@ -34,6 +34,8 @@ REACHES = {
     "low_speed": (VEHICLE, RENDER),
     "variant": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
+    "labels": (RENDER,),
+    "pictures": (RENDER, JUDGING),
     "seed": (RENDER,),
     "code": (VEHICLE, RENDER, JUDGING),
     "libraries": (VEHICLE, RENDER, JUDGING),
@@ -46,7 +48,7 @@ STAGE_OF_CONTENT = {"ticks": VEHICLE, "frames": JUDGING} | dict.fromkeys(
 ABSENT = "absent"
 
 
-def input_differences(
+def find_input_differences(
     a: Mapping[str, Any], b: Mapping[str, Any], inputs_a: Mapping[str, bytes], inputs_b: Mapping[str, bytes]
 ) -> list[dict[str, Any]]:
     """Every input that differs, down to the value inside a catalogue entry.
@@ -75,15 +77,16 @@ def input_differences(
     rows += _list_rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
     rows += _list_rows("backend", "backend", a["backend"], b["backend"])
     for name in (
-        "vehicle_mode", "low_speed", "variant", "composition", "frames", "frame_rate_hz", "duration_s", "seed"
+        "vehicle_mode", "low_speed", "variant", "composition", "labels", "pictures", "frames", "frame_rate_hz",
+        "duration_s", "seed",
     ):  # fmt: skip
         before = BEFORE.get(name)
         rows += _list_rows(name, name, a["grid"].get(name, before), b["grid"].get(name, before))
-    return rows + tool_differences(a, b)
+    return rows + find_tool_differences(a, b)
 
 
-def tool_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Rows of `input_differences` that are about code, libraries and processor.
+def find_tool_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of `find_input_differences` that are about code, libraries and processor.
 
     Parameters
     ----------
@@ -104,8 +107,8 @@ def tools_here() -> dict[str, Any]:
     }
 
 
-def parameter_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Rows like those of `input_differences` for what was asked of each clip.
+def find_parameter_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows like those of `find_input_differences` for what was asked of each clip.
 
     Parameters
     ----------
@@ -137,14 +140,14 @@ def find_reasons(changed: Sequence[str], differences: Sequence[Mapping[str, Any]
     Parameters
     ----------
     changed : contents of the clip that differ: ticks, frames, rgb, depth, class
-    differences : rows of `input_differences`
+    differences : rows of `find_input_differences`
     """
     stages = {STAGE_OF_CONTENT[name] for name in changed}
     first = next((stage for stage in (VEHICLE, RENDER, JUDGING) if stage in stages), None)
     return list(dict.fromkeys(row["input"] for row in differences if first in row["reaches"]))
 
 
-def value_differences(a: Any, b: Any, place: str = "") -> list[tuple[str, Any, Any]]:
+def find_value_differences(a: Any, b: Any, place: str = "") -> list[tuple[str, Any, Any]]:
     """Leaves at which two JSON-like values differ, as (path, in a, in b).
 
     Parameters
@@ -159,14 +162,16 @@ def value_differences(a: Any, b: Any, place: str = "") -> list[tuple[str, Any, A
         pairs = [(str(i), x, y) for i, (x, y) in enumerate(zip(a, b, strict=True))]
     else:
         return [] if a == b else [(place, a, b)]
-    return [row for key, x, y in pairs for row in value_differences(x, y, f"{place}.{key}" if place else key)]
+    return [
+        row for key, x, y in pairs for row in find_value_differences(x, y, f"{place}.{key}" if place else key)
+    ]
 
 
 def _list_rows(name: str, key: str, a: Any, b: Any) -> list[dict[str, Any]]:
     reaches = list(REACHES.get(key, (VEHICLE, RENDER, JUDGING)))
     return [
         {"input": name, "path": path, "a": x, "b": y, "reaches": reaches}
-        for path, x, y in value_differences(a, b)
+        for path, x, y in find_value_differences(a, b)
     ]
 
 

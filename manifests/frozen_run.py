@@ -10,7 +10,7 @@ from typing import Any
 
 from catalogs.documents import read_json_document
 from catalogs.weather.grip import GRIP_SECTIONS
-from manifests.explain import REACHES, VEHICLE, format_value, kind_of_input, value_differences
+from manifests.explain import REACHES, VEHICLE, find_value_differences, format_value, kind_of_input
 from manifests.manifest import seal_of
 from manifests.records import FrozenRun, check_record
 from tasks.errors import InputError
@@ -21,12 +21,12 @@ NEVER_DECIDES = ("source",)
 """Keys of a catalogue entry that no number follows from."""
 
 
-def frozen_names() -> tuple[str, ...]:
+def list_frozen() -> tuple[str, ...]:
     """Names of the frozen runs that ship with the project."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.json")))
 
 
-def frozen_source(name_or_path: str | Path) -> Path:
+def find_frozen(name_or_path: str | Path) -> Path:
     """Return the file of a frozen run: a path ending in .json as it is, a name from those that ship.
 
     Raises
@@ -39,7 +39,7 @@ def frozen_source(name_or_path: str | Path) -> Path:
         path = FOLDER / f"{name_or_path}.json"
     if not path.is_file():
         raise InputError(
-            f"manifest {name_or_path}: no such frozen run; give a JSON file or one of: {', '.join(frozen_names())}"
+            f"manifest {name_or_path}: no such frozen run; give a JSON file or one of: {', '.join(list_frozen())}"
         )
     return path
 
@@ -52,7 +52,7 @@ def read_frozen(name_or_path: str | Path) -> FrozenRun:
     InputError
         If there is none, or it is of another format, was changed by hand, or breaks a rule.
     """
-    path = frozen_source(name_or_path)
+    path = find_frozen(name_or_path)
     frozen = read_json_document(path, "frozen run")
     found = frozen.get("format") if isinstance(frozen, dict) else None
     if found != FROZEN_FORMAT:
@@ -99,16 +99,16 @@ def find_differences(
     parameters : `parameters_that_matter` of what is here
     clips : records of the clips as the grid makes them here
     """
-    rows = value_differences(frozen["parameters"], dict(parameters))
+    rows = find_value_differences(frozen["parameters"], dict(parameters))
     asked = {clip["label"]: _without_hash(clip) for clip in frozen["clips"]}
-    rows += value_differences(asked, {clip["label"]: _without_hash(clip) for clip in clips}, "clips")
+    rows += find_value_differences(asked, {clip["label"]: _without_hash(clip) for clip in clips}, "clips")
     return [
         f"{place} is {format_value(there)} in the manifest and {format_value(here)} here"
         for place, there, here in rows
     ]
 
 
-def differing_clips(frozen: Mapping[str, Any], ticks: Mapping[str, str]) -> list[str]:
+def find_differing_clips(frozen: Mapping[str, Any], ticks: Mapping[str, str]) -> list[str]:
     """Labels of the clips whose telemetry is not the frozen one.
 
     Parameters

@@ -24,7 +24,7 @@ from flows.store.sealed import read_manifest, read_receipt
 from flows.store.staging import scratch_dataset
 from flows.store.telemetry import read_columns
 from manifests.canonical import sha256_of
-from manifests.compare import first_pixel_difference, first_row_difference
+from manifests.compare import find_pixel_difference, find_row_difference
 from manifests.explain import as_sentences, find_reasons
 from manifests.records import Manifest, Receipt
 from tasks.conventions import TICK_CHANNELS
@@ -205,10 +205,10 @@ def _first_difference(layout: Layout, remade: Layout, plan: Plan, clip: Receipt)
         recorded = read_columns(layout.telemetry / first / f"family={family}", clip_id)
         again = read_columns(remade.staged(clip_id, first))
         channels = [c.name for c in TICK_CHANNELS] if first == "ticks" else list(again)
-        difference = first_row_difference(recorded, again, channels)
+        difference = find_row_difference(recorded, again, channels)
     else:
         recorded_pixels = read_clip(layout.frames, index, first)
-        difference = first_pixel_difference(first, recorded_pixels, read_clip(remade.frames, index, first))
+        difference = find_pixel_difference(first, recorded_pixels, read_clip(remade.frames, index, first))
     # the hashes differ but the stored values do not: the file was changed after it was recorded
     return {"clip_id": clip_id, "label": clip["label"], "stage": STAGE_OF[first], "changed": changed,
             "counted_in": "tick" if first == "ticks" else "frame",

@@ -13,8 +13,8 @@ from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from manifests.canonical import content_id
-from manifests.compare import first_row_difference
-from manifests.explain import find_reasons, input_differences
+from manifests.compare import find_row_difference
+from manifests.explain import find_input_differences, find_reasons
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.label_moves import compare_figures, compare_ticks
@@ -41,7 +41,7 @@ def compare_datasets(a: str, b: str, *, out: str | None = None) -> dict[str, Any
     results = Outputs(out, "diff", "diff.json", "diff.txt")
     old, new = open_for_reading(a), open_for_reading(b)
     before, after = read_manifest(old), read_manifest(new)
-    why = input_differences(before, after, _read_inputs(old, before), _read_inputs(new, after))
+    why = find_input_differences(before, after, _read_inputs(old, before), _read_inputs(new, after))
     theirs = {content_id(clip["scenario"]): clip for clip in after["clips"]}
     ours = {content_id(clip["scenario"]): clip for clip in before["clips"]}
     pairs = [(clip, theirs[key]) for key, clip in ours.items() if key in theirs]
@@ -96,7 +96,8 @@ def format_text(result: Mapping[str, Any]) -> str:
 def _clip_row(
     old: Layout, new: Layout, a: Mapping[str, Any], b: Mapping[str, Any], why: list[dict[str, Any]]
 ) -> dict[str, Any] | None:
-    changed = [name for name in a["content"] if a["content"][name] != b["content"].get(name)]
+    names = dict.fromkeys([*a["content"], *b["content"]])
+    changed = [name for name in names if a["content"].get(name) != b["content"].get(name)]
     if not changed:
         return None
     row: dict[str, Any] = {
@@ -112,11 +113,11 @@ def _clip_row(
     if "ticks" in changed:
         ours, theirs = _read_ticks(old, a), _read_ticks(new, b)
         moves |= compare_ticks(ours, theirs)
-        first = first_row_difference(ours, theirs, [channel.name for channel in TICK_CHANNELS])
+        first = find_row_difference(ours, theirs, [channel.name for channel in TICK_CHANNELS])
         row["first"] = first and {
             "channel": first["channel"], "tick": first["tick"], "a": first["recorded"], "b": first["remade"]
         }  # fmt: skip
-    if "rgb" in changed:
+    if "rgb" in changed and "rgb" in a["content"].keys() & b["content"].keys():
         row["picture"] = _compare_pictures(old, new, a["index"], b["index"])
     return row | {"labels": {name: None if isnan(value) else value for name, value in moves.items()}}
 
@@ -127,7 +128,7 @@ def _read_ticks(layout: Layout, clip: Mapping[str, Any]) -> dict[str, np.ndarray
 
 
 def _compare_pictures(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | None:
-    """Share of changed pixels and mean change of their 8-bit values; None for pictures of two sizes."""
+    """Return the share of changed pixels and the mean change of their 8-bit values; None for pictures of two sizes."""
     ours, theirs = read_clip(old.frames, a, "rgb"), read_clip(new.frames, b, "rgb")
     if ours.shape[1:] != theirs.shape[1:]:
         return None

@@ -17,7 +17,14 @@ from catalogs.variants import Variant
 from catalogs.vehicles import load_vehicle
 from catalogs.weather.grip import GRIP_SECTIONS
 from flows.auditing.kept_lines import Line, is_number, scale_line
-from flows.making.driving import hazard_of, ranges_of, simulate_drive, surface_figures, surface_of, weather_of
+from flows.making.driving import (
+    collect_surface_figures,
+    hazard_of,
+    ranges_of,
+    simulate_drive,
+    surface_of,
+    weather_of,
+)
 from flows.running.progress import progress_bar
 from flows.store.layout import write_atomically
 from manifests.explain import REACHES, VEHICLE, kind_of_input
@@ -143,7 +150,13 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
         **compute_lift_times(ride.columns),
         "static_pitch": ride.static_pitch,
     }
-    numbers = {**surface_figures(seen, ride), **ride.columns, "T_world_rig": poses, **figures, **ranges}
+    numbers = {
+        **collect_surface_figures(seen, ride),
+        **ride.columns,
+        "T_world_rig": poses,
+        **figures,
+        **ranges,
+    }
     return Drive(scenario=driven, state=state, ride=ride, numbers=numbers)
 
 
@@ -156,7 +169,7 @@ def list_steps(asked: Asked, entries: Entries, drive: Drive) -> list[Step]:
     """
     tick = int(np.argmin(drive.ride.columns["longitudinal_acceleration"]))
     row = {name: column[tick] for name, column in drive.ride.columns.items()} | {"tick": tick}
-    row |= surface_figures(drive.state, drive.ride)
+    row |= collect_surface_figures(drive.state, drive.ride)
     vehicle, hazard = entries.vehicle, hazard_of(drive.scenario)
     response = compute_surface_response(vehicle, drive.state.kind, drive.state.friction)
     return [

@@ -15,7 +15,7 @@ from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
 from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
-from flows.making.driving import controls_of, hazard_of, surface_depths, surface_of, weather_of
+from flows.making.driving import collect_surface_depths, controls_of, hazard_of, surface_of, weather_of
 from flows.making.places import find_scene
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import refuse_traced
@@ -88,7 +88,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     surface = load_surface(layout.inputs / "surface.yaml", layout.inputs / "weather")
     driven = cut_coupling(scenario, variant, load_kept_families(layout.inputs, variant))
     if variant != "full":  # the stored depths are those of the picture, which the motion does not follow from
-        row = row | surface_depths(surface_of(driven, surface))
+        row = row | collect_surface_depths(surface_of(driven, surface))
     hazard = hazard_of(driven)
     state = SurfaceState(
         kind=driven.weather,

@@ -24,7 +24,7 @@ from flows.store.sealed import read_manifest
 from flows.store.staging import left_overs, remove_staged, remove_staging, scratch_dataset
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
-from manifests.explain import as_sentences, tool_differences, tools_here
+from manifests.explain import as_sentences, find_tool_differences, tools_here
 from manifests.manifest import recorded_files
 from manifests.records import Manifest
 from tasks.errors import InputError
@@ -95,7 +95,7 @@ def _repair_locked(
         "damaged": found["damaged"],
         "restored": restored,
         "failed": sorted(set(paths) - set(restored)),
-        "differences": as_sentences(tool_differences(manifest, tools_here())),
+        "differences": as_sentences(find_tool_differences(manifest, tools_here())),
     }
 
 

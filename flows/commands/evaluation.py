@@ -127,7 +127,7 @@ COMMANDS = (
         function="flows.judging.video_sets.judge_set:judge_video_set",
         options=(
             define_argument(
-                "folder", str, "Folder of models, sources, claims and targets (docs/evaluation.md)."
+                "folder", str, "Folder of models, sources, claims and targets (docs/evidence/evaluation.md)."
             ),
             define_option(
                 "protocol",

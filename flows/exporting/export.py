@@ -12,7 +12,7 @@ from typing import Any
 from flows.exporting.card import CARD, describe_export
 from flows.exporting.dataset import ExportedDataset
 from flows.exporting.formats import FORMAT_NAMES, FORMATS, ExportFormat
-from flows.reading.previews import named_clips
+from flows.reading.previews import select_clips
 from flows.reading.suggestions import suggest_names
 from flows.running.progress import progress_bar
 from flows.store.address import is_address, open_for_reading
@@ -51,7 +51,7 @@ def export_dataset(
     layout = open_for_reading(dataset)
     manifest = read_manifest(layout)
     rows: Sequence[Mapping[str, Any]] = manifest["clips"]
-    kept, left_out = (named_clips(rows, clips, dataset), []) if clips else part_quarantined(rows)
+    kept, left_out = (select_clips(rows, clips, dataset), []) if clips else part_quarantined(rows)
     folder = choose_folder(dataset, to, out)
     problems = [
         *([] if kept else [f"{dataset}: every clip is in quarantine; name clips with --clip to export them"]),

@@ -10,7 +10,7 @@ from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import VARIANTS, Variant
 from flows.drawing import as_svg
 from flows.judging.controls_figure import roc_figure
-from flows.judging.evaluation_rows import control_of
+from flows.judging.evaluation_rows import find_control
 from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
@@ -74,9 +74,9 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")
     clips = [run_as_stage(judge_clip)(View(root=root), row) for row in facts]
-    false = false_claims(clips, read_plan(root), catalogue_of(root))
+    false = make_false_claims(clips, read_plan(root), catalogue_of(root))
     rows = list(score_controls(clips, false))
-    result = {**summarise_controls(rows, list_untried(clips, false)), "rows": [*rows, *unread_rows()]}
+    result = {**summarise_controls(rows, list_untried(clips, false)), "rows": [*rows, *list_unread_rows()]}
     results.write_json("controls.json", result)
     if rows and out is not None:
         results.write("controls.svg", as_svg(roc_figure(rows, CONTROLS)))
@@ -114,7 +114,7 @@ def summarise_controls(rows: list[dict[str, Any]], kept: dict[str, str]) -> dict
     }
 
 
-def false_claims(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) -> list[dict[str, Claim]]:
+def make_false_claims(clips: list[JudgedClip], plan: Plan, catalogue: Catalogue) -> list[dict[str, Claim]]:
     """Return the faulty claims of each clip by control, without those that equal the true claim.
 
     Parameters
@@ -132,7 +132,7 @@ def list_untried(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> dict
     Parameters
     ----------
     clips : as their judges saw them
-    false : of `false_claims`
+    false : of `make_false_claims`
     """
     kept = {}
     for name in CONTROLS:
@@ -156,11 +156,11 @@ def score_controls(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> It
     Parameters
     ----------
     clips : as their judges saw them
-    false : of `false_claims`
+    false : of `make_false_claims`
     """
     response = float(np.deg2rad(load_gates().response_deg))
     true = _true_claims(clips)
-    dry = [control_of(clip, clips, weather=True) for clip in clips]
+    dry = [find_control(clip, clips, weather=True) for clip in clips]
 
     def scores(k: int, method: str, claim: Claim) -> dict[str, float]:
         return _score_claim(clips[k], dry[k], method, claim, response)
@@ -191,7 +191,7 @@ def score_controls(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> It
                 }
 
 
-def unread_rows() -> Iterator[dict[str, Any]]:
+def list_unread_rows() -> Iterator[dict[str, Any]]:
     """One row for each control and metric that no claim enters: blind, whatever the pixels are."""
     for name in CONTROLS:
         for metric, method in UNREAD.items():

@@ -9,7 +9,7 @@ import pyarrow as pa
 from catalogs.learned_judges import load_judges
 from flows.judging.evaluation_means import mean_rows
 from flows.judging.evaluation_page import render_page
-from flows.judging.evaluation_rows import figure_row, weather_families
+from flows.judging.evaluation_rows import figure_row, group_weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View, judge_clip
 from flows.judging.learned_rows import learned_rows
 from flows.judging.motion_rows import EventWindow, motion_rows
@@ -107,7 +107,7 @@ def quality_rows(clips: list[JudgedClip]) -> Iterator[Row]:
 
 def severity_rows(clips: list[JudgedClip]) -> Iterator[Row]:
     """Rank agreement of the named image statistics with the rate, within one drive and one kind of weather."""
-    for _, condition, levels in weather_families(clips):
+    for _, condition, levels in group_weather_families(clips):
         rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
         for name in levels[0].statistics:
             values = {c.facts["clip_id"]: c.statistics[name] for c in levels}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.paper_metrics import ClipSet, paper_values
-from flows.judging.evaluation_rows import figure_row, visual_seed, weather_families
+from flows.judging.evaluation_rows import figure_row, group_weather_families, read_visual_seed
 from flows.judging.judged_clip import JudgedClip, Row
 
 SETS: dict[ClipSet, Callable[[dict[str, Any]], bool]] = {
@@ -74,10 +74,10 @@ def _find_conditions(clips: list[JudgedClip]) -> dict[str, Place]:
     places = {}
     for facts in (clip.facts for clip in clips):
         label = facts["label"]
-        places[label] = Place(head=label.partition("/")[0], seed=visual_seed(label), facts=facts)
-    for kind, condition, levels in weather_families(clips):
+        places[label] = Place(head=label.partition("/")[0], seed=read_visual_seed(label), facts=facts)
+    for kind, condition, levels in group_weather_families(clips):
         facts = levels[-1].facts
-        places[condition] = Place(head=kind, seed=visual_seed(facts["label"]), facts=facts)
+        places[condition] = Place(head=kind, seed=read_visual_seed(facts["label"]), facts=facts)
     return places
 
 

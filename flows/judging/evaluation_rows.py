@@ -69,13 +69,13 @@ def figure_row(
     }
 
 
-def visual_seed(label: str) -> str:
+def read_visual_seed(label: str) -> str:
     """The visual seed in a clip's label; empty in a dataset of one seed."""
     found = re.search(r"(?:^|/)seed-(\d+)$", label)
     return found[1] if found else ""
 
 
-def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> JudgedClip | None:
+def find_control(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> JudgedClip | None:
     """Return the clip of the same visual seed that differs only by a dry sky, or by a flat road; None if there is none.
 
     Parameters
@@ -88,8 +88,8 @@ def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> J
         "hazard_center_m", "hazard_length_m", "hazard_height_m"
     }  # fmt: skip
     held = set(SCENARIO_FIELDS) - free
-    seed = visual_seed(clip.facts["label"])
-    for other in (c for c in clips if visual_seed(c.facts["label"]) == seed):
+    seed = read_visual_seed(clip.facts["label"])
+    for other in (c for c in clips if read_visual_seed(c.facts["label"]) == seed):
         plain = other.facts["weather"] == DRY if weather else other.facts["hazard_height_m"] == 0
         if (
             plain
@@ -100,7 +100,7 @@ def control_of(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) -> J
     return None
 
 
-def weather_families(clips: list[JudgedClip]) -> Iterator[tuple[str, str, list[JudgedClip]]]:
+def group_weather_families(clips: list[JudgedClip]) -> Iterator[tuple[str, str, list[JudgedClip]]]:
     """Clips of one drive in dry weather and at two rates or more of one kind: kind, condition and the clips, dry first.
 
     Parameters
@@ -110,7 +110,7 @@ def weather_families(clips: list[JudgedClip]) -> Iterator[tuple[str, str, list[J
     for control in (c for c in clips if c.facts["weather"] == DRY):
         for kind in WEATHERS:
             family = [
-                c for c in clips if c.facts["weather"] == kind and control_of(c, [control], weather=True) is control
+                c for c in clips if c.facts["weather"] == kind and find_control(c, [control], weather=True) is control
             ]  # fmt: skip
             levels = [control, *family]
             if len({c.facts["precipitation_mm_h"] for c in levels}) >= 3:

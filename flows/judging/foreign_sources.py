@@ -97,7 +97,7 @@ class Footage:
                 name, self.times[used], self.times, self.poses, camera.mount, metric=metric
             )
         height, width = self.frames.shape[1:3]
-        K = intrinsics_at(camera, width, height)
+        K = scale_intrinsics(camera, width, height)
         seen = self.frames[used]
         if camera.distortion is not None:
             bent, seen = seen, np.empty_like(seen)
@@ -235,7 +235,7 @@ def _is_number(value: Any, least: float = 0.0) -> bool:
     return number and bool(least <= value <= LARGEST_CAMERA)
 
 
-def intrinsics_at(camera: ForeignCamera, width: int, height: int) -> NDArray[np.float64]:
+def scale_intrinsics(camera: ForeignCamera, width: int, height: int) -> NDArray[np.float64]:
     """Intrinsics [3, 3] for a video that was scaled from the camera's size [px].
 
     Parameters

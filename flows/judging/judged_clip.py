@@ -23,7 +23,7 @@ from tasks.eval.poses.checks import POSE_CHECKS
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.outside_trajectory import motion_from_trajectory
 from tasks.eval.poses.undistort import undistort_frames
-from tasks.eval.severity import image_statistics, sampled_frames
+from tasks.eval.severity import measure_image, sampled_frames
 from tasks.render.camera import PIXEL_CENTRE
 
 Row = dict[str, Any]
@@ -131,7 +131,7 @@ def judge_clip(
             )
             for name, trajectory in others.items()
         },
-        statistics=image_statistics(rgb, np.isin(kind, ROAD_CLASSES)),
+        statistics=measure_image(rgb, np.isin(kind, ROAD_CLASSES)),
         quality={
             "piqe": float(np.mean([piqe(picture) for picture in sampled])),
             "temporal_error": temporal_error(rgb),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from catalogs.clip_prompts import load_prompts
 from catalogs.learned_judges import LoadedJudge
-from flows.judging.evaluation_rows import control_of, figure_row, weather_families
+from flows.judging.evaluation_rows import figure_row, find_control, group_weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View
 from tasks.eval.learned_scores import (
     ClipWeather,
@@ -75,7 +75,7 @@ def _temporal_lpips(view: View, clips: list[JudgedClip], loaded: LoadedJudge) ->
     for clip in clips:
         label, value = clip.facts["label"], scores[clip.facts["clip_id"]]
         yield figure_row(names[0], "TorchScript", label, value, "1", note=loaded.note)
-        control = control_of(clip, clips, weather=True)
+        control = find_control(clip, clips, weather=True)
         if control is not None:
             excess = value - scores[control.facts["clip_id"]]
             yield figure_row(names[1], "TorchScript", label, excess, "1", note=loaded.note)
@@ -93,7 +93,7 @@ def _score_severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge
         return
     network = clip_judge.network
     features = dict(zip(load_prompts(), clip_judge.text_features, strict=True))
-    for kind, condition, levels in weather_families(clips):
+    for kind, condition, levels in group_weather_families(clips):
         if kind not in features:
             for name in names:
                 note = f"not run: the catalogue has no CLIP prompts of {kind}"

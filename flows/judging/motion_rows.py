@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from catalogs.gates import load_gates
-from flows.judging.evaluation_rows import control_of, figure_row
+from flows.judging.evaluation_rows import figure_row, find_control
 from flows.judging.judged_clip import JudgedClip, Row
 from flows.judging.standards import MeantMotion, Standard, opening_of
 from tasks.errors import InputError
@@ -85,7 +85,7 @@ def weather_rows(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Ro
     Against reference traces E_path has no dry clip: the route itself, on which the reference drives, stands for it.
     """
     for clip, method, motion, meant in _list_judged(clips, standard):
-        control = control_of(clip, list(clips), weather=True)
+        control = find_control(clip, list(clips), weather=True)
         dry = None if control is None else standard.motions.get(control.facts["clip_id"])
         if control is None or dry is None:
             continue

@@ -11,7 +11,7 @@ from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
 from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
-from flows.making.driving import surface_depths, surface_of
+from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.plan import TICK_RATE_HZ, Plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
@@ -112,7 +112,7 @@ def drive_facts(root: Path, plan: Plan) -> dict[str, dict[str, Any]]:
     driven = {clip.clip_id: cut_coupling(clip.scenario, variant, families) for clip in plan.clips}
     return {
         name: {key: np.nan if value is None else value for key, value in scenario.as_row().items()}
-        | surface_depths(surface_of(scenario, surface))
+        | collect_surface_depths(surface_of(scenario, surface))
         for name, scenario in driven.items()
     }
 

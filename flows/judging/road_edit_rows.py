@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.judging.evaluation_rows import control_of, figure_row
+from flows.judging.evaluation_rows import figure_row, find_control
 from flows.judging.judged_clip import JudgedClip, Row, View
 from flows.making.catalogue import Catalogue, catalogue_of
 from tasks.conventions import ROAD_CLASSES
@@ -34,7 +34,7 @@ def road_edit_rows(view: View, clips: list[JudgedClip]) -> list[Row]:
     rows: list[Row] = []
     catalogue = catalogue_of(view.root)
     for clip in clips:
-        flat = control_of(clip, clips, weather=False)
+        flat = find_control(clip, clips, weather=False)
         if clip.facts["hazard_height_m"] == 0 or flat is None:
             continue
         depth, kind = view.arrays(clip.facts["index"], "depth", "class")

@@ -18,10 +18,10 @@ from catalogs.scenario import Scenario
 from catalogs.studies.ablation import cut_coupling
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import (
+    collect_surface_figures,
     hazard_of,
     ranges_of,
     simulate_drive,
-    surface_figures,
     surface_of,
     weather_of,
 )
@@ -36,7 +36,7 @@ from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.motion_agreement import PoseVerdict, pose_verdict
+from tasks.eval.motion_agreement import PoseVerdict, judge_pose
 from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
 from tasks.eval.poses.undistort import undistort_frames
 from tasks.render.camera import PIXEL_CENTRE, RigAt, body_poses, continuous_rig
@@ -59,7 +59,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     catalogue = catalogue_of(layout.root)
 
     state, ride = move_car(clip.scenario, plan, catalogue)
-    facts = surface_figures(state, ride)
+    facts = collect_surface_figures(state, ride)
     driven = cut_coupling(clip.scenario, plan.settings.variant, catalogue.families)
     ranges = unknown_ranges() if catalogue.traces is not None else ranges_of(
         driven, surface_of(driven, catalogue.surface), catalogue.vehicle, catalogue.surface, catalogue.study,
@@ -218,7 +218,7 @@ def judge_motion(
     shown = {name: buffers[name] for name in ("rgb", "depth", "class")}
     pinhole = undistort_frames(shown, camera.K - PIXEL_CENTRE, camera.distortion)
     recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue))
-    verdict = pose_verdict(recovered, frames["pitch"], frames["station"], catalogue.gates)
+    verdict = judge_pose(recovered, frames["pitch"], frames["station"], catalogue.gates)
     return {
         "recovered_pitch": recovered.pitch,
         "recovered_progress": recovered.progress,

@@ -32,12 +32,15 @@ def surface_of(scenario: Scenario, surface: SurfaceParameters) -> SurfaceState:
     return surface_state(weather_of(scenario), surface)
 
 
-def surface_figures(state: SurfaceState, ride: Rollout) -> dict[str, float]:
+def collect_surface_figures(state: SurfaceState, ride: Rollout) -> dict[str, float]:
     """Return what tables and receipts record of the surface that is seen, and of the friction that is driven on."""
-    return surface_depths(state) | {"surface_friction": ride.surface_friction, "tyre_peak": ride.tyre_peak}
+    return collect_surface_depths(state) | {
+        "surface_friction": ride.surface_friction,
+        "tyre_peak": ride.tyre_peak,
+    }
 
 
-def surface_depths(state: SurfaceState) -> dict[str, float]:
+def collect_surface_depths(state: SurfaceState) -> dict[str, float]:
     """Return what lies on the road, of which the picture shows every part."""
     return {
         "film_depth_mm": state.film_depth_mm,

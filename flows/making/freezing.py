@@ -23,12 +23,12 @@ from flows.store.layout import write_atomically
 from flows.store.outputs import refuse_link
 from flows.store.sealed import read_manifest, recorded_grid
 from flows.store.telemetry import columns_hash
-from manifests.explain import as_sentences, parse_input, tool_differences, tools_here
+from manifests.explain import as_sentences, find_tool_differences, parse_input, tools_here
 from manifests.frozen_run import (
     FOLDER,
-    differing_clips,
     find_differences,
-    frozen_names,
+    find_differing_clips,
+    list_frozen,
     parameters_that_matter,
     read_frozen,
     seal_run,
@@ -64,7 +64,7 @@ def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, 
     InputError
         For a faulty grid, or one that is not the project's own and goes to no file.
     """
-    names = [grid] if grid is not None else list(frozen_names())
+    names = [grid] if grid is not None else list(list_frozen())
     if out is not None and grid is None:
         raise InputError("--out FILE: name the grid whose run is to be frozen in it")
     if out is not None and Path(out).suffix != ".json":
@@ -173,10 +173,10 @@ def problems_of(frozen: FrozenRun) -> list[str]:
     found = find_differences(frozen, _read_parameters(plan, inputs), _list_records(plan))
     if found:
         return found
-    differing = differing_clips(frozen, ticks_of(plan, grid.settings))
+    differing = find_differing_clips(frozen, ticks_of(plan, grid.settings))
     if not differing:
         return []
-    tools = "; ".join(as_sentences(tool_differences(frozen, tools_here()))) or "none that is recorded"
+    tools = "; ".join(as_sentences(find_tool_differences(frozen, tools_here()))) or "none that is recorded"
     return [
         f"the telemetry of {len(differing)} of {len(frozen['clips'])} clips comes out otherwise ({differing[0]} first),"
         f" from the same scenarios and parameters; tools that differ: {tools}"
@@ -224,7 +224,7 @@ def reproduce_run(
         _grid_of(frozen), out, runner=runner, workers=workers, scheduler=scheduler, backend=backend
     )
     made = {clip["label"]: clip["content"]["ticks"] for clip in read_manifest(report.layout)["clips"]}
-    return report, differing_clips(frozen, made)
+    return report, find_differing_clips(frozen, made)
 
 
 def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:

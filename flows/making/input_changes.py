@@ -10,7 +10,7 @@ from flows.making.places import find_scene, noted_place
 from flows.store.layout import Layout
 from flows.store.sealed import read_plan_record, recorded_grid
 from manifests.canonical import sha256_of, sha256_of_file
-from manifests.explain import input_differences, parameter_differences, tools_here
+from manifests.explain import find_input_differences, find_parameter_differences, tools_here
 from manifests.records import Manifest
 from tasks.errors import InputError
 
@@ -24,7 +24,7 @@ def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
 
     Returns
     -------
-    Rows as of `manifests.explain.input_differences`, recorded value first.
+    Rows as of `manifests.explain.find_input_differences`, recorded value first.
 
     Raises
     ------
@@ -46,7 +46,9 @@ def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
         for name, digest in manifest["inputs"].items()
         if (content := recorded_input(layout, sources, name, digest)) is not None
     }
-    return input_differences(manifest, here, recorded, present) + parameter_differences(manifest, plan)
+    return find_input_differences(manifest, here, recorded, present) + find_parameter_differences(
+        manifest, plan
+    )
 
 
 def recorded_input(

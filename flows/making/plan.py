@@ -16,7 +16,7 @@ from flows.making.places import remember_place
 from flows.store.layout import Layout
 from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
 from manifests.canonical import content_id, sha256_of
-from manifests.explain import format_value, input_differences, value_differences
+from manifests.explain import find_input_differences, find_value_differences, format_value
 from manifests.provenance import code_version, library_versions
 from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
@@ -233,9 +233,9 @@ def plan_differences(
     theirs, ours : plans as JSON
     their_inputs, our_inputs : catalogue files by their path under ``inputs/``
     """
-    grid = [(f"grid.{path}", a, b) for path, a, b in value_differences(theirs["grid"], ours["grid"])]
+    grid = [(f"grid.{path}", a, b) for path, a, b in find_value_differences(theirs["grid"], ours["grid"])]
     bare = [{**plan, "grid": {}} for plan in (theirs, ours)]
-    rows = input_differences(bare[0], bare[1], their_inputs, our_inputs)
+    rows = find_input_differences(bare[0], bare[1], their_inputs, our_inputs)
     rest = [(f"{row['input']} {row['path']}".strip(), row["a"], row["b"]) for row in rows]
     return [
         f"{place} is {format_value(a)} there and {format_value(b)} here" for place, a, b in (*grid, *rest)

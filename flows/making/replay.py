@@ -12,7 +12,7 @@ from catalogs.grids import load_grid
 from catalogs.studies.ablation import cut_coupling
 from flows.making.catalogue import Catalogue, load_catalogue
 from flows.making.clip import frame_rows, render_frames, rig_of
-from flows.making.driving import simulate_drive, surface_figures, surface_of
+from flows.making.driving import collect_surface_figures, simulate_drive, surface_of
 from flows.making.plan import ClipPlan, Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.store.frames import buffer_hash
@@ -119,7 +119,7 @@ def _run_clip(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> 
     rig_at = rig_of(ride, shown, catalogue)
     buffers = render_frames(clip.scenario, state, shown, plan, catalogue, int(clip.seed), rig_at)
     columns = {channel.name: ride.columns[channel.name] for channel in TICK_CHANNELS}
-    columns |= {name: np.array([value]) for name, value in surface_figures(state, ride).items()} | {
+    columns |= {name: np.array([value]) for name, value in collect_surface_figures(state, ride).items()} | {
         "T_world_rig": rows["T_world_rig"]
     }
     return Replay(

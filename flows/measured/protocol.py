@@ -13,7 +13,7 @@ from catalogs.vehicles import load_vehicle
 from flows.drawing import as_svg
 from flows.measured.dive_figure import draw_dives
 from flows.store.outputs import Outputs
-from tasks.campaign.attrition import attrition_table
+from tasks.campaign.attrition import tabulate_attrition
 from tasks.campaign.selection import Judged, select_events
 from tasks.studies.brake_dive import pitch_mode, with_model
 from tasks.studies.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
@@ -63,7 +63,7 @@ def brake_protocol(
     selection = select_events(recorded.drives, rules)
     used = tuple(judged.event for judged in selection.judged) if all_events else selection.retained
     folds = leave_one_drive_out(used, base, load_surface("dense-asphalt"))
-    table = [asdict(row) for row in attrition_table(selection, rules)]
+    table = [asdict(row) for row in tabulate_attrition(selection, rules)]
     result: dict[str, Any] = {
         "campaign": recorded.name,
         "vehicle": base.name,

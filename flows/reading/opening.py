@@ -183,7 +183,7 @@ class Dataset:
 
     def _quote_columns(self, table: str, columns: str | Sequence[str]) -> list[str]:
         """Columns of a view as SQL takes them; DuckDB does not mind the case of a name."""
-        asked = [columns] if isinstance(columns, str) else list(columns)
+        asked = _list_names(columns)
         if not asked:
             raise InputError(f"columns of {table}: must name one or more; None takes all")
         known = self.sql(f"SELECT * FROM {table}").columns
@@ -235,9 +235,9 @@ class Dataset:
         *,
         window: int = 16,
         stride: int | None = None,
-        columns: Sequence[str] = ("speed", "longitudinal_acceleration", "pitch", "heave"),
-        arrays: Sequence[str] = ("rgb",),
-        clips: Sequence[str] | None = None,
+        columns: str | Sequence[str] = ("speed", "longitudinal_acceleration", "pitch", "heave"),
+        arrays: str | Sequence[str] = ("rgb",),
+        clips: str | Sequence[str] | None = None,
         quarantined: bool = False,
     ) -> "ClipWindows":
         """Windows of consecutive frames with their telemetry, for `torch.utils.data.DataLoader`.
@@ -253,16 +253,22 @@ class Dataset:
         """
         from flows.reading.windows import windows_of
 
+        columns, arrays = _list_names(columns), _list_names(arrays)
         folders = tuple(f"frames.zarr/{array}/" for array in arrays)
         # workers read the files of these arrays often: they have to be here, and no links
         open_for_reading(self.origin or self.root, lambda name: name.startswith(folders))
-        return windows_of(
-            self._layout, self.manifest, window, stride or window, columns, arrays, clips, quarantined
-        )
+        chosen = None if clips is None else _list_names(clips)
+        step = window if stride is None else stride
+        return windows_of(self._layout, self.manifest, window, step, columns, arrays, chosen, quarantined)
 
     def schema(self) -> dict[str, Any]:
         """Columns of every view with unit, paper symbol, CF standard name and description."""
         return list_columns()
+
+
+def _list_names(names: str | Sequence[str]) -> list[str]:
+    """Return the names as a list; a single one may be given by itself."""
+    return [names] if isinstance(names, str) else list(names)
 
 
 def open(dataset: str | Path, *, allow_files: bool = False) -> Dataset:

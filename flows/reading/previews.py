@@ -48,8 +48,8 @@ def make_films(
     plan, rows = read_plan(layout.root), read_manifest(layout)["clips"]
     if not plan.settings.pictures:
         raise InputError(f"{dataset}: must be a dataset with frames; it was made with --no-frames")
-    chosen = named_clips(rows, clips, dataset) if clips else rows
-    names = film_names(rows)
+    chosen = select_clips(rows, clips, dataset) if clips else rows
+    names = name_films(rows)
     results = Outputs(out, "preview", *(names[row["clip_id"]] for row in chosen))
     films = []
     with progress_bar("films", len(chosen)) as advance:
@@ -63,7 +63,7 @@ def make_films(
     return {"films": films}
 
 
-def film_names(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def name_films(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """File name of each clip's film, by clip id: its label, made a file name; no two are the same.
 
     Parameters
@@ -90,7 +90,7 @@ def _file_stem(label: str) -> str:
     return plain.encode()[:NAME_BYTES].decode(errors="ignore")
 
 
-def named_clips(
+def select_clips(
     rows: Sequence[Mapping[str, Any]], names: Sequence[str], dataset: str
 ) -> list[Mapping[str, Any]]:
     """The clips of these labels or ids, in the dataset's order.

@@ -17,7 +17,7 @@ from catalogs.variants import warn_of_variant
 from flows.making.plan import TICK_RATE_HZ
 from flows.making.seal import pick_evenly
 from flows.reading.film import write_film
-from flows.reading.previews import named_clips
+from flows.reading.previews import select_clips
 from flows.running.progress import progress_bar
 from flows.running.runner import open_executor, run_unordered
 from flows.store.address import open_for_reading
@@ -64,7 +64,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     layout = open_for_reading(dataset)
     manifest = read_manifest(layout)
     rows = manifest["clips"]
-    brought = named_clips(rows, clips, dataset) if clips else pick_evenly(rows, TRACED_CLIPS)
+    brought = select_clips(rows, clips, dataset) if clips else pick_evenly(rows, TRACED_CLIPS)
     folder = _choose_folder(layout, out)
     pictures = manifest["grid"].get("pictures", True)
     data = page_data(manifest, {row["clip_id"] for row in brought}, pictures)

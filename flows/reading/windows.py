@@ -141,7 +141,11 @@ def windows_of(
     if stride < 1:
         problems.append(f"stride must be 1 or more; it is {stride}")
     named = {name for row in rows for name in (row["label"], row["clip_id"])}
-    problems += [f"clip {name!r}: no such label or id in the dataset" for name in set(clips or ()) - named]
+    problems += [
+        f"clip {name!r}: no such label or id in the dataset" for name in sorted(set(clips or ()) - named)
+    ]
+    if clips is not None and not clips:
+        problems.append("clips: must name one or more; None takes all that are not in quarantine")
     left_out = (
         tuple(row["label"] for row in rows if is_quarantined(row))
         if clips is None and not quarantined

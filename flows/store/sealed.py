@@ -112,15 +112,23 @@ def read_receipt(layout: Layout, clip_id: str) -> Receipt:
     return receipt
 
 
-def is_committed(layout: Layout, clip_id: str) -> bool:
-    """Whether a clip need not be made again: its receipt is sound, and in a folder its files are there.
+def is_committed(layout: Layout, planned: Mapping[str, Any]) -> bool:
+    """Whether a clip need not be made again: its receipt is sound and of the plan, and in a folder its files are there.
 
     In an object store the receipt is sent last and stands for the rest.
+
+    Parameters
+    ----------
+    layout : the dataset
+    planned : the clip as the plan records it
     """
+    clip_id = planned["clip_id"]
     if not layout.receipt(clip_id).is_file():
         return False
     try:
         receipt = read_receipt(layout, clip_id)
+        if {**receipt, **planned} != receipt:
+            return False
         tables = [layout.staged(clip_id, table) for table in STAGED_TABLES]
         if layout.origin is None:
             for table in tables:

@@ -29,7 +29,7 @@ class AttritionRow:
     paper_fails: int | None
 
 
-def attrition_table(selection: Selection, protocol: Protocol) -> tuple[AttritionRow, ...]:
+def tabulate_attrition(selection: Selection, protocol: Protocol) -> tuple[AttritionRow, ...]:
     """Return one row per rule, in the protocol's order; failure counts overlap, as in the paper's table.
 
     Parameters

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.eval.motion_agreement import PoseThresholds, pose_verdict
+from tasks.eval.motion_agreement import PoseThresholds, judge_pose
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.rigid import Floats
 from tasks.eval.video_motion import geometry_error
@@ -107,7 +107,7 @@ def judge_motion(recovered: RecoveredMotion, claim: ClaimAtFrames, limits: PoseT
     """
     if recovered.failed.all():
         raise InputError("No frame of the video could be placed: it shows too little that can be followed.")
-    verdict = pose_verdict(recovered, claim.pitch, claim.station, limits)
+    verdict = judge_pose(recovered, claim.pitch, claim.station, limits)
     figures = {
         "pitch_rmse_deg": verdict.pitch_rmse_deg,
         "pitch_relative_error": verdict.pitch_relative_error,

@@ -67,7 +67,7 @@ class PoseVerdict:
     reasons: tuple[str, ...]
 
 
-def pose_verdict(
+def judge_pose(
     recovered: RecoveredMotion, claimed_pitch: Floats, claimed_station: Floats, thresholds: PoseThresholds
 ) -> PoseVerdict:
     """Compare recovered motion with the telemetry at the frame times.

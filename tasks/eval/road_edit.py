@@ -96,7 +96,7 @@ def register_background(
     return cv2.warpAffine(moving, warp, size, flags=flags, borderMode=cv2.BORDER_REPLICATE), True
 
 
-def paired_residual(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.float64]:
+def compute_paired_residual(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.float64]:
     """Mean absolute Lab difference of two pictures, 8-bit Lab over 255 [1].
 
     Parameters
@@ -127,7 +127,7 @@ def detect_edit(
     background = ~wide
     background[round((1 - settings.lower_share) * height) :] = False
     laid, converged = register_background(flat, feature, background, settings)
-    residual = paired_residual(feature, laid)
+    residual = compute_paired_residual(feature, laid)
     quiet = residual[background]
     middle = float(np.median(quiet))
     spread = max(float(np.median(np.abs(quiet - middle))), settings.mad_floor)

@@ -23,7 +23,7 @@ def sampled_frames(count: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, count - 1, min(SAMPLED_FRAMES, count)).astype(np.int64))
 
 
-def image_statistics(frames: NDArray[np.uint8], road: NDArray[np.bool_]) -> dict[str, float]:
+def measure_image(frames: NDArray[np.uint8], road: NDArray[np.bool_]) -> dict[str, float]:
     """Means over the sampled frames of a clip.
 
     Parameters

@@ -27,7 +27,7 @@ GROUND_REACH = 15.0
 """Farther to the side, points are not classified as ground [m]."""
 
 
-def carriageway_extents(
+def measure_carriageway(
     station: NDArray[np.float64],
     lateral: NDArray[np.float64],
     height: NDArray[np.float64],

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
-from tasks.reconstruction.carriageway import carriageway_extents, classify_points
+from tasks.reconstruction.carriageway import classify_points, measure_carriageway
 from tasks.reconstruction.normals import turn_to_camera
 from tasks.reconstruction.surfels import COVERAGE, Surfels, derive_discs
 from tasks.scene.gaussians import Gaussians
@@ -65,7 +65,7 @@ def build_cloud(
     R, t = T_world_camera[:, :3, :3], T_world_camera[:, :3, 3]
     rays = np.einsum("nij,nj->ni", R, surfels.rays)
     station, lateral, height = route.project(rays * surfels.depth[:, None] + t)
-    extents = carriageway_extents(station, lateral, height, surfels.depth, route.length, carriageway_limit)
+    extents = measure_carriageway(station, lateral, height, surfels.depth, route.length, carriageway_limit)
     class_id = classify_points(lateral, height, surfels.depth, extents)
     up = route.pose(np.clip(station, 0, route.length))[:, :3, 2]
 

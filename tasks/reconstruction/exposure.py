@@ -86,8 +86,8 @@ def estimate_exposure(
         for n in range(count - gap):
             i, j = int(training[n]), int(training[n + gap])
             relative = np.linalg.inv(T_world_camera[j]) @ T_world_camera[i]
-            near = corresponding_pixels(disparity[i], disparity[j], intrinsics, disparity_scale, relative)
-            far = corresponding_directions(calm[i], calm[j], intrinsics, relative)
+            near = pair_pixels(disparity[i], disparity[j], intrinsics, disparity_scale, relative)
+            far = pair_directions(calm[i], calm[j], intrinsics, relative)
             here, there = (
                 tuple(np.concatenate(a) for a in zip(near[k], far[k], strict=True)) for k in (0, 1)
             )
@@ -125,7 +125,7 @@ def _calm_above_horizon(picture: NDArray[np.uint8], intrinsics: NDArray[np.float
     return (variance < (0.04 * mean) ** 2 + 1) & (rows < intrinsics[1, 2])
 
 
-def corresponding_directions(
+def pair_directions(
     calm: NDArray[np.bool_],
     other_calm: NDArray[np.bool_],
     intrinsics: NDArray[np.float64],
@@ -146,7 +146,7 @@ def corresponding_directions(
     return (first[0][same], first[1][same]), (second[0][same], second[1][same])
 
 
-def corresponding_pixels(
+def pair_pixels(
     disparity: NDArray[np.float32],
     other_disparity: NDArray[np.float32],
     intrinsics: NDArray[np.float64],

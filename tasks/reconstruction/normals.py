@@ -12,7 +12,7 @@ STIFFNESS = 2.0
 """Weight of a prior of constant depth, which stabilises thin patches [px^2]."""
 
 
-def camera_normals(
+def estimate_normals(
     depth: NDArray[np.float32], intrinsics: NDArray[np.float64], disparity_scale: float
 ) -> NDArray[np.float32]:
     """Return unit normals in camera coordinates, facing the camera; NaN where the depth is not finite.

@@ -13,12 +13,12 @@ from tasks.reconstruction.disparity import fill_disparity, match_stereo
 from tasks.reconstruction.exposure import Exposure, estimate_exposure
 from tasks.reconstruction.fusion import find_finest_view, fuse_depth
 from tasks.reconstruction.held_out import HeldOutFrame, score_held_out_frames
-from tasks.reconstruction.normals import camera_normals
+from tasks.reconstruction.normals import estimate_normals
 from tasks.reconstruction.pose_correction import correct_poses
 from tasks.reconstruction.refinement import TrainingView, refine_gaussians
 from tasks.reconstruction.road_plane import fit_road_plane, lay_route_below, settle_route
 from tasks.reconstruction.sequence import StereoSequence, StereoSettings
-from tasks.reconstruction.sky import build_panorama, fit_sky, sky_mask, sky_view
+from tasks.reconstruction.sky import build_panorama, fit_sky, mask_sky, sky_view
 from tasks.reconstruction.surfels import Surfels, join_samples, sample_picture
 from tasks.render.camera import world_to_camera
 from tasks.scene.route import Route
@@ -181,7 +181,7 @@ def _find_sky(
     radiance = [exposure.to_radiance(sequence.left[i], int(i)) for i in training]
     sky = fit_sky(radiance, sequence.intrinsics, poses[training])
     masks = [
-        sky_mask(picture, sky, sequence.intrinsics, poses[i])
+        mask_sky(picture, sky, sequence.intrinsics, poses[i])
         for picture, i in zip(radiance, training, strict=True)
     ]
     environment = build_panorama(
@@ -245,7 +245,7 @@ def _sample_surfels(
         sample_picture(
             find_finest_view(n, depth, confirmed, K, scale, poses[training]),
             depth[n],
-            camera_normals(depth[n], K, scale),
+            estimate_normals(depth[n], K, scale),
             sequence.left[i],
             exposure.to_radiance(sequence.left[i], int(i)),
             K,

@@ -125,7 +125,7 @@ def fit_sky(
     )
 
 
-def sky_mask(
+def mask_sky(
     radiance: NDArray[np.float32],
     sky: Sky | None,
     intrinsics: NDArray[np.float64],

@@ -11,7 +11,7 @@ from tasks.render.camera import Camera, RigAt, world_to_camera
 from tasks.render.composition import compose_over_sky, round_depth
 from tasks.render.display_bytes import encode_picture
 from tasks.render.environment import environment_view
-from tasks.render.labels import clip_flow, forward_flow, frame_labels, row_flow
+from tasks.render.labels import compute_clip_flow, compute_flow, compute_row_flow, label_frame
 from tasks.render.rasterise.backend import Backend
 from tasks.render.readout import Field, sensor_field
 from tasks.render.road_edit import RoadRelief
@@ -121,7 +121,7 @@ def render_clip(
         }
         if seen.points is not None and seen.changes is not None:
             elevation = None if relief is None else relief.elevation
-            buffers |= frame_labels(
+            buffers |= label_frame(
                 seen.normal, seen.class_id, seen.points, seen.changes, scene.route, elevation
             )
         for name, values in buffers.items():
@@ -141,15 +141,15 @@ def _label_flow(
     T_world_camera: NDArray[np.float64],
     T_world_rows: list[NDArray[np.float64]] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Return flow and occlusion marks as `clip_flow` does, for either kind of shutter."""
+    """Return flow and occlusion marks as `compute_clip_flow` does, for either kind of shutter."""
 
     def flow_from(k: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         pair = depth[k], depth[k + 1]
         if T_world_rows is None:
-            return forward_flow(*pair, camera.K, T_world_camera[k], T_world_camera[k + 1])
-        return row_flow(*pair, field.directions, camera, T_world_rows[k][1], T_world_rows[k + 1][1])
+            return compute_flow(*pair, camera.K, T_world_camera[k], T_world_camera[k + 1])
+        return compute_row_flow(*pair, field.directions, camera, T_world_rows[k][1], T_world_rows[k + 1][1])
 
-    return clip_flow(depth, flow_from)
+    return compute_clip_flow(depth, flow_from)
 
 
 def _row_poses(

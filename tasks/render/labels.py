@@ -24,7 +24,7 @@ NORMAL_STEPS = 127
 """Steps of a stored normal's component from 0 to 1 [1]."""
 
 
-def forward_flow(
+def compute_flow(
     depth: NDArray[np.float32],
     next_depth: NDArray[np.float32],
     K: NDArray[np.float64],
@@ -50,10 +50,12 @@ def forward_flow(
     T = np.linalg.inv(next_T_world_camera) @ T_world_camera
     x, y, z = np.moveaxis((rays * depth[..., None]) @ T[:3, :3].T + T[:3, 3], -1, 0)
     z = np.where(z > 0, z, np.nan)
-    return flow_and_occlusion(depth, next_depth, K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2], z)
+    return compute_flow_and_occlusion(
+        depth, next_depth, K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2], z
+    )
 
 
-def row_flow(
+def compute_row_flow(
     depth: NDArray[np.float32],
     next_depth: NDArray[np.float32],
     directions: NDArray[np.float64],
@@ -61,7 +63,7 @@ def row_flow(
     T_world_rows: NDArray[np.float64],
     next_T_world_rows: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return `forward_flow` for a camera with a lens or a rolling shutter, between pixels as they are stored.
+    """Return `compute_flow` for a camera with a lens or a rolling shutter, between pixels as they are stored.
 
     Parameters
     ----------
@@ -72,14 +74,14 @@ def row_flow(
 
     Returns
     -------
-    As `forward_flow`.
+    As `compute_flow`.
     """
     points = row_points(directions, depth, T_world_rows)
     there = project_by_rows(points, next_T_world_rows, camera)
-    return flow_and_occlusion(depth, next_depth, there[..., 0], there[..., 1], there[..., 2])
+    return compute_flow_and_occlusion(depth, next_depth, there[..., 0], there[..., 1], there[..., 2])
 
 
-def flow_and_occlusion(
+def compute_flow_and_occlusion(
     depth: NDArray[np.float32],
     next_depth: NDArray[np.float32],
     there_u: NDArray[np.float64],
@@ -90,13 +92,13 @@ def flow_and_occlusion(
 
     Parameters
     ----------
-    depth, next_depth : as `forward_flow` takes them
+    depth, next_depth : as `compute_flow` takes them
     there_u, there_v : [H, W] places in the next frame; NaN where there is none [px]
     z : [H, W] camera z there [m]
 
     Returns
     -------
-    As `forward_flow`.
+    As `compute_flow`.
     """
     height, width = depth.shape
     u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -108,7 +110,7 @@ def flow_and_occlusion(
     return flow, np.isfinite(depth) & (~inside | hidden)
 
 
-def road_coordinates(
+def locate_road_pixels(
     class_id: NDArray[np.uint8], points: NDArray[np.floating], route: Route
 ) -> NDArray[np.float32]:
     """Return the station along the route and the lateral position of every road pixel.
@@ -130,14 +132,14 @@ def road_coordinates(
     return place
 
 
-def hazard_mark(place: NDArray[np.float32], elevation: Profile) -> NDArray[np.uint8]:
+def mark_hazard(place: NDArray[np.float32], elevation: Profile) -> NDArray[np.uint8]:
     """Return `HAZARD` where the profile H_g(s) [m] moves the road at road coordinates [H, W, 2], else 0."""
     on_road = np.isfinite(place[..., 0])
     lifted = elevation(np.where(on_road, place[..., 0], -1e9).astype(np.float64)) != 0
     return np.where(on_road & lifted, HAZARD, 0).astype(np.uint8)
 
 
-def frame_labels(
+def label_frame(
     normal: NDArray[np.float32],
     class_id: NDArray[np.uint8],
     points: NDArray[np.floating],
@@ -150,7 +152,7 @@ def frame_labels(
     Parameters
     ----------
     normal : float32 [H, W, 3] world normals, zero where nothing is seen [1]
-    class_id, points, route : as `road_coordinates` takes them
+    class_id, points, route : as `locate_road_pixels` takes them
     changes : uint8 [H, W] `LAYER_BITS` of the layers that changed each pixel
     elevation : H_g(s) [m] at stations [m]; None for a flat road
 
@@ -159,15 +161,15 @@ def frame_labels(
     ``normal`` int8 [H, W, 3] world normal in steps of 1/127; ``road`` float32 [H, W, 2] station and lateral of road
     pixels, else NaN [m]; ``marks`` uint8 [H, W] `MARK_BITS` without ``occluded``
     """
-    place = road_coordinates(class_id, points, route)
+    place = locate_road_pixels(class_id, points, route)
     return {
         "normal": np.rint(normal * NORMAL_STEPS).astype(np.int8),
         "road": round_depth(place),
-        "marks": changes if elevation is None else changes | hazard_mark(place, elevation),
+        "marks": changes if elevation is None else changes | mark_hazard(place, elevation),
     }
 
 
-def clip_flow(
+def compute_clip_flow(
     depth: NDArray[np.float32], flow_from: Callable[[int], tuple[NDArray[np.float32], NDArray[np.bool_]]]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     """Return the flow of every frame to the next, and the mark of points hidden there; the last frame has neither.
@@ -175,7 +177,7 @@ def clip_flow(
     Parameters
     ----------
     depth : float32 [F, H, W] camera z [m]
-    flow_from : frame number to flow and occlusion, as `forward_flow` and `row_flow` return them
+    flow_from : frame number to flow and occlusion, as `compute_flow` and `compute_row_flow` return them
 
     Returns
     -------

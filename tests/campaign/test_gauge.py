@@ -27,10 +27,11 @@ def noise(sigma: float, rho: float = 0.5, seed: int = 1) -> NDArray[np.float64]:
 @pytest.mark.parametrize("rho", [0.0, 0.3, 0.6])
 @pytest.mark.parametrize("sigma", [0.005, 0.02])
 def test_scale_and_correlation_of_the_gauges_noise_are_found_on_a_slope(sigma: float, rho: float) -> None:
-    found = np.array([estimate_gauge_noise(0.2 * TIME + noise(sigma, rho, seed)) for seed in range(20)]).mean(
-        axis=0
+    found = np.array([estimate_gauge_noise(0.2 * TIME + noise(sigma, rho, seed)) for seed in range(20)])
+    assert found[:, 1].min() >= 0, (
+        "noise that is not correlated does not come out as correlated the other way"
     )
-    assert found == pytest.approx((sigma, rho), rel=0.2, abs=0.12 if rho == 0.0 else 0.0)
+    assert found.mean(axis=0) == pytest.approx((sigma, rho), rel=0.2, abs=0.12 if rho == 0.0 else 0.0)
 
 
 def test_a_pressure_without_noise_is_left_as_it_is() -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from benchmarks.synthetic_street import Clip
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, pose_verdict
+from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, judge_pose
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.photometric import recover_motion_photometric
@@ -56,7 +56,7 @@ class TestVerdictOnFrames:
         self, recovered: dict[str, RecoveredMotion], method: str, clip: Clip, pitch: NDArray[np.float64]
     ) -> PoseVerdict:
         limits = CAMERA_ONLY if method == "essential" else THRESHOLDS
-        return pose_verdict(recovered[method], pitch, clip.station, limits)
+        return judge_pose(recovered[method], pitch, clip.station, limits)
 
     def test_the_true_telemetry_passes(self, recovered, method, full_clip) -> None:
         verdict = self.judge(recovered, method, full_clip, full_clip.pitch)
@@ -87,17 +87,17 @@ def motion_with(clip: Clip, pitch: NDArray[np.float64], **others: object) -> Rec
 
 @pytest.mark.parametrize("control", CONTROLS)
 def test_pictures_out_of_step_with_true_telemetry_fail(full_clip: Clip, control: str) -> None:
-    assert pose_verdict(
+    assert judge_pose(
         motion_with(full_clip, full_clip.pitch), full_clip.pitch, full_clip.station, THRESHOLDS
     ).passed
     shown = motion_with(full_clip, CONTROLS[control](full_clip.pitch))
-    assert not pose_verdict(shown, full_clip.pitch, full_clip.station, THRESHOLDS).passed
+    assert not judge_pose(shown, full_clip.pitch, full_clip.station, THRESHOLDS).passed
 
 
 def test_the_controls_score_as_their_algebra_says(full_clip: Clip) -> None:
     def relative(name: str) -> float:
         shown = motion_with(full_clip, CONTROLS[name](full_clip.pitch))
-        return pose_verdict(shown, full_clip.pitch, full_clip.station, THRESHOLDS).pitch_relative_error
+        return judge_pose(shown, full_clip.pitch, full_clip.station, THRESHOLDS).pitch_relative_error
 
     assert relative("no response") == pytest.approx(1.0)
     assert relative("amplitude x 0.8") == pytest.approx(0.2)
@@ -106,14 +106,14 @@ def test_the_controls_score_as_their_algebra_says(full_clip: Clip) -> None:
 
 
 def test_a_wrong_speed_fails_by_progress_alone(full_clip: Clip) -> None:
-    verdict = pose_verdict(
+    verdict = judge_pose(
         motion_with(full_clip, full_clip.pitch), full_clip.pitch, 1.05 * full_clip.station, THRESHOLDS
     )
     assert [reason.split(" is ")[0] for reason in verdict.reasons] == ["progress RMSE"]
 
 
 def test_pitch_counts_from_frame_0_so_a_constant_offset_does_not_matter(full_clip: Clip) -> None:
-    verdict = pose_verdict(
+    verdict = judge_pose(
         motion_with(full_clip, full_clip.pitch), full_clip.pitch + 0.1, full_clip.station + 50, THRESHOLDS
     )
     assert verdict.passed and verdict.pitch_rmse_deg < 1e-9 and verdict.progress_rmse_m < 1e-9
@@ -122,7 +122,7 @@ def test_pitch_counts_from_frame_0_so_a_constant_offset_does_not_matter(full_cli
 def test_without_response_the_relative_figures_are_not_judged(full_clip: Clip) -> None:
     noise = np.deg2rad(0.01) * np.random.default_rng(0).standard_normal(len(full_clip.pitch))
     quiet = motion_with(full_clip, noise)
-    verdict = pose_verdict(quiet, 0 * full_clip.pitch, full_clip.station, THRESHOLDS)
+    verdict = judge_pose(quiet, 0 * full_clip.pitch, full_clip.station, THRESHOLDS)
     assert verdict.passed and np.isnan(verdict.pitch_relative_error) and np.isnan(verdict.pitch_correlation)
 
 
@@ -131,10 +131,10 @@ def test_a_car_that_stands_has_no_normalised_progress(full_clip: Clip) -> None:
     still = motion_with(
         full_clip, 0 * full_clip.pitch, progress=np.zeros(n), normalised_path=np.full((n, 3), np.nan)
     )
-    verdict = pose_verdict(still, np.zeros(n), np.full(n, 7.0), THRESHOLDS)
+    verdict = judge_pose(still, np.zeros(n), np.full(n, 7.0), THRESHOLDS)
     assert verdict.passed and np.isnan(verdict.normalised_progress_rmse)
     # but a car that should have moved and was seen standing fails, though its figure is NaN
-    moved = pose_verdict(still, np.zeros(n), full_clip.station, replace(THRESHOLDS, progress_rmse_m=None))
+    moved = judge_pose(still, np.zeros(n), full_clip.station, replace(THRESHOLDS, progress_rmse_m=None))
     assert not moved.passed
 
 
@@ -147,16 +147,16 @@ def test_a_frame_without_a_pose_fails_the_clip_unless_a_share_of_them_is_allowed
         failed=failed,
         failures=("exact: frame 5 has no pose: dark.",),
     )
-    verdict = pose_verdict(gap, full_clip.pitch, full_clip.station, THRESHOLDS)
+    verdict = judge_pose(gap, full_clip.pitch, full_clip.station, THRESHOLDS)
     assert not verdict.passed and verdict.failed_frames == 1 and "frame 5" in verdict.reasons[0]
     assert np.isfinite(verdict.pitch_rmse_deg)
     lenient = replace(THRESHOLDS, failed_share=0.1)
-    assert pose_verdict(gap, full_clip.pitch, full_clip.station, lenient).passed
+    assert judge_pose(gap, full_clip.pitch, full_clip.station, lenient).passed
 
 
 def test_telemetry_that_does_not_fit_the_frames_is_refused(full_clip: Clip) -> None:
     holed = full_clip.station.copy()
     holed[3] = np.nan
     with pytest.raises(InputError) as caught:
-        pose_verdict(motion_with(full_clip, full_clip.pitch), full_clip.pitch[:-1], holed, THRESHOLDS)
+        judge_pose(motion_with(full_clip, full_clip.pitch), full_clip.pitch[:-1], holed, THRESHOLDS)
     assert len(caught.value.problems) == 2

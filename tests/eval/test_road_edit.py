@@ -11,7 +11,7 @@ from tasks.eval.road_edit import (
     score_true_masks,
     temporal_iou,
 )
-from tasks.eval.severity import image_statistics, severity_agreement
+from tasks.eval.severity import measure_image, severity_agreement
 
 DRAW = np.random.Generator(np.random.Philox(4))
 GROUND = cv2.GaussianBlur(DRAW.integers(0, 255, (160, 240, 3)).astype(np.uint8), (0, 0), 2.5)
@@ -90,7 +90,7 @@ def test_statistics_follow_what_they_are_named_for() -> None:
     road = np.broadcast_to(np.arange(160)[:, None] > 80, (2, 160, 240))
     clear = np.stack([GROUND, GROUND])
     fog = (0.5 * clear + 0.5 * 200).astype(np.uint8)
-    a, b = image_statistics(clear, road), image_statistics(fog, road)
+    a, b = measure_image(clear, road), measure_image(fog, road)
     assert b["dark_channel"] > a["dark_channel"] and b["contrast"] < a["contrast"]
     assert b["road_saturation"] < a["road_saturation"]
 

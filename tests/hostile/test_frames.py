@@ -127,7 +127,8 @@ def test_attributes_of_frames_are_texts_and_nothing_more(stage):
         units="seconds since the flood", _FillValue="x", scale_factor=[1], calendar="{}", coordinates="/etc"
     ))  # fmt: skip
     reseal(stage.dataset)
-    endure(stage, *READS_PICTURES, "audit")
+    outcomes = endure(stage, *READS_PICTURES, "audit")
+    assert unrefused(outcomes, "open frames", "open windows") == []
 
 
 SHARDS = {

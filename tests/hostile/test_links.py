@@ -131,7 +131,9 @@ def test_a_file_in_place_of_a_folder(stage, name):
     place = stage.dataset.root / name
     shutil.rmtree(place, ignore_errors=True)
     place.write_text("somebody's")
-    endure(stage, *LIGHT, "open windows", "sheets")
+    outcomes = endure(stage, *LIGHT, "open windows", "sheets")
+    assert unrefused(outcomes, "verify", "repair", "open windows", "sheets") == []
+    assert place.read_text() == "somebody's"
 
 
 def test_files_that_somebody_keeps_in_the_dataset_are_not_deleted(stage):

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.flows.reseal import reseal
-from tests.hostile.stage import Stage, endure
+from tests.hostile.stage import Stage, endure, refused, unrefused
 from tests.hostile.test_frames import Payload
 
 READS_TABLES = ("sql", "open tables", "open windows", "explain", "audit-physics", "sheets")
@@ -106,11 +106,27 @@ TABLES: dict[str, Callable[[Stage], object]] = {
 }
 
 
+UNREADABLE = {
+    "SQL in place of every name", "no columns of ours", "no columns", "three thousand columns", "columns twice",
+    "no Parquet", "ends cut off",
+}  # fmt: skip
+"""Tables that every reader refuses."""
+UNPHYSICAL = {
+    "numbers as text", "numbers in lists", "numbers that are none", "infinite numbers", "times of other lengths",
+    "ids that are numbers", "one row", "half of the rows", "noise in the middle",
+}  # fmt: skip
+"""Tables that some readers take, as their form is right: the audit of the physics does not."""
+
+
 @pytest.mark.parametrize("attack", TABLES)
 def test_tables_with(stage, attack):
     TABLES[attack](stage)
     reseal(stage.dataset)
-    endure(stage, *READS_TABLES)
+    outcomes = endure(stage, *READS_TABLES)
+    if attack in UNREADABLE:
+        assert unrefused(outcomes) == []
+    if attack in UNPHYSICAL:
+        assert refused(outcomes["audit-physics"])
 
 
 def test_folders_and_files_that_the_manifest_does_not_name_are_no_tables(stage):

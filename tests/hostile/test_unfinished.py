@@ -10,7 +10,7 @@ import pytest
 
 from flows.store.layout import STAGED_TABLES
 from flows.store.telemetry import write_parquet
-from tests.hostile.stage import Stage, endure, listing
+from tests.hostile.stage import COMMANDS, Stage, endure, listing, refused
 
 GOES_ON = (
     "verify",
@@ -108,8 +108,16 @@ RECEIPTS: dict[str, Callable[[Stage], object]] = {
 
 @pytest.mark.parametrize("attack", RECEIPTS)
 def test_a_receipt(begun, attack):
+    labels = [clip["label"] for clip in json.loads(begun.dataset.plan.read_text())["clips"]]
     RECEIPTS[attack](begun)
-    endure(begun, *GOES_ON)
+    outcomes = endure(begun, *GOES_ON)
+    assert refused(outcomes["verify"])
+    if not refused(outcomes["generate"]):
+        assert outcomes["generate"].made == 2, (
+            "the clip of the receipt is made again beside the one that lacks"
+        )
+        assert [clip["label"] for clip in begun.manifest()["clips"]] == labels
+        assert not refused(COMMANDS["verify"](begun))
 
 
 def test_what_a_run_without_a_plan_left_is_cleared_in_the_dataset_alone(stage):

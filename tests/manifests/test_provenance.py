@@ -2,10 +2,11 @@
 
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 
-from manifests.provenance import git_commit
+from manifests.provenance import describe_processor, git_commit
 
 pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
 
@@ -90,3 +91,15 @@ def test_asking_runs_no_monitor_of_the_repository_and_writes_nothing(checkout, t
     before = (checkout / ".git" / "index").read_bytes()
     assert git_commit(checkout) is not None
     assert not trace.exists() and (checkout / ".git" / "index").read_bytes() == before
+
+
+def test_the_processor_is_named_as_the_kernel_names_it() -> None:
+    table = Path("/proc/cpuinfo")
+    lines = table.read_text().splitlines() if table.is_file() else []
+    said = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
+    if not {"model name", "flags"} <= said.keys():
+        pytest.skip("this kernel names neither model nor vector extensions")
+    facts = describe_processor()
+    assert facts["model"] == said["model name"]
+    known = {"avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl"}
+    assert set(facts["vector_extensions"].split()) == known & set(said["flags"].split())

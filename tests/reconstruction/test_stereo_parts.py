@@ -5,14 +5,14 @@ import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.reconstruction.camera import pixel_rays
-from tasks.reconstruction.carriageway import carriageway_extents, classify_points
+from tasks.reconstruction.carriageway import classify_points, measure_carriageway
 from tasks.reconstruction.cloud import LONGEST, _depth_factor_onto_route, _split_long_discs
 from tasks.reconstruction.disparity import fill_disparity, match_stereo
 from tasks.reconstruction.exposure import estimate_exposure
 from tasks.reconstruction.fusion import find_finest_view, fuse_depth
-from tasks.reconstruction.normals import camera_normals, turn_to_camera
+from tasks.reconstruction.normals import estimate_normals, turn_to_camera
 from tasks.reconstruction.road_plane import fit_road_plane, lay_route_below, settle_route
-from tasks.reconstruction.sky import Sky, build_panorama, fit_sky, sky_mask
+from tasks.reconstruction.sky import Sky, build_panorama, fit_sky, mask_sky
 from tasks.reconstruction.surfels import COVERAGE, derive_discs, sample_picture
 from tasks.render.composition import to_display
 from tasks.scene.route import Route
@@ -118,7 +118,7 @@ def test_carriageway_ends_at_the_kerb_and_at_the_limit() -> None:
     draw = np.random.Generator(np.random.Philox(6))
     station, lateral = draw.uniform(0, 20, 20000), draw.uniform(-8, 8, 20000)
     height = np.where(lateral > 2.3, 0.12, 0.01) + draw.normal(0, 0.01, 20000)
-    left, right = carriageway_extents(station, lateral, height, np.full(20000, 8.0), 20.0, 5.0)
+    left, right = measure_carriageway(station, lateral, height, np.full(20000, 8.0), 20.0, 5.0)
     assert left == pytest.approx(2.3, abs=0.11)
     assert right == -5.0
 
@@ -133,7 +133,7 @@ def test_classes_follow_height_and_side() -> None:
 def test_normals_of_a_plane_are_those_of_the_plane() -> None:
     toward = np.array([0.2, -0.9, -0.3]) / np.linalg.norm([0.2, -0.9, -0.3])
     depth = plane_depth(tuple(-toward), 1.6)
-    normals = camera_normals(depth, K, SCALE)
+    normals = estimate_normals(depth, K, SCALE)
     near = np.isfinite(depth) & (depth < 6)
     near[:6], near[-6:], near[:, :6], near[:, -6:] = False, False, False, False
     assert (normals[near] @ toward).min() > 0.995
@@ -290,7 +290,7 @@ def test_what_stands_still_is_sky_and_what_moves_is_not() -> None:
     pictures, poses = drive_below_a_sky()
     sky = fit_sky(pictures, K, poses)
     assert sky is not None
-    mask = sky_mask(pictures[2], sky, K, poses[2])
+    mask = mask_sky(pictures[2], sky, K, poses[2])
     assert mask[:38].mean() > 0.99
     assert not mask[52:].any()
 
@@ -309,7 +309,7 @@ def test_a_drive_without_steady_sky_has_none() -> None:
     for n, picture in enumerate(pictures):
         picture *= 1 + 0.3 * n
     assert fit_sky(pictures, K, poses) is None
-    assert not sky_mask(pictures[0], None, K, poses[0]).any()
+    assert not mask_sky(pictures[0], None, K, poses[0]).any()
 
 
 def test_panorama_puts_zenith_first_and_left_to_the_left() -> None:

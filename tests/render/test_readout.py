@@ -8,7 +8,7 @@ import pytest
 
 from tasks.eval.poses.rolling_shutter import correct_rolling_shutter, row_times
 from tasks.render.composition import encode_8bit
-from tasks.render.labels import row_flow
+from tasks.render.labels import compute_row_flow
 from tasks.render.lens import distort_rays
 from tasks.render.readout import read_out, sensor_field
 from tasks.render.sight import row_points
@@ -149,7 +149,7 @@ def test_flow_leads_to_the_pixel_that_sees_the_same_point():
     later = now.copy()
     later[:, :3, 3] += (0.2, 0.05, 1.0)
     depth, next_depth = (wall_seen(field.directions, poses)[1].astype(np.float32) for poses in (now, later))
-    flow, occluded = row_flow(depth, next_depth, field.directions, ALL, now, later)
+    flow, occluded = compute_row_flow(depth, next_depth, field.directions, ALL, now, later)
     points, next_points = (
         row_points(field.directions, depth, now),
         row_points(field.directions, next_depth, later),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tasks.conventions import ROAD_CLASSES
-from tasks.render.labels import HAZARD, hazard_mark
+from tasks.render.labels import HAZARD, mark_hazard
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.road_edit import apply_road_profile
 from tasks.render.road_refinement import refine_road
@@ -35,7 +35,7 @@ def seen_from(x: float, height: float, length: float):
     place = np.full((HEIGHT, WIDTH, 2), np.nan, np.float32)
     on_road = np.isin(g.class_id, ROAD_CLASSES) & np.isfinite(g.depth)
     place[on_road, 0] = x + g.depth[on_road]
-    mark = hazard_mark(place, lambda s: road_elevation(s, hazard))
+    mark = mark_hazard(place, lambda s: road_elevation(s, hazard))
     return hazard, rows, by_depth, by_ray, g, mark
 
 

@@ -12,7 +12,7 @@ from catalogs.entries import entry_folder, entry_names, find_entry
 from catalogs.tyres import LARGEST_TIR, load_tyre, parse_tyre
 from catalogs.vehicles import load_vehicle
 from flows.making.plan import make_plan
-from manifests.explain import input_differences
+from manifests.explain import find_input_differences
 from tasks.errors import InputError
 from tasks.vehicle.tyres.magic_formula import MagicFormula, compute_tyre_forces
 
@@ -168,6 +168,6 @@ def test_a_dataset_keeps_the_tyre_beside_its_vehicle_and_names_what_differs(tmp_
     (tmp_path / "mine.tir").write_bytes(changed(("PDX1", "PDX1 = 0.9")))
     other, others = make_plan("demo", "cpu", car, pictures=False)
     assert {clip.clip_id for clip in plan.clips}.isdisjoint(clip.clip_id for clip in other.clips)
-    (row,) = input_differences(plan.as_json(), other.as_json(), inputs, others)
+    (row,) = find_input_differences(plan.as_json(), other.as_json(), inputs, others)
     assert (row["input"], row["path"], row["a"], row["b"]) == ("mine.tir", "PDX1", "1.210", "0.9")
     assert row["reaches"] == ["vehicle", "render"]

@@ -45,7 +45,7 @@ def asphalt_albedo(
     albedo = _add_repairs(layout, seed, s, d, size, albedo)
     albedo = _add_cracks(layout, seed, s, d, size, albedo)
     albedo = _add_covers(layout, seed, s, d, size, albedo)
-    return _add_leaves(seed, s, d, to_kerb, albedo)
+    return _add_leaves(seed, to_kerb, albedo)
 
 
 def paint_albedo(seed: int, s: Floats, d: Floats, grain: Floats) -> Floats:
@@ -101,10 +101,10 @@ def _add_covers(
     return albedo
 
 
-def _add_leaves(seed: int, s: Floats, d: Floats, to_kerb: Floats, albedo: Floats) -> Floats:
+def _add_leaves(seed: int, to_kerb: Floats, albedo: Floats) -> Floats:
     rng = named_generator(seed, "leaves on the road")
-    fallen = rng.random(len(s)) < 0.10 * np.exp(-to_kerb / 0.4) + 0.002
-    colour = _LEAVES[rng.integers(0, len(_LEAVES), len(s))]
+    fallen = rng.random(len(albedo)) < 0.10 * np.exp(-to_kerb / 0.4) + 0.002
+    colour = _LEAVES[rng.integers(0, len(_LEAVES), len(albedo))]
     return _mix_colours(albedo, colour, np.where(fallen, 0.75, 0.0))
 
 

@@ -47,6 +47,7 @@ def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         ("weak", "weak", 1, 31),
         ("seen", "plain", 1, 5),
         ("other seed", "plain", 2, 5),
+        ("without pictures", "plain", 1, 5),
     ):
         (folder / f"{name}-grid.yaml").write_text(
             GRID.format(
@@ -97,6 +98,16 @@ def test_swapping_the_datasets_turns_the_changes_round(datasets: dict[str, str])
         change = x["labels"]["stopping_distance_change_m"]
         if change is not None:
             assert change == -y["labels"]["stopping_distance_change_m"]
+
+
+@pytest.mark.parametrize(("a", "b"), [("seen", "without pictures"), ("without pictures", "seen")])
+def test_pictures_that_one_dataset_lacks_are_a_difference_either_way(
+    datasets: dict[str, str], a: str, b: str
+) -> None:
+    result = compare_datasets(datasets[a], datasets[b])
+    assert not result["same"] and len(result["clips"]) == 4
+    assert all({"rgb", "depth", "class"} <= set(row["changed"]) for row in result["clips"])
+    assert all(row["why"] == ["pictures"] and row["picture"] is None for row in result["clips"])
 
 
 def test_another_seed_changes_the_picture_and_no_label(datasets: dict[str, str]) -> None:

@@ -15,12 +15,12 @@ from flows.judging.controls import (
     BLIND_BY_DESIGN,
     CONTROLS,
     UNREAD,
-    false_claims,
+    list_unread_rows,
     list_untried,
+    make_false_claims,
     run_controls,
     score_controls,
     summarise_controls,
-    unread_rows,
 )
 from flows.judging.controls_figure import roc_figure
 from flows.judging.judged_clip import METHODS, JudgedClip
@@ -91,7 +91,7 @@ def clips(dataset: Path) -> list[JudgedClip]:
 
 @pytest.fixture(scope="module")
 def false(dataset: Path, clips: list[JudgedClip]) -> list[dict[str, Claim]]:
-    return false_claims(clips, read_plan(dataset), catalogue_of(dataset))
+    return make_false_claims(clips, read_plan(dataset), catalogue_of(dataset))
 
 
 def test_a_good_pose_check_sees_all_seven_and_the_blind_are_named(
@@ -142,7 +142,7 @@ def test_the_change_against_the_dry_sibling_is_held_against_the_claim(
 def test_metrics_that_no_claim_enters_are_blind_to_every_control(
     clips: list[JudgedClip], false: list[dict[str, Claim]]
 ) -> None:
-    rows = list(unread_rows())
+    rows = list(list_unread_rows())
     assert {(row["control"], row["metric"]) for row in rows} == {(c, m) for c in CONTROLS for m in UNREAD}
     assert {"localised_edit_rate", "severity_rank_correlation", "piqe"} <= set(UNREAD)
     assert all(row["verdict"] == "blind" and row["reason"] == BLIND_BY_DESIGN for row in rows)

@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.paper_metrics import PAPER_METRICS, paper_values
 from flows.judging.evaluation_means import mean_rows
-from flows.judging.evaluation_rows import control_of, figure_row, weather_families
+from flows.judging.evaluation_rows import figure_row, find_control, group_weather_families
 
 RATES = {"dry": 0.0, "rain-10": 10.0, "rain-50": 50.0}
 DRIVES: dict[str, dict[str, float]] = {
@@ -66,7 +66,7 @@ def test_windows_and_methods_are_never_mixed() -> None:
 
 def test_a_family_of_weathers_is_of_its_kind_and_drive() -> None:
     made = clips(1, 2)
-    conditions = [condition for _, condition, _ in weather_families(made)]
+    conditions = [condition for _, condition, _ in group_weather_families(made)]
     assert conditions == [f"rain: {drive}/seed-{seed}" for drive in DRIVES for seed in (1, 2)]
     rows = figures(
         "clip_adjacent_accuracy", dict(zip(conditions, (1.0, 0.5, 0.0, 0.0, 0.0, 0.0), strict=True))
@@ -80,9 +80,9 @@ def test_a_clip_is_held_against_the_control_of_its_own_seed() -> None:
     made = clips(1, 2)
     for clip in made:
         for weather in (True, False):
-            control = control_of(clip, made, weather=weather)
+            control = find_control(clip, made, weather=weather)
             assert control is None or control.facts["label"][-1] == clip.facts["label"][-1]
-    assert sum(control_of(clip, made, weather=True) is not None for clip in made) == 12
+    assert sum(find_control(clip, made, weather=True) is not None for clip in made) == 12
 
 
 def test_every_figure_of_the_paper_is_at_hand() -> None:

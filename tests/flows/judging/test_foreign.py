@@ -18,9 +18,9 @@ from flows.judging.foreign_sources import (
     LEVEL,
     MOST_PIXELS,
     ForeignCamera,
-    intrinsics_at,
     read_camera,
     read_video,
+    scale_intrinsics,
 )
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
@@ -167,10 +167,10 @@ def test_all_wrong_inputs_are_told_at_once(tmp_path: Path) -> None:
 def test_intrinsics_follow_the_size_and_refuse_another_shape(tmp_path: Path) -> None:
     K = np.array([[400.0, 0, 239.5], [0, 400, 159.5], [0, 0, 1]])
     camera = ForeignCamera(K=K, width=480, height=320, mount=np.eye(4), distortion=None)
-    half = intrinsics_at(camera, 240, 160)
+    half = scale_intrinsics(camera, 240, 160)
     np.testing.assert_allclose(half, [[200, 0, 119.5], [0, 200, 79.5], [0, 0, 1]])
     with pytest.raises(InputError, match="not the same shape"):
-        intrinsics_at(camera, 320, 320)
+        scale_intrinsics(camera, 320, 320)
     assert pytest.approx(K) == read_camera(Path("catalogs/cameras/dashcam-480x320.yaml")).K
 
 

@@ -19,7 +19,7 @@ from flows.making.freezing import (
     reproduce_run,
 )
 from flows.store.sealed import recorded_grid
-from manifests.frozen_run import frozen_names, parameters_that_matter, read_frozen, seal_run
+from manifests.frozen_run import list_frozen, parameters_that_matter, read_frozen, seal_run
 from tasks.errors import InputError
 
 SMALL = "multibody-speed-check"
@@ -40,14 +40,14 @@ def written(run: dict, tmp_path) -> str:
 
 
 def test_the_runs_that_the_paper_and_the_demo_need_ship():
-    counts = {name: len(read_frozen(name)["clips"]) for name in frozen_names()}
+    counts = {name: len(read_frozen(name)["clips"]) for name in list_frozen()}
     assert counts == {
         "demo": 15, "severity": 9, "hazards": 4, "replay": 27,
         "multibody-development": 19, "multibody-speed-check": 4, "multibody-held-out": 12,
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", frozen_names())
+@pytest.mark.parametrize("name", list_frozen())
 def test_a_frozen_run_that_ships_is_not_stale(name):
     frozen = read_frozen(name)
     stale = problems_of(frozen)

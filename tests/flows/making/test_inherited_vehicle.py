@@ -2,7 +2,7 @@
 
 from catalogs.vehicles import load_vehicle
 from flows.making.plan import make_plan
-from manifests.explain import input_differences
+from manifests.explain import find_input_differences
 
 
 def test_the_copy_in_a_dataset_is_whole_and_a_change_of_the_other_vehicle_changes_the_clips(tmp_path):
@@ -19,7 +19,7 @@ def test_the_copy_in_a_dataset_is_whole_and_a_change_of_the_other_vehicle_change
     base.write_text(text.format(1600))
     other, others = make_plan("demo", "cpu", str(car), pictures=False)
     assert {clip.clip_id for clip in plan.clips}.isdisjoint(clip.clip_id for clip in other.clips)
-    (row,) = input_differences(plan.as_json(), other.as_json(), inputs, others)
+    (row,) = find_input_differences(plan.as_json(), other.as_json(), inputs, others)
     assert (row["input"], row["path"], row["a"], row["b"]) == (
         "vehicle.yaml",
         "sprung_mass.value",

@@ -28,7 +28,7 @@ from flows.reading.describe import describe_dataset, validate_grid
 from flows.reading.report import page_data
 from flows.store.frames import read_clip
 from flows.store.sealed import read_manifest
-from manifests.explain import input_differences
+from manifests.explain import find_input_differences
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
 
@@ -230,7 +230,9 @@ def test_a_variant_changes_ids_and_is_named_as_the_difference(write_grid, made):
         plans[variant] = freeze_grid(replace(grid, settings=settings), "t", "cpu")[0]
     assert len({plan.clips[0].clip_id for plan in plans.values()}) == 5
     assert len({plan.clips[0].seed for plan in plans.values()}) == 1  # the same drops
-    rows = input_differences(read_manifest(made["fixed-mu"]), read_manifest(made["vertical-only"]), {}, {})
+    rows = find_input_differences(
+        read_manifest(made["fixed-mu"]), read_manifest(made["vertical-only"]), {}, {}
+    )
     assert ("fixed-mu", "vertical-only") in {
         (row["a"], row["b"]) for row in rows if row["input"] == "variant"
     }

@@ -214,6 +214,13 @@ def test_clips_in_quarantine_are_left_out_and_named_unless_asked_for(data):
     assert all(label in str(told[0].message) for label in failed)
     assert data.torch(window=5, columns=["speed"], quarantined=True).clips == (0, 1, 2, 3)
     assert data.torch(window=5, columns=["speed"], clips=failed[:1]).clips == (0,)
+    alone = data.torch(
+        window=5, columns="speed", arrays="rgb", clips=failed[0]
+    )  # a name by itself is one name
+    assert (alone.clips, alone.columns, alone.arrays) == ((0,), ("speed",), ("rgb",))
+    with pytest.raises(InputError) as caught:
+        data.torch(window=5, stride=0, clips=[])
+    assert [problem.partition(" must")[0] for problem in caught.value.problems] == ["stride", "clips:"]
 
 
 def test_a_dataset_all_in_quarantine_is_no_training_set(data):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flows.reading.film import through_film, write_film
-from flows.reading.previews import film_names, make_films
+from flows.reading.previews import make_films, name_films
 from flows.store.frames import read_clip
 from flows.store.layout import read_json
 from flows.store.outputs import name_problem
@@ -54,7 +54,7 @@ def test_labels_that_differ_have_films_of_their_own_with_names_that_stay_in_the_
         "a\x1bb", "$(id)", "a_b-0000000000000000", "snow-3/hump",
     ]  # fmt: skip
     rows = [{"clip_id": f"{k:016x}", "label": label} for k, label in enumerate(labels)]
-    names = film_names(rows)
+    names = name_films(rows)
     assert len({name.casefold() for name in names.values()}) == len(labels)
     assert all(name_problem(name) is None and "/" not in name for name in names.values())
     assert not any(name.startswith((".", "-")) for name in names.values())

@@ -49,6 +49,20 @@ def test_only_the_line_feeds_of_several_lines_stay():
     assert escape_controls("Schnee, 雪, é") == "Schnee, 雪, é"
 
 
+def test_a_table_too_wide_for_the_terminal_lies_on_its_side_and_cuts_no_number(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    wide = [
+        {f"figure_{k}_of_a_drive": 1234.5 + k for k in range(12)} | {"drive": name} for name in ("one", "two")
+    ]
+    print_result({"drives": wide, "small": [{"drive": "one", "events": 16}]})
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    for k in range(12):
+        row = next(line for line in lines if f"figure_{k}_of_a_drive" in line)
+        assert row.count(f"{1234.5 + k:.5g}") == 2
+    assert any("drive" in line and "events" in line for line in lines), "a small one stands upright"
+
+
 def test_a_reader_that_leaves_ends_no_run(monkeypatch):
     console = open_console()
     monkeypatch.setattr("flows.running.terminal._silence_stream", lambda stream: None)

@@ -9,7 +9,7 @@ import pytest
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.environment import environment_view
-from tasks.render.labels import forward_flow
+from tasks.render.labels import compute_flow
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.atmosphere import air_layer, light_layer, precipitating_air
 from tasks.render.weather.attribution import snow_on
@@ -107,7 +107,7 @@ def test_the_next_frame_warped_back_by_the_flow_is_this_one(street, parameters, 
     (_, now, here, view), (_, later, there, next_view) = (
         rendered(street, state, parameters, time_s=2 + 0.1 * k, x=1.5 + 0.6 * k, speed=6) for k in (0, 1)
     )
-    flow, occluded = forward_flow(
+    flow, occluded = compute_flow(
         here.depth, there.depth, view.K, view.T_world_camera, next_view.T_world_camera
     )
     first, second = (encode_8bit(frame.picture).astype(float).mean(axis=2) for frame in (now, later))
