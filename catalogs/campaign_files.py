@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from catalogs.channel_maps import HIGHEST_RATE
+from catalogs.channel_maps import HIGHEST_RATE, condition_problems
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.names import name_problem
 from catalogs.quantities import Text
@@ -117,11 +117,13 @@ def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, see
     if name in seen:
         problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
     seen.add(name)
+    wrong = [key for key in numbers if not _is_number(row[key])]
+    problems += [f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}" for key in wrong]
     if problem := weather_problem(row["weather"]):
         problems.append(f"{name}: weather {problem}")
-    for key in numbers:
-        if not _is_number(row[key]):
-            problems.append(f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}")
+    elif not wrong:
+        facts = {"weather": row["weather"], **{key: float(row[key]) for key in numbers}}
+        problems += [f"{name}: {problem}" for problem in condition_problems(facts)]
     return problems
 
 

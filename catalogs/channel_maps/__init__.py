@@ -1,6 +1,6 @@
 """Channel maps: how a logger's signals become the channels and runs of a campaign."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -10,6 +10,7 @@ from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
 from catalogs.names import LONGEST_NAME, WeatherName
 from catalogs.quantities import CatalogueEntry, Number, Text
+from catalogs.scenario import SCENARIO_FIELDS, Scenario, scenario_problems
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
 from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
 from tasks.campaign.signals import ChannelRule, Gain
@@ -22,12 +23,38 @@ Part = Literal["train", "held_out"]
 Kept = TypeVar("Kept")
 Entry = TypeVar("Entry", bound=CatalogueEntry)
 Sigma = Annotated[float, Field(strict=True, gt=0)]
+LARGEST_SHARE = 1.0
+"""One sigma of a number over the number [1]: who gives 5 for 5 % would otherwise say that nothing is known of it."""
+LONGEST_DELAY = 2.0
+"""By which a time stamp is late [s]: loggers and GPS receivers take some tenths; 50 is a delay in ms."""
+
+
+def _check_share(sigma: float) -> float:
+    if sigma > LARGEST_SHARE:
+        raise ValueError(f"must be a share of at most {LARGEST_SHARE:g}, not per cent; it is {sigma:g}")
+    return sigma
+
+
+def _check_delay(delay: float) -> float:
+    if abs(delay) > LONGEST_DELAY:
+        raise ValueError(f"must be a delay in seconds, at most {LONGEST_DELAY:g} either way; it is {delay:g}")
+    return delay
+
+
+def _check_scale(scale: float) -> float:
+    if scale == 0.0:
+        raise ValueError("must not be 0, which makes every sample the same; leave it away for 1")
+    return scale
+
+
+Share = Annotated[Sigma, AfterValidator(_check_share)]
+Factor = Annotated[Number, AfterValidator(_check_scale)]
 
 
 class GainEntry(CatalogueEntry):
     """A change of quantity, such as torque to pressure; ``unit`` is that of the result."""
 
-    value: Number
+    value: Factor
     unit: Text
     source: Text
 
@@ -38,9 +65,9 @@ class ChannelEntry(CatalogueEntry):
     source: Text | Annotated[tuple[Text, ...], Field(min_length=1)]
     unit: Text
     sign: Literal[1, -1] = 1
-    scale: Number = 1.0
+    scale: Factor = 1.0
     offset: Number = 0.0
-    delay_s: Number = 0.0
+    delay_s: Annotated[Number, AfterValidator(_check_delay)] = 0.0
     gain: GainEntry | None = None
     note: str = ""
 
@@ -84,6 +111,16 @@ class Conditions(CatalogueEntry):
     hazard_height_m: Number = 0.0
 
 
+def condition_problems(facts: Mapping[str, Any]) -> list[str]:
+    """Rules of a scenario that a run's weather and road break; other facts are left out.
+
+    Parameters
+    ----------
+    facts : weather and numbers by the names of `Scenario`
+    """
+    return scenario_problems(Scenario(**{name: facts[name] for name in SCENARIO_FIELDS if name in facts}))
+
+
 def _check_inside(file: str) -> str:
     path = PurePosixPath(file)
     if path.is_absolute() or ".." in path.parts or not path.name or not file.isprintable():
@@ -123,7 +160,7 @@ class RunTolerances(CatalogueEntry):
     """One-sigma doubts about a single run."""
 
     initial_speed_m_s: Sigma
-    friction: Sigma
+    friction: Share
     acceleration_bias_m_s2: Sigma
     pitch_offset_deg: Sigma
 
@@ -131,13 +168,13 @@ class RunTolerances(CatalogueEntry):
 class Tolerances(CatalogueEntry):
     """One-sigma doubts about a session, relative save the grade."""
 
-    pressure_gain: Sigma
-    mass: Sigma
-    pitch_gain: Sigma
-    wheel_radius: Sigma
-    suspension_damping: Sigma
-    suspension_stiffness: Sigma
-    grade: Sigma
+    pressure_gain: Share
+    mass: Share
+    pitch_gain: Share
+    wheel_radius: Share
+    suspension_damping: Share
+    suspension_stiffness: Share
+    grade: Share
     run: RunTolerances
 
 
@@ -161,7 +198,7 @@ class ChannelMap(CatalogueEntry):
     channels: dict[str, ChannelEntry]
     not_measured: Annotated[tuple[str, ...], Field(validate_default=True)] = ()
     conditions: Conditions = Conditions()
-    runs: tuple[RunEntry, ...] = ()
+    runs: Annotated[tuple[RunEntry, ...], Field(validate_default=True)] = ()
     segment: SegmentEntry | None = None
     tolerances_1sigma: Tolerances
     notes: str = ""
@@ -173,7 +210,7 @@ class ChannelMap(CatalogueEntry):
 
     def conditions_of(self, run: RunEntry) -> Conditions:
         """The common conditions with the run's own laid over them."""
-        return Conditions.model_validate(self.conditions.model_dump() | run.conditions)
+        return _lay_over(self.conditions, run)
 
     @field_validator("channels")
     @classmethod
@@ -204,10 +241,19 @@ class ChannelMap(CatalogueEntry):
 
     @field_validator("runs")
     @classmethod
-    def _runs_stand_once(cls, runs: tuple[RunEntry, ...]) -> tuple[RunEntry, ...]:
+    def _runs_stand_once_in_weather_that_there_is(
+        cls, runs: tuple[RunEntry, ...], info: ValidationInfo
+    ) -> tuple[RunEntry, ...]:
         names = [run.name for run in runs]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        return _note_problems(runs, [f"run {name} stands twice" for name in twice])
+        problems = [f"run {name} stands twice" for name in sorted({n for n in names if names.count(n) > 1})]
+        if (common := info.data.get("conditions")) is not None:
+            laid = {f"run {run.name}": _lay_over(common, run) for run in runs} or {"conditions": common}
+            problems += [
+                f"{place}: {problem}"
+                for place, conditions in laid.items()
+                for problem in condition_problems(conditions.model_dump())
+            ]
+        return _note_problems(runs, problems)
 
     @field_validator("segment")
     @classmethod
@@ -230,6 +276,10 @@ class FaultyMap(InputError):
     def __init__(self, problems: list[str], readable: ChannelMap | None):
         super().__init__(problems)
         self.readable = readable
+
+
+def _lay_over(common: Conditions, run: RunEntry) -> Conditions:
+    return Conditions.model_validate(common.model_dump() | run.conditions)
 
 
 def _unknown_channels(names: Iterable[str]) -> list[str]:
