@@ -325,7 +325,7 @@ def _readable_part(content: dict[str, Any]) -> ChannelMap | None:
     time, csv = _read_part(TimeEntry, content.get("time")), _read_part(CsvEntry, content.get("csv", {}))
     listed = content.get("runs", [])
     runs = [_read_part(RunEntry, given) for given in listed] if isinstance(listed, list) else [None]
-    if not channels or csv is None or None in runs or (time is None and "time" in content):
+    if csv is None or None in runs or (time is None and "time" in content):
         return None
     return ChannelMap.model_construct(channels=channels, time=time, csv=csv, runs=tuple(runs))
 

@@ -13,6 +13,8 @@ WITHOUT_BRAKE = 3.0
 """Deceleration that drag, an engine or a generator gives without brake pressure at most [m/s^2]."""
 APPLIED, RELEASED = 0.5, 0.1
 """Share of a brake signal's largest value above which the brake is applied, and below which it is released [1]."""
+SLOWEST_STOP, LEAST_FALL, BRAKING_PRESSURE = 0.1, 5.0, 1.0
+"""A speed that falls by so much [m/s] under such a pressure [MPa] falls faster than this at some time [m/s^2]."""
 LEAST_SAMPLES = 20
 """Samples of an applied and of a released brake from which their decelerations are compared [1]."""
 
@@ -37,6 +39,7 @@ def brake_problems(
     found: list[str | None] = []
     if "brake_pressure" in columns and not stands_in:
         motor_brakes = bool(np.any(columns.get("engine_torque", np.zeros(1)) < 0.0))
+        found.append(_slow_clock_problem(smooth["brake_pressure"], smooth.get("speed"), rate))
         width = len(columns["brake_pressure"]) - len(smooth["brake_pressure"]) + 1
         found.append(_constant_problem(columns["brake_pressure"], None if motor_brakes else rate, width))
     if rate is not None:
@@ -71,6 +74,26 @@ def _constant_problem(
     return (
         f"channel brake_pressure is 0 over the whole run while speed falls at {lost:.1f} m/s^2, which needs the brake"
         f" beyond {WITHOUT_BRAKE:g}: record it anew, or leave the run out"
+    )
+
+
+def _slow_clock_problem(
+    pressure: NDArray[np.float64], speed: NDArray[np.float64] | None, rate: NDArray[np.float64] | None
+) -> str | None:
+    """Return the problem of a stop that takes hours: a time in ms that was taken for s.
+
+    Parameters
+    ----------
+    pressure, speed : moving means, float64 [M] [MPa], [m/s]
+    rate : of speed, float64 [M] [m/s^2]
+    """
+    if speed is None or rate is None or pressure.max() < BRAKING_PRESSURE or np.ptp(speed) < LEAST_FALL:
+        return None
+    if (fastest := float(np.max(np.abs(rate)))) >= SLOWEST_STOP:
+        return None
+    return (
+        f"channel speed changes by {np.ptp(speed):.3g} m/s under the brake, and never faster than {fastest:.2g} m/s^2:"
+        " correct the unit of time"
     )
 
 

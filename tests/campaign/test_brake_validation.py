@@ -55,3 +55,11 @@ def test_a_brake_that_pulls_is_an_offset(name: str, brake: float) -> None:
 )
 def test_a_sound_brake_raises_no_alarm(name: str, deceleration: NDArray[np.float64]) -> None:
     assert problems_of(name, BRAKE, deceleration) == []
+
+
+@pytest.mark.parametrize(("slower", "told"), [(1.0, False), (30.0, False), (1000.0, True)])
+def test_a_stop_of_an_hour_is_a_time_in_ms(slower: float, told: bool) -> None:
+    speed = 45.0 - 9.0 * np.cumsum(BRAKE) * INTERVAL
+    columns = {"brake_pressure": 3.0 * BRAKE, "speed": speed}
+    problems = plausibility_problems(columns, slower * INTERVAL, {"brake_pressure": "MPa", "speed": "m/s"})
+    assert any("correct the unit of time" in problem for problem in problems) == told

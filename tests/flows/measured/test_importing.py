@@ -230,6 +230,7 @@ def _held(x: np.ndarray) -> np.ndarray:
         ("w_r", lambda x: -x, "wheel_speed_rear is negative"),
         ("pitch_up", _held, "pitch: is frozen: it holds"),
         ("v_kmh", _held, "speed: is frozen: it holds"),
+        ("p_bar", lambda x: np.where(np.arange(len(x)) < 300, x, np.nan), "brake_pressure: has samples from"),
         ("az", lambda x: np.where(np.arange(len(x)) == 90, np.inf, x), "vertical_acceleration: has 1 samples"),
         ("t_ms", lambda x: x + 700.0 * (np.arange(len(x)) > 100), "gaps or forward jumps of its clock"),
         ("t_ms", lambda x: x - 300.0 * (np.arange(len(x)) > 100), "clock that does not advance"),
@@ -259,6 +260,21 @@ def test_a_missing_signal_is_named_with_those_that_come_near(tmp_path: Path) -> 
     log = log_signal(braking_columns())
     log["v_kmph"] = log.pop("v_kmh")
     assert "signal v_kmh is missing; there are: v_kmph" in problems_of(tmp_path, log)
+
+
+@pytest.mark.parametrize(
+    ("rate", "sound"), [(100, True), (50, True), (120, True), (130, False), (1000, False)]
+)
+def test_no_campaign_has_more_samples_than_were_measured(tmp_path: Path, rate: float, sound: bool) -> None:
+    """At 80 Hz in place of its 20, the log of the tutorial gave a verdict with a fiftieth of the interval."""
+    log = log_signal(braking_columns())
+    if sound:
+        source = write_csv(tmp_path / "log.csv", log)
+        assert len(imported(tmp_path, source, sample_rate_hz=rate)["speed"]) > 3.9 * rate
+    else:
+        assert "must not be above the rate of the fastest signal, 100 Hz" in problems_of(
+            tmp_path, log, sample_rate_hz=rate
+        )
 
 
 def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
