@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from catalogs.channel_maps import HIGHEST_RATE, condition_problems
+from catalogs.channel_maps import HIGHEST_RATE
+from catalogs.channel_maps.conditions import condition_problems
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.names import name_problem
 from catalogs.quantities import Text

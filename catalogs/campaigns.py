@@ -14,7 +14,7 @@ from catalogs.campaign_files import (
     parse_rows,
     read_header_bytes,
 )
-from catalogs.channel_maps import Tolerances as TolerancesEntry
+from catalogs.channel_maps.tolerances import Tolerances as TolerancesEntry
 from catalogs.documents import read_content
 from catalogs.quantities import Text, parse_entry
 from catalogs.sentences import cap_problems, shorten, shorten_value

@@ -1,38 +1,30 @@
 """Channel maps: how a logger's signals become the channels and runs of a campaign."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
 
+from catalogs.channel_maps.conditions import Conditions, condition_problems
+from catalogs.channel_maps.tolerances import Tolerances
 from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
-from catalogs.names import LONGEST_NAME, WeatherName
+from catalogs.names import LONGEST_NAME
 from catalogs.quantities import CatalogueEntry, Number, Text
-from catalogs.scenario import SCENARIO_FIELDS, Scenario, scenario_problems
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
 from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
 from tasks.campaign.signals import ChannelRule, Gain
 from tasks.errors import InputError
-from tasks.surface.weather import DRY
 
 HIGHEST_RATE = 1_000_000.0
 """Of a campaign [Hz]: a thousand times what a vehicle's bus gives."""
+MAIN_NAMES = tuple(channel.name for channel in MAIN_CHANNELS)
 Part = Literal["train", "held_out"]
 Kept = TypeVar("Kept")
 Entry = TypeVar("Entry", bound=CatalogueEntry)
-Sigma = Annotated[float, Field(strict=True, gt=0)]
-LARGEST_SHARE = 1.0
-"""One sigma of a number over the number [1]: who gives 5 for 5 % would otherwise say that nothing is known of it."""
 LONGEST_DELAY = 2.0
 """By which a time stamp is late [s]: loggers and GPS receivers take some tenths; 50 is a delay in ms."""
-
-
-def _check_share(sigma: float) -> float:
-    if sigma > LARGEST_SHARE:
-        raise ValueError(f"must be a share of at most {LARGEST_SHARE:g}, not per cent; it is {sigma:g}")
-    return sigma
 
 
 def _check_delay(delay: float) -> float:
@@ -47,7 +39,6 @@ def _check_scale(scale: float) -> float:
     return scale
 
 
-Share = Annotated[Sigma, AfterValidator(_check_share)]
 Factor = Annotated[Number, AfterValidator(_check_scale)]
 
 
@@ -98,29 +89,6 @@ class TimeEntry(CatalogueEntry):
         return unit
 
 
-class Conditions(CatalogueEntry):
-    """Facts of a run that the logger does not know; the columns of runs.csv."""
-
-    weather: WeatherName = DRY
-    precipitation_mm_h: Number = 0.0
-    snow_accumulation_h: Number = 0.0
-    direction: Literal[1, -1] = 1
-    disc_temperature_above_ambient_c: Number = 0.0
-    hazard_center_m: Number = 0.0
-    hazard_length_m: Number = 0.0
-    hazard_height_m: Number = 0.0
-
-
-def condition_problems(facts: Mapping[str, Any]) -> list[str]:
-    """Rules of a scenario that a run's weather and road break; other facts are left out.
-
-    Parameters
-    ----------
-    facts : weather and numbers by the names of `Scenario`
-    """
-    return scenario_problems(Scenario(**{name: facts[name] for name in SCENARIO_FIELDS if name in facts}))
-
-
 def _check_inside(file: str) -> str:
     path = PurePosixPath(file)
     if path.is_absolute() or ".." in path.parts or not path.name or not file.isprintable():
@@ -154,28 +122,6 @@ class SegmentEntry(CatalogueEntry):
     before_s: Annotated[float, Field(strict=True, ge=0)]
     after_s: Annotated[float, Field(strict=True, ge=0)]
     held_out_every: Annotated[int, Field(strict=True, ge=2)]
-
-
-class RunTolerances(CatalogueEntry):
-    """One-sigma doubts about a single run."""
-
-    initial_speed_m_s: Sigma
-    friction: Share
-    acceleration_bias_m_s2: Sigma
-    pitch_offset_deg: Sigma
-
-
-class Tolerances(CatalogueEntry):
-    """One-sigma doubts about a session, relative save the grade."""
-
-    pressure_gain: Share
-    mass: Share
-    pitch_gain: Share
-    wheel_radius: Share
-    suspension_damping: Share
-    suspension_stiffness: Share
-    grade: Share
-    run: RunTolerances
 
 
 class CsvEntry(CatalogueEntry):
@@ -222,6 +168,15 @@ class ChannelMap(CatalogueEntry):
                     _ = entry.rule(name).factor
                 except InputError as error:
                     problems += [f"channel {name}: {problem}" for problem in error.problems]
+        compared = [name for name in MAIN_NAMES if name in channels]
+        given = [(source, name) for name in compared for source in channels[name].rule(name).sources]
+        for signal in dict.fromkeys(source for source, _ in given):
+            names = [name for source, name in given if source == signal]
+            if len(names) > 1:
+                problems.append(
+                    f"signal {shorten(signal, 60)} must be one measurement; it stands for {', '.join(names)}: correct a"
+                    " source, or list a channel under not_measured"
+                )
         return _note_problems(channels, problems)
 
     @field_validator("not_measured")

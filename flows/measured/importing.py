@@ -12,7 +12,8 @@ import pyarrow as pa
 import yaml
 
 from catalogs.campaign_files import MOST_SAMPLES
-from catalogs.channel_maps import ChannelMap, Conditions, FaultyMap, SegmentEntry, load_channel_map
+from catalogs.channel_maps import ChannelMap, FaultyMap, SegmentEntry, load_channel_map
+from catalogs.channel_maps.conditions import Conditions
 from catalogs.names import name_problem
 from catalogs.recordings import read_signals, recording_files, recording_root, stored_files
 from catalogs.sentences import shorten

@@ -313,6 +313,18 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
             {"channels": {"speed": {"source": "v", "unit": "m/s", "delay_s": -20}}},
             "must be a delay in seconds",
         ),
+        (
+            {
+                "channels": {
+                    name: {"source": "w", "unit": "rpm"} for name in ("wheel_speed_front", "wheel_speed_rear")
+                }
+            },
+            "signal w must be one measurement; it stands for wheel_speed_front, wheel_speed_rear",
+        ),
+        (
+            {"channels": {"wheel_speed_front": {"source": ["w", "w"], "unit": "rpm"}}},
+            "signal w must be one measurement; it stands for wheel_speed_front, wheel_speed_front",
+        ),
         ({"conditions": {"weather": "rain"}}, "conditions: weather rain needs precipitation_mm_h above 0"),
         ({"conditions": {"precipitation_mm_h": 25.0}}, "conditions: weather dry has no precipitation"),
         (
