@@ -80,7 +80,8 @@ def _take_all_parquet(path: Path, _: CsvEntry) -> tuple[Columns, dict[str, str],
     numbers = {f.name for f in schema if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)}
     columns, units = parse_columns(content, path.name, numbers)
     notes = {f.name: f"not of numbers, but of {f.type}" for f in schema if f.name not in numbers}
-    return columns | {name: np.empty(0) for name in notes}, units, notes
+    rows = pq.read_metadata(pa.BufferReader(content)).num_rows
+    return columns | {name: np.full(rows, np.nan) for name in notes}, units, notes
 
 
 def _load_frame(path: Path, options: CsvEntry) -> pd.DataFrame:

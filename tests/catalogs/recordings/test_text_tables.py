@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -70,6 +71,21 @@ def test_a_list_of_signals_shows_those_that_are_text(tmp_path: Path) -> None:
         app, ["import-measurements", str(tmp_path), "--list-signals"], env={"COLUMNS": "200"}
     )
     assert shown.exit_code == 0 and "remove this row" in shown.output
+
+
+@pytest.mark.parametrize("column", ["t", "v"])
+def test_a_list_of_signals_of_parquet_shows_the_type_that_is_none_of_numbers(
+    tmp_path: Path, column: str
+) -> None:
+    table = pd.DataFrame({"t": [0.0, 1.0], "v": [10.0, 12.0]})
+    table[column] = pd.to_datetime(table[column], unit="s")
+    table.to_parquet(tmp_path / "log.parquet")
+    (tmp_path / "map.yaml").write_text("time: {source: t}\n")
+    listed = import_measurements(
+        str(tmp_path / "log.parquet"), map=str(tmp_path / "map.yaml"), list_signals=True
+    )
+    rows = {row["signal"]: row for row in listed["signals"]["log.parquet"]}
+    assert rows[column]["samples"] == 0 and "not of numbers, but of timestamp" in rows[column]["note"]
 
 
 def test_a_map_that_says_only_how_the_text_is_written_lists_the_signals(tmp_path: Path) -> None:
