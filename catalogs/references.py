@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from catalogs.campaign_files import parse_columns
+from catalogs.campaign_files import parse_columns, unit_problems
 from catalogs.documents import LARGEST_YAML, parse_json, read_content
 from catalogs.names import Name, WeatherName
 from catalogs.physical_limits import limit_problem, load_physical_limits
@@ -30,7 +30,13 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Traces = dict[str, NDArray[np.float64]]
 PRESSURE, CG_HEIGHT, ACCELERATION = "brake_pressure", "cg_height", "longitudinal_acceleration"
 OPTIONAL_COLUMNS = (PRESSURE, CG_HEIGHT, ACCELERATION)
-"""Columns that a trace may hold beside those that are scored [MPa], [m], [m/s2]."""
+"""Columns that a trace may hold beside those that are scored."""
+TRACE_UNITS = {
+    "time": "s", "station": "m", "speed": "m/s", "pitch": "deg", PRESSURE: "MPa", CG_HEIGHT: "m", ACCELERATION: "m/s^2",
+    **{name: "1" for name in REFERENCE_COLUMNS if name.startswith("slip_")},
+    **{name: "N" for name in REFERENCE_COLUMNS if name.startswith("wheel_load_")},
+}  # fmt: skip
+"""Units in which the columns of a trace are scored."""
 
 
 class ReferenceCase(BaseModel):
@@ -190,14 +196,15 @@ def trace_file(folder: Path, case: str) -> Path:
 def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Traces]:
     """A case with its columns, optional ones included; an open brake onset is read from the trace's pressure."""
     path = trace_file(folder, case.case)
-    held, _ = parse_columns(
+    held, units = parse_columns(
         read_content(path, "trace", LARGEST_TRACE), str(path), (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS)
     )
     missing = [name for name in REFERENCE_COLUMNS if name not in held]
     if missing:
         raise InputError(f"{path}: a trace needs the columns {', '.join(missing)}; they are missing")
     columns = {name: held[name] for name in (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS) if name in held}
-    problems = [
+    problems = unit_problems(units, TRACE_UNITS, str(path))
+    problems += [
         f"{path}: column {name} must hold numbers throughout; {int(np.sum(~np.isfinite(values)))} are not"
         for name, values in columns.items()
         if not np.isfinite(values).all()

@@ -75,7 +75,7 @@ def query_dataset(
         The folder is no sealed dataset, the query is none that DuckDB answers, it asks for files without
         ``allow_files``, its answer is too large to be returned, or the file cannot be written.
     """
-    file = open_answer_file(dataset, to, out)
+    file = open_answer_file(to, out)
     fetch = _fetch_table if to == "parquet" else _fetch_rows
     with connect_views(dataset, allow_files=allow_files) as connection:
         try:
