@@ -23,6 +23,12 @@ from tasks.vehicle.rollout import Controls
 AFTER_STOP_S = 12.0
 """How long past the reference's end the model may still roll before it counts as not stopping [s]."""
 
+UNITS_APART = 1.3
+"""Factor by which quantities of a trace may contradict each other [1]: m/s and km/h differ by 3.6, s and ms by 1000."""
+LEAST_WAY = 1.0
+"""Way from which speed and station are compared [m]."""
+LOADS = (1e3, 1e5)
+"""Weight of a car on its four wheels, from 100 kg to 10 t [N]."""
 LARGEST_TRACE = 2**30
 """Bytes of a trace's Parquet [1]."""
 
@@ -211,11 +217,39 @@ def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Trace
     ]
     if not problems and not (len(columns["time"]) > 1 and (np.diff(columns["time"]) > 0).all()):
         problems.append(f"{path}: column time must hold at least two ascending times")
+    if not problems:
+        problems = [f"{path}: {problem}" for problem in _quantity_problems(case, columns)]
     if problems:
         raise InputError(problems)
     if case.peak_pressure_mpa and case.brake_onset_s is None and case.brake_onset_m is None:
         case = case.model_copy(update={"brake_onset_s": _find_onset(path, case.case, held)})
     return case, columns
+
+
+def _quantity_problems(case: ReferenceCase, columns: Traces) -> list[str]:
+    """Sentences on columns that contradict the case or each other by more than a factor: units that were mixed up."""
+    time, station, speed = columns["time"], columns["station"], columns["speed"]
+    begun, announced = float(speed[0]), case.initial_speed_km_h / 3.6
+    driven, told = float(np.trapezoid(speed, time)), float(station[-1] - station[0])
+    loads = [values for name, values in columns.items() if name.startswith("wheel_load_")]
+    weight, (lightest, heaviest) = float(np.mean(np.sum(loads, axis=0))), LOADS
+    problems = []
+    if not announced / UNITS_APART < begun < announced * UNITS_APART:
+        problems.append(
+            f"column speed must begin at initial_speed_km_h, {announced:.4g} m/s; it begins at {begun:.4g}: correct its"
+            " unit or the case"
+        )
+    if driven > LEAST_WAY and not driven / UNITS_APART < told < driven * UNITS_APART:
+        problems.append(
+            f"column station must grow by speed times time, {driven:.4g} m; it grows by {told:.4g}: correct the unit of"
+            " time, speed or station"
+        )
+    if not lightest < weight < heaviest:
+        problems.append(
+            f"the columns wheel_load must add up to a car, {lightest:g} to {heaviest:g} N; they add up to {weight:.4g}:"
+            " correct their unit"
+        )
+    return problems
 
 
 def _find_onset(path: Path, case: str, columns: Traces) -> float:

@@ -24,10 +24,21 @@ DRIVE = {
 CLAIM = {"time": "s", "pitch": "rad", "speed": "m s-1"}
 
 
-def write_table(path: Path, units: dict[str, str]) -> None:
+TIME = np.linspace(0.0, 3.0, 30)
+TRACE = {
+    **{name: np.full(30, 4e3 if unit == "N" else 0.1) for name, unit in TRACE_UNITS.items()},
+    "time": TIME, "speed": 16.7 - TIME, "station": 16.7 * TIME - TIME**2 / 2,
+}  # fmt: skip
+
+
+def write_table(path: Path, units: dict[str, str], values: dict[str, np.ndarray] | None = None) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    fields = [pa.field(name, pa.float64(), metadata={"units": unit}) for name, unit in units.items()]
-    pq.write_table(pa.table([np.linspace(0.0, 1.0, 30)] * len(units), schema=pa.schema(fields)), path)
+    fields = [
+        pa.field(name, pa.float64(), metadata={"units": unit} if unit else None)
+        for name, unit in units.items()
+    ]
+    columns = [(values or {}).get(name, np.linspace(0.0, 1.0, 30)) for name in units]
+    pq.write_table(pa.table(columns, schema=pa.schema(fields)), path)
 
 
 def read_as_claim(folder: Path, units: dict[str, str]) -> Any:
@@ -35,8 +46,8 @@ def read_as_claim(folder: Path, units: dict[str, str]) -> Any:
     return read_claim(folder / "claim.parquet")
 
 
-def read_as_trace(folder: Path, units: dict[str, str]) -> Any:
-    write_table(folder / "a.parquet", units)
+def read_as_trace(folder: Path, units: dict[str, str], **changes: np.ndarray) -> Any:
+    write_table(folder / "a.parquet", units, TRACE | changes)
     case = {"case": "a", "weather": "dry", "surface_coefficient": 0.8, "initial_speed_km_h": 60.0}
     (folder / "cases.json").write_text(json.dumps([case]))
     return read_reference(folder)
@@ -85,3 +96,29 @@ def test_a_stated_unit_that_is_another_one_is_refused(
         InputError, match=f"column {column} must be in .*; its metadata says {unit}: convert it"
     ):
         read(tmp_path, units | {column: unit})
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"speed": 3.6 * TRACE["speed"]},
+            "column speed must begin at initial_speed_km_h, 16.67 m/s; it begins at 60.12",
+        ),
+        (
+            {"time": 1e3 * TIME},
+            "column station must grow by speed times time, .* the unit of time, speed or station",
+        ),
+        ({"station": TRACE["station"] / 1e3}, "column station must grow by speed times time"),
+        (
+            {name: values / 1e3 for name, values in TRACE.items() if name.startswith("wheel_load_")},
+            "the columns wheel_load must add up to a car, 1000 to 100000 N; they add up to 16",
+        ),
+    ],
+)
+def test_a_trace_without_stated_units_whose_columns_contradict_is_refused(
+    changes: dict[str, np.ndarray], words: str, tmp_path: Path
+) -> None:
+    assert read_as_trace(tmp_path, dict.fromkeys(TRACE_UNITS, ""))
+    with pytest.raises(InputError, match=words):
+        read_as_trace(tmp_path, dict.fromkeys(TRACE_UNITS, ""), **changes)
