@@ -3,7 +3,7 @@
 import csv
 import io
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from catalogs.channel_maps import HIGHEST_RATE
+from catalogs.channel_maps.conditions import condition_problems
 from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.names import name_problem
 from catalogs.quantities import Text
@@ -26,6 +27,8 @@ LARGEST_TABLE = 64 * 2**20
 """Bytes of runs.csv [1]: a line of 200 bytes for each of 300,000 runs."""
 LARGEST_RUN = 2**31
 """Bytes of a run's Parquet [1]."""
+SPELLINGS = {"m s-1": "m/s", "m s-2": "m/s^2", "rad s-1": "rad/s"}
+"""Units as the telemetry of a dataset writes them, and as a campaign does."""
 MOST_SAMPLES = 20_000_000
 """Samples of a run [1]: five hours at 1 kHz; a few bytes of Parquet can claim billions."""
 
@@ -117,11 +120,13 @@ def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, see
     if name in seen:
         problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
     seen.add(name)
+    wrong = [key for key in numbers if not _is_number(row[key])]
+    problems += [f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}" for key in wrong]
     if problem := weather_problem(row["weather"]):
         problems.append(f"{name}: weather {problem}")
-    for key in numbers:
-        if not _is_number(row[key]):
-            problems.append(f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}")
+    elif not wrong:
+        facts = {"weather": row["weather"], **{key: float(row[key]) for key in numbers}}
+        problems += [f"{name}: {problem}" for problem in condition_problems(facts)]
     return problems
 
 
@@ -163,6 +168,22 @@ def parse_columns(
     except (pa.ArrowException, OSError, ValueError, TypeError, KeyError, OverflowError) as error:
         raise InputError(f"{file} must be a Parquet file of numbers; {shorten(error)}") from None
     return columns, {name: unit for name, unit in units.items() if unit is not None}
+
+
+def unit_problems(units: Mapping[str, str], wanted: Mapping[str, str], file: str) -> list[str]:
+    """Return a sentence for each column whose file states another unit than its reader takes.
+
+    Parameters
+    ----------
+    units : that the file states, by column; a column without one counts as correct
+    wanted : by column
+    file : its name, for the sentences
+    """
+    return [
+        f"{file}: column {name} must be in {wanted[name]}; its metadata says {shorten(unit, 40)}: convert it"
+        for name, unit in units.items()
+        if SPELLINGS.get(unit, unit) != wanted[name]
+    ]
 
 
 def _column_problems(schema: pa.Schema, found: Sequence[str], count: int, file: str) -> list[str]:

@@ -14,7 +14,7 @@ from catalogs.campaign_files import (
     parse_rows,
     read_header_bytes,
 )
-from catalogs.channel_maps import Tolerances as TolerancesEntry
+from catalogs.channel_maps.tolerances import Tolerances as TolerancesEntry
 from catalogs.documents import read_content
 from catalogs.quantities import Text, parse_entry
 from catalogs.sentences import cap_problems, shorten, shorten_value
@@ -87,7 +87,7 @@ def read_campaign(folder: str | Path) -> Campaign:
     needed = list(dict.fromkeys(needed))
     digest = hashlib.sha256(header_bytes + table_bytes)
     interval, judged = 1.0 / header.sample_rate_hz, set(held_out)
-    runs = []
+    runs, first_of = [], dict[bytes, str]()
     for row in rows:
         path = folder / "runs" / f"{row['run']}.parquet"
         if not path.is_file():
@@ -96,6 +96,10 @@ def read_campaign(folder: str | Path) -> Campaign:
         try:
             content = read_content(path, "run", LARGEST_RUN)
             digest.update(row["run"].encode() + content)
+            if (twin := first_of.setdefault(content, row["run"])) != row["run"]:
+                problems.append(
+                    f"{row['run']}: must be a recording of its own; its file is that of {twin}: remove one"
+                )
             columns, units = parse_columns(content, path.name, COLUMN_UNITS)
             columns = {name: values for name, values in columns.items() if name not in header.not_measured}
             found = run_problems(

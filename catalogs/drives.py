@@ -5,12 +5,20 @@ from pathlib import Path
 
 import numpy as np
 
-from catalogs.campaign_files import LARGEST_RUN, CampaignHeader, parse_columns, parse_rows, read_header_bytes
+from catalogs.campaign_files import (
+    LARGEST_RUN,
+    CampaignHeader,
+    parse_columns,
+    parse_rows,
+    read_header_bytes,
+    unit_problems,
+)
 from catalogs.documents import read_content
 from catalogs.quantities import parse_entry
 from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.events import RecordedRun
+from tasks.campaign.run_validation import COLUMN_UNITS
 from tasks.errors import InputError
 from tasks.surface.weather import Weather
 
@@ -57,10 +65,13 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
             problems.append(f"{row['run']}: runs.csv names it, but {path.name} is not in runs/")
             continue
         try:
-            columns, _ = parse_columns(read_content(path, "run", LARGEST_RUN), path.name, CHANNELS_BY_NAME)
+            columns, units = parse_columns(
+                read_content(path, "run", LARGEST_RUN), path.name, CHANNELS_BY_NAME
+            )
         except InputError as error:
             problems += [f"{row['run']}: {problem}" for problem in error.problems]
             continue
+        problems += unit_problems(units, COLUMN_UNITS, row["run"])
         problems += [f"{row['run']}: channel {name} is missing" for name in needed if name not in columns]
         problems += [
             f"{row['run']}: channel {name} has a gap; import the recording again"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from catalogs.campaign_files import parse_columns
+from catalogs.campaign_files import parse_columns, unit_problems
 from catalogs.documents import LARGEST_YAML, parse_json, read_content
 from catalogs.names import Name, WeatherName
 from catalogs.physical_limits import limit_problem, load_physical_limits
@@ -23,6 +23,12 @@ from tasks.vehicle.rollout import Controls
 AFTER_STOP_S = 12.0
 """How long past the reference's end the model may still roll before it counts as not stopping [s]."""
 
+UNITS_APART = 1.3
+"""Factor by which quantities of a trace may contradict each other [1]: m/s and km/h differ by 3.6, s and ms by 1000."""
+LEAST_WAY = 1.0
+"""Way from which speed and station are compared [m]."""
+LOADS = (1e3, 1e5)
+"""Weight of a car on its four wheels, from 100 kg to 10 t [N]."""
 LARGEST_TRACE = 2**30
 """Bytes of a trace's Parquet [1]."""
 
@@ -30,7 +36,13 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Traces = dict[str, NDArray[np.float64]]
 PRESSURE, CG_HEIGHT, ACCELERATION = "brake_pressure", "cg_height", "longitudinal_acceleration"
 OPTIONAL_COLUMNS = (PRESSURE, CG_HEIGHT, ACCELERATION)
-"""Columns that a trace may hold beside those that are scored [MPa], [m], [m/s2]."""
+"""Columns that a trace may hold beside those that are scored."""
+TRACE_UNITS = {
+    "time": "s", "station": "m", "speed": "m/s", "pitch": "deg", PRESSURE: "MPa", CG_HEIGHT: "m", ACCELERATION: "m/s^2",
+    **{name: "1" for name in REFERENCE_COLUMNS if name.startswith("slip_")},
+    **{name: "N" for name in REFERENCE_COLUMNS if name.startswith("wheel_load_")},
+}  # fmt: skip
+"""Units in which the columns of a trace are scored."""
 
 
 class ReferenceCase(BaseModel):
@@ -190,25 +202,54 @@ def trace_file(folder: Path, case: str) -> Path:
 def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Traces]:
     """A case with its columns, optional ones included; an open brake onset is read from the trace's pressure."""
     path = trace_file(folder, case.case)
-    held, _ = parse_columns(
+    held, units = parse_columns(
         read_content(path, "trace", LARGEST_TRACE), str(path), (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS)
     )
     missing = [name for name in REFERENCE_COLUMNS if name not in held]
     if missing:
         raise InputError(f"{path}: a trace needs the columns {', '.join(missing)}; they are missing")
     columns = {name: held[name] for name in (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS) if name in held}
-    problems = [
+    problems = unit_problems(units, TRACE_UNITS, str(path))
+    problems += [
         f"{path}: column {name} must hold numbers throughout; {int(np.sum(~np.isfinite(values)))} are not"
         for name, values in columns.items()
         if not np.isfinite(values).all()
     ]
     if not problems and not (len(columns["time"]) > 1 and (np.diff(columns["time"]) > 0).all()):
         problems.append(f"{path}: column time must hold at least two ascending times")
+    if not problems:
+        problems = [f"{path}: {problem}" for problem in _quantity_problems(case, columns)]
     if problems:
         raise InputError(problems)
     if case.peak_pressure_mpa and case.brake_onset_s is None and case.brake_onset_m is None:
         case = case.model_copy(update={"brake_onset_s": _find_onset(path, case.case, held)})
     return case, columns
+
+
+def _quantity_problems(case: ReferenceCase, columns: Traces) -> list[str]:
+    """Sentences on columns that contradict the case or each other by more than a factor: units that were mixed up."""
+    time, station, speed = columns["time"], columns["station"], columns["speed"]
+    begun, announced = float(speed[0]), case.initial_speed_km_h / 3.6
+    driven, told = float(np.trapezoid(speed, time)), float(station[-1] - station[0])
+    loads = [values for name, values in columns.items() if name.startswith("wheel_load_")]
+    weight, (lightest, heaviest) = float(np.mean(np.sum(loads, axis=0))), LOADS
+    problems = []
+    if not announced / UNITS_APART < begun < announced * UNITS_APART:
+        problems.append(
+            f"column speed must begin at initial_speed_km_h, {announced:.4g} m/s; it begins at {begun:.4g}: correct its"
+            " unit or the case"
+        )
+    if driven > LEAST_WAY and not driven / UNITS_APART < told < driven * UNITS_APART:
+        problems.append(
+            f"column station must grow by speed times time, {driven:.4g} m; it grows by {told:.4g}: correct the unit of"
+            " time, speed or station"
+        )
+    if not lightest < weight < heaviest:
+        problems.append(
+            f"the columns wheel_load must add up to a car, {lightest:g} to {heaviest:g} N; they add up to {weight:.4g}:"
+            " correct their unit"
+        )
+    return problems
 
 
 def _find_onset(path: Path, case: str, columns: Traces) -> float:

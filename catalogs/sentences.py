@@ -1,5 +1,6 @@
 """Sentences about faulty input: values and lists cut to what a reader takes in, and pydantic's rules in words."""
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from reprlib import Repr
 from typing import Any
@@ -103,4 +104,21 @@ def _describe_rule(problem: Any, known: Callable[[Place], Iterable[str]]) -> str
             return f"{place}: must be a table of keys and values; it is {shorten_value(problem['input'])}"
         case _:
             rule = problem["msg"].replace("Input should be", "must be")
-            return f"{place}: {rule}; it is {shorten_value(problem['input'])}"
+            remedy = _suggest_form(problem["type"], problem["input"])
+            return f"{place}: {rule}; it is {shorten_value(problem['input'])}{remedy}"
+
+
+def _suggest_form(rule: str, value: object) -> str:
+    """What a person meant who wrote a number as text, or text as a number; empty where nobody can tell."""
+    if rule == "string_type" and isinstance(value, bool | int | float):
+        return ": put it in quotes"
+    if rule not in {"float_type", "int_type"} or not isinstance(value, str):
+        return ""
+    if re.fullmatch(r"[+-]?\d*,\d+", value):
+        return f": write it with a point, {value.replace(',', '.')}"
+    if found := re.fullmatch(r"([+-]?)(\d*)\.?(\d*)[eE]([+-]?)(\d+)", value):
+        sign, whole, part, direction, power = found.groups()
+        return f": YAML wants the point and the sign of the power, {sign}{whole}.{part or 0}e{direction or '+'}{power}"
+    if re.fullmatch(r"[+-]?[\d.]+ *%", value):
+        return ": write it without the sign, in the unit that stands beside it"
+    return ""

@@ -1,5 +1,6 @@
 """YAML text becomes plain values: every fault of keys and values with its line, nothing that grows without bound."""
 
+import re
 from math import isfinite
 from typing import Any, ClassVar
 
@@ -16,7 +17,8 @@ LARGEST_INTEGER = 2**53
 """Beyond it a float does not hold every integer, and JSON readers differ (RFC 8785, RFC 7493)."""
 LONGEST_NUMBER = 400
 """Characters of a number [1]: the largest float takes 309 digits."""
-
+OTHER_BASES = re.compile(r"[-+]?(0_*[0-9][0-9_]*|[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?)")
+"""Numbers that YAML 1.1 reads to the base of 8 or 60: 0420 is 272, and 7:00 is 420."""
 
 _TAG = "tag:yaml.org,2002:"
 _SCALAR_TAGS = tuple(_TAG + name for name in ("null", "bool", "int", "float", "str"))
@@ -152,6 +154,11 @@ def _value_problem(loader: Any, node: yaml.Node, finite: bool) -> str | None:
         return None if is_encodable(node.value) else "have whole characters; one is half of a surrogate pair"
     if len(node.value) > LONGEST_NUMBER:
         return f"have numbers of at most {LONGEST_NUMBER} characters; one has {len(node.value)}"
+    if OTHER_BASES.fullmatch(node.value):
+        return (
+            f"have plain decimal numbers; YAML takes {node.value} for one to the base of 8 or 60: write it without the"
+            " zero in front or the colon, or put it in quotes"
+        )
     try:
         value = loader.construct_object(node)
     except (ValueError, KeyError, IndexError, OverflowError, yaml.YAMLError):

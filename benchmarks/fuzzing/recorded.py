@@ -24,9 +24,9 @@ from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.channels import MAIN_CHANNELS
 
 
-def make_stop(samples: int = 120, rate: float = 100.0) -> dict[str, np.ndarray]:
-    """Measured columns of one stop, with a little noise."""
-    draw = np.random.default_rng(5)
+def make_stop(samples: int = 120, rate: float = 100.0, seed: int = 5) -> dict[str, np.ndarray]:
+    """Measured columns of one stop, with a little noise that the seed decides."""
+    draw = np.random.default_rng(seed)
     t = np.arange(samples) / rate
     pressure = np.clip((t - 0.3) / 0.3, 0.0, 1.0) * 1.5
     acceleration = -2.0 * pressure
@@ -65,8 +65,8 @@ def write_campaign(folder: Path) -> None:
     }  # fmt: skip
     write_file(folder / "0" / "campaign.yaml", yaml.safe_dump(header).encode())
     write_file(folder / "0" / "runs.csv", _format_csv([{"run": name, **row} for name in names]))
-    for name in names:
-        write_file(folder / "0" / "runs" / f"{name}.parquet", _format_parquet(make_stop()))
+    for seed, name in enumerate(names):
+        write_file(folder / "0" / "runs" / f"{name}.parquet", _format_parquet(make_stop(seed=seed)))
 
 
 def write_recordings(folder: Path) -> None:

@@ -6,28 +6,46 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
 
+from catalogs.channel_maps.conditions import Conditions, condition_problems
+from catalogs.channel_maps.tolerances import Tolerances
 from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
-from catalogs.names import LONGEST_NAME, WeatherName
+from catalogs.names import LONGEST_NAME
 from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
 from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
 from tasks.campaign.signals import ChannelRule, Gain
 from tasks.errors import InputError
-from tasks.surface.weather import DRY
 
 HIGHEST_RATE = 1_000_000.0
 """Of a campaign [Hz]: a thousand times what a vehicle's bus gives."""
+MAIN_NAMES = tuple(channel.name for channel in MAIN_CHANNELS)
 Part = Literal["train", "held_out"]
 Kept = TypeVar("Kept")
 Entry = TypeVar("Entry", bound=CatalogueEntry)
-Sigma = Annotated[float, Field(strict=True, gt=0)]
+LONGEST_DELAY = 2.0
+"""By which a time stamp is late [s]: loggers and GPS receivers take some tenths; 50 is a delay in ms."""
+
+
+def _check_delay(delay: float) -> float:
+    if abs(delay) > LONGEST_DELAY:
+        raise ValueError(f"must be a delay in seconds, at most {LONGEST_DELAY:g} either way; it is {delay:g}")
+    return delay
+
+
+def _check_scale(scale: float) -> float:
+    if scale == 0.0:
+        raise ValueError("must not be 0, which makes every sample the same; leave it away for 1")
+    return scale
+
+
+Factor = Annotated[Number, AfterValidator(_check_scale)]
 
 
 class GainEntry(CatalogueEntry):
     """A change of quantity, such as torque to pressure; ``unit`` is that of the result."""
 
-    value: Number
+    value: Factor
     unit: Text
     source: Text
 
@@ -38,9 +56,9 @@ class ChannelEntry(CatalogueEntry):
     source: Text | Annotated[tuple[Text, ...], Field(min_length=1)]
     unit: Text
     sign: Literal[1, -1] = 1
-    scale: Number = 1.0
+    scale: Factor = 1.0
     offset: Number = 0.0
-    delay_s: Number = 0.0
+    delay_s: Annotated[Number, AfterValidator(_check_delay)] = 0.0
     gain: GainEntry | None = None
     note: str = ""
 
@@ -69,19 +87,6 @@ class TimeEntry(CatalogueEntry):
         if UNITS.get(unit, ("", 0.0))[0] != "time":
             raise ValueError(f"time unit must be one of s, ms, us, ns; it is {unit}")
         return unit
-
-
-class Conditions(CatalogueEntry):
-    """Facts of a run that the logger does not know; the columns of runs.csv."""
-
-    weather: WeatherName = DRY
-    precipitation_mm_h: Number = 0.0
-    snow_accumulation_h: Number = 0.0
-    direction: Literal[1, -1] = 1
-    disc_temperature_above_ambient_c: Number = 0.0
-    hazard_center_m: Number = 0.0
-    hazard_length_m: Number = 0.0
-    hazard_height_m: Number = 0.0
 
 
 def _check_inside(file: str) -> str:
@@ -119,28 +124,6 @@ class SegmentEntry(CatalogueEntry):
     held_out_every: Annotated[int, Field(strict=True, ge=2)]
 
 
-class RunTolerances(CatalogueEntry):
-    """One-sigma doubts about a single run."""
-
-    initial_speed_m_s: Sigma
-    friction: Sigma
-    acceleration_bias_m_s2: Sigma
-    pitch_offset_deg: Sigma
-
-
-class Tolerances(CatalogueEntry):
-    """One-sigma doubts about a session, relative save the grade."""
-
-    pressure_gain: Sigma
-    mass: Sigma
-    pitch_gain: Sigma
-    wheel_radius: Sigma
-    suspension_damping: Sigma
-    suspension_stiffness: Sigma
-    grade: Sigma
-    run: RunTolerances
-
-
 class CsvEntry(CatalogueEntry):
     """How text files are written."""
 
@@ -161,7 +144,7 @@ class ChannelMap(CatalogueEntry):
     channels: dict[str, ChannelEntry]
     not_measured: Annotated[tuple[str, ...], Field(validate_default=True)] = ()
     conditions: Conditions = Conditions()
-    runs: tuple[RunEntry, ...] = ()
+    runs: Annotated[tuple[RunEntry, ...], Field(validate_default=True)] = ()
     segment: SegmentEntry | None = None
     tolerances_1sigma: Tolerances
     notes: str = ""
@@ -173,7 +156,7 @@ class ChannelMap(CatalogueEntry):
 
     def conditions_of(self, run: RunEntry) -> Conditions:
         """The common conditions with the run's own laid over them."""
-        return Conditions.model_validate(self.conditions.model_dump() | run.conditions)
+        return _lay_over(self.conditions, run)
 
     @field_validator("channels")
     @classmethod
@@ -185,6 +168,15 @@ class ChannelMap(CatalogueEntry):
                     _ = entry.rule(name).factor
                 except InputError as error:
                     problems += [f"channel {name}: {problem}" for problem in error.problems]
+        compared = [name for name in MAIN_NAMES if name in channels]
+        given = [(source, name) for name in compared for source in channels[name].rule(name).sources]
+        for signal in dict.fromkeys(source for source, _ in given):
+            names = [name for source, name in given if source == signal]
+            if len(names) > 1:
+                problems.append(
+                    f"signal {shorten(signal, 60)} must be one measurement; it stands for {', '.join(names)}: correct a"
+                    " source, or list a channel under not_measured"
+                )
         return _note_problems(channels, problems)
 
     @field_validator("not_measured")
@@ -204,10 +196,19 @@ class ChannelMap(CatalogueEntry):
 
     @field_validator("runs")
     @classmethod
-    def _runs_stand_once(cls, runs: tuple[RunEntry, ...]) -> tuple[RunEntry, ...]:
+    def _runs_stand_once_in_weather_that_there_is(
+        cls, runs: tuple[RunEntry, ...], info: ValidationInfo
+    ) -> tuple[RunEntry, ...]:
         names = [run.name for run in runs]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        return _note_problems(runs, [f"run {name} stands twice" for name in twice])
+        problems = [f"run {name} stands twice" for name in sorted({n for n in names if names.count(n) > 1})]
+        if (common := info.data.get("conditions")) is not None:
+            laid = {f"run {run.name}": _lay_over(common, run) for run in runs} or {"conditions": common}
+            problems += [
+                f"{place}: {problem}"
+                for place, conditions in laid.items()
+                for problem in condition_problems(conditions.model_dump())
+            ]
+        return _note_problems(runs, problems)
 
     @field_validator("segment")
     @classmethod
@@ -230,6 +231,10 @@ class FaultyMap(InputError):
     def __init__(self, problems: list[str], readable: ChannelMap | None):
         super().__init__(problems)
         self.readable = readable
+
+
+def _lay_over(common: Conditions, run: RunEntry) -> Conditions:
+    return Conditions.model_validate(common.model_dump() | run.conditions)
 
 
 def _unknown_channels(names: Iterable[str]) -> list[str]:
@@ -275,7 +280,7 @@ def _readable_part(content: dict[str, Any]) -> ChannelMap | None:
     time, csv = _read_part(TimeEntry, content.get("time")), _read_part(CsvEntry, content.get("csv", {}))
     listed = content.get("runs", [])
     runs = [_read_part(RunEntry, given) for given in listed] if isinstance(listed, list) else [None]
-    if not channels or csv is None or None in runs or (time is None and "time" in content):
+    if csv is None or None in runs or (time is None and "time" in content):
         return None
     return ChannelMap.model_construct(channels=channels, time=time, csv=csv, runs=tuple(runs))
 

@@ -36,6 +36,7 @@ class SignalSummary:
     rate_hz : mean rate; None without a clock [Hz]
     start_s, end_s : times of the first and the last sample; None without a clock [s]
     lowest, highest : range of the finite values; None without any [the unit]
+    note : why its values are no numbers, and what to do; empty where they are
     """
 
     signal: str
@@ -46,6 +47,7 @@ class SignalSummary:
     end_s: float | None
     lowest: float | None
     highest: float | None
+    note: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,13 +101,14 @@ def sample_column(
     return Signal(time=time[usable], values=values[usable], unit=unit)
 
 
-def summarise_signal(name: str, signal: Signal) -> SignalSummary:
+def summarise_signal(name: str, signal: Signal, note: str = "") -> SignalSummary:
     """Return the row of a signal.
 
     Parameters
     ----------
     name : in its file
     signal : on its clock; without times if its clock is not known
+    note : why its values are no numbers
     """
     values = signal.values[~np.isnan(signal.values)]
     finite = values[np.isfinite(values)]
@@ -120,6 +123,7 @@ def summarise_signal(name: str, signal: Signal) -> SignalSummary:
         end_s=float(times[-1]) if len(times) else None,
         lowest=float(finite.min()) if len(finite) else None,
         highest=float(finite.max()) if len(finite) else None,
+        note=note,
     )
 
 

@@ -1,7 +1,9 @@
 """Recordings as tables: CSV and Parquet, a column for each signal and one for the clock."""
 
 import io
+import json
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,13 +26,15 @@ from catalogs.recordings.forms import (
     signal_names,
     summarise_signal,
 )
-from catalogs.sentences import shorten
+from catalogs.sentences import shorten, shorten_value
 from tasks.campaign.signals import Signal
 from tasks.errors import InputError
 
 Columns = dict[str, NDArray[np.float64]]
 Take = Callable[[Path, tuple[str, ...], CsvEntry], tuple[Columns, dict[str, str]]]
-ListColumns = Callable[[Path, CsvEntry], tuple[Columns, dict[str, str]]]
+ListColumns = Callable[[Path, CsvEntry], tuple[Columns, dict[str, str], dict[str, str]]]
+SEPARATORS = (";", ",", "\t", "|")
+DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def _read_with(take: Take) -> Callable[[Path, ChannelMap], dict[str, Signal]]:
@@ -45,7 +49,7 @@ def _read_with(take: Take) -> Callable[[Path, ChannelMap], dict[str, Signal]]:
 
 def _summarise_with(take_all: ListColumns) -> Callable[[Path, ChannelMap | None], list[SignalSummary]]:
     def summarise(path: Path, channel_map: ChannelMap | None) -> list[SignalSummary]:
-        columns, units = take_all(path, CsvEntry() if channel_map is None else channel_map.csv)
+        columns, units, notes = take_all(path, CsvEntry() if channel_map is None else channel_map.csv)
         clock = None if channel_map is None else channel_map.time
         rows = []
         for name, values in columns.items():
@@ -53,7 +57,7 @@ def _summarise_with(take_all: ListColumns) -> Callable[[Path, ChannelMap | None]
                 signal = Signal(time=np.empty(0), values=values, unit=units.get(name, ""))
             else:
                 signal = sample_column(columns[clock.source], values, clock, units.get(name, ""))
-            rows.append(summarise_signal(name, signal))
+            rows.append(summarise_signal(name, signal, notes.get(name, "")))
         return rows
 
     return summarise
@@ -67,27 +71,47 @@ def _take_parquet(path: Path, wanted: tuple[str, ...], _: CsvEntry) -> tuple[Col
     return columns, units
 
 
-def _take_all_parquet(path: Path, _: CsvEntry) -> tuple[Columns, dict[str, str]]:
+def _take_all_parquet(path: Path, _: CsvEntry) -> tuple[Columns, dict[str, str], dict[str, str]]:
     content = read_content(path, "recording", LARGEST_FILE)
     try:
         schema = pq.read_schema(pa.BufferReader(content))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise InputError(f"{path.name} must be a Parquet file of numbers; {shorten(error)}") from None
     numbers = {f.name for f in schema if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)}
-    return parse_columns(content, path.name, numbers)
+    columns, units = parse_columns(content, path.name, numbers)
+    notes = {f.name: f"not of numbers, but of {f.type}" for f in schema if f.name not in numbers}
+    rows = pq.read_metadata(pa.BufferReader(content)).num_rows
+    return columns | {name: np.full(rows, np.nan) for name in notes}, units, notes
 
 
 def _load_frame(path: Path, options: CsvEntry) -> pd.DataFrame:
-    try:
-        return pd.read_csv(
-            io.BytesIO(read_content(path, "recording", LARGEST_FILE)),
-            sep=options.separator,
-            decimal=options.decimal,
-            skiprows=options.skip_rows,
-            encoding="utf-8-sig",
+    content = read_content(path, "recording", LARGEST_FILE)
+    head = content.split(b"\n", options.skip_rows + 1)[options.skip_rows : options.skip_rows + 1]
+    names = b"".join(head).decode("utf-8", "replace").strip()
+    found = [separator for separator in SEPARATORS if separator in names]
+    if found and len(options.separator) == 1 and options.separator not in names:
+        raise InputError(
+            f"{path}: names of signals must be separated by {shorten_value(options.separator)}; the first line is"
+            f" {shorten_value(names)}: give csv: {{separator: {json.dumps(found[0])}}} in the map"
         )
-    except InputError:
-        raise
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            return pd.read_csv(
+                io.BytesIO(content),
+                sep=options.separator,
+                decimal=options.decimal,
+                skiprows=options.skip_rows,
+                encoding="utf-8-sig",
+                index_col=False,  # else rows that end in a separator move every value to its neighbour's name
+            )
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: must be UTF-8 text; it is not: save it as UTF-8") from None
+    except pd.errors.ParserWarning:
+        raise InputError(
+            f"{path}: rows must have a name for each value; they have more values than the first line has names:"
+            " add the missing names"
+        ) from None
     except (ValueError, TypeError, OverflowError, re.error) as error:
         raise InputError(f"{path}: must be a table of text; {shorten(error)}") from None
 
@@ -103,28 +127,37 @@ def _take_csv(path: Path, wanted: tuple[str, ...], options: CsvEntry) -> tuple[C
                 f"{path.name}: signal {name} must stand once; {names.count(name)} columns have its name"
             )
         elif name in names:
-            values = _convert_column(frame.iloc[:, names.index(name)])
-            if values is None:
-                problems.append(f"{path.name}: signal {name} must be of numbers; it has text in it")
-            else:
-                columns[name] = values
+            columns[name], note = _convert_column(frame.iloc[:, names.index(name)])
+            problems += [f"{path.name}: signal {name} must be of numbers; {note}"] if note else []
     if problems:
         raise InputError(problems)
     return columns, {}
 
 
-def _take_all_csv(path: Path, options: CsvEntry) -> tuple[Columns, dict[str, str]]:
+def _take_all_csv(path: Path, options: CsvEntry) -> tuple[Columns, dict[str, str], dict[str, str]]:
     frame = _load_frame(path, options)
-    columns = {str(name).strip(): _convert_column(frame.iloc[:, k]) for k, name in enumerate(frame.columns)}
-    return {name: values for name, values in columns.items() if values is not None}, {}
+    read = {str(name).strip(): _convert_column(frame.iloc[:, k]) for k, name in enumerate(frame.columns)}
+    notes = {name: note for name, (_, note) in read.items() if note}
+    return {name: values for name, (values, _) in read.items()}, {}, notes
 
 
-def _convert_column(column: pd.Series) -> NDArray[np.float64] | None:
-    """Return a column as numbers; None if it has text in it."""
+def _convert_column(column: pd.Series) -> tuple[NDArray[np.float64], str]:
+    """Return a column as numbers, NaN in place of text; and its first text with what to do, empty if there is none."""
     try:
-        return np.asarray(column, dtype=np.float64)
+        return np.asarray(column, dtype=np.float64), ""
     except (TypeError, ValueError):
-        return None
+        values = pd.to_numeric(column, errors="coerce").to_numpy(np.float64)
+    wrong = np.isnan(values) & column.notna().to_numpy()
+    row, text = int(np.argmax(wrong)), str(column.iloc[int(np.argmax(wrong))])
+    if DECIMAL_COMMA.fullmatch(text.strip()):
+        remedy = "give csv: {decimal: ','} in the map"
+    elif re.search(r"\d[:-]\d", text):
+        remedy = "write times as a number of seconds"
+    elif row == 0 and np.count_nonzero(wrong) == 1:
+        remedy = "remove this row, which seems to hold units"
+    else:
+        remedy = "correct it, or leave it empty"
+    return values, f"row {row + 1} below the names has {shorten_value(text)}: {remedy}"
 
 
 CSV = Form(read=_read_with(_take_csv), summarise=_summarise_with(_take_all_csv))

@@ -31,10 +31,13 @@ def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
     """Return the report of an import, or a narrow table of signals for each recording."""
     if "signals" not in result:
         return result
-    return {file: [_shorten_signal(row) for row in rows] for file, rows in result["signals"].items()}
+    return {
+        file: [_shorten_signal(row, any(row["note"] for row in rows)) for row in rows]
+        for file, rows in result["signals"].items()
+    }
 
 
-def _shorten_signal(row: dict[str, Any]) -> dict[str, Any]:
+def _shorten_signal(row: dict[str, Any], noted: bool) -> dict[str, Any]:
     def join(low: float | None, high: float | None) -> str | None:
         return None if low is None else f"{low:.6g} to {high:.6g}"
 
@@ -42,6 +45,7 @@ def _shorten_signal(row: dict[str, Any]) -> dict[str, Any]:
         **{key: row[key] for key in ("signal", "unit", "samples", "rate_hz")},
         "time_s": join(row["start_s"], row["end_s"]),
         "range": join(row["lowest"], row["highest"]),
+        **({"note": row["note"]} if noted else {}),
     }
 
 

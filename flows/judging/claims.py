@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from catalogs.campaign_files import parse_columns
+from catalogs.campaign_files import parse_columns, unit_problems
 from catalogs.documents import read_content
 from catalogs.sentences import shorten
 from tasks.errors import InputError
@@ -14,8 +14,8 @@ from tasks.eval.foreign_video import VideoClaim
 
 LARGEST_CLAIM = 2**28
 """Bytes of a claim [1]."""
-CLAIMED = ("t_ns", "time", "pitch", "station", "speed")
-"""Columns of a claim that are read."""
+CLAIMED = {"t_ns": "ns", "time": "s", "pitch": "rad", "station": "m", "speed": "m/s"}
+"""Columns of a claim that are read, and their units."""
 LARGEST_MOTION = 1e8
 """Farthest station [m], and greatest speed [m/s], that a claim may hold."""
 
@@ -29,8 +29,8 @@ def read_claim(path: Path) -> VideoClaim:
         If the file cannot be read, or lacks or repeats what is needed.
     """
     content = read_content(path, "claim", LARGEST_CLAIM)
-    columns, _ = parse_columns(content, f"{path}: the claim", CLAIMED)
-    problems = []
+    columns, units = parse_columns(content, f"{path}: the claim", CLAIMED)
+    problems = unit_problems(units, CLAIMED, str(path))
     if not columns.keys() & {"t_ns", "time"}:
         problems.append(
             f"{path}: the claim lacks a column t_ns or time; it has {shorten(', '.join(columns))}."

@@ -86,10 +86,14 @@ def measure_retention(
     Raises
     ------
     InputError
-        For every file that cannot be read, clips of different length, an event outside them, or a lost track.
+        For every file that cannot be read or is given twice, clips of different length, an event outside them, or a
+        lost track.
     """
     results = Outputs(out, "retention", "retention.json")
     names = (source, source_braking, edited, edited_braking)
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise InputError([f"{name}: must be one of the four clips; it stands for two." for name in twice])
     *clips, lens = _read_all(*((read_footage, name) for name in names), (read_camera, camera))
     counts = [len(clip.times) for clip in clips]
     problems = []

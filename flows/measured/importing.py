@@ -12,7 +12,8 @@ import pyarrow as pa
 import yaml
 
 from catalogs.campaign_files import MOST_SAMPLES
-from catalogs.channel_maps import ChannelMap, Conditions, FaultyMap, SegmentEntry, load_channel_map
+from catalogs.channel_maps import ChannelMap, FaultyMap, SegmentEntry, load_channel_map
+from catalogs.channel_maps.conditions import Conditions
 from catalogs.names import name_problem
 from catalogs.recordings import read_signals, recording_files, recording_root, stored_files
 from catalogs.sentences import shorten
@@ -236,6 +237,25 @@ def _plan_problems(
         if count > MOST_SAMPLES:
             problems.append(
                 f"run {shorten(run.name)} must have at most {MOST_SAMPLES} samples; at {rate:g} Hz it has {count:.3g}"
+            )
+    return problems + _shared_stretches(planned)
+
+
+def _shared_stretches(planned: list[PlannedRun]) -> list[str]:
+    """Held-out runs that a training run has samples of: what judges a fit must be nothing that was fitted."""
+    problems = []
+    for judge in (run for run in planned if run.part == "held_out"):
+        taught = [
+            shorten(run.name)
+            for run in planned
+            if run.part == "train"
+            and run.file == judge.file
+            and max(run.start, judge.start) < min(run.end, judge.end)
+        ]
+        if taught:
+            problems.append(
+                f"run {shorten(judge.name)} is held out and must share no sample with a training run; it shares some of"
+                f" {shorten(judge.file.name)} with {shorten(', '.join(taught))}: correct its file or its window"
             )
     return problems
 

@@ -11,7 +11,6 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from flows.store.address import is_address
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
 
@@ -20,12 +19,11 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """First characters of a text that a spreadsheet takes for a formula."""
 
 
-def open_answer_file(dataset: str, to: str | None, out: str | None) -> Outputs | None:
+def open_answer_file(to: str | None, out: str | None) -> Outputs | None:
     """Return where the answer goes, before the query runs; None where it is printed.
 
     Parameters
     ----------
-    dataset : that is asked: the file must lie outside it
     to : csv, parquet or None
     out : the file, or None
 
@@ -41,10 +39,6 @@ def open_answer_file(dataset: str, to: str | None, out: str | None) -> Outputs |
         problems.append(f"--to {to or 'is missing'}: must be {' or '.join(FORMATS)}, the form of --out")
     if not out:
         problems.append("--out: must name the file that --to writes")
-    elif not is_address(dataset) and Path(out).resolve().is_relative_to(Path(dataset).resolve()):
-        problems.append(
-            f"--out {out}: must lie outside the dataset, whose files are all recorded; name another file"
-        )
     if problems or out is None:
         raise InputError(problems)
     file = Path(out)

@@ -58,7 +58,7 @@ def query_dataset(
     Parameters
     ----------
     dataset : a sealed dataset folder
-    query : DuckDB SQL, one statement
+    query : DuckDB SQL, one statement; with ``allow_files`` several, of which the last one is answered
     allow_files : the query may read and write files of this machine, and load extensions; else it reaches the views
         alone
     to : csv or parquet writes the answer to a file; None returns it
@@ -72,13 +72,18 @@ def query_dataset(
     Raises
     ------
     InputError
-        The folder is no sealed dataset, the query is none that DuckDB answers, it asks for files without
-        ``allow_files``, its answer is too large to be returned, or the file cannot be written.
+        The folder is no sealed dataset, the query is none that DuckDB answers or more than one, it asks for files
+        without ``allow_files``, its answer is too large to be returned, or the file cannot be written.
     """
-    file = open_answer_file(dataset, to, out)
+    file = open_answer_file(to, out)
     fetch = _fetch_table if to == "parquet" else _fetch_rows
     with connect_views(dataset, allow_files=allow_files) as connection:
         try:
+            count = len(connection.extract_statements(query))
+            if count == 0 or (
+                count > 1 and not allow_files
+            ):  # with files, LOAD and ATTACH come before the question
+                raise InputError(f"--- {shorten(query)}: must be one SQL statement; it holds {count}")
             names, rows = run_interruptibly(connection, lambda: fetch(connection, query))
         except duckdb.Error as error:
             raise refused_query(query, error, "--allow-files") from None
@@ -87,8 +92,6 @@ def query_dataset(
             "columns": names,
             "rows": [dict(zip(names, map(make_plain, row), strict=True)) for row in rows],
         }
-    if not names:
-        raise InputError(f"--- {shorten(query)}: must have an answer to write to a file; it has none")
     (name,) = file.names
     file.write(name, format_parquet(rows) if to == "parquet" else format_csv(names, rows))
     return {"file": str(file.path(name)), "columns": names, "row_count": len(rows)}
@@ -97,8 +100,6 @@ def query_dataset(
 def _fetch_rows(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], Any]:
     """Names of the columns, and tuples."""
     answer = connection.execute(query)
-    if answer is None:  # nothing but a comment
-        return [], []
     names = [column[0] for column in answer.description or ()]
     rows: list[tuple[Any, ...]] = []
     while some := answer.fetchmany(_FETCHED_AT_ONCE):
@@ -110,8 +111,6 @@ def _fetch_rows(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list
 def _fetch_table(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], Any]:
     """Names of the columns, and an Arrow table."""
     relation = connection.sql(query)
-    if relation is None:
-        return [], None
     count, batches = 0, []
     reader = pa.RecordBatchReader.from_stream(relation)
     for batch in reader:

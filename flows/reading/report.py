@@ -218,10 +218,6 @@ def _choose_folder(layout: Layout, out: str | None) -> Path:
     if out is None and beside.is_symlink():
         raise InputError(f"{beside}: is a link; name the page's folder with --out")
     folder = Path(out).resolve() if out else beside
-    if folder.is_relative_to(layout.root):
-        raise InputError(
-            f"--out {out}: must lie outside the dataset, whose files are all recorded; name another folder"
-        )
     if folder.is_dir() and any(folder.iterdir()) and COMMAND not in read_marker(folder).values():
         raise InputError(
             f"{folder}: must be new, empty or an earlier report; it holds other files, or a report of an earlier"

@@ -42,7 +42,8 @@ class Outputs:
     Raises
     ------
     InputError
-        Listing every file in the way that the command did not write, every link, and a folder that cannot be used.
+        Listing every file in the way that the command did not write, every link, and a folder that cannot be used or
+        lies in a dataset.
     """
 
     def __init__(self, out: str | Path | None, command: str, *names: str) -> None:
@@ -131,6 +132,11 @@ class Outputs:
             problems.append(f"{nearest}: must be a folder; name another one for the files of {self._title}")
         elif not os.access(nearest, os.W_OK | os.X_OK):
             problems.append(f"{nearest}: must be a folder that can be written; name another one")
+        elif (dataset := _find_dataset_around(folder)) is not None:
+            problems.append(
+                f"{folder}: must lie outside the dataset {dataset.name}, whose files are all recorded; name another"
+                " folder"
+            )
         if problems:
             raise InputError(problems)
         if not folder.is_dir():
@@ -145,6 +151,13 @@ class Outputs:
     @property
     def _title(self) -> str:
         return f"musync {self.command}"
+
+
+def _find_dataset_around(folder: Path) -> Path | None:
+    """Return the dataset that a folder is or lies in; None if there is none."""
+    place = folder.resolve()
+    places = (place, *place.parents)
+    return next((one for one in places if (one / "plan.json").is_file() and (one / "inputs").is_dir()), None)
 
 
 def name_problem(name: str) -> str | None:

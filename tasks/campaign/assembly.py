@@ -25,6 +25,12 @@ ALIASES = {
 }  # fmt: skip
 """Spellings of the units that this project knows, as files have them."""
 
+LEAST_COVERED = 0.9
+"""Share of a run that each of its channels covers at least [1]."""
+HIGHEST_RATIO = 1.25
+"""Of a campaign's rate over that of the fastest signal, whose samples need not be even [1]: a log of 20 Hz that was put
+on 80 Hz gave another verdict, with a fiftieth of the interval."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Assembled:
@@ -69,10 +75,13 @@ def assemble_run(
     usable = {channel: signals for channel, signals in parts.items() if not _is_unreadable(signals)}
     if not usable:
         return Assembled(start=start, columns={}, problems=tuple(problems))
+    problems += _find_short_channels(usable)
+    problems += _find_high_rate(usable, rate)
     clock = make_common_clock([signal for signals in usable.values() for signal in signals], rate)
     if len(clock) < LEAST_SAMPLES:
         problems.append(
-            f"has {len(clock)} samples that all channels share; a run needs {LEAST_SAMPLES}: widen its window"
+            f"has {len(clock)} samples at {rate:g} Hz that all channels share; a run needs {LEAST_SAMPLES}: widen its"
+            " window, or correct the unit of time"
         )
         return Assembled(start=start, columns={}, problems=tuple(problems))
     columns = {
@@ -104,6 +113,32 @@ def _find_frozen_channels(parts: Mapping[str, list[Signal]]) -> list[tuple[str, 
         for channel, signals in parts.items()
         for signal in signals
         if len(signal.time) > 2 and (problem := frozen_problem(channel, signal, speed)) is not None
+    ]
+
+
+def _find_short_channels(parts: Mapping[str, list[Signal]]) -> list[str]:
+    """Return a sentence for each channel without which the run would be longer: a sensor that fell silent."""
+    spans = {
+        channel: (max(s.time[0] for s in signals), min(s.time[-1] for s in signals))
+        for channel, signals in parts.items()
+    }
+    first, last = min(start for start, _ in spans.values()), max(end for _, end in spans.values())
+    return [
+        f"channel {channel}: has samples from {start:.3f} to {end:.3f} s of a run from {first:.3f} to {last:.3f} s: cut"
+        " the run there, or leave the channel out"
+        for channel, (start, end) in spans.items()
+        if end - start < LEAST_COVERED * (last - first)
+    ]
+
+
+def _find_high_rate(parts: Mapping[str, list[Signal]], rate: float) -> list[str]:
+    """Return the problem of a rate at which most samples of every channel would lie between measured ones."""
+    fastest = min(float(np.median(np.diff(s.time))) for signals in parts.values() for s in signals)
+    if rate * fastest <= HIGHEST_RATIO:
+        return []
+    return [
+        f"sample_rate_hz must not be above the rate of the fastest signal, {1.0 / fastest:.4g} Hz; it is {rate:g}:"
+        " lower it, because samples between samples would count as measurements"
     ]
 
 

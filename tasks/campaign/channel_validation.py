@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.campaign.brake_validation import MOVING, brake_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS, guess_unit
 from tasks.campaign.signals import Signal
 
@@ -15,14 +16,10 @@ FROZEN_DWELLS = 20.0
 """A frozen sensor holds a value this long, and this many times longer than usual."""
 SHORT_FREEZE_SECONDS = 0.25
 """This long suffices for a sensor that hardly holds values: it must be as many times longer than 95 % of the holds."""
-MOVING = 2.0
-"""Speed above which the vibration of a car changes every sensor's value [m/s]."""
 SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
 DECELERATION_PER_PRESSURE = (0.3, 8.0)
 """Deceleration that a road car's brake may give per pressure; the paper's vehicle has 2.4 [m/s^2 per MPa]."""
-WITHOUT_BRAKE = 3.0
-"""Deceleration that drag, an engine or a generator gives without brake pressure at most [m/s^2]."""
 DIVE_PER_DECELERATION = (0.02, 2.0)
 """Pitch that a road car's body gives per deceleration; the paper's vehicle has 0.4 [deg per m/s^2]."""
 ROLLING_RADIUS = (0.2, 0.6)
@@ -116,9 +113,7 @@ def plausibility_problems(
     units : the unit that each channel's values were taken to be in
     """
     stands_in = UNITS[units.get("brake_pressure", "MPa")][0] != "pressure"
-    problems = _step_problems(columns, interval) + (
-        [] if stands_in else _pressure_problems(columns, interval)
-    )
+    problems = _step_problems(columns, interval)
     for name, values in columns.items():
         channel = CHANNELS_BY_NAME[name]
         if name == "brake_pressure" and stands_in:
@@ -129,8 +124,14 @@ def plausibility_problems(
                 f"channel {name} reaches {peak:.4g} {channel.unit}, which no road car does (limit {channel.limit:g}):"
                 " correct its unit or scale"
             )
+        elif (low := float(np.min(values))) < channel.lowest:
+            problems.append(
+                f"channel {name} falls to {low:.4g} {channel.unit}, which no road car does (limit {channel.lowest:g}):"
+                " turn its sign over, or correct its offset"
+            )
     smooth = {name: _moving_mean(values, interval) for name, values in columns.items()}
     problems += _radius_problems(smooth, interval)
+    problems += brake_problems(columns, smooth, interval, stands_in=stands_in)
     if "speed" in smooth:
         rate = np.gradient(smooth["speed"], interval)
         if "longitudinal_acceleration" in smooth:
@@ -171,28 +172,6 @@ def _step_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) 
     return [
         f"channel speed must not jump; {wrong.size} steps do, the largest by {steps[at]:.3g} m/s at sample {at + 1}"
         f" ({(at + 1) * interval:.3f} s into the run): samples are lost or its clock jumps, cut the run there"
-    ]
-
-
-def _pressure_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
-    """Return the problem of a constant pressure, or of a pressure of 0 while the car brakes."""
-    pressure = columns.get("brake_pressure")
-    if pressure is None or np.ptp(pressure) > 0:
-        return []
-    if pressure[0] != 0.0:
-        return [
-            f"channel brake_pressure is frozen: it holds {pressure[0]:.4g} MPa over the whole run; record it anew, or"
-            " leave the run out"
-        ]
-    lost = 0.0
-    if "speed" in columns:
-        rate = np.sort(np.gradient(_moving_mean(columns["speed"], interval), interval))
-        lost = -float(np.mean(rate[: max(round(SMOOTHING / interval), 1)]))
-    if lost <= WITHOUT_BRAKE or np.any(columns.get("engine_torque", np.zeros(1)) < 0.0):
-        return []  # a motor that brakes needs no pressure
-    return [
-        f"channel brake_pressure is 0 over the whole run while speed falls at {lost:.1f} m/s^2, which needs the brake"
-        f" beyond {WITHOUT_BRAKE:g}: record it anew, or leave the run out"
     ]
 
 

@@ -28,6 +28,7 @@ class MeasuredChannel:
     ----------
     name, unit : as in the run's file
     limit : magnitude that no road car exceeds [the channel's unit]
+    lowest : value that no road car goes below, with room for noise and offset of a sensor [the channel's unit]
     moves : in a moving car the sensor never holds one value for long
     description : for people
     """
@@ -35,19 +36,25 @@ class MeasuredChannel:
     name: str
     unit: str
     limit: float
+    lowest: float
     moves: bool
     description: str
 
 
 def _make_channel(
-    name: str, unit: str, limit: float, description: str, moves: bool = True
+    name: str, unit: str, limit: float, description: str, moves: bool = True, lowest: float | None = None
 ) -> MeasuredChannel:
-    return MeasuredChannel(name=name, unit=unit, limit=limit, moves=moves, description=description)
+    lowest = -limit if lowest is None else lowest
+    return MeasuredChannel(
+        name=name, unit=unit, limit=limit, lowest=lowest, moves=moves, description=description
+    )
 
 
 MAIN_CHANNELS = (
-    _make_channel("brake_pressure", "MPa", 25.0, "brake pressure at the caliper line", moves=False),
-    _make_channel("speed", "m/s", 90.0, "speed over ground"),
+    _make_channel(
+        "brake_pressure", "MPa", 25.0, "brake pressure at the caliper line", moves=False, lowest=-0.5
+    ),
+    _make_channel("speed", "m/s", 90.0, "speed over ground", lowest=-15.0),
     _make_channel("longitudinal_acceleration", "m/s^2", 20.0, "accelerometer, forward positive"),
     _make_channel("wheel_speed_front", "rad/s", 400.0, "mean of the front wheels"),
     _make_channel("wheel_speed_rear", "rad/s", 400.0, "mean of the rear wheels"),
@@ -69,11 +76,12 @@ SIDE_CHANNELS = (
         1.2,
         "share of the full brake: pedal travel or a controller's command",
         moves=False,
+        lowest=-0.2,
     ),
-    _make_channel("pedal_force", "N", 3000.0, "of the foot on the brake pedal", moves=False),
+    _make_channel("pedal_force", "N", 3000.0, "of the foot on the brake pedal", moves=False, lowest=-100.0),
     _make_channel("engine_torque", "N m", 40000.0, "at the wheels, driving positive", moves=False),
     _make_channel("road_slope", "deg", 30.0, "of the road, uphill positive", moves=False),
-    _make_channel("throttle", "1", 1.2, "share of the full throttle", moves=False),
+    _make_channel("throttle", "1", 1.2, "share of the full throttle", moves=False, lowest=-0.2),
 )
 """Channels that selection rules, residual plots and the closing of the loop use where they were measured."""
 

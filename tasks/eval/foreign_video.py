@@ -19,6 +19,8 @@ EVENT_LEAD = 0.6
 
 LEAST_SHARED = 5
 """Fewest frames within the claim's time that can be judged [1]."""
+FRAMES_PER_ROW = 5
+"""Frames of a video for each row of its claim at most [1]: between sparser rows a straight line would be judged."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +68,7 @@ def sample_claim(claim: VideoClaim, times: Floats) -> ClaimAtFrames:
     Raises
     ------
     InputError
-        If too few frames lie within it.
+        If too few frames lie within it, or it has too few rows within the video.
     """
     # a frame up to half an interval after the last row takes that row
     slack = 0.5 * float(np.median(np.diff(times)))
@@ -75,6 +77,12 @@ def sample_claim(claim: VideoClaim, times: Floats) -> ClaimAtFrames:
         raise InputError(
             f"The claim lasts {claim.time[-1]:.3g} s and covers {len(rows)} of the video's {len(times)} frames;"
             f" at least {LEAST_SHARED} are needed."
+        )
+    given, needed = int(np.sum(claim.time <= times[-1] + slack)), -(-len(rows) // FRAMES_PER_ROW)
+    if given < needed:
+        raise InputError(
+            f"The claim has {given} rows in the {times[-1]:.3g} s of the video's {len(times)} frames; at least {needed}"
+            " are needed: give its time in the unit of its column, or a row for each frame."
         )
     return ClaimAtFrames(
         rows=rows,

@@ -19,6 +19,9 @@ WINDOWS: tuple[int | None, ...] = (None, 5, 7, 9)
 PAPER_OPENING = 2.2
 """When the paper's event window opens (Appendix A.5) [s]: 2.2 to 3.8 s holds 25 frames at 16 and 17 at 10 a second."""
 
+LEAST_RESPONSE = 1e-9
+"""Pitch below which two clips are one [rad]: what rounding leaves of a difference of equal angles."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MotionProtocol:
@@ -223,6 +226,11 @@ def motion_retention(
     source, edited : [F] pitch recovered from input and output [rad]
     source_braking, edited_braking : [F] the same of the flat-road braking clips [rad]
     event : first and last frame of the event [1]
+
+    Raises
+    ------
+    InputError
+        If the pitch of a pair of clips does not differ in the event, so that there is nothing to correlate.
     """
     inside = slice(event[0], event[1] + 1)
     curves = []
@@ -231,4 +239,12 @@ def motion_retention(
         frame = np.arange(len(change))
         outside = (frame < event[0]) | (frame > event[1])
         curves.append((change - np.polyval(np.polyfit(frame[outside], change[outside], 1), frame))[inside])
+    flat = [
+        f"The {name} clips must differ in pitch in the event; they do not: give the drive over the road feature and the"
+        " one that brakes on the flat road."
+        for name, curve in zip(("source", "edited"), curves, strict=True)
+        if np.ptp(curve) < LEAST_RESPONSE
+    ]
+    if flat:
+        raise InputError(flat)
     return float(abs(np.corrcoef(curves[0], curves[1])[0, 1]))

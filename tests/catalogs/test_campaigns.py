@@ -78,6 +78,28 @@ def test_a_sound_campaign_is_read_with_its_split_and_hashes(folder: Path) -> Non
     assert (campaign.content_hash, campaign.split_hash) == (again.content_hash, again.split_hash)
 
 
+def test_no_run_stands_in_a_campaign_under_two_names(folder: Path) -> None:
+    """A copy of a training run that is held out judges the fit by what was fitted."""
+    write_run(folder, NAMES[4], braking_columns(1))
+    assert "run-05: must be a recording of its own; its file is that of run-02" in problems_of(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("dry,0.0", "rain,0.0", "run-01: weather rain needs precipitation_mm_h above 0"),
+        ("dry,0.0", "dry,25.0", "run-01: weather dry has no precipitation"),
+        ("dry,0.0", "rain,-2.0", "run-01: precipitation_mm_h must not be negative"),
+        ("dry,0.0", "rain,1e9", "run-01: precipitation_mm_h must be at most 1872"),
+        ("dry,0.0,0.0", "snow,3.0,0.0", "run-01: weather snow needs an accumulation time"),
+    ],
+)
+def test_a_run_is_driven_in_weather_that_there_is(folder: Path, old: str, new: str, words: str) -> None:
+    table = folder / "runs.csv"
+    table.write_text(table.read_text().replace(old, new))
+    assert words in problems_of(folder)
+
+
 def test_the_hash_changes_with_any_sample(folder: Path) -> None:
     before = read_campaign(folder).content_hash
     columns = braking_columns(0)

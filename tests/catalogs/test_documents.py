@@ -83,6 +83,21 @@ def test_faulty_yaml_is_one_sentence_in_time(content, words):
     assert time.process_time() - begun < 5
 
 
+@pytest.mark.parametrize("number", ["0420", "-0_7", "7:00", "12:30:45.5", "+190:20:30"])
+def test_a_number_that_yaml_reads_to_another_base_is_refused(number):
+    """0420 would be 272, and 7:00 would be 420, without a word."""
+    with pytest.raises(InputError, match=r"must have plain decimal numbers; YAML takes .* \(line 2\)"):
+        parse_yaml(f"b: 1\na: {number}".encode(), "a file", "document")
+    assert parse_yaml(f"a: '{number}'".encode(), "a file", "document") == {"a": number}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("0", 0), ("0.5", 0.5), ("-0.0", 0.0), ("1_000", 1000), ("0x10", 16)]
+)
+def test_other_numbers_are_what_they_look_like(text, value):
+    assert parse_yaml(f"a: {text}".encode(), "a file", "document") == {"a": value}
+
+
 def test_all_faults_of_yaml_are_told_at_once_with_their_lines():
     problems = problems_of(parse_yaml, b"a: 1\na: 2\nb: {c: 1, c: 2, 3: 4}\nd: .inf\ne: !!omap []\n")
     assert [problem.rpartition(" (line ")[2] for problem in problems] == ["2)", "3)", "3)", "4)", "5)"]

@@ -208,11 +208,25 @@ def test_the_tyre_lies_beside_the_file_that_names_it(write, tmp_path):
             "{value: 0.55, unit: m, source: s, tolerance: 0}",
             "cg_height.tolerance: must be greater than 0; it is 0",
         ),
-        ("{value: 0.55, unit: m, source: s, tolerance: 5 %}", "must be a valid number; it is '5 %'"),
+        ("{value: 0.55, unit: m, source: s, tolerance: 5 %}", "it is '5 %': write it without the sign"),
         ("{value: 0.55, unit: m, source: s, tolerance: .nan}", "must be a finite number"),
     ],
 )
 def test_a_tolerance_that_is_none_is_refused(write, number, words):
+    assert words in refusal(write("car.yaml", f"extends: paper-reference\ncg_height: {number}\n"))
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        ("{value: '0,55', unit: m, source: s}", "it is '0,55': write it with a point, 0.55"),
+        ("{value: 5.5e-1, unit: m, source: s, tolerance: 1e2}", "the sign of the power, 1.0e+2"),
+        ("{value: 55e-2, unit: m, source: s}", "the sign of the power, 55.0e-2"),
+        ("{value: 0.55, unit: m, source: 7}", "it is 7: put it in quotes"),
+        ("{value: 055, unit: m, source: s}", "YAML takes 055 for one to the base of 8 or 60"),
+    ],
+)
+def test_a_number_as_people_write_it_is_told_how_yaml_wants_it(write, number, words):
     assert words in refusal(write("car.yaml", f"extends: paper-reference\ncg_height: {number}\n"))
 
 

@@ -108,7 +108,10 @@ def retention_rows(judged: JudgedSet, model: str, seed: str, method: str) -> Ite
                 note = f"not run: the four clips must have one number of frames, above {last + 2}"
             else:
                 given, braking, edited, edited_braking = (seen.motion.pitch for seen in pair)
-                value = motion_retention(given, braking, edited, edited_braking, (first, last))
+                try:
+                    value = motion_retention(given, braking, edited, edited_braking, (first, last))
+                except InputError as fault:
+                    note = f"not run: {fault}"
             yield figure_row("motion_retention", method, names[0], value, "1", note=note)
 
 

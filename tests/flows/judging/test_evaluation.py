@@ -74,7 +74,11 @@ def write_reference(dataset: Path, folder: Path) -> None:
         slower = 1 - 0.03 * time / time[-1] * (facts["weather"] == "snow")
         columns = {"time": time, "station": ticks["station"] * slower, "speed": ticks["speed"]}
         columns["pitch"] = np.rad2deg(1.25 * ticks["pitch"]) + 0.15
-        columns |= {f"{name}_{wheel}": 0 * time for name in ("slip", "wheel_load") for wheel in WHEELS}
+        columns |= {
+            f"{name}_{wheel}": load + 0 * time
+            for name, load in (("slip", 0.0), ("wheel_load", 4e3))
+            for wheel in WHEELS
+        }
         name = facts["label"].replace("/", "-")
         pq.write_table(pa.table(columns), folder / f"{name}.parquet")
         keys = ("weather", "initial_speed_km_h", "hazard_center_m", "hazard_length_m", "hazard_height_m")

@@ -222,6 +222,33 @@ def test_retention_sees_what_an_editor_kept_and_what_it_lost(tmp_path: Path) -> 
         measure_retention(
             source, braking, kept, edited_braking, camera=str(tmp_path / "K.yaml"), event=(16, 80)
         )
+    with pytest.raises(InputError, match=r"source\.txt: must be one of the four clips; it stands for two"):
+        measure_retention(source, source, kept, edited_braking, camera=str(tmp_path / "K.yaml"))
+    with pytest.raises(InputError, match="The edited clips must differ in pitch in the event; they do not"):
+        measure_retention(
+            source,
+            braking,
+            kept,
+            track("copy", 0.5 * dive - 0.4 * hump + drift),
+            camera=str(tmp_path / "K.yaml"),
+        )
+
+
+@pytest.mark.parametrize(
+    ("unit", "step", "told"), [(1.0, 0.1, False), (1.0, 0.4, False), (1e3, 0.1, True), (1e3, 1e-3, True)]
+)
+def test_a_claim_with_its_time_in_ms_is_not_judged_by_its_first_rows(
+    unit: float, step: float, told: bool
+) -> None:
+    """The first 8 of its seconds would be 8 ms of driving, in which nothing happens: any video would pass."""
+    time = np.arange(0.0, 8.0, step) * unit
+    claim = VideoClaim(time=time, pitch=np.zeros(len(time)), station=time)
+    frames = np.arange(80) * 0.1
+    if told:
+        with pytest.raises(InputError, match=r"The claim has .* rows in the 7\.9 s of the video's 80 frames"):
+            sample_claim(claim, frames)
+    else:
+        assert len(sample_claim(claim, frames).rows) >= 76
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,8 @@ from tests.campaign.recorded import MAP, braking_columns, log_signal
 def test_a_brake_command_stands_for_the_pressure_and_asks_for_the_joint_fit(tmp_path: Path) -> None:
     columns = log_signal(braking_columns(seconds=8.0))
     columns["command"] = columns.pop("p_bar") / 40.0  # 2 MPa are half of the brake
-    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    for part in ("train", "held_out"):
+        pd.DataFrame(columns).to_csv(tmp_path / f"{part}.csv", index=False)
     content = yaml.safe_load(MAP)
     del content["channels"]["brake_pressure"]
     content["channels"]["brake_command"] = {"source": "command", "unit": "1"}
@@ -26,14 +27,12 @@ def test_a_brake_command_stands_for_the_pressure_and_asks_for_the_joint_fit(tmp_
     content |= {
         "not_measured": ["brake_pressure"],
         "runs": [
-            {"name": f"r{i}", "file": "log.csv", "from_s": 0.2 * i, "to_s": 0.2 * i + 3.0, "part": part}
+            {"name": f"r{i}", "file": f"{part}.csv", "from_s": 0.2 * i, "to_s": 0.2 * i + 3.0, "part": part}
             for i, part in enumerate(parts)
         ],
     }
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
-    import_measurements(
-        str(tmp_path / "log.csv"), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign")
-    )
+    import_measurements(str(tmp_path), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign"))
     campaign = read_campaign(tmp_path / "campaign")
     assert campaign.brake_signal == "brake_command" and campaign.runs[0].pressure.max() == pytest.approx(
         5.0, abs=0.1

@@ -21,6 +21,9 @@ from tests.campaign.recorded import MAP, braking_columns, log_signal
 Columns = dict[str, np.ndarray]
 
 
+TOLERANCES = yaml.safe_load(MAP)["tolerances_1sigma"]
+
+
 def write_map(folder: Path, **changes: object) -> str:
     content = yaml.safe_load(MAP) | changes
     (folder / "map.yaml").write_text(yaml.safe_dump(content))
@@ -110,9 +113,10 @@ def test_without_asammdf_the_reader_says_what_to_install(
 
 
 def test_the_campaign_is_the_one_that_closing_the_loop_reads(tmp_path: Path) -> None:
-    write_csv(tmp_path / "log.csv", log_signal(braking_columns(seconds=14.0)))
+    for file, seconds in (("log.csv", 14.0), ("other.csv", 13.0)):
+        write_csv(tmp_path / file, log_signal(braking_columns(seconds)))
     runs = [
-        {"name": f"r{i}", "file": "log.csv", "from_s": 0.2 * i, "to_s": 0.2 * i + 3.0,
+        {"name": f"r{i}", "file": "other.csv" if i % 2 else "log.csv", "from_s": 0.2 * i, "to_s": 0.2 * i + 3.0,
          "part": "held_out" if i % 2 else "train", "conditions": {"disc_temperature_above_ambient_c": 10.0 * i}}
         for i in range(6)
     ]  # fmt: skip
@@ -124,6 +128,36 @@ def test_the_campaign_is_the_one_that_closing_the_loop_reads(tmp_path: Path) -> 
     assert campaign.runs[4].disc_rise == 40.0
     speed = campaign.runs[2].response[:, CHANNELS.index("speed")]
     np.testing.assert_allclose(speed, braking_columns(14.0)["speed"][40 : 40 + len(speed)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("train", "held_out", "shared"),
+    [
+        ({}, {}, True),
+        ({"to_s": 2.0}, {"from_s": 1.99}, True),
+        ({"to_s": 2.0}, {"from_s": 2.0}, False),
+        ({"to_s": 2.0}, {"from_s": 2.0, "part": "train"}, False),
+        ({}, {"part": "train"}, False),
+        ({}, {"file": "other.csv"}, False),
+    ],
+)
+def test_what_judges_a_fit_shares_no_sample_with_what_is_fitted(
+    tmp_path: Path, train: dict[str, object], held_out: dict[str, object], shared: bool
+) -> None:
+    for file in ("log.csv", "other.csv"):
+        write_csv(tmp_path / file, log_signal(braking_columns()))
+    common = {"file": "log.csv"}
+    runs = [
+        {"name": "a", **common, **train},
+        {"name": "b", "part": "held_out", **common, **held_out},
+    ]
+    out, channel_map = tmp_path / "campaign", write_map(tmp_path, runs=runs)
+    if not shared:
+        assert len(import_measurements(str(tmp_path), map=channel_map, out=str(out))["runs"]) == 2
+        return
+    with pytest.raises(InputError, match="run b is held out and must share no sample with a training run"):
+        import_measurements(str(tmp_path), map=channel_map, out=str(out))
+    assert not out.exists()
 
 
 def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
@@ -187,6 +221,7 @@ def _held(x: np.ndarray) -> np.ndarray:
         ("ax_g", lambda x: -x, "longitudinal_acceleration runs against the rate of speed"),
         ("p_bar", lambda x: x * 100, "channel brake_pressure reaches"),
         ("p_bar", lambda x: x / 10, "brake_pressure gives 15"),
+        ("p_bar", lambda x: -x, "brake_pressure falls to"),
         ("pitch_up", lambda x: -x, "channel pitch runs against the deceleration"),
         ("pitch_up", lambda x: np.degrees(x), "channel pitch reaches"),
         ("pitch_rate_up", lambda x: -x, "channel pitch_rate runs against the slope of pitch"),
@@ -195,6 +230,7 @@ def _held(x: np.ndarray) -> np.ndarray:
         ("w_r", lambda x: -x, "wheel_speed_rear is negative"),
         ("pitch_up", _held, "pitch: is frozen: it holds"),
         ("v_kmh", _held, "speed: is frozen: it holds"),
+        ("p_bar", lambda x: np.where(np.arange(len(x)) < 300, x, np.nan), "brake_pressure: has samples from"),
         ("az", lambda x: np.where(np.arange(len(x)) == 90, np.inf, x), "vertical_acceleration: has 1 samples"),
         ("t_ms", lambda x: x + 700.0 * (np.arange(len(x)) > 100), "gaps or forward jumps of its clock"),
         ("t_ms", lambda x: x - 300.0 * (np.arange(len(x)) > 100), "clock that does not advance"),
@@ -226,6 +262,21 @@ def test_a_missing_signal_is_named_with_those_that_come_near(tmp_path: Path) -> 
     assert "signal v_kmh is missing; there are: v_kmph" in problems_of(tmp_path, log)
 
 
+@pytest.mark.parametrize(
+    ("rate", "sound"), [(100, True), (50, True), (120, True), (130, False), (1000, False)]
+)
+def test_no_campaign_has_more_samples_than_were_measured(tmp_path: Path, rate: float, sound: bool) -> None:
+    """At 80 Hz in place of its 20, the log of the tutorial gave a verdict with a fiftieth of the interval."""
+    log = log_signal(braking_columns())
+    if sound:
+        source = write_csv(tmp_path / "log.csv", log)
+        assert len(imported(tmp_path, source, sample_rate_hz=rate)["speed"]) > 3.9 * rate
+    else:
+        assert "must not be above the rate of the fastest signal, 100 Hz" in problems_of(
+            tmp_path, log, sample_rate_hz=rate
+        )
+
+
 def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
     columns = braking_columns()
     for name in columns:
@@ -248,11 +299,56 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
             "runs.0.conditions.weather: must be",
         ),
         ({"colour": "red"}, "colour: unknown key"),
+        (
+            {"tolerances_1sigma": TOLERANCES | {"mass": 5}},
+            "mass: must be a share of at most 1, not per cent; it is 5",
+        ),
+        ({"tolerances_1sigma": TOLERANCES | {"grade": 1.5}}, "grade: must be a share of at most 1"),
+        ({"channels": {"speed": {"source": "v", "unit": "m/s", "scale": 0}}}, "speed.scale: must not be 0"),
+        (
+            {"channels": {"speed": {"source": "v", "unit": "m/s", "delay_s": 50}}},
+            "at most 2 either way; it is 50",
+        ),
+        (
+            {"channels": {"speed": {"source": "v", "unit": "m/s", "delay_s": -20}}},
+            "must be a delay in seconds",
+        ),
+        (
+            {
+                "channels": {
+                    name: {"source": "w", "unit": "rpm"} for name in ("wheel_speed_front", "wheel_speed_rear")
+                }
+            },
+            "signal w must be one measurement; it stands for wheel_speed_front, wheel_speed_rear",
+        ),
+        (
+            {"channels": {"wheel_speed_front": {"source": ["w", "w"], "unit": "rpm"}}},
+            "signal w must be one measurement; it stands for wheel_speed_front, wheel_speed_front",
+        ),
+        ({"conditions": {"weather": "rain"}}, "conditions: weather rain needs precipitation_mm_h above 0"),
+        ({"conditions": {"precipitation_mm_h": 25.0}}, "conditions: weather dry has no precipitation"),
+        (
+            {"conditions": {"weather": "rain", "precipitation_mm_h": -1.0}},
+            "precipitation_mm_h must not be negative",
+        ),
+        ({"conditions": {"hazard_height_m": 0.1}}, "needs hazard_length_m above 0"),
+        (
+            {"runs": [{"name": "a", "file": "log.csv", "conditions": {"weather": "snow"}}]},
+            "runs: run a: weather snow needs precipitation_mm_h above 0",
+        ),
         ({"runs": [{"name": "../a", "file": "log.csv"}]}, "runs.0.name"),
     ],
 )
 def test_a_faulty_map_is_named_by_its_key(tmp_path: Path, changes: dict[str, object], words: str) -> None:
     assert words in problems_of(tmp_path, log_signal(braking_columns()), **changes)
+
+
+def test_conditions_of_a_run_complete_the_common_ones(tmp_path: Path) -> None:
+    source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
+    runs = [{"name": "a", "file": "log.csv", "conditions": {"precipitation_mm_h": 25.0}}]
+    channel_map = write_map(tmp_path, conditions={"weather": "rain"}, runs=runs)
+    import_measurements(source, map=channel_map, out=str(tmp_path / "campaign"))
+    assert "rain,25.0" in (tmp_path / "campaign" / "runs.csv").read_text()
 
 
 @pytest.mark.parametrize("file", ["../log.csv", "/etc/passwd", "..", "a\x00b", ""])

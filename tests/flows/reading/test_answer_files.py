@@ -95,7 +95,7 @@ def test_an_answer_too_large_or_none_leaves_no_file(toy_dataset, tmp_path, monke
 @pytest.mark.parametrize("to", ["csv", "parquet"])
 def test_a_query_that_fails_or_has_no_answer_leaves_no_file(toy_dataset, tmp_path, to):
     told = {
-        "-- nothing": "must have an answer",
+        "-- nothing": "must be one SQL statement",
         "SELECT label::INT FROM ticks": "Could not convert",
         "SELEC": "syntax",
     }

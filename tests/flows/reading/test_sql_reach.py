@@ -104,6 +104,21 @@ def test_files_are_read_and_written_where_they_are_allowed(toy_dataset, tmp_path
         musync.open(toy_dataset.root).sql(f"SELECT * FROM read_text('{tmp_path}/notes.txt')")
 
 
+@pytest.mark.parametrize(
+    ("query", "count"),
+    [("", 0), (" ; ", 0), ("-- nothing", 0), ("SELECT 1; SELECT 2", 2), ("SELECT 1;", None)],
+)
+def test_a_question_is_one_statement(toy_dataset, query, count):
+    """Of two, the first one's rows would go without a word; none gave an empty answer."""
+    if count is None:
+        assert query_dataset(str(toy_dataset.root), query)["rows"] == [{"1": 1}]
+        return
+    with pytest.raises(InputError, match=f"must be one SQL statement; it holds {count}"):
+        query_dataset(str(toy_dataset.root), query)
+    if count > 1:
+        assert query_dataset(str(toy_dataset.root), query, allow_files=True)["rows"] == [{"2": 2}]
+
+
 def test_a_query_sees_no_variables_of_python(toy_dataset):
     secret = pd.DataFrame({"password": ["1234"]})
     data = musync.open(toy_dataset.root)

@@ -153,6 +153,20 @@ def test_a_folder_that_cannot_be_used_is_told_before_the_work(tmp_path):
             Outputs(tmp_path / out, "audit", "audit.json")
 
 
+@pytest.mark.parametrize("place", [".", "inputs", "results/new", "../link", "../link/results"])
+def test_a_dataset_keeps_only_the_files_that_it_records(tmp_path, place):
+    dataset = tmp_path / "dataset"
+    (dataset / "inputs").mkdir(parents=True)
+    (dataset / "plan.json").write_text("{}")
+    (tmp_path / "link").symlink_to(dataset)
+    with pytest.raises(
+        InputError, match="must lie outside the dataset dataset, whose files are all recorded"
+    ):
+        Outputs(dataset / place, "diff", "diff.json")
+    assert contents(dataset) == {"plan.json": b"{}"}
+    write(tmp_path / "beside", "diff", "diff.json")
+
+
 def test_the_marker_lists_a_file_before_it_is_there(tmp_path, monkeypatch):
     def full(path: Path, content: bytes) -> None:
         raise OSError(28, "No space left on device")

@@ -1,0 +1,97 @@
+"""Text files as loggers and spreadsheets write them: what is no number is named with its row and what to do."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from catalogs.channel_maps import load_channel_map
+from catalogs.recordings import read_signals, summarise_signals
+from flows.cli import app
+from flows.measured.importing import import_measurements
+from tasks.errors import InputError
+from tests.campaign.recorded import MAP
+
+WANTED = "channels: {speed: {source: v, unit: m/s}}\ntime: {source: t}\n"
+
+
+def read(folder: Path, text: bytes, rest: str = "") -> dict[str, list[float]]:
+    (folder / "log.csv").write_bytes(text)
+    content = yaml.safe_load(MAP) | yaml.safe_load(WANTED + rest)
+    content["not_measured"] = sorted(yaml.safe_load(MAP)["channels"].keys() - {"speed"})
+    (folder / "map.yaml").write_text(yaml.safe_dump(content))
+    channel_map, _ = load_channel_map(folder / "map.yaml")
+    signals = read_signals(folder / "log.csv", channel_map)
+    return {"t": signals["v"].time.tolist(), "v": signals["v"].values.tolist()}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"t,v\n0,10\n1,11\n",
+        b"t,v\n0,10,\n1,11,\n",  # a separator at the end of each row
+        b"t,v,\n0,10,\n1,11,\n",
+        b"\xef\xbb\xbft,v\r\n0,10\r\n1,11\r\n",
+    ],
+)
+def test_each_value_stands_under_its_own_name(tmp_path: Path, text: bytes) -> None:
+    assert read(tmp_path, text) == {"t": [0.0, 1.0], "v": [10.0, 11.0]}
+
+
+@pytest.mark.parametrize(
+    ("text", "rest", "words"),
+    [
+        (b"t,v\n0,10,5\n1,11,6\n", "", "more values than the first line has names"),
+        (b"t;v\n0;10\n", "", r'the first line is .t;v.: give csv: {separator: ";"} in the map'),
+        (b"t\tv\n0\t10\n", "", r'give csv: {separator: "\\t"} in the map'),
+        (b"\n\nt;v\n0;10\n", "csv: {skip_rows: 2}", r'give csv: {separator: ";"}'),
+        (b"t;v\n0;10,5\n1;11,5\n", "csv: {separator: ;}", "v must be of numbers; row 1 .* '10,5': give csv: {decimal"),
+        (b"t,v\ns,m/s\n0,10\n1,11\n", "", "v must be of numbers; row 1 .* 'm/s': remove this row"),
+        (b"t,v\n0,10\n1,Err\n", "", "v must be of numbers; row 2 .* 'Err': correct it, or leave it empty"),
+        (b"t,v\n12:00:01,10\n12:00:02,11\n", "", "t must be of numbers; row 1 .* write times as a number of seconds"),
+        (b"t,v\n2026-01-01,10\n", "", "t must be of numbers; row 1 .* write times as a number of seconds"),
+        ("t,v,\u00b0\n0,10,1\n".encode("latin-1"), "", "must be UTF-8 text; it is not: save it as UTF-8"),
+    ],
+)  # fmt: skip
+def test_what_is_no_number_is_named_with_what_to_do(
+    tmp_path: Path, text: bytes, rest: str, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        read(tmp_path, text, rest)
+
+
+def test_a_list_of_signals_shows_those_that_are_text(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,v\ns,m/s\n0,10\n1,12\n")
+    rows = {row.signal: row for row in summarise_signals(tmp_path / "log.csv", None)}
+    assert (rows["v"].samples, rows["v"].lowest, rows["v"].highest) == (2, 10.0, 12.0)
+    assert "'m/s': remove this row, which seems to hold units" in rows["v"].note
+    shown = CliRunner().invoke(
+        app, ["import-measurements", str(tmp_path), "--list-signals"], env={"COLUMNS": "200"}
+    )
+    assert shown.exit_code == 0 and "remove this row" in shown.output
+
+
+@pytest.mark.parametrize("column", ["t", "v"])
+def test_a_list_of_signals_of_parquet_shows_the_type_that_is_none_of_numbers(
+    tmp_path: Path, column: str
+) -> None:
+    table = pd.DataFrame({"t": [0.0, 1.0], "v": [10.0, 12.0]})
+    table[column] = pd.to_datetime(table[column], unit="s")
+    table.to_parquet(tmp_path / "log.parquet")
+    (tmp_path / "map.yaml").write_text("time: {source: t}\n")
+    listed = import_measurements(
+        str(tmp_path / "log.parquet"), map=str(tmp_path / "map.yaml"), list_signals=True
+    )
+    rows = {row["signal"]: row for row in listed["signals"]["log.parquet"]}
+    assert rows[column]["samples"] == 0 and "not of numbers, but of timestamp" in rows[column]["note"]
+
+
+def test_a_map_that_says_only_how_the_text_is_written_lists_the_signals(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "log.csv").write_text("t;v\n0;10,5\n1;11,5\n")
+    (tmp_path / "map.yaml").write_text("csv: {separator: ';', decimal: ','}\ntime: {source: t}\n")
+    listed = import_measurements(str(tmp_path / "logs"), map=str(tmp_path / "map.yaml"), list_signals=True)
+    speed = listed["signals"]["log.csv"][1]
+    assert (speed["lowest"], speed["rate_hz"]) == (10.5, 1.0)
