@@ -40,8 +40,8 @@ def find_row_difference(
                 first = {
                     "channel": channel,
                     "tick": tick,
-                    "recorded": a[tick].tolist(),
-                    "remade": b[tick].tolist(),
+                    "recorded": a[tick : tick + 1].tolist()[0],
+                    "remade": b[tick : tick + 1].tolist()[0],
                 }
     return first
 
@@ -82,7 +82,9 @@ def find_pixel_difference(array: str, recorded: NDArray[Any], remade: NDArray[An
 
 def _mark_differences(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
     """Return which rows of two arrays [N, ...] hold other bytes, bool [N]: 0 is not -0, and a NaN is itself."""
-    ours, theirs = (np.ascontiguousarray(x).reshape(len(x), prod(x.shape[1:])).view(np.uint8) for x in (a, b))
+    ours, theirs = (np.ascontiguousarray(x).reshape(len(x), prod(x.shape[1:])) for x in (a, b))
+    if a.dtype != object:  # text has no bytes of its own in an array
+        ours, theirs = ours.view(np.uint8), theirs.view(np.uint8)
     unequal: NDArray[np.bool_] = (ours != theirs).any(axis=1)
     return unequal
 

@@ -57,3 +57,11 @@ def test_one_changed_pixel_is_named_by_frame_column_and_row():
 def test_depth_with_nan_compares_equal_to_itself():
     depth = np.full((2, 3, 4), np.nan, np.float32)
     assert find_pixel_difference("depth", depth, depth.copy()) is None
+
+
+def test_text_differs_by_what_it_says():
+    recorded = {"label": np.array(["dry", "rain", "snow"], object)}
+    remade = {"label": np.array(["dry", "rain", "ice"], object)}
+    found = find_row_difference(recorded, remade, ["label"])
+    assert found == {"channel": "label", "tick": 2, "recorded": "snow", "remade": "ice"}
+    assert find_row_difference(recorded, dict(recorded), ["label"]) is None
