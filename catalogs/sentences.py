@@ -109,7 +109,7 @@ def _describe_rule(problem: Any, known: Callable[[Place], Iterable[str]]) -> str
 
 
 def _suggest_form(rule: str, value: object) -> str:
-    """What a person meant who wrote a number as text, or text as a number; empty where nobody can tell."""
+    """Return what to write in place of a number given as text, or the reverse; empty where nobody can tell."""
     if rule == "string_type" and isinstance(value, bool | int | float):
         return ": put it in quotes"
     if rule not in {"float_type", "int_type"} or not isinstance(value, str):
