@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
 
+from flows.running.runner import IN_FLIGHT
+
 Row = tuple[str, float, str]
 """Name, value and unit."""
 SECONDS_PER_HOUR = 3600
@@ -75,7 +77,7 @@ def plan_production(
     yield "workers' time", work_s / SECONDS_PER_HOUR, "CPU-h"
     yield "making, all workers busy", making_s / SECONDS_PER_HOUR, "h"
     yield "driver and scheduler", driver_s / SECONDS_PER_HOUR, "CPU-h"
-    yield "workers that one driver keeps busy", c.cpu_s / c.scheduler_cpu_s, "1"
+    yield "workers that one driver keeps busy", min(c.cpu_s / c.scheduler_cpu_s, IN_FLIGHT), "1"
     yield "stored", size / 1e12, "TB"
     yield "written a second", size / making_s / 1e6, "MB/s"
     yield "manifest of one dataset", min(clips, most_clips) * c.manifest_bytes / 1e6, "MB"

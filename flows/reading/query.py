@@ -80,9 +80,8 @@ def query_dataset(
     with connect_views(dataset, allow_files=allow_files) as connection:
         try:
             count = len(connection.extract_statements(query))
-            if count == 0 or (
-                count > 1 and not allow_files
-            ):  # with files, LOAD and ATTACH come before the question
+            # with files, LOAD and ATTACH come before the question
+            if count == 0 or (count > 1 and not allow_files):
                 raise InputError(f"--- {shorten(query)}: must be one SQL statement; it holds {count}")
             names, rows = run_interruptibly(connection, lambda: fetch(connection, query))
         except duckdb.Error as error:
