@@ -21,6 +21,7 @@ from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign, Run, Tolerances
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.run_validation import COLUMN_UNITS, run_problems
+from tasks.campaign.slow_channels import collect_samples, fill_between_samples
 from tasks.errors import InputError
 
 NEEDED = ("brake_pressure", "speed")
@@ -218,10 +219,16 @@ def _make_run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: boo
         hazard_height=float(row["hazard_height_m"]),
         interval=interval,
         pressure=pressure,
-        response=np.column_stack([columns.get(name, np.zeros(len(pressure))) for name in CHANNELS]),
+        response=np.column_stack(
+            [
+                fill_between_samples(name, columns[name]) if name in columns else np.zeros(len(pressure))
+                for name in CHANNELS
+            ]
+        ),
         drive_torque=columns.get("engine_torque"),
         road_slope=np.radians(columns["road_slope"]) if "road_slope" in columns else None,
         throttle=columns.get("throttle"),
+        sampled=collect_samples(columns),
     )
 
 

@@ -19,6 +19,7 @@ from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.events import RecordedRun
 from tasks.campaign.run_validation import COLUMN_UNITS
+from tasks.campaign.slow_channels import fill_between_samples
 from tasks.errors import InputError
 from tasks.surface.weather import Weather
 
@@ -71,6 +72,7 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
         except InputError as error:
             problems += [f"{row['run']}: {problem}" for problem in error.problems]
             continue
+        columns = {name: fill_between_samples(name, values) for name, values in columns.items()}
         problems += unit_problems(units, COLUMN_UNITS, row["run"])
         problems += [f"{row['run']}: channel {name} is missing" for name in needed if name not in columns]
         problems += [

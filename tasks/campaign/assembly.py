@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import UNITS
 from tasks.campaign.run_validation import LEAST_SAMPLES
@@ -16,6 +17,7 @@ from tasks.campaign.signals import (
     make_common_clock,
     resample_on_clock,
 )
+from tasks.campaign.slow_channels import clear_between_samples, take_updates
 
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
@@ -39,7 +41,8 @@ class Assembled:
     Parameters
     ----------
     start : the logger's time of the first sample [s]
-    columns : channels by name, each float64 [N], in campaign units; empty if there are problems
+    columns : channels by name, each float64 [N], in campaign units, NaN between the samples of a slow channel; empty
+        if there are problems
     problems : one sentence each
     """
 
@@ -63,7 +66,10 @@ def assemble_run(
     found: list[tuple[str, str]] = []
     parts: dict[str, list[Signal]] = {}
     for rule in rules:
-        logged = [signals[name].cut_window(start, end) for name in rule.sources]
+        logged = [signals[name] for name in rule.sources]
+        if rule.channel in CHANNELS:
+            logged = [take_updates(signal) for signal in logged]
+        logged = [signal.cut_window(start, end) for signal in logged]
         for signal in logged:
             stated = ALIASES.get(signal.unit, signal.unit)
             if stated in UNITS and stated != rule.unit:
@@ -91,7 +97,12 @@ def assemble_run(
     broken = {channel for channel, _ in found}
     whole = {channel: values for channel, values in columns.items() if channel not in broken}
     problems += plausibility_problems(whole, 1.0 / rate, {rule.channel: rule.unit for rule in rules})
-    return Assembled(start=float(clock[0]), columns={} if problems else columns, problems=tuple(problems))
+    if problems:
+        return Assembled(start=float(clock[0]), columns={}, problems=tuple(problems))
+    cleared = {
+        name: clear_between_samples(name, values, usable[name], clock) for name, values in columns.items()
+    }
+    return Assembled(start=float(clock[0]), columns=cleared, problems=())
 
 
 def _write_sentences(found: list[tuple[str, str]]) -> list[str]:

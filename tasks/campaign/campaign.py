@@ -61,10 +61,12 @@ class Run:
     hazard_center, hazard_length, hazard_height : road feature [m]; length 0 is a flat road
     interval : time between samples [s]
     pressure : float64 [N] measured brake pressure [MPa]
-    response : float64 [N, 7] measured channels in the order of `CHANNELS`; 0 where a channel was not measured
+    response : float64 [N, 7] measured channels in the order of `CHANNELS`, linear between the samples of a slow one; 0
+        where a channel was not measured
     drive_torque : float64 [N] of the engine at the wheels, driving positive [N m]; None where it was not measured
     road_slope : float64 [N] of the road, uphill positive [rad]; None where it was not measured
     throttle : float64 [N] share of the full throttle [1]; None where it was not measured
+    sampled : bool [N, 7] instants at which each channel has a sample; None where all have one at every instant
     """
 
     name: str
@@ -83,6 +85,27 @@ class Run:
     drive_torque: NDArray[np.float64] | None = None
     road_slope: NDArray[np.float64] | None = None
     throttle: NDArray[np.float64] | None = None
+    sampled: NDArray[np.bool_] | None = None
+
+    def find_samples(self, channel: int) -> NDArray[np.int64]:
+        """Return the instants at which a channel has a sample, int64 [M].
+
+        Parameters
+        ----------
+        channel : place in `CHANNELS`
+        """
+        return (
+            np.arange(len(self.response))
+            if self.sampled is None
+            else np.flatnonzero(self.sampled[:, channel])
+        )
+
+    def group_channels(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Return the channels that share their instants: places in `CHANNELS`, int64 [C], and instants, int64 [M]."""
+        groups: dict[bytes, list[int]] = {}
+        for channel in range(len(CHANNELS)):
+            groups.setdefault(self.find_samples(channel).tobytes(), []).append(channel)
+        return [(np.array(channels), self.find_samples(channels[0])) for channels in groups.values()]
 
 
 @dataclass(frozen=True, kw_only=True)

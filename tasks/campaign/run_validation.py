@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
+from tasks.campaign.slow_channels import fill_between_samples, find_samples
 
 COLUMN_UNITS = {"time": "s", **{name: channel.unit for name, channel in CHANNELS_BY_NAME.items()}}
 LEAST_SAMPLES = 20
@@ -28,7 +29,7 @@ def run_problems(
 
     Parameters
     ----------
-    columns : measured columns by name, each float64 [N]
+    columns : measured columns by name, each float64 [N]; NaN between the samples of a slow channel
     units : units from the file's metadata, by column; a column without one counts as correct
     interval : declared time between samples [s]
     needed : columns that there must be
@@ -51,15 +52,16 @@ def run_problems(
     if "time" in columns and "time" not in misread:
         problems += _clock_problems(columns["time"], interval)
     clock = interval * np.arange(count, dtype=np.float64)
-    usable = {}
+    usable, signals = dict[str, NDArray[np.float64]](), dict[str, Signal]()
     for name in COLUMN_UNITS:
         if name == "time" or name not in columns:
             continue
-        gaps = signal_problems(Signal(time=clock, values=columns[name]))
+        own = find_samples(name, columns[name])
+        signal = Signal(time=clock[own], values=columns[name][own])
+        gaps = signal_problems(signal)
         problems += [f"channel {name} has a gap: it {problem}" for problem in gaps]
         if not gaps and name not in misread:
-            usable[name] = columns[name]
-    signals = {name: Signal(time=clock, values=values) for name, values in usable.items()}
+            usable[name], signals[name] = fill_between_samples(name, columns[name]), signal
     for name, signal in signals.items():
         frozen = frozen_problem(name, signal, signals.get("speed"))
         problems += [] if frozen is None else [f"channel {name} {frozen}"]

@@ -108,6 +108,25 @@ def test_the_hash_changes_with_any_sample(folder: Path) -> None:
     assert read_campaign(folder).content_hash != before
 
 
+def test_a_slow_channel_has_samples_where_its_file_has_values(folder: Path) -> None:
+    columns = braking_columns(1)
+    kept = np.arange(300) % 10 == 4
+    columns["speed"] = np.where(kept, columns["speed"], np.nan)
+    write_run(folder, "run-02", columns)
+    first, second, *_ = read_campaign(folder).runs
+    assert first.sampled is None and second.sampled is not None
+    np.testing.assert_array_equal(second.sampled[:, 0], kept)
+    assert second.sampled[:, 1:].all() and np.isfinite(second.response).all()
+
+
+def test_a_hole_in_a_slow_channel_is_a_gap(folder: Path) -> None:
+    columns = braking_columns(1)
+    kept = (np.arange(300) % 10 == 4) & (abs(np.arange(300) - 150) > 40)
+    columns["speed"] = np.where(kept, columns["speed"], np.nan)
+    write_run(folder, "run-02", columns)
+    assert "run-02: channel speed has a gap" in problems_of(folder)
+
+
 @pytest.mark.parametrize(
     ("channel", "damage", "words"),
     [

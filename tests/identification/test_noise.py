@@ -91,6 +91,40 @@ def test_a_channel_that_never_changes_and_runs_that_are_too_short_are_both_named
     )
 
 
+def log_slowly(campaign: Campaign, channel: int, every: int) -> Campaign:
+    """The campaign with one channel that has a sample at every few instants only, and a line between them."""
+    runs = []
+    for k, run in enumerate(campaign.runs):
+        rows = np.arange(k % every, len(run.response), every)
+        response, sampled = run.response.copy(), np.ones(run.response.shape, dtype=bool)
+        response[:, channel] = np.interp(np.arange(len(response)), rows, response[rows, channel])
+        sampled[:, channel] = np.isin(np.arange(len(response)), rows)
+        runs.append(replace(run, response=response, sampled=sampled))
+    return replace(campaign, runs=tuple(runs))
+
+
+def test_the_noise_of_a_slow_channel_is_that_of_its_own_samples() -> None:
+    speed = CHANNELS.index("speed")
+    rho, sigma = estimate_channel_noise(log_slowly(quiet_campaign(), speed, 4))
+    _, whole_sigma = estimate_channel_noise(quiet_campaign())
+    assert sigma[speed] == pytest.approx(NOISE[speed], rel=0.4) and rho[speed] < 0.5
+    assert np.delete(sigma, speed) == pytest.approx(np.delete(whole_sigma, speed), rel=1e-9)
+
+
+def test_a_slow_channel_is_white_at_its_samples_and_weighs_nothing_between_them() -> None:
+    x = np.random.default_rng(2).standard_normal((40, 7, 2))
+    rho = np.full(7, 0.5)
+    sampled = np.ones((40, 7), dtype=bool)
+    sampled[:, 0] = np.arange(40) % 5 == 3
+    white = whiten_channels(x, rho, NOISE, sampled).reshape(x.shape)
+    alone = whiten_channels(x[3::5], rho, NOISE).reshape((8, 7, 2))
+    np.testing.assert_array_equal(white[3::5, 0], alone[:, 0])
+    assert (white[~sampled[:, 0], 0] == 0.0).all()
+    np.testing.assert_array_equal(white[:, 1:], whiten_channels(x, rho, NOISE).reshape(x.shape)[:, 1:])
+    back = unwhiten_channels(white.reshape(-1, 2), rho, NOISE, sampled)
+    assert back[sampled] == pytest.approx(x[sampled]) and (back[~sampled] == 0.0).all()
+
+
 def test_unwhitening_undoes_whitening() -> None:
     x = np.random.default_rng(1).standard_normal((40, 7, 3))
     rho = np.array([0.6, 0.0, 0.9, 0.2, 0.8, 0.0, 0.5])

@@ -71,11 +71,12 @@ def _correlate_channel(
     powers, pressed, count = np.zeros(2), 0.0, 0
     for i, run in enumerate(runs):
         rho, sigma = run.rho[channel : channel + 1], run.sigma[channel : channel + 1]
-        u = _whiten_channel(run.model.run.pressure[: run.model.samples], rho, sigma)
+        u = _whiten_channel(run.model.run.pressure[: run.model.samples, None], rho, sigma)
+        own = None if run.model.sampled is None else run.model.sampled[:, channel : channel + 1]
         pressed += float(u @ u)
         count += len(u)
         for j in range(2):
-            e = _whiten_channel(residuals[j][i][:, channel], rho, sigma)
+            e = _whiten_channel(residuals[j][i][:, channel : channel + 1], rho, sigma, own)
             powers[j] += float(e @ e)
             sums[j] += np.correlate(np.pad(e, most), u, mode="valid")
     scale = np.sqrt(np.maximum(powers * pressed, 1e-300))[:, None]
@@ -89,8 +90,11 @@ def _correlate_channel(
 
 
 def _whiten_channel(
-    x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
+    x: NDArray[np.float64],
+    rho: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    sampled: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
-    """Return one channel, whitened and without its mean, float64 [N - 1]."""
-    white = whiten_channels(x[:, None], rho, sigma)[1:]
+    """Return one channel of shape [N, 1], whitened and without its mean, float64 [N - 1]."""
+    white = whiten_channels(x, rho, sigma, sampled)[1:]
     return np.asarray(white - white.mean(), dtype=np.float64)

@@ -48,14 +48,17 @@ def plan_next_experiment(
     other, other_slots = compose_parameters(second.parts, second.values, second.session)
     planned = []
     for plan, drive in EXPERIMENTS:
-        model = prepare_run(make_planned_run(drive, plan), vehicle, surface)
+        run = make_planned_run(drive, plan)
+        if (sampled := evidence.train[0].model.sampled) is not None:
+            run = replace(run, sampled=np.resize(sampled, run.response.shape))
+        model = prepare_run(run, vehicle, surface)
         predicted = predict_channels(model, theta, slots=slots)
         # prepared again with the predicted speed, so that the run ends where the vehicle is slow
         model = prepare_run(replace(model.run, response=predicted), vehicle, surface)
         change = predict_channels(model, other, slots=other_slots) - predict_channels(
             model, theta, slots=slots
         )
-        planned.append((plan, model, whiten_channels(change, rho, sigma)))
+        planned.append((plan, model, whiten_channels(change, rho, sigma, model.sampled)))
     best = ("", -1.0)
     # what the nuisances take away makes a distance smaller only: the largest come first, and the rest are not taken
     for plan, model, change in sorted(planned, key=lambda run: -float(run[2] @ run[2])):

@@ -140,7 +140,12 @@ def rewhiten_splines(
     before, after : the runs under either noise
     """
     return tuple(
-        whiten_channels(unwhiten_channels(columns, old.rho, old.sigma), new.rho, new.sigma)
+        whiten_channels(
+            unwhiten_channels(columns, old.rho, old.sigma, old.model.sampled),
+            new.rho,
+            new.sigma,
+            new.model.sampled,
+        )
         for columns, old, new in zip(splines, before.train, after.train, strict=True)
     )
 
@@ -161,7 +166,7 @@ def _differentiate_run(
             )
             moved = predict_channels(run.model, theta, slots=(*slots, extra))
             columns.append((moved - y) / PORT_STEP[port])
-    return whiten_channels(np.stack(columns, axis=-1), run.rho, run.sigma)
+    return whiten_channels(np.stack(columns, axis=-1), run.rho, run.sigma, run.model.sampled)
 
 
 def make_form_hypotheses(leftover: ResidualSpline, samples: int, count: int = 2) -> list[Hypothesis]:

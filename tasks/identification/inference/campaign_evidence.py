@@ -43,4 +43,4 @@ class Evidence:
     @property
     def samples(self) -> int:
         """Return the number of measured training values, N of the score."""
-        return sum(run.model.samples * int(np.isfinite(run.sigma).sum()) for run in self.train)
+        return sum(int(run.model.count_samples()[np.isfinite(run.sigma)].sum()) for run in self.train)

@@ -86,7 +86,7 @@ def differentiate_run(
         compute_quotient(_shift_parameter(base, i, 0.5 * s), 0.5 * s)
         for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
     ]
-    nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma)
+    nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma, model.sampled)
     evidence = RunEvidence(
         model=model,
         rho=rho,
@@ -94,7 +94,7 @@ def differentiate_run(
         nuisance=nuisance,
         knots=tuple(knots),
         information=nuisance.T @ nuisance,
-        session=whiten_channels(np.stack(session, axis=-1), rho, sigma),
+        session=whiten_channels(np.stack(session, axis=-1), rho, sigma, model.sampled),
         library=np.zeros((len(nuisance), 1)),
         others=np.zeros((len(nuisance), 1)),
         factor=np.empty(0),
@@ -139,7 +139,7 @@ def differentiate_by_library(
             else compute_quotient(_shift_parameter(theta, leading.index, leading.step), leading.step)
         )
     columns, more = (
-        whiten_channels(np.stack(part, axis=-1), run.rho, run.sigma)
+        whiten_channels(np.stack(part, axis=-1), run.rho, run.sigma, run.model.sampled)
         for part in (library, others or [np.zeros_like(library[0])])
     )
     return replace(

@@ -66,7 +66,12 @@ def set_run_noise(evidence: Evidence, noise: Mapping[str, RunNoise]) -> Evidence
         if np.array_equal(own.rho, run.rho) and np.array_equal(own.sigma, run.sigma):
             return run
         nuisance, session, library, others = (
-            whiten_channels(unwhiten_channels(columns, run.rho, run.sigma), own.rho, own.sigma)
+            whiten_channels(
+                unwhiten_channels(columns, run.rho, run.sigma, run.model.sampled),
+                own.rho,
+                own.sigma,
+                run.model.sampled,
+            )
             for columns in (run.nuisance, run.session, run.library, run.others)
         )
         changed = replace(
@@ -85,12 +90,13 @@ def set_run_noise(evidence: Evidence, noise: Mapping[str, RunNoise]) -> Evidence
 def _estimate_noise(run: RunEvidence, point: LinearisedRun, evidence: Evidence) -> RunNoise:
     """Return the noise that a run's leftover asks for, which is nowhere below its sensors'."""
     left = run.add_offsets(point.residual, point.offsets - run.estimate_offsets(point.projected))
-    error = unwhiten_channels(left, run.rho, run.sigma)
-    white = whiten_channels(error, *evidence.sensors).reshape(error.shape)
+    error = unwhiten_channels(left, run.rho, run.sigma, run.model.sampled)
+    white = whiten_channels(error, *evidence.sensors, run.model.sampled).reshape(error.shape)
     rho, sigma = evidence.sensors[0].copy(), evidence.sensors[1].copy()
     for c in np.flatnonzero(np.isfinite(sigma)):
-        if float(np.mean(white[:, c] ** 2)) > evidence.rules.discrepancy_limit:
-            e = error[:, c]
+        own = slice(None) if run.model.sampled is None else run.model.sampled[:, c]
+        if float(np.mean(white[own, c] ** 2)) > evidence.rules.discrepancy_limit:
+            e = error[own, c]
             rho[c] = max(correlate_with_next(e, evidence.rules.joint.most_residual_correlation), rho[c])
             sigma[c] = max(float(np.sqrt(np.mean(e**2))), sigma[c])
     return RunNoise(rho=rho, sigma=sigma)

@@ -92,7 +92,7 @@ class RunEvidence:
             y = predict_channels(self.model, theta, slots=slots)
             if not np.isfinite(y).all():
                 return np.full(len(self.nuisance), BROKEN)
-            return whiten_channels(self.model.measured - y, self.rho, self.sigma)
+            return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
         moved, slots = move_by_offsets(theta, slots, offsets, self.knots)
         speed = compute_starting_speed(self.model, theta) + offsets[0]
         simulated = simulate_run(self.model, moved, slots=slots, initial_speed=speed)
@@ -101,7 +101,7 @@ class RunEvidence:
             return np.full(len(self.nuisance), BROKEN)
         y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
         y[:, CHANNELS.index("pitch")] += offsets[3]
-        return whiten_channels(self.model.measured - y, self.rho, self.sigma)
+        return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
 
     def add_offsets(self, residual: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a residual with the linear part of the run's own offsets and disturbances, float64 [M].

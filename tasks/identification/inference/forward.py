@@ -65,6 +65,25 @@ class RunModel:
         """Return the measured channels that are used, float64 [samples, 7]."""
         return self.run.response[: self.samples]
 
+    @property
+    def sampled(self) -> NDArray[np.bool_] | None:
+        """Return where the used channels have samples, bool [samples, 7]; None where all have one at every instant."""
+        return None if self.run.sampled is None else self.run.sampled[: self.samples]
+
+    def find_samples(self, channel: int) -> NDArray[np.int64]:
+        """Return the used instants at which a channel has a sample, int64 [M].
+
+        Parameters
+        ----------
+        channel : place in `CHANNELS`
+        """
+        rows = self.run.find_samples(channel)
+        return rows[rows < self.samples]
+
+    def count_samples(self) -> NDArray[np.int64]:
+        """Return the number of used samples of each channel, int64 [7]."""
+        return np.array([len(self.find_samples(channel)) for channel in range(len(CHANNELS))])
+
 
 def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunModel:
     """Return a run with its vehicle, surface friction, road feature and disc temperature, ready for simulation.

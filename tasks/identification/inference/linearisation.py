@@ -114,7 +114,7 @@ def compute_step_misfit(model: RunModel, rho: NDArray[np.float64], sigma: NDArra
     """
     plain = np.zeros(len(EFFECT_TABLE))
     change = predict_channels(model, plain) - predict_channels(model, plain, refinement=2)
-    return float(np.sum(whiten_channels(change, rho, sigma) ** 2))
+    return float(np.sum(whiten_channels(change, rho, sigma, model.sampled) ** 2))
 
 
 def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:

@@ -1,5 +1,7 @@
 """Sensor noise from the samples before the brake, without a model: AR(1) noise under a slow disturbance."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
@@ -23,8 +25,9 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
 
     The semivariogram of AR(1) noise under a smooth motion is sigma^2 (1 - rho^k) + a k^2 at lag k. rho is searched on
     a grid; sigma^2 and a follow by least squares. The data are the samples before the brake, or whole runs if these are
-    too short. A channel has at least the variance of its rounding, step^2 / 12. A channel that was not measured has an
-    infinite standard deviation and thus no weight.
+    too short. A lag counts the channel's own samples, which in a slow channel lie further apart than the run's. A
+    channel has at least the variance of its rounding, step^2 / 12. A channel that was not measured has an infinite
+    standard deviation and thus no weight.
 
     Parameters
     ----------
@@ -39,24 +42,12 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
     InputError
         If a measured channel never changes, or the training runs are too short.
     """
-    sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros(len(LAGS))
-    stretches = [run.response[: _count_quiet_samples(run)].copy() for run in campaign.train]
-    if max(len(stretch) for stretch in stretches) <= 3 * LAGS[-1]:
-        stretches = [run.response.copy() for run in campaign.train]
-    for run, quiet in zip(campaign.train, stretches, strict=True):
-        for level, rate in INTEGRALS:
-            # a change that the rate explains is motion, not noise
-            quiet[:, level] -= np.cumsum(quiet[:, rate]) * run.interval
-        for i, lag in enumerate(LAGS):
-            if len(quiet) > 3 * lag:
-                difference = quiet[lag:] - quiet[:-lag]
-                sums[i] += 0.5 * np.sum((difference - difference.mean(0)) ** 2, axis=0)
-                counts[i] += len(difference) - 1
     floor = np.where(campaign.is_measured, _compute_rounding_variance(campaign), np.inf)
-    problems = _find_problems(campaign, floor, max(len(stretch) for stretch in stretches))
+    stretches = [stretch for run in campaign.train for stretch in _list_stretches(run)]
+    problems = _find_problems(campaign, floor, _find_longest(stretches))
     if problems:
         raise InputError(problems)
-    variogram = np.maximum(sums / counts[:, None], floor)
+    variogram = np.maximum(_compute_variogram(stretches), floor)
     rho, sigma = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     k = np.array(LAGS, dtype=np.float64)
     for j in np.flatnonzero(campaign.is_measured):
@@ -70,6 +61,65 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
     return rho, np.maximum(sigma, np.sqrt(floor))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Stretch:
+    """Samples of the channels of one run that share their instants, without the motion that their rates explain.
+
+    Parameters
+    ----------
+    channels : int64 [C] places in `CHANNELS`
+    values : float64 [N, C] [unit of the channel]
+    quiet : number of samples before the brake
+    """
+
+    channels: NDArray[np.int64]
+    values: NDArray[np.float64]
+    quiet: int
+
+
+def _list_stretches(run: Run) -> list[Stretch]:
+    """Return the samples of a run, the channels of one clock together."""
+    left = run.response.copy()
+    for level, rate in INTEGRALS:
+        # a change that the rate explains is motion, not noise
+        left[:, level] -= np.cumsum(left[:, rate]) * run.interval
+    end = _count_quiet_samples(run)
+    return [
+        Stretch(
+            channels=channels,
+            values=left.take(rows, axis=0).take(channels, axis=1),
+            quiet=int(np.searchsorted(rows, end)),
+        )
+        for channels, rows in run.group_channels()
+    ]
+
+
+def _find_longest(stretches: list[Stretch]) -> NDArray[np.int64]:
+    """Return the number of samples of every channel in its longest run, int64 [7]."""
+    longest = np.zeros(len(CHANNELS), dtype=np.int64)
+    for stretch in stretches:
+        longest[stretch.channels] = np.maximum(longest[stretch.channels], len(stretch.values))
+    return longest
+
+
+def _compute_variogram(stretches: list[Stretch]) -> NDArray[np.float64]:
+    """Return the semivariogram of every channel at `LAGS`, float64 [L, 7] [unit of the channel, squared]."""
+    quiet = np.zeros(len(CHANNELS), dtype=np.int64)
+    for stretch in stretches:
+        quiet[stretch.channels] = np.maximum(quiet[stretch.channels], stretch.quiet)
+    sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros((len(LAGS), len(CHANNELS)))
+    for stretch in stretches:
+        long = quiet[stretch.channels] > 3 * LAGS[-1]
+        for taken, end in ((long, stretch.quiet), (~long, len(stretch.values))):
+            channels, values = stretch.channels[taken], stretch.values[:end].compress(taken, axis=1)
+            for i, lag in enumerate(LAGS):
+                if len(values) > 3 * lag:
+                    difference = values[lag:] - values[:-lag]
+                    sums[i, channels] += 0.5 * np.sum((difference - difference.mean(0)) ** 2, axis=0)
+                    counts[i, channels] += len(difference) - 1
+    return sums / counts
+
+
 def _count_quiet_samples(run: Run) -> int:
     """Return the number of samples of a run before the brake."""
     pressed = np.flatnonzero(run.pressure > QUIET_PRESSURE)
@@ -81,30 +131,39 @@ def _count_quiet_samples(run: Run) -> int:
 
 def _compute_rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
     """Return the variance of rounding to every channel's smallest step, float64 [7] [unit^2]; NaN for a constant."""
-    values = np.concatenate([run.response for run in campaign.train])
-    gaps = np.diff(np.sort(values, axis=0), axis=0)
-    # equal readings may differ by the last bits of a change of unit
-    gaps[gaps <= 1e-12 * np.abs(values).max(axis=0)] = np.inf
-    steps = gaps.min(axis=0)
+    steps = np.full(len(CHANNELS), np.inf)
+    for j in np.flatnonzero(campaign.is_measured):
+        values = np.sort(
+            np.concatenate([run.response[run.find_samples(int(j)), j] for run in campaign.train])
+        )
+        gaps = np.diff(values)
+        # equal readings may differ by the last bits of a change of unit
+        steps[j] = np.min(gaps[gaps > 1e-12 * np.abs(values).max()], initial=np.inf)
     return np.where(np.isfinite(steps), steps, np.nan) ** 2 / 12
 
 
-def _find_problems(campaign: Campaign, floor: NDArray[np.float64], longest: int) -> list[str]:
+def _find_problems(campaign: Campaign, floor: NDArray[np.float64], longest: NDArray[np.int64]) -> list[str]:
     """Return a sentence for every reason why the noise cannot be estimated."""
     problems = [
         f"{campaign.name}: channel {CHANNELS[j]} must change; it holds one value in all training runs: record it anew"
         for j in np.flatnonzero(np.isnan(floor))
     ]
-    if longest <= 3 * LAGS[-1]:
+    short = np.flatnonzero(campaign.is_measured & (longest <= 3 * LAGS[-1]))
+    if short.size:
+        names = ", ".join(CHANNELS[j] for j in short)
         problems.append(
             f"{campaign.name}: sensor noise is read from training runs, so one must hold more than {3 * LAGS[-1]}"
-            f" samples; the longest has {longest}: lengthen the runs"
+            f" samples of each channel; the longest has {longest[short].min()} ({names}): lengthen the runs, or leave"
+            " the channel out"
         )
     return problems
 
 
 def whiten_channels(
-    x: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
+    x: NDArray[np.float64],
+    rho: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    sampled: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Return channels with AR(1) noise whitened to unit variance along the first axis, and stacked.
 
@@ -112,37 +171,49 @@ def whiten_channels(
     ----------
     x : float64 [N, 7] or [N, 7, P] residuals or derivatives [unit of the channel]
     rho, sigma : float64 [7] AR(1) coefficients [1] and standard deviations [unit of the channel]
+    sampled : bool [N, 7] whether a channel has a sample at an instant; None where all have
 
     Returns
     -------
-    float64 [7 N] or [7 N, P]
+    float64 [7 N] or [7 N, P]; 0 where a channel has no sample
     """
-    shape = (1, -1) + (1,) * (x.ndim - 2)
-    r, s = rho.reshape(shape), sigma.reshape(shape)
-    white = np.concatenate((x[:1] / s, (x[1:] - r * x[:-1]) / (s * np.sqrt(1.0 - r**2))))
+    if sampled is None:
+        shape = (1, -1) + (1,) * (x.ndim - 2)
+        r, s = rho.reshape(shape), sigma.reshape(shape)
+        white = np.concatenate((x[:1] / s, (x[1:] - r * x[:-1]) / (s * np.sqrt(1.0 - r**2))))
+    else:
+        white = np.zeros_like(x)
+        for c in range(len(rho)):
+            own = x[sampled[:, c], c]
+            driven = (own[1:] - rho[c] * own[:-1]) / (sigma[c] * np.sqrt(1.0 - rho[c] ** 2))
+            white[sampled[:, c], c] = np.concatenate((own[:1] / sigma[c], driven))
     return white.reshape((-1, *x.shape[2:]))
 
 
 def unwhiten_channels(
-    white: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
+    white: NDArray[np.float64],
+    rho: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    sampled: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Return what was whitened by `whiten_channels`.
 
     Parameters
     ----------
     white : float64 [7 N] or [7 N, P]
-    rho, sigma : float64 [7] that it was whitened with
+    rho, sigma, sampled : that it was whitened with
 
     Returns
     -------
-    float64 [N, 7] or [N, 7, P] [unit of the channel]; 0 in a channel that was not measured
+    float64 [N, 7] or [N, 7, P] [unit of the channel]; 0 in a channel that was not measured, and where one has no sample
     """
     rows = white.reshape((-1, len(rho), *white.shape[1:]))
     x = np.zeros_like(rows)
     for c in np.flatnonzero(np.isfinite(sigma)):
-        driven = rows[:, c] * sigma[c]
+        own = slice(None) if sampled is None else sampled[:, c]
+        driven = rows[own, c] * sigma[c]
         driven[1:] *= np.sqrt(1.0 - rho[c] ** 2)
-        x[:, c] = lfilter([1.0], [1.0, -rho[c]], driven, axis=0)
+        x[own, c] = lfilter([1.0], [1.0, -rho[c]], driven, axis=0)
     return x
 
 

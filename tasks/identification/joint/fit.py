@@ -40,8 +40,8 @@ class JointFit:
     values : float64 [K] of the numbers
     offsets : float64 [R, 3] of the runs
     cost : robust misfit with the priors, over 2
-    residuals : weighted, one float64 [N C] a run
-    slopes : derivatives by the numbers, the run's own offsets taken out, one float64 [N C, K] a run
+    residuals : weighted, one float64 [M] a run, the channels of an instant together
+    slopes : derivatives by the numbers, the run's own offsets taken out, one float64 [M, K] a run
     information : float64 [K, K] of the numbers, offsets taken out, priors included
     scales : size of a misfit that counts one, by place in `CHANNELS` [the channel's unit]
     """
@@ -121,7 +121,7 @@ def lead_offsets(
     end = max(stop.onset - 1, 3) if stop.onset < stop.model.samples else max(stop.model.samples // 5, 3)
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate((_weighted(stop, numbers, x, scales)[:end].ravel(), x / OFFSET_SIGMA))
+        return np.concatenate((_weighted(stop, numbers, x, scales, end), x / OFFSET_SIGMA))
 
     limit = OFFSET_LIMIT
     found = least_squares(
@@ -131,12 +131,20 @@ def lead_offsets(
 
 
 def _weighted(
-    stop: Stop, numbers: Mapping[str, float], offsets: NDArray[np.float64], scales: NDArray[np.float64]
+    stop: Stop,
+    numbers: Mapping[str, float],
+    offsets: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    end: int | None = None,
 ) -> NDArray[np.float64]:
-    """Return measured less model over the scales, float64 [N, C]; each sample weighs as at 20 Hz."""
+    """Return measured less model over the scales until an instant, float64 [M]; each sample weighs as at 20 Hz."""
     left = stop.measured - predict_stop(stop, numbers, offsets)[:, stop.channels]
-    weight = np.sqrt(min(stop.model.run.interval / 0.05, 1.0))
-    return np.asarray(weight * left / scales[stop.channels], dtype=np.float64)
+    apart = stop.model.samples / stop.model.count_samples()[stop.channels]
+    weight = np.sqrt(np.minimum(apart * stop.model.run.interval / 0.05, 1.0))
+    weighted = np.asarray(weight * left / scales[stop.channels], dtype=np.float64)[:end]
+    if stop.model.sampled is None:
+        return weighted.ravel()
+    return weighted[stop.model.sampled[:end, stop.channels]]
 
 
 def _fit_from(
@@ -161,7 +169,7 @@ def _fit_from(
 
     def of_run(i: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
         values = dict(zip(names, x[:k].tolist(), strict=True))
-        return _weighted(stops[i], values, x[k + own * i : k + own * (i + 1)], scales).ravel()
+        return _weighted(stops[i], values, x[k + own * i : k + own * (i + 1)], scales)
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.concatenate((*(of_run(i, x) for i in range(len(stops))), prior * x))
@@ -216,8 +224,9 @@ def misfit_scales(fitted: JointFit, stops: Sequence[Stop]) -> NDArray[np.float64
     for name in FITTED:
         place = CHANNELS.index(name)
         left = [
-            stop.measured[:, list(stop.channels).index(place)]
-            - predict_stop(stop, fitted.by_name, offsets)[:, place]
+            (stop.model.measured - predict_stop(stop, fitted.by_name, offsets))[
+                stop.model.find_samples(place), place
+            ]
             for stop, offsets in zip(stops, fitted.offsets, strict=True)
             if place in stop.channels
         ]

@@ -1,0 +1,118 @@
+"""A channel that is slower than its run: it has no value between its samples, and noise belongs to its samples only.
+
+A run's file holds NaN (in Parquet also null) where such a channel has no sample. Values made up between samples are for
+the eye and for checks: as evidence they would count noise several times, and their corners would look like an effect.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import CHANNELS
+from tasks.campaign.signals import Signal
+
+SLOW = 2
+"""Instants from sample to sample from which a channel is slow; a faster one misses single samples, which is a gap."""
+NEARLY = 0.9
+"""Share of `SLOW` that a logger's own clock may be off [1]."""
+FEWEST_UPDATES, ALIKE = 20, 0.8
+"""Updates from which a held signal can be told, and the share of holds of the usual length."""
+SHORTEST_UNEVEN = 4
+"""Samples of a hold from which one sample more or less is the logger's jitter."""
+
+
+def find_samples(name: str, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return the instants at which a channel has a sample, bool [N]; all of them where the channel is not slow.
+
+    Parameters
+    ----------
+    name : channel; inputs such as the brake pressure must have a value at every instant
+    values : float64 [N], NaN where there is no sample
+    """
+    found = np.isfinite(values)
+    rows = np.flatnonzero(found)
+    slow = name in CHANNELS and len(rows) > 1 and float(np.median(np.diff(rows))) >= SLOW
+    return found if slow else np.ones(len(values), dtype=bool)
+
+
+def fill_between_samples(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a channel linear between its samples, and constant before the first and after the last.
+
+    Parameters
+    ----------
+    name : channel
+    values : float64 [N], NaN where there is no sample
+    """
+    found = find_samples(name, values)
+    if found.all():
+        return values
+    return np.interp(np.arange(len(values)), np.flatnonzero(found), values[found])
+
+
+def collect_samples(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.bool_] | None:
+    """Return where the channels of a run have samples, bool [N, 7]; None where all have one at every instant.
+
+    Parameters
+    ----------
+    columns : channels of a run by name, each float64 [N]; one that is absent was not measured
+    """
+    count = len(next(iter(columns.values())))
+    everywhere = np.ones(count, dtype=bool)
+    found = [find_samples(name, columns[name]) if name in columns else everywhere for name in CHANNELS]
+    sampled = np.column_stack(found)
+    return None if sampled.all() else sampled
+
+
+def clear_between_samples(
+    name: str, values: NDArray[np.float64], signals: Sequence[Signal], clock: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return a channel with NaN wherever no sample of its signals is nearest; unchanged where it is not slow.
+
+    Parameters
+    ----------
+    name : channel
+    values : float64 [N] on the clock
+    signals : that the channel was made of; of several the slowest counts
+    clock : float64 [N] uniform [s]
+    """
+    interval = float(clock[1] - clock[0])
+    slowest = max(signals, key=lambda signal: float(np.median(np.diff(signal.time))))
+    if name not in CHANNELS or float(np.median(np.diff(slowest.time))) < NEARLY * SLOW * interval:
+        return values
+    rows = np.round((slowest.time - clock[0]) / interval).astype(np.int64)
+    rows = rows[(rows >= 0) & (rows < len(clock))]
+    cleared = np.full(len(values), np.nan)
+    cleared[rows] = values[rows]
+    return cleared
+
+
+def take_updates(signal: Signal) -> Signal:
+    """Return the samples of a signal that bring a new value, where the logger repeats each for a fixed number of rows.
+
+    A table with one row per 10 ms holds a receiver's 10 Hz as ten equal rows. A coarse sensor repeats values too, but
+    not for the same number of rows each time, and by one step of its resolution. An input is left as it is: a command
+    may be held by the one who gives it.
+
+    Parameters
+    ----------
+    signal : as logged
+    """
+    updates = np.flatnonzero(np.diff(signal.values) != 0.0) + 1
+    holds = np.diff(updates)
+    if len(holds) < FEWEST_UPDATES:
+        return signal
+    usual = int(np.median(holds))
+    jitter = 1 if usual >= SHORTEST_UNEVEN else 0
+    multiples = np.maximum(np.round(holds / usual), 1.0)
+    steps = np.abs(np.diff(signal.values)[updates - 1])
+    is_coarse = np.mean(steps < 1.5 * steps.min()) > ALIKE
+    uneven = np.any(np.abs(holds - usual * multiples) > jitter * multiples)
+    if usual < SLOW or is_coarse or uneven or np.mean(multiples == 1.0) < ALIKE:
+        return signal
+    starts = [
+        updates[i] + np.round(np.arange(n) * holds[i] / n).astype(np.int64)
+        for i, n in enumerate(multiples.astype(np.int64))
+    ]
+    rows = np.concatenate((*starts, updates[-1:]))
+    return Signal(time=signal.time[rows], values=signal.values[rows], unit=signal.unit)
