@@ -2,10 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.errors import InputError
+from tasks.identification.inference.recursion import filter_recursively
 
 LAGS = (1, 2, 3, 4, 6, 8)
 INTEGRALS = tuple(
@@ -142,7 +142,7 @@ def unwhiten_channels(
     for c in np.flatnonzero(np.isfinite(sigma)):
         driven = rows[:, c] * sigma[c]
         driven[1:] *= np.sqrt(1.0 - rho[c] ** 2)
-        x[:, c] = lfilter([1.0], [1.0, -rho[c]], driven, axis=0)
+        x[:, c] = filter_recursively(driven, rho[c])
     return x
 
 
