@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation, Slerp
 
 from tasks.errors import InputError
+from tasks.scene.hermite import CubicCurve, make_cubic_curve
 
 SAMPLING = 0.25
 """Step of the samples from which a point's projection onto the route is found [m]."""
@@ -105,7 +105,7 @@ class Route:
                 f"the station must lie on the route, 0 to {self.length:.2f} m; it is {s[beyond][0]:.2f} m"
             )
         poses = np.zeros((s.size, 4, 4))
-        poses[:, :3, 3] = self._position(s.ravel())
+        poses[:, :3, 3] = self._position.evaluate(s.ravel())
         poses[:, :3, :3] = self._attitude(s.ravel()).as_matrix()
         poses[:, 3, 3] = 1.0
         return poses.reshape(*s.shape, 4, 4)
@@ -141,11 +141,11 @@ class Route:
         return fine.station[nearest] + step, lateral, height
 
     @cached_property
-    def _position(self) -> CubicHermiteSpline:
+    def _position(self) -> CubicCurve:
         # unit-speed tangents from the knots themselves: the rig's x axis may differ by its mounting pitch
         edges: Literal[1, 2] = 2 if len(self.station) > 2 else 1
         tangents = np.gradient(self.T_world_rig[:, :3, 3], self.station, axis=0, edge_order=edges)
-        return CubicHermiteSpline(self.station, self.T_world_rig[:, :3, 3], tangents, axis=0)
+        return make_cubic_curve(self.station, self.T_world_rig[:, :3, 3], tangents)
 
     @cached_property
     def _attitude(self) -> Slerp:
@@ -159,7 +159,10 @@ class Route:
         between = (R[:-1].inv() * R[1:]).as_rotvec() / station[1]
         turn = (between[np.r_[0, : len(between)]] + between[np.r_[: len(between), -1]]) / 2
         return _Samples(
-            station=station, pose=pose, tangent=R.inv().apply(self._position(station, 1)), turn=turn
+            station=station,
+            pose=pose,
+            tangent=R.inv().apply(self._position.differentiate(station)),
+            turn=turn,
         )
 
     @cached_property
