@@ -8,7 +8,7 @@ import numpy as np
 
 from catalogs.cameras import load_camera
 from catalogs.scenes import load_scene
-from catalogs.weather import load_weather
+from catalogs.weather.look import load_weather
 from tasks.render.camera import world_to_camera
 from tasks.render.composition import compose_over_sky
 from tasks.render.environment import environment_view

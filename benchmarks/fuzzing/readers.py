@@ -7,8 +7,8 @@ from typing import Any
 from catalogs.channel_maps import load_channel_map
 from catalogs.recordings import read_signals, summarise_signals
 from catalogs.surfaces import load_surface
-from catalogs.weather import load_weather
 from catalogs.weather.grip import shared_families
+from catalogs.weather.look import load_weather
 from flows.auditing.signing import signature_findings
 from flows.auditing.verify import verify_dataset
 from flows.judging.physics import clip_columns, clip_facts

@@ -7,8 +7,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from flows.auditing.verify import describe_files, describe_signature
-from flows.drawing import make_policy
-from flows.reading.report import PAGE as DATASET_PAGE
+from flows.pages import DATASET_PAGE, make_policy
 from manifests.explain import ABSENT
 
 PAGE = Path(__file__).parent / "audit_page"

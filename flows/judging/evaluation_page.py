@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from flows.drawing import as_svg, escape_formulas, make_policy
+from flows.drawing import as_svg, escape_formulas
 from flows.judging.judged_clip import JudgedClip, Row
+from flows.pages import make_policy
 
 COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
 STYLE = """

@@ -15,7 +15,7 @@ from catalogs.studies.ablation import FamilyWeather, load_kept_families
 from catalogs.surfaces import load_surface
 from catalogs.variants import Variant
 from catalogs.vehicles import load_vehicle
-from catalogs.weather import load_weather
+from catalogs.weather.look import load_weather
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
 from flows.making.traced import FOLDER as TRACES

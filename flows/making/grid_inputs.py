@@ -17,7 +17,7 @@ from catalogs.studies import SENSITIVITY
 from catalogs.studies.ablation import ABLATION, cut_coupling, load_families
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
-from catalogs.weather import FOLDER as WEATHER_FOLDER
+from catalogs.weather.grip import FOLDER as WEATHER_FOLDER
 from flows.making.memory import memory_problems
 from flows.making.places import remember_place
 from flows.making.traced import read_trace_inputs

@@ -7,7 +7,6 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from flows.drawing import make_policy
 from flows.measured.closing_error_rates import tell_error_rates
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import (
@@ -18,7 +17,7 @@ from flows.measured.verdict_figures import (
     make_residual_figures,
     make_spline_figures,
 )
-from flows.reading.report import PAGE as DATASET_PAGE
+from flows.pages import DATASET_PAGE, make_policy, read_plotly
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.joint.verdict import JointTrace
@@ -48,7 +47,7 @@ def write_verdict_page(trace: Trace | JointTrace, result: Mapping[str, Any], cam
     """
     pages = Environment(loader=FileSystemLoader(PAGE), autoescape=True, undefined=StrictUndefined)
     pages.filters |= {"digits": _format_digits, "words": _format_name, "unit": format_plain_unit}
-    scripts = (_read_plotly(), (PAGE / "page.js").read_text())
+    scripts = (read_plotly(), (PAGE / "page.js").read_text())
     style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
     train, held_out = predict_runs(trace)
     figures = {"runs": make_residual_figures(held_out), "curve": make_brake_curve(train)}
@@ -147,11 +146,3 @@ def _format_digits(value: float | None) -> str:
 
 def _format_name(name: str) -> str:
     return name.replace("_", " ")
-
-
-def _read_plotly() -> str:
-    # its import takes a second, which no other verdict should pay
-    from plotly.offline import get_plotlyjs
-
-    source: str = get_plotlyjs()
-    return source

@@ -16,6 +16,7 @@ from catalogs.cameras import load_camera
 from catalogs.variants import warn_of_variant
 from flows.making.plan import TICK_RATE_HZ
 from flows.making.seal import pick_evenly
+from flows.pages import DATASET_PAGE, read_plotly
 from flows.reading.film import write_film
 from flows.reading.previews import select_clips
 from flows.running.progress import progress_bar
@@ -31,7 +32,6 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.render.traces import TRACES
 
-PAGE = Path(__file__).parent / "report_page"
 COMMAND = "report"
 OF_A_CLIP = re.compile(r"clips/\w+\.js|media/\w+\.mp4")
 """Files that go when their clip does."""
@@ -69,8 +69,8 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     pictures = manifest["grid"].get("pictures", True)
     data = page_data(manifest, {row["clip_id"] for row in brought}, pictures)
     data["horizon"] = locate_horizon(layout) if pictures else None
-    fixed = {source.name: source.read_bytes() for source in sorted(PAGE.iterdir())} | {
-        "plotly.min.js": _read_plotly().encode(),
+    fixed = {source.name: source.read_bytes() for source in sorted(DATASET_PAGE.iterdir())} | {
+        "plotly.min.js": read_plotly().encode(),
         "data.js": f"const REPORT = {_format_script(data)};\n".encode(),
     }
     of_clips = [
@@ -253,11 +253,3 @@ def _manifest_facts(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _format_script(value: Any) -> str:
     """A value as JavaScript: in ASCII, and without what could end a script element."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-
-
-def _read_plotly() -> str:
-    # its import takes a second, which no other command should pay
-    from plotly.offline import get_plotlyjs
-
-    source: str = get_plotlyjs()
-    return source

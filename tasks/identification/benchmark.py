@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from tasks.campaign.campaign import Campaign, Run, Tolerances
 from tasks.campaign.planned_runs import RICH, TRAINING, RunPlan, make_planned_run
@@ -178,6 +178,6 @@ def compute_exact_interval(hits: int, trials: int, confidence: float = 0.95) -> 
     confidence : probability that the interval covers the share [1]
     """
     tail = 0.5 * (1.0 - confidence)
-    low = float(beta.ppf(tail, hits, trials - hits + 1)) if hits else 0.0
-    high = float(beta.ppf(1.0 - tail, hits + 1, trials - hits)) if hits < trials else 1.0
+    low = float(betaincinv(hits, trials - hits + 1, tail)) if hits else 0.0
+    high = float(betaincinv(hits + 1, trials - hits, 1.0 - tail)) if hits < trials else 1.0
     return low, high

@@ -19,8 +19,8 @@ from catalogs.learned_judges import load_judges
 from catalogs.stop_studies import load_stop_study
 from catalogs.vehicles import load_vehicle
 from catalogs.vehicles.frozen import frozen_text
-from catalogs.weather import FOLDER as WEATHER
-from catalogs.weather import load_weather
+from catalogs.weather.grip import FOLDER as WEATHER
+from catalogs.weather.look import load_weather
 from tasks.errors import InputError
 
 CATALOGS = WEATHER.parent

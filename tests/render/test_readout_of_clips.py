@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.weather import load_weather
+from catalogs.weather.look import load_weather
 from tasks.errors import InputError
 from tasks.eval.image_quality import psnr
 from tasks.render.camera import body_poses, continuous_rig, world_to_camera

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import Candidate
@@ -62,7 +62,7 @@ def compute_student_quantile(candidate: Candidate) -> float:
     ----------
     candidate : refined and judged candidate
     """
-    return float(student.ppf(0.975, max(candidate.informed - 1, 1)))
+    return float(stdtrit(max(candidate.informed - 1, 1), 0.975))
 
 
 def compute_curvature_interval(candidate: Candidate) -> Bounds:

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.campaign.gauge import zero_pressure_at_rest
+from tasks.identification.inference.recursion import filter_recursively
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, surface_state
@@ -248,9 +248,9 @@ def compute_instrument_readings(
                 y[:, j] = np.interp(late, np.arange(model.samples), y[:, j])
         if lag > 0.0:
             keep = np.exp(-dt / lag)
-            y[:, columns] = lfilter(
-                [1.0 - keep], [1.0, -keep], y[:, columns], axis=0, zi=keep * y[:1, columns]
-            )[0]
+            driven = (1.0 - keep) * y[:, columns]
+            driven[0] += keep * y[0, columns]
+            y[:, columns] = filter_recursively(driven, keep)
     return y
 
 

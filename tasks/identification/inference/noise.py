@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.errors import InputError
+from tasks.identification.inference.recursion import filter_recursively
 
 LAGS = (1, 2, 3, 4, 6, 8)
 INTEGRALS = tuple(
@@ -213,7 +213,7 @@ def unwhiten_channels(
         own = slice(None) if sampled is None else sampled[:, c]
         driven = rows[own, c] * sigma[c]
         driven[1:] *= np.sqrt(1.0 - rho[c] ** 2)
-        x[own, c] = lfilter([1.0], [1.0, -rho[c]], driven, axis=0)
+        x[own, c] = filter_recursively(driven, rho[c])
     return x
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from tasks.identification.inference.noise import correlate_with_next
 from tasks.identification.joint.fit import JointFit, fit_jointly
@@ -74,7 +74,7 @@ def compute_interval_quantile(fitted: JointFit) -> float:
     ----------
     fitted : the fit
     """
-    return float(student.ppf(0.975, max(len(fitted.residuals) - 1, 2)))
+    return float(stdtrit(max(len(fitted.residuals) - 1, 2), 0.975))
 
 
 def certain_from(fitted: JointFit, rules: JointRules) -> float:
@@ -86,7 +86,7 @@ def certain_from(fitted: JointFit, rules: JointRules) -> float:
     rules : of the joint fit
     """
     runs = max(len(fitted.residuals), rules.fewest_scatter_runs)
-    return float(student.ppf(1.0 - rules.false_name_chance, runs - 1))
+    return float(stdtrit(runs - 1, 1.0 - rules.false_name_chance))
 
 
 def count_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flows.drawing import make_policy
 from flows.judging.evaluation_page import render_page
 from flows.judging.evaluation_rows import figure_row
+from flows.pages import make_policy
 
 HOSTILE = [
     '<img src=x onerror="alert(1)">', "</title></style><script>alert(1)</script>", "\"'><svg onload=alert(1)>",

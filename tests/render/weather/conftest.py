@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catalogs.weather import load_weather
+from catalogs.weather.look import load_weather
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.parameters import WeatherParameters
 

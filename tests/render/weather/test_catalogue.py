@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from catalogs.weather import FOLDER, load_weather
+from catalogs.weather.grip import FOLDER
+from catalogs.weather.look import load_weather
 from tasks.errors import InputError
 from tasks.surface.weather import WEATHERS
 
