@@ -19,6 +19,7 @@ from tasks.identification.inference.forward import (
     RunModel,
     compute_instrument_readings,
     compute_starting_speed,
+    equip_vehicle,
     moves_alike,
     simulate_run,
 )
@@ -152,7 +153,8 @@ def _prepare_quotients(
     model: RunModel, base: NDArray[np.float64], slots: tuple[Slot, ...]
 ) -> tuple[Simulation, Quotient]:
     """Return the simulation of a run at a point with its states, and the function that differentiates about it."""
-    simulated = simulate_run(model, base, slots=slots, keep_states=True)
+    equipped = equip_vehicle(model, base)
+    simulated = simulate_run(model, base, slots=slots, keep_states=True, equipped=equipped)
     y = compute_instrument_readings(model, base, simulated)
 
     def compute_quotient(
@@ -161,7 +163,8 @@ def _prepare_quotients(
         """Return the difference quotient of the readings."""
         moved = simulated
         if extra or options or not moves_alike(theta, base):
-            moved = simulate_run(model, theta, slots=(*slots, *extra), **options)
+            car = equipped if theta is base else None
+            moved = simulate_run(model, theta, slots=(*slots, *extra), equipped=car, **options)
         return (compute_instrument_readings(model, theta, moved) - y) / step
 
     return simulated, compute_quotient

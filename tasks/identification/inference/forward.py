@@ -17,7 +17,7 @@ from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, unpack_para
 from tasks.vehicle.model.brake_input import make_trace_input
 from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import Recording, Simulation, simulate
-from tasks.vehicle.parameters import Vehicle, compute_surface_response
+from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
 MASKED_SPEED = 2.0
 """Speed at which the used part of a run ends: below it the floor of the slip's denominator distorts slip [m/s]."""
@@ -151,6 +151,37 @@ def moves_alike(theta: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     return not np.any(np.delete(theta != other, READ_ALONE))
 
 
+@dataclass(frozen=True, kw_only=True)
+class EquippedVehicle:
+    """A vehicle with effects, its tyres on the surface of a run, and the run's conditions.
+
+    Parameters
+    ----------
+    vehicle, surface, conditions : as `simulate` takes them
+    """
+
+    vehicle: Vehicle
+    surface: SurfaceResponse
+    conditions: Conditions
+
+
+def equip_vehicle(model: RunModel, theta: NDArray[np.float64]) -> EquippedVehicle:
+    """Return a run's vehicle with effects, ready to simulate.
+
+    Parameters
+    ----------
+    model : the run
+    theta : float64 [len(EFFECT_TABLE)] effects, added to the vehicle's own [units of the table]
+    """
+    values = unpack_parameter_vector(theta)
+    car = apply_effects(model.vehicle, {n: v for n, v in values.items() if PARAMETERS[n].of_vehicle})
+    return EquippedVehicle(
+        vehicle=car,
+        surface=compute_surface_response(car, model.run.weather, model.surface_friction),
+        conditions=replace(model.conditions, grade=values.get("slope", 0.0)),
+    )
+
+
 def simulate_run(
     model: RunModel,
     theta: NDArray[np.float64],
@@ -160,6 +191,7 @@ def simulate_run(
     branch: tuple[int, Simulation] | None = None,
     refinement: int = 1,
     keep_states: bool = False,
+    equipped: EquippedVehicle | None = None,
 ) -> Simulation:
     """Simulate a run under its measured pressure.
 
@@ -172,15 +204,15 @@ def simulate_run(
     branch : sample, and an earlier simulation with its states, at which this one starts; earlier samples are copied
     refinement : factor on the number of integration steps between samples [1]
     keep_states : keep the states, from which other simulations can start
+    equipped : `equip_vehicle` of the same run and vector, where many simulations share it
     """
-    values = unpack_parameter_vector(theta)
-    car = apply_effects(model.vehicle, {n: v for n, v in values.items() if PARAMETERS[n].of_vehicle})
+    car = equip_vehicle(model, theta) if equipped is None else equipped
     first = branch[0] if branch else 0
     simulated = simulate(
-        car,
-        compute_surface_response(car, model.run.weather, model.surface_friction),
+        car.vehicle,
+        car.surface,
         make_trace_input(model.run.pressure, model.run.interval, model.run.drive_torque),
-        replace(model.conditions, grade=values.get("slope", 0.0)),
+        car.conditions,
         Recording(
             samples=model.samples - first,
             interval=model.run.interval,
