@@ -20,6 +20,7 @@ from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
+from tasks.campaign.slow_channels import measure_slow_rates
 from tasks.errors import InputError
 
 
@@ -37,8 +38,8 @@ def import_measurements(
 
     Returns
     -------
-    Report on what was made: ``campaign``, ``runs[]``, ``channels``, ``not_measured``, ``sources``; or ``signals``, a
-    row for each in every recording.
+    Report on what was made: ``campaign``, ``runs[]``, ``channels``, ``slow_channels_hz`` (of the channels slower than
+    their runs), ``not_measured``, ``sources``; or ``signals``, a row for each in every recording.
 
     Raises
     ------
@@ -134,6 +135,7 @@ def write_campaign(
             for run, found in made
         ],
         "channels": list(channel_map.channels),
+        "slow_channels_hz": measure_slow_rates([found.columns for _, found in made], rate),
         "not_measured": list(channel_map.not_measured),
         "sources": sources,
     }

@@ -64,6 +64,22 @@ def collect_samples(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.bo
     return None if sampled.all() else sampled
 
 
+def measure_slow_rates(runs: Sequence[Mapping[str, NDArray[np.float64]]], rate: float) -> dict[str, float]:
+    """Return the rate at which each slow channel was sampled, to a tenth [Hz].
+
+    Parameters
+    ----------
+    runs : channels of each run by name, float64 [N], NaN where there is no sample
+    rate : of the runs [Hz]
+    """
+    steps: dict[str, list[NDArray[np.int64]]] = {}
+    for columns in runs:
+        for name, values in columns.items():
+            if not (found := find_samples(name, values)).all():
+                steps.setdefault(name, []).append(np.diff(np.flatnonzero(found)))
+    return {name: round(rate / float(np.mean(np.concatenate(own))), 1) for name, own in steps.items()}
+
+
 def clear_between_samples(
     name: str, values: NDArray[np.float64], signals: Sequence[Signal], clock: NDArray[np.float64]
 ) -> NDArray[np.float64]:

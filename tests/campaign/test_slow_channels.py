@@ -6,7 +6,13 @@ import pytest
 from tasks.campaign.assembly import assemble_run
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.signals import ChannelRule, Signal
-from tasks.campaign.slow_channels import collect_samples, fill_between_samples, find_samples, take_updates
+from tasks.campaign.slow_channels import (
+    collect_samples,
+    fill_between_samples,
+    find_samples,
+    measure_slow_rates,
+    take_updates,
+)
 
 CLOCK = np.arange(600) * 0.01
 SPEED = 30.0 - 6.0 * np.clip(CLOCK - 1.0, 0.0, 4.0) - 0.3 * CLOCK
@@ -89,3 +95,4 @@ def test_a_run_is_empty_between_the_samples_of_a_slow_signal_and_inputs_are_not(
     )
     assert np.isfinite(found.columns["brake_pressure"]).all()
     assert np.isfinite(found.columns["longitudinal_acceleration"]).all()
+    assert measure_slow_rates([found.columns], 100.0) == {"speed": 10.0}
