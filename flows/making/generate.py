@@ -10,7 +10,7 @@ from functools import partial
 from catalogs.grids import Grid
 from catalogs.scenes import load_scene
 from flows.making.clip import make_clip, warm_up
-from flows.making.input_changes import frozen_inputs
+from flows.making.input_changes import frozen_inputs, restore_inputs
 from flows.making.places import find_scene
 from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
 from flows.making.seal import seal_dataset
@@ -168,6 +168,7 @@ def prepare_dataset(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> 
     remove_left_overs(layout)
     if layout.plan.is_file():
         _refuse_other_plan(layout, plan, inputs)
+        restore_inputs(layout, inputs)
         return
     # what lies there without a plan is what a run began that was stopped
     forget_begun(layout)
