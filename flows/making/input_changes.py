@@ -103,6 +103,13 @@ def read_kept(layout: Layout, recorded: Mapping[str, str]) -> dict[str, bytes]:
     return kept
 
 
+def refuse_changed_records(layout: Layout, manifest: Manifest) -> None:
+    """Raise `InputError` where a finished dataset's plan or a catalogue file that it keeps is not the recorded one."""
+    read_kept(layout, manifest["inputs"])
+    if not layout.plan.is_file() or sha256_of_file(layout.plan) != manifest["artifacts"].get("plan.json"):
+        raise InputError(f"{layout.plan}: must be as recorded; it is not: musync repair makes it again")
+
+
 def frozen_inputs(layout: Layout, names: Iterable[str]) -> dict[str, bytes]:
     """Return the catalogue files that a dataset keeps, by name, without the missing ones."""
     files = {name: layout.inputs / name for name in names}

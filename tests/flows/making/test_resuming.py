@@ -130,7 +130,9 @@ def test_a_run_goes_on_with_the_inputs_it_was_planned_with_and_no_others(grid, w
     next(layout.staging.glob("*.json")).unlink()
     vehicle = layout.inputs / "vehicle.yaml"
     vehicle.write_text(vehicle.read_text().replace("value: 1200", "value: 2200"))
-    with pytest.raises(InputError, match=r"inputs/vehicle\.yaml: must be the file that the run was planned with"):
+    with pytest.raises(
+        InputError, match=r"inputs/vehicle\.yaml: must be the file that the run was planned with"
+    ):
         make(grid, layout.root)
     vehicle.unlink()
     make(grid, layout.root)
@@ -156,7 +158,9 @@ def test_damaged_rows_of_a_clip_that_is_made_are_not_sealed(grid, whole, tmp_pat
     content = bytearray(rows.read_bytes())
     content[len(content) // 4] ^= 1
     rows.write_bytes(content)
-    with pytest.raises(InputError, match="remove it, and the same musync generate command makes its clip again"):
+    with pytest.raises(
+        InputError, match="remove it, and the same musync generate command makes its clip again"
+    ):
         make(grid, layout.root)
     rows.unlink()
     make(grid, layout.root)

@@ -8,7 +8,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import musync
+from flows.auditing.explain import explain_frame
 from flows.exporting.export import export_dataset
+from flows.judging.evaluation import evaluate_dataset
+from flows.judging.physics import audit_physics
 from flows.reading.describe import describe_dataset
 from flows.store.layout import Layout
 from flows.store.telemetry import read_table
@@ -36,7 +39,7 @@ def test_a_clip_whose_pictures_are_missing_is_no_black_clip(copy, reader):
     READ_PICTURES[reader](copy.root)
     shutil.rmtree(copy.root.with_name("out"), ignore_errors=True)
     copy.frame_shard("rgb", 0).unlink()
-    with pytest.raises(InputError, match="missing.* musync repair makes it again"):
+    with pytest.raises(InputError, match=r"missing.* musync repair makes it again"):
         READ_PICTURES[reader](copy.root)
 
 
@@ -77,3 +80,27 @@ def test_a_manifest_that_was_edited_by_hand_is_not_believed(copy, read):
     copy.manifest.write_text(json.dumps(manifest))
     with pytest.raises(InputError, match=r"manifest\.json: must be as it was sealed"):
         read(str(copy.root))
+
+
+USE_INPUTS = {
+    "evaluate": lambda root: evaluate_dataset(root, out=f"{root}-out"),
+    "audit-physics": lambda root: audit_physics(root),
+    "explain": lambda root: explain_frame(root, "dry/flat", 3),
+    "export": lambda root: export_dataset(root, "tum", out=f"{root}-out", clips=["dry/flat"]),
+}
+
+
+@pytest.mark.parametrize("command", USE_INPUTS)
+@pytest.mark.parametrize("name", ["inputs/camera.yaml", "plan.json"])
+def test_a_camera_or_a_rate_that_was_edited_by_hand_is_not_believed(copy, command, name):
+    path = copy.root / name
+    path.write_text(path.read_text().replace("value: 80", "value: 160").replace('_hz": 10', '_hz": 20'))
+    with pytest.raises(InputError, match=f"{name}: must be as recorded"):
+        USE_INPUTS[command](str(copy.root))
+
+
+def test_a_table_of_clips_that_lost_rows_is_not_judged_as_if_it_were_whole(copy):
+    path = copy.telemetry / "clips.parquet"
+    pq.write_table(pq.read_table(path).slice(0, 2), path)
+    with pytest.raises(InputError, match="a row of each of the manifest's 4 clips"):
+        audit_physics(str(copy.root))
