@@ -139,6 +139,8 @@ def windows_of(
                  for name in arrays if name not in stored]  # fmt: skip
     if not 1 <= window <= frames:
         problems.append(f"window must lie in 1 to the {frames} frames of a clip; it is {window}")
+    if repeated := sorted({name for name in columns if list(columns).count(name) > 1}):
+        problems.append(f"columns must name each column once; {', '.join(repeated)} stand there twice")
     if stride < 1:
         problems.append(f"stride must be 1 or more; it is {stride}")
     named = {name for row in rows for name in (row["label"], row["clip_id"])}
